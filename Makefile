@@ -1,0 +1,39 @@
+# make        set up .venv, then derive, emit, compile and verify the default hand
+# make test   all tests              make lint   ruff, mypy, layers
+# make check  is generated/ fresh?   make bench  timings and counts
+# make clean  remove what make made (generated/ stays: it is checked in)
+
+PYTHON ?= python3
+BIN := .venv/bin
+export AWIWI_GEN_CACHE ?= $(CURDIR)/.cache
+
+all: .venv/installed
+	@$(BIN)/awiwi-gen generate --verify
+
+.venv/installed: requirements.lock pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "awiwi_gen needs Python 3.11 or newer")'
+	$(PYTHON) -m venv .venv
+	$(BIN)/pip install --quiet --disable-pip-version-check -r requirements.lock
+	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+	@touch $@
+
+test: .venv/installed
+	$(BIN)/python -m pytest
+
+lint: .venv/installed
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/python -m pytest tests/test_layers.py
+
+check: .venv/installed
+	@$(BIN)/awiwi-gen check
+
+bench: .venv/installed
+	@$(BIN)/python bench/generation.py
+
+clean:
+	rm -rf .venv .cache build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+.PHONY: all test lint check bench clean

@@ -1,0 +1,291 @@
+"""The command line: ``awiwi-gen`` and ``python -m awiwi_gen``; each command a few lines.
+
+Exit codes: 0 done, 1 verification failed or out of date, 2 bad input.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable
+from enum import Enum
+from functools import wraps
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from awiwi_gen.errors import AwiwiError, InputError
+
+app = typer.Typer(
+    help="From the CAD numbers of a tendon-driven hand to verified real-time C.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+
+
+class Scalar(str, Enum):
+    """Scalar type of the generated C."""
+
+    f64 = "f64"
+    f32 = "f32"
+
+
+class Params(str, Enum):
+    """Where the hand's numbers are: constants in the code, or fields of a struct."""
+
+    baked = "baked"
+    runtime = "runtime"
+
+
+HandFile = Annotated[Path | None, typer.Option("--hand", help="Hand file; the Awiwi hand if left out.")]
+Output = Annotated[Path, typer.Option("--output", "-o", help="Directory of the generated C.")]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON for programs.")]
+Only = Annotated[str, typer.Option("--only", metavar="GLOB", help="Only kernels whose name matches.")]
+ScalarOption = Annotated[Scalar, typer.Option("--scalar", help="Scalar type of the C.")]
+ParamsOption = Annotated[Params, typer.Option("--params", help="Numbers as constants or in a struct.")]
+GENERATED = Path("generated")
+
+
+def command(function: Callable[..., int | None]) -> Callable[..., None]:
+    """Register a command: errors become one message and an exit code, in JSON where that was asked for."""
+
+    @wraps(function)
+    def run(**options: Any) -> None:
+        try:
+            code = function(**options)
+        except AwiwiError as error:
+            if options.get("as_json"):
+                from awiwi_gen.report import print_json
+
+                print_json({"error": type(error).__name__, "message": str(error)})
+            else:
+                print(error, file=sys.stderr)
+            code = error.exit_code
+        raise typer.Exit(code or 0)
+
+    app.command(function.__name__.removesuffix("_"))(run)
+    return run
+
+
+def make_job(hand: Path | None, scalar: Scalar = Scalar.f64, params: Params = Params.baked, only: str = "*") -> Any:
+    """A job from command-line options."""
+    from awiwi_gen.emit.options import Options
+    from awiwi_gen.hand import Hand
+    from awiwi_gen.pipeline import Job
+    from awiwi_gen.report import Progress
+
+    return Job(Hand.load(hand), Options(scalar.value, params.value), only, progress=Progress())
+
+
+@command
+def generate(
+    hand: HandFile = None, output: Output = GENERATED, scalar: ScalarOption = Scalar.f64,
+    params: ParamsOption = Params.baked, only: Only = "*", as_json: Json = False,
+    verify: Annotated[bool, typer.Option("--verify", help="Verify what was generated.")] = False,
+) -> int:  # fmt: skip
+    """Derive, compare the witnesses, optimise and write the C."""
+    from awiwi_gen.pipeline import generate
+    from awiwi_gen.report import print_json
+
+    job = make_job(hand, scalar, params, only)
+    changed = generate(job, output)
+    if verify:
+        return prove(job, output, as_json)
+    if as_json:
+        print_json({"directory": str(output), "changed": changed, "digest": job.hand.digest()})
+    else:
+        print(f"{output}: {'generated' if changed else 'already up to date'}")
+    return 0
+
+
+@command
+def check(
+    hand: HandFile = None, output: Output = GENERATED, scalar: ScalarOption = Scalar.f64,
+    params: ParamsOption = Params.baked, only: Only = "*", as_json: Json = False,
+) -> int:  # fmt: skip
+    """Check the hand file, and whether the generated C is fresh and unedited."""
+    from awiwi_gen.pipeline import state
+    from awiwi_gen.report import print_json, state_lines
+
+    job = make_job(hand, scalar, params, only)
+    found = state(job, output)
+    again = " ".join(["awiwi-gen generate", *([f"--hand {hand}"] if hand else []), f"-o {output}"])
+    if as_json:
+        print_json({"hand": job.hand.name, "fresh": found.fresh, **vars(found)})
+    else:
+        print(f"{hand or 'hand.toml'}: {len(job.hand.fingers)} fingers, no faults")
+        print("\n".join(state_lines(found, str(output), again)))
+    return 0 if found.fresh else 1
+
+
+@command
+def build(hand: HandFile = None, output: Output = GENERATED, as_json: Json = False) -> int:
+    """Compile a generated directory and load it, as Python does."""
+    from awiwi_gen.build import load
+    from awiwi_gen.report import print_json
+
+    require(output)
+    library = load(output)
+    summary = {"kernels": len(library), "digest": library.digest, "scalar": library.manifest["c_type"]}
+    if as_json:
+        print_json(summary)
+    else:
+        print(f"{output}: {summary['kernels']} kernels compiled and loaded, model {library.digest[:12]}")
+    return 0
+
+
+@command
+def verify(
+    hand: HandFile = None, output: Output = GENERATED, scalar: ScalarOption = Scalar.f64,
+    params: ParamsOption = Params.baked, only: Only = "*", as_json: Json = False,
+) -> int:  # fmt: skip
+    """Compile the generated C as it stands and compare every kernel with its reference."""
+    require(output)
+    return prove(make_job(hand, scalar, params, only), output, as_json)
+
+
+@command
+def list_(
+    hand: HandFile = None, output: Output = GENERATED, as_json: Json = False,
+    assumed: Annotated[bool, typer.Option("--assumed", help="The hand's numbers without a source.")] = False,
+) -> int:  # fmt: skip
+    """List the kernels with their ports and costs, or the numbers that are assumed."""
+    from awiwi_gen.report import print_json, print_table
+
+    if assumed:
+        rows = [(path, str(quantity)) for path, quantity in make_job(hand).hand.assumed().items()]
+        if as_json:
+            print_json([{"path": path, "value": value} for path, value in rows])
+        else:
+            print_table(("number", "assumed value"), rows)
+        return 0
+    entries = require(output)["kernels"]
+    if as_json:
+        print_json(entries)
+        return 0
+    rows = [
+        (e["name"], ", ".join(p["name"] for p in e["inputs"]), ", ".join(p["name"] for p in e["outputs"]),
+         str(e["cost"]["operations"]), e["source"])
+        for e in entries
+    ]  # fmt: skip
+    print_table(("kernel", "inputs", "outputs", "operations", "source"), rows)
+    return 0
+
+
+@command
+def call(
+    kernel: Annotated[str, typer.Argument(help="Name of a kernel, see list.")],
+    inputs: Annotated[list[str] | None, typer.Argument(help="Inputs such as q=0.1,0.2,0.3,0.4")] = None,
+    hand: HandFile = None, as_json: Json = False,
+) -> int:  # fmt: skip
+    """Evaluate a compiled kernel. With --json, inputs come as one JSON object from standard input."""
+    import numpy as np
+
+    import awiwi_gen
+    from awiwi_gen.hand import Hand
+    from awiwi_gen.report import print_json
+
+    library = awiwi_gen.build(Hand.load(hand))
+    function = find(library, kernel)
+    given = parse_inputs(inputs or []) if inputs or not as_json else read_json_inputs()
+    result = function(**given)
+    values = result._asdict() if len(function.outputs) > 1 else {function.outputs[0]["name"]: result}
+    if as_json:
+        print_json({name: value.tolist() for name, value in values.items()})
+        return 0
+    for port in function.outputs:
+        print(f"{port['name']} [{port['unit']}]")
+        print(np.array2string(values[port["name"]], precision=9, suppress_small=False, max_line_width=100))
+    return 0
+
+
+@command
+def explain(
+    kernel: Annotated[str, typer.Argument(help="Name of a kernel, see list.")],
+    hand: HandFile = None, as_json: Json = False,
+) -> int:  # fmt: skip
+    """Show a kernel's mathematics, source, units and cost."""
+    from awiwi_gen.explain import explanation, explanation_lines
+    from awiwi_gen.report import print_json
+
+    told = explanation(make_job(hand), kernel)
+    if as_json:
+        print_json(told)
+    else:
+        print("\n".join(explanation_lines(told)))
+    return 0
+
+
+def prove(job: Any, output: Path, as_json: bool) -> int:
+    """Verify a directory, print the proof sheet, return the exit code."""
+    from awiwi_gen.pipeline import state
+    from awiwi_gen.pipeline import verify as examine
+    from awiwi_gen.report import print_json, print_proof, state_lines
+
+    found = state(job, output)
+    if found.stale or found.lost:
+        print("\n".join(state_lines(found, str(output), f"awiwi-gen generate -o {output}")), file=sys.stderr)
+        return 1
+    proof = examine(job, output)
+    if as_json:
+        print_json([verdict.as_dict() for verdict in proof.verdicts])
+    else:
+        print_proof(proof, require(output))
+    return 0 if proof.passed else 1
+
+
+def require(output: Path) -> dict[str, Any]:
+    """The manifest of a generated directory. Raises InputError if there is none."""
+    from awiwi_gen.emit.tree import read_manifest
+
+    manifest = read_manifest(output)
+    if manifest is None:
+        raise InputError(f"{output}: nothing generated here; run awiwi-gen generate -o {output}")
+    return manifest
+
+
+def find(library: Any, kernel: str) -> Any:
+    """A kernel of a library by name. Raises InputError with near names."""
+    if kernel not in library:
+        import difflib
+
+        near = difflib.get_close_matches(kernel, library, 3)
+        raise InputError(f"no kernel {kernel!r}; {'did you mean ' + ', '.join(near) if near else 'see awiwi-gen list'}")
+    return library[kernel]
+
+
+def parse_inputs(texts: list[str]) -> dict[str, list[float]]:
+    """``q=0.1,0.2`` as named lists of numbers."""
+    parsed = {}
+    for text in texts:
+        name, equals, numbers = text.partition("=")
+        try:
+            parsed[name] = [float(number) for number in numbers.split(",")]
+        except ValueError:
+            equals = ""
+        if not equals:
+            raise InputError(f"{text!r} is not an input; expected name=number,number,... such as q=0.1,0.2,0.3,0.4")
+    return parsed
+
+
+def read_json_inputs() -> dict[str, Any]:
+    """One JSON object from standard input."""
+    try:
+        given = json.load(sys.stdin)
+    except ValueError as error:
+        raise InputError(f"standard input is not JSON: {error}") from None
+    if not isinstance(given, dict):
+        raise InputError('standard input must be one JSON object such as {"q": [0.1, 0.2, 0.3, 0.4]}')
+    return given
+
+
+def main() -> None:
+    """Entry point of ``awiwi-gen``."""
+    app()
+
+
+if __name__ == "__main__":
+    main()

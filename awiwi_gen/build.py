@@ -1,0 +1,161 @@
+"""Compile generated C and load it: the only file that runs a compiler, and the only one that knows cffi.
+
+Every C file becomes an object kept by the digest of its text, the headers, the flags and the compiler, so a
+changed number recompiles the kernels it changes. The wrapper cffi makes depends on prototypes only.
+"""
+
+from __future__ import annotations
+
+import importlib.machinery
+import importlib.util
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import sysconfig
+import tempfile
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cache
+from math import prod
+from pathlib import Path
+from typing import Any
+
+from awiwi_gen.cache import Cache, key
+from awiwi_gen.errors import BuildError
+from awiwi_gen.library import Library
+from awiwi_gen.resources import CSRC
+
+WARNINGS = ("-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wdouble-promotion", "-Wshadow", "-Werror")
+FLAGS = ("-std=c99", "-O2", "-fPIC", "-ffp-contract=off", *WARNINGS)
+GLUE_FLAGS = ("-O1", "-fPIC", "-w")
+
+
+@dataclass(frozen=True)
+class Compiler:
+    """A C compiler: its command and what it says of its version."""
+
+    command: tuple[str, ...]
+    version: str
+
+    def run(self, *arguments: str) -> str:
+        """Run it and return what it prints. Raises BuildError with its messages."""
+        done = subprocess.run([*self.command, *arguments], capture_output=True, text=True, check=False)  # noqa: S603
+        if done.returncode:
+            raise BuildError(f"{' '.join(self.command)} failed:\n{done.stderr.strip()[:4000]}")
+        return done.stdout
+
+
+@cache
+def compiler() -> Compiler:
+    """``$CC``, or the first of cc, gcc and clang. Raises BuildError when there is none."""
+    named = os.environ.get("CC", "").split()
+    for command in [named] if named else [["cc"], ["gcc"], ["clang"]]:
+        if shutil.which(command[0]):
+            found = Compiler(tuple(command), "")
+            return Compiler(tuple(command), found.run("--version").splitlines()[0])
+    wanted = f"$CC is {named[0]!r}, which is not there" if named else "there is no cc, gcc or clang on the PATH"
+    raise BuildError(f"no C compiler: {wanted}; install one (Debian: apt-get install gcc) or set CC")
+
+
+def headers(directory: Path) -> str:
+    """Everything a generated C file may include, as one text."""
+    files = sorted(directory.glob("*.h")) + sorted(CSRC.glob("*.h"))
+    return "\0".join(path.read_text(encoding="utf-8") for path in files)
+
+
+def compile_objects(directory: Path, store: Cache) -> list[Path]:
+    """Objects of all C files of a generated directory; only those not in the cache are compiled."""
+    cc, shared = compiler(), headers(directory)
+    includes = (f"-I{directory}", f"-I{CSRC}")
+
+    def compile_one(source: Path) -> Path:
+        digest = key(source.read_text(encoding="utf-8"), shared, FLAGS, cc.version) + ".o"
+        target = store.directory / "objects" / digest
+        if not target.exists():
+            with tempfile.TemporaryDirectory() as scratch:
+                made = Path(scratch) / "kernel.o"
+                cc.run(*FLAGS, *includes, "-c", str(source), "-o", str(made))
+                target = store.put_bytes("objects", digest, made.read_bytes())
+        return target
+
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        return list(pool.map(compile_one, sorted(directory.glob("*.c"))))
+
+
+def declarations(directory: Path) -> str:
+    """The firmware header, preprocessed: what cffi is told is what C sees."""
+    return compiler().run("-E", "-P", "-std=c99", f"-I{directory}", str(CSRC / "awiwi.h"))
+
+
+def load(directory: Path, store: Cache | None = None) -> Library:
+    """Compile a generated directory and load it as a Library. Raises BuildError."""
+    store = store or Cache()
+    manifest = json.loads((directory / "manifest.json").read_text(encoding="utf-8"))
+    objects = compile_objects(directory, store)
+    glue = _glue_source(manifest, declarations(directory))
+    python = f"{sys.version} {sysconfig.get_config_var('EXT_SUFFIX')}"
+    name = "_awiwi_" + key(glue, python, compiler().version)[:16]
+    digest = key(name, *(path.name for path in objects)) + ".so"
+    target = store.directory / "libraries" / digest
+    if not target.exists():
+        with tempfile.TemporaryDirectory() as scratch:
+            made = Path(scratch) / "library.so"
+            wrapper = _glue_object(name, glue, directory, store)
+            compiler().run("-shared", *(str(o) for o in objects), str(wrapper), "-o", str(made), "-lm")
+            target = store.put_bytes("libraries", digest, made.read_bytes())
+    module = _import(name, target)
+    return Library(manifest, module.lib, module.ffi)
+
+
+def _glue_source(manifest: dict[str, Any], declared: str) -> str:
+    """JSON of what the wrapper is made from: declarations, and loops over batches."""
+    loops, prototypes = [], []
+    scalar, prefix = manifest["c_type"], manifest["prefix"]
+    for entry in manifest["kernels"]:
+        sizes = {p["name"]: prod(p["shape"]) for p in entry["inputs"] + entry["outputs"]}
+        inputs, outputs = ([p["name"] for p in entry[side]] for side in ("inputs", "outputs"))
+        signature = [f"const {scalar} *{n}, ptrdiff_t step_{n}" for n in inputs]
+        signature += [f"{scalar} *{n}" for n in outputs]
+        call = [f"{n} + i*step_{n}" for n in inputs] + [f"{n} + i*{sizes[n]}" for n in outputs]
+        if entry["params"]:
+            signature.insert(0, f"const {prefix}_params *p")
+            call.insert(0, "p")
+        head = f"void batch_{entry['name']}(ptrdiff_t n, {', '.join(signature)})"
+        prototypes.append(f"{head};")
+        body = f"for (ptrdiff_t i = 0; i < n; i++) {prefix}_{entry['name']}({', '.join(call)});"
+        loops.append(f"static {head} {{ {body} }}")
+    return json.dumps({"declared": declared, "prototypes": prototypes, "loops": loops})
+
+
+def _glue_object(name: str, glue: str, directory: Path, store: Cache) -> Path:
+    digest = key(name, glue) + ".o"
+    target = store.directory / "objects" / digest
+    if target.exists():
+        return target
+    import cffi
+
+    parts = json.loads(glue)
+    ffi = cffi.FFI()
+    ffi.cdef(re.sub(r"^#.*$", "", parts["declared"], flags=re.M) + "\n".join(parts["prototypes"]))
+    ffi.set_source(name, '#include "awiwi.h"\n' + "\n".join(parts["loops"]))
+    with tempfile.TemporaryDirectory() as scratch:
+        source, made = Path(scratch) / f"{name}.c", Path(scratch) / f"{name}.o"
+        ffi.emit_c_code(str(source))
+        python = sysconfig.get_paths()["include"]
+        compiler().run(
+            *GLUE_FLAGS, f"-I{python}", f"-I{directory}", f"-I{CSRC}", "-c", str(source), "-o", str(made)
+        )
+        return store.put_bytes("objects", digest, made.read_bytes())
+
+
+def _import(name: str, path: Path) -> Any:
+    loader = importlib.machinery.ExtensionFileLoader(name, str(path))
+    spec = importlib.util.spec_from_file_location(name, path, loader=loader)
+    if spec is None:
+        raise BuildError(f"{path} cannot be loaded")
+    module = importlib.util.module_from_spec(spec)
+    loader.exec_module(module)
+    return module

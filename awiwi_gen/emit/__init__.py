@@ -1,0 +1,1 @@
+"""From graph to C text to files."""

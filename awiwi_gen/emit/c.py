@@ -1,0 +1,136 @@
+"""A graph as C statements: the only printer of C expressions.
+
+Values used once are written where they are used, others get a name; parentheses keep the graph's order of
+evaluation, so that the compiled function rounds exactly as the interpreter does.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from math import prod
+
+from awiwi_gen.emit.options import Options
+from awiwi_gen.ir.cost import Cost, cost
+from awiwi_gen.ir.graph import LEAVES, Graph, Node, Ref, node_of, operands
+
+LINE = 100  # longer expressions are cut into named parts
+ATOM, PRODUCT, SUM = 3, 2, 1  # how tightly a printed expression binds
+
+Text = tuple[str, int]
+
+
+@dataclass(frozen=True)
+class CFunction:
+    """All a template sees of a kernel: finished strings."""
+
+    name: str
+    prototype: str
+    definition: str
+    comment: tuple[str, ...]
+    statements: tuple[str, ...]
+    cost: Cost
+    includes_math: bool
+
+
+def identifier(path: str) -> str:
+    """A path of the hand file as a C identifier: ``links[1].mass`` becomes ``links_1_mass``."""
+    return re.sub(r"\W+", "_", path).strip("_")
+
+
+def c_function(
+    name: str,
+    prefix: str,
+    graph: Graph,
+    inputs: Mapping[str, tuple[int, ...]],
+    comment: tuple[str, ...],
+    options: Options,
+    part: str = "",
+) -> CFunction:
+    """Print a graph. ``inputs`` maps port names to shapes; ``part`` is where its parameters live."""
+    printer = Printer(graph, options, f"p->{identifier(part)}_" if part else "p->")
+    arguments = [f"const {options.c_type} {port}[%s{prod(shape)}]" for port, shape in inputs.items()]
+    arguments += [f"{options.c_type} {o.name}[%s{len(o.elements)}]" for o in graph.outputs]
+    if graph.params:
+        arguments.insert(0, f"const {prefix}_params *%sp")
+    signature = f"void {prefix}_{name}({', '.join(arguments)})"
+    read = {node[1] for node in graph.nodes if node[0] == "input"}
+    unused = tuple(f"(void){port};" for port in inputs if port not in read)
+    return CFunction(
+        name=name,
+        prototype=signature.replace("%s", ""),
+        definition=signature.replace("[%s", "[restrict ").replace("*%s", "*restrict "),
+        comment=comment,
+        statements=unused + tuple(printer.statements()),
+        cost=cost(graph),
+        includes_math=any(node[0] not in LEAVES | {"add", "mul", "div", "inv"} for node in graph.nodes),
+    )
+
+
+class Printer:
+    """Turns the nodes of one graph into C text."""
+
+    def __init__(self, graph: Graph, options: Options, params: str) -> None:
+        self.graph, self.options, self.params = graph, options, params
+        self.texts: list[Text] = []
+        self.lines: list[str] = []
+        self.count = 0
+
+    def statements(self) -> list[str]:
+        """Declarations in order of evaluation, then the assignments to the outputs."""
+        uses = self.graph.uses
+        argument = {node_of(r) for node in self.graph.nodes if node[0] in ("sin", "cos") for r in node[1:]}
+        for index, node in enumerate(self.graph.nodes):
+            text = self.expression(node)
+            named = node[0] not in LEAVES and (
+                uses[index] > 1 or len(text[0]) > LINE or index in argument or node[0] in ("sin", "cos")
+            )
+            self.texts.append(self.declare(node, text[0]) if named else text)
+        for output in self.graph.outputs:
+            for position, ref in enumerate(output.elements):
+                self.lines.append(f"{output.name}[{position}] = {self.operand(ref, SUM)};")
+        return self.lines
+
+    def declare(self, node: Node, text: str) -> Text:
+        """Give a value a name."""
+        name = f"t{self.count}"
+        leaf = self.graph.nodes[node_of(node[1])] if len(node) == 2 else None
+        if node[0] in ("sin", "cos") and leaf is not None and leaf[0] == "input":
+            name = f"{node[0]}_{leaf[1]}{leaf[2]}"
+        else:
+            self.count += 1
+        self.lines.append(f"const {self.options.c_type} {name} = {text};")
+        return name, ATOM
+
+    def expression(self, node: Node) -> Text:
+        """A node in terms of the texts of its operands."""
+        operation = node[0]
+        if operation == "const":
+            return self.options.literal(node[1]), ATOM
+        if operation == "input":
+            return f"{node[1]}[{node[2]}]", ATOM
+        if operation == "param":
+            return self.params + identifier(node[1]), ATOM
+        refs = operands(node)
+        if operation == "add":
+            text = self.operand(refs[0], SUM)
+            for ref in refs[1:]:
+                text += (" + " if ref >= 0 else " - ") + self.operand(node_of(ref), PRODUCT)
+            return text, SUM
+        if operation == "mul":
+            return "*".join([self.operand(refs[0], PRODUCT), *(self.operand(r, ATOM) for r in refs[1:])]), PRODUCT
+        if operation == "div":
+            return f"{self.operand(refs[0], PRODUCT)}/{self.operand(refs[1], ATOM)}", PRODUCT
+        if operation == "inv":
+            return f"{self.options.literal(Fraction(1))}/{self.operand(refs[0], ATOM)}", PRODUCT
+        return f"{self.options.function(operation)}({', '.join(self.operand(r, SUM) for r in refs)})", ATOM
+
+    def operand(self, ref: Ref, binding: int) -> str:
+        """The text of a reference, in parentheses if it binds less tightly than asked."""
+        text, own = self.texts[node_of(ref)]
+        if ref < 0:
+            text = "-" + (text if own == ATOM else f"({text})")
+            own = PRODUCT
+        return text if own >= binding else f"({text})"

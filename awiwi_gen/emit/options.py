@@ -1,0 +1,39 @@
+"""What can be chosen about the emitted C; one frozen value that is passed down."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Literal
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Options:
+    """Scalar type of the C, and whether the hand's numbers are constants in it or come in a struct."""
+
+    scalar: Literal["f64", "f32"] = "f64"
+    params: Literal["baked", "runtime"] = "baked"
+
+    @property
+    def c_type(self) -> str:
+        """The C scalar type."""
+        return "double" if self.scalar == "f64" else "float"
+
+    @property
+    def dtype(self) -> type:
+        """The NumPy scalar type."""
+        return np.float64 if self.scalar == "f64" else np.float32
+
+    def literal(self, value: Fraction) -> str:
+        """The shortest C literal that reads back as the nearest scalar."""
+        rounded = value.numerator / value.denominator
+        if self.scalar == "f64":
+            return repr(rounded)
+        text = str(np.float32(rounded))
+        return (text if any(c in text for c in ".en") else text + ".0") + "f"
+
+    def function(self, operation: str) -> str:
+        """The C library's name of a function."""
+        return operation if self.scalar == "f64" else operation + "f"

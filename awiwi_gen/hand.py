@@ -1,0 +1,55 @@
+"""The hand: a frozen tree of the numbers that CAD gives, read from one file and checked before anyone may use it.
+
+    hand = Hand.load()                            # the Awiwi hand; Hand.load("my_hand.toml") for another one
+    float(hand.fingers["index"].radii["pip"])     # 0.006, in metres
+    hand.symbolic(lambda path, _: Symbol(path))   # the same tree, with fingers.index.pulleys[2].radius in its place
+
+The parts of a hand are in `hand_parts`, reading a file is in `hand_file`, what physics demands is in `hand_lint`.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import Field
+
+from awiwi_gen.hand_file import HandFile
+from awiwi_gen.hand_lint import complaints
+from awiwi_gen.hand_parts import Finger, FingerName, Limits, Link, Part, Prefix, Title
+
+__all__ = ["Finger", "Hand", "Limits", "Link"]
+
+_PACKAGED = Path(__file__).with_name("hand.toml")
+
+
+class Hand(Part):
+    """A whole hand; the order of its fingers is the order of their tendons in the forearm."""
+
+    prefix: Prefix
+    name: Title
+    limits: Limits
+    fingers: Annotated[
+        dict[FingerName, Finger], Field(min_length=1, max_length=8, examples=["[[fingers.index.links]]"])
+    ]
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str] | None = None) -> Hand:
+        """Read a hand file; without a path, the Awiwi hand of this package.
+
+        Raises `InputError` with every fault of the first stage that fails: reading, schema, physics.
+        """
+        return cls._checked(HandFile.read(path) if path is not None else HandFile.read(_PACKAGED, _PACKAGED.name))
+
+    @classmethod
+    def parse(cls, text: str, name: str = "hand.toml") -> Hand:
+        """Like `load`, from text; `name` is what messages call the file."""
+        return cls._checked(HandFile.parse(text, name))
+
+    @classmethod
+    def _checked(cls, file: HandFile) -> Hand:
+        hand = file.validated(cls)
+        if found := list(complaints(hand.limits, hand.fingers)):
+            raise file.error(found)
+        return hand

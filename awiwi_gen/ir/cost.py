@@ -1,0 +1,61 @@
+"""What a graph costs: counts of operations, which do not drift as clocks do."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import asdict, dataclass
+
+from awiwi_gen.ir.graph import LEAVES, Graph
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Operations of one call. A subtraction is an addition; a sine and a cosine of one angle are one sincos."""
+
+    add: int = 0
+    mul: int = 0
+    div: int = 0
+    neg: int = 0
+    sqrt: int = 0
+    sincos: int = 0
+    calls: int = 0
+
+    @property
+    def operations(self) -> int:
+        """Additions, multiplications and divisions; negations counted with them."""
+        return self.add + self.mul + self.div + self.neg
+
+    @property
+    def weight(self) -> float:
+        """One number to compare routes by: rough latencies relative to a multiplication."""
+        return self.operations + 4 * self.div + 6 * self.sqrt + 15 * self.sincos + 20 * self.calls
+
+    def as_dict(self) -> dict[str, int]:
+        """Plain data for JSON."""
+        return {**asdict(self), "operations": self.operations}
+
+
+def cost(graph: Graph) -> Cost:
+    """Count the operations of a graph."""
+    counts: Counter[str] = Counter()
+    angles = set()
+    for node in graph.nodes:
+        operation, *refs = node
+        if operation in LEAVES:
+            continue
+        if operation in ("add", "mul"):
+            counts[operation] += len(refs) - 1
+        elif operation in ("div", "inv"):
+            counts["div"] += 1
+        elif operation in ("sin", "cos"):
+            angles.add(refs[0])
+        elif operation == "sqrt":
+            counts["sqrt"] += 1
+        else:
+            counts["calls"] += 1
+        if operation != "add":
+            counts["neg"] += sum(1 for r in refs if r < 0 and graph.nodes[~r][0] != "const")
+        elif refs[0] < 0:
+            counts["neg"] += 1
+    counts["neg"] += sum(1 for r in graph.roots if r < 0 and graph.nodes[~r][0] != "const")
+    return Cost(sincos=len(angles), **counts)

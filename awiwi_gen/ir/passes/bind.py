@@ -1,0 +1,45 @@
+"""Give the hand's named numbers their values and compute everything that has become constant."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from fractions import Fraction
+
+from flint import arb, ctx
+
+from awiwi_gen.ir.algebras import FLINT_NAMES, ball
+from awiwi_gen.ir.graph import LEAVES, VARIADIC, Builder, Graph, Node, Ref, rebuild
+
+FOLDING_BITS = 400  # the rounding of a folded square root stays far below what the pass checks resolve
+
+
+def bind(graph: Graph, values: Mapping[str, Fraction]) -> Graph:
+    """Replace every parameter that has a value by it, exactly; the others stay named."""
+
+    def rule(builder: Builder, node: Node, refs: tuple[Ref, ...]) -> Ref:
+        if node[0] == "param":
+            return builder.const(values[node[1]]) if node[1] in values else builder.param(node[1])
+        return fold(builder, node, refs)
+
+    return rebuild(graph, rule)
+
+
+def fold(builder: Builder, node: Node, refs: tuple[Ref, ...]) -> Ref:
+    """Rebuild a node; a function of constants becomes a constant of 400 bits."""
+    if node[0] == "const":
+        return builder.const(node[1])
+    if node[0] == "input":
+        return builder.input(node[1], node[2])
+    arguments = [builder.value(ref) for ref in refs]
+    if node[0] not in VARIADIC | LEAVES | {"inv", "div"} and None not in arguments:
+        return builder.const(_value(node[0], [a for a in arguments if a is not None]))
+    return builder.make(node[0], refs)
+
+
+def _value(operation: str, arguments: list[Fraction]) -> Fraction:
+    with ctx.workprec(FOLDING_BITS):
+        result = getattr(arb, FLINT_NAMES.get(operation, operation))(*(ball(a) for a in arguments))
+        if not result.is_finite():
+            raise ZeroDivisionError(f"{operation}({', '.join(str(float(a)) for a in arguments)}) is not a number")
+        mantissa, exponent = result.mid().man_exp()
+    return Fraction(int(mantissa)) * Fraction(2) ** int(exponent)

@@ -1,0 +1,35 @@
+"""Merge sums into the sums, and products into the products, that alone use them.
+
+Products are always merged: what several of them share is found again by `share`, and better so.
+"""
+
+from __future__ import annotations
+
+from awiwi_gen.ir.graph import Builder, Graph, Node, Ref, node_of, rebuild
+
+
+def flatten(graph: Graph) -> Graph:
+    """The same graph with longer sums and products."""
+    uses = graph.uses
+
+    def rule(builder: Builder, node: Node, refs: tuple[Ref, ...]) -> Ref:
+        if node[0] == "const":
+            return builder.const(node[1])
+        if node[0] == "input":
+            return builder.input(node[1], node[2])
+        if node[0] == "param":
+            return builder.param(node[1])
+        if node[0] not in ("add", "mul"):
+            return builder.make(node[0], refs)
+        merged: list[Ref] = []
+        for old, ref in zip(node[1:], refs, strict=True):
+            inner = builder.nodes[node_of(ref)]
+            if inner[0] == node[0] == "mul":
+                merged += [inner[1] if ref >= 0 else ~inner[1], *inner[2:]]
+            elif inner[0] == node[0] == "add" and uses[node_of(old)] == 1:
+                merged += inner[1:] if ref >= 0 else [~r for r in inner[1:]]
+            else:
+                merged.append(ref)
+        return builder.make(node[0], merged)
+
+    return rebuild(graph, rule)

@@ -1,0 +1,114 @@
+"""Find pairs of terms (or of factors) that several sums (products) have in common and compute them once.
+
+Greedy: the pair that most nodes contain is taken out first, until every pair is used once only.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections import Counter
+from itertools import combinations
+
+from awiwi_gen.ir.graph import Builder, Graph, Output, Ref, copy_node, node_of, operands
+
+Pair = tuple[Ref, Ref]
+
+
+def share_sums(graph: Graph) -> Graph:
+    """Common partial sums, up to sign."""
+    return _share(graph, "add")
+
+
+def share_products(graph: Graph) -> Graph:
+    """Common partial products, constants and reciprocals among the factors."""
+    return _share(graph, "mul")
+
+
+def _share(graph: Graph, operation: str) -> Graph:
+    groups = {i: list(node[1:]) for i, node in enumerate(graph.nodes) if node[0] == operation}
+    pairs = _extract(groups, first_free=len(graph.nodes))
+    return _replay(graph, operation, groups, pairs)
+
+
+def _normal(a: Ref, b: Ref) -> tuple[Pair, bool]:
+    """The pair in sorted order with a positive first member, and whether its sign was turned."""
+    if node_of(a) > node_of(b):
+        a, b = b, a
+    return ((~a, ~b), True) if a < 0 else ((a, b), False)
+
+
+def _extract(groups: dict[int, list[Ref]], first_free: int) -> dict[int, Pair]:
+    """Take pairs out of the groups in place; returns the pair behind each new node number."""
+    where: dict[Pair, Counter[int]] = {}
+    for index, terms in groups.items():
+        for a, b in combinations(terms, 2):
+            where.setdefault(_normal(a, b)[0], Counter())[index] += 1
+    heap = [(-len(nodes), pair) for pair, nodes in where.items() if len(nodes) > 1]
+    heapq.heapify(heap)
+    pairs: dict[int, Pair] = {}
+    while heap:
+        count, pair = heapq.heappop(heap)
+        holders = sorted(where[pair])
+        if len(holders) != -count:  # out of date: put back with its present count
+            if len(holders) > 1:
+                heapq.heappush(heap, (-len(holders), pair))
+            continue
+        new = first_free + len(pairs)
+        pairs[new] = pair
+        touched: set[Pair] = set()
+        for index in holders:
+            touched |= _replace(groups, where, index, pair, new)
+        for other in sorted(touched):
+            if len(where[other]) > 1:
+                heapq.heappush(heap, (-len(where[other]), other))
+    return pairs
+
+
+def _replace(groups: dict[int, list[Ref]], where: dict[Pair, Counter[int]], index: int, pair: Pair, new: int) -> set[Pair]:
+    """Write one group with ``new`` in place of the pair; returns the pairs that it newly contains."""
+    terms = groups[index]
+    for a, b in combinations(terms, 2):
+        other = _normal(a, b)[0]
+        where[other][index] -= 1
+        if not where[other][index]:
+            del where[other][index]
+    for sign in (False, True):
+        first, second = (~pair[0], ~pair[1]) if sign else pair
+        if first in terms and second in terms and (first != second or terms.count(first) > 1):
+            terms.remove(first)
+            terms.remove(second)
+            terms.append(~new if sign else new)
+            break
+    touched = set()
+    for a, b in combinations(terms, 2):
+        other = _normal(a, b)[0]
+        where.setdefault(other, Counter())[index] += 1
+        touched.add(other)
+    return touched
+
+
+def _replay(graph: Graph, operation: str, groups: dict[int, list[Ref]], pairs: dict[int, Pair]) -> Graph:
+    builder = Builder()
+    done: dict[int, Ref] = {}
+
+    def members(index: int) -> tuple[Ref, ...]:
+        if index in pairs:
+            return pairs[index]
+        return tuple(groups[index]) if index in groups else operands(graph.nodes[index])
+
+    def new(ref: Ref) -> Ref:
+        return done[ref] if ref >= 0 else ~done[~ref]
+
+    stack = [node_of(ref) for ref in reversed(list(graph.roots))]
+    while stack:
+        index = stack[-1]
+        missing = [node_of(r) for r in members(index) if node_of(r) not in done]
+        if index not in done and missing:
+            stack += missing
+            continue
+        stack.pop()
+        if index not in done:
+            refs = tuple(new(r) for r in members(index))
+            grouped = index in pairs or index in groups
+            done[index] = builder.make(operation, refs) if grouped else copy_node(builder, graph.nodes[index], refs)
+    return builder.graph(Output(o.name, o.shape, tuple(new(r) for r in o.elements)) for o in graph.outputs)

@@ -1,0 +1,72 @@
+"""What a kernel is: typed ports, a definition, and a second route to the same numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from math import prod
+from typing import Any
+
+from awiwi_gen.units import Unit
+
+Route = Callable[..., Any]
+
+
+@dataclass(frozen=True)
+class Port:
+    """One array argument of a kernel.
+
+    ``unit`` is one unit for the whole array or one per element, row by row. ``low`` and ``high`` (a number
+    or one per element) bound the values the kernel is documented and verified for; outputs have none.
+    """
+
+    shape: tuple[int, ...]
+    unit: Unit | tuple[Unit, ...]
+    low: float | tuple[float, ...] | None = None
+    high: float | tuple[float, ...] | None = None
+
+    @property
+    def size(self) -> int:
+        """Number of elements; a scalar has one."""
+        return prod(self.shape)
+
+    @property
+    def units(self) -> tuple[Unit, ...]:
+        """The unit of every element."""
+        return self.unit if isinstance(self.unit, tuple) else (self.unit,) * self.size
+
+    @property
+    def unit_text(self) -> str:
+        """The unit for people; mixed arrays list their distinct units."""
+        return ", ".join(dict.fromkeys(str(unit) for unit in self.units))
+
+    def bounds(self) -> list[tuple[float, float]]:
+        """(low, high) of every element."""
+        low = self.low if isinstance(self.low, tuple) else (self.low,) * self.size
+        high = self.high if isinstance(self.high, tuple) else (self.high,) * self.size
+        return [(float(a or 0.0), float(b or 0.0)) for a, b in zip(low, high, strict=True)]
+
+
+@dataclass(frozen=True)
+class Kernel:
+    """One function of the C interface.
+
+    ``part`` is the piece of the hand the routes receive as their first argument, ``path`` its place in the
+    hand file. Kernels of parts with equal ``structure`` share their derivation. The first route is the
+    definition, the others are independent ways to the same result.
+    """
+
+    name: str
+    doc: str
+    source: str
+    inputs: Mapping[str, Port]
+    outputs: Mapping[str, Port]
+    routes: Mapping[str, Route]
+    part: Any = field(repr=False)
+    path: str = ""
+    structure: str = ""
+
+    @property
+    def family(self) -> str:
+        """The kernel's name without its part: what the five fingers' versions have in common."""
+        return self.name.removeprefix(self.path.rpartition(".")[2] + "_")

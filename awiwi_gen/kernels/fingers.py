@@ -1,0 +1,238 @@
+"""The kernels every finger has, written once for all of them.
+
+A kernel is declared by one decorated function. Its argument names choose its input ports, its name (after
+the finger's) is the C symbol, its docstring the documentation. The function is the definition, in SymPy; the
+``witness`` is another road to the same numbers, in CasADi. Both receive the finger with symbols for numbers.
+"""
+
+from __future__ import annotations
+
+import inspect
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from awiwi_gen.hand import Finger, Hand
+from awiwi_gen.kernel import Kernel, Port, Route
+from awiwi_gen.models import chain, lagrange, recursive, tendons, tendons_ad
+from awiwi_gen.units import J, N, Unit, kg, m, one, rad, s
+
+
+@dataclass(frozen=True)
+class Size:
+    """How large a finger's arrays are: independent joints, tendons, links."""
+
+    joints: int
+    tendons: int
+    links: int
+
+
+Outputs = Callable[[Size], dict[str, Port]]
+
+
+@dataclass(frozen=True)
+class Template:
+    """A kernel before it knows its finger."""
+
+    name: str
+    outputs: Outputs
+    source: str
+    definition: Route
+    witness: Route
+
+
+TEMPLATES: list[Template] = []
+
+
+def per_finger(outputs: Outputs, source: str, witness: Route) -> Callable[[Route], Route]:
+    """Declare a kernel of every finger."""
+
+    def declare(definition: Route) -> Route:
+        TEMPLATES.append(Template(definition.__name__, outputs, source, definition, witness))
+        return definition
+
+    return declare
+
+
+def finger_kernels(hand: Hand, name: str, finger: Finger) -> list[Kernel]:
+    """All kernels of one finger."""
+    size = Size(len(finger.joints), len(finger.tendons), len(finger.links))
+    ports = input_ports(hand, finger, size)
+    structure = json.dumps(finger.structure(), sort_keys=True)
+    return [
+        Kernel(
+            name=f"{name}_{template.name}",
+            doc=inspect.getdoc(template.definition) or "",
+            source=template.source,
+            inputs={p: ports[p] for p in list(inspect.signature(template.definition).parameters)[1:]},
+            outputs=template.outputs(size),
+            routes={"sympy": template.definition, "casadi": template.witness},
+            part=finger,
+            path=f"fingers.{name}",
+            structure=structure,
+        )
+        for template in TEMPLATES
+    ]
+
+
+def input_ports(hand: Hand, finger: Finger, size: Size) -> dict[str, Port]:
+    """The ports an argument name stands for, with the ranges of this hand."""
+    n, limits = (size.joints,), hand.limits
+    ranges = [link for link in finger.links if link.joint in finger.joints]
+    low = tuple(float(link.low) for link in ranges)
+    high = tuple(float(link.high) for link in ranges)
+
+    def symmetric(shape: tuple[int, ...], unit: Unit, limit: Any) -> Port:
+        return Port(shape, unit, -float(limit), float(limit))
+
+    return {
+        "q": Port(n, rad, low, high),
+        "qd": symmetric(n, rad / s, limits.joint_velocity),
+        "qdd": symmetric(n, rad / s**2, limits.joint_acceleration),
+        "tau": symmetric(n, N * m, limits.joint_torque),
+        "f": Port((size.tendons,), N, 0.0, float(limits.tendon_force)),
+        "k": Port((size.tendons,), N / m, float(limits.tendon_stiffness_low), float(limits.tendon_stiffness_high)),
+        "g": symmetric((3,), m / s**2, limits.gravity),
+    }
+
+
+POSE = (one, one, one, m) * 3 + (one,) * 4
+
+
+def torque(size: Size) -> Port:
+    """A generalised force for every joint."""
+    return Port((size.joints,), N * m)
+
+
+def inertia(size: Size) -> Port:
+    """A joint-space inertia."""
+    return Port((size.joints, size.joints), kg * m**2)
+
+
+def coriolis(size: Size) -> Port:
+    """A joint-space Coriolis matrix."""
+    return Port((size.joints, size.joints), N * m * s / rad)
+
+
+# -- kinematics -------------------------------------------------------------------------------------------
+
+
+@per_finger(lambda z: {"T": Port((4, 4), POSE)}, "eq. 5.2, 5.3, table 5.1", witness=recursive.fingertip_pose)
+def fingertip_pose(finger: Any, q: Any) -> Any:
+    """Pose of the fingertip: maps fingertip coordinates into the finger's base frame."""
+    return chain.fingertip_pose(finger, q)
+
+
+@per_finger(lambda z: {"T": Port((z.links, 4, 4), POSE * z.links)}, "eq. 5.2", witness=recursive.link_poses)
+def link_poses(finger: Any, q: Any) -> Any:
+    """Pose of every link frame (at its joint, turning with the link) in the finger's base frame."""
+    return chain.link_poses(finger, q)
+
+
+@per_finger(
+    lambda z: {"J": Port((6, z.joints), (m / rad,) * (3 * z.joints) + (rad / rad,) * (3 * z.joints))},
+    "eq. 5.3, differentiated",
+    witness=recursive.jacobian,
+)
+def jacobian(finger: Any, q: Any) -> Any:
+    """Fingertip Jacobian in base axes: velocity of the tip (rows 0-2) and angular velocity (rows 3-5)."""
+    return chain.jacobian(finger, q)
+
+
+# -- dynamics ---------------------------------------------------------------------------------------------
+
+
+@per_finger(lambda z: {"M": inertia(z)}, "eq. 2.17, 5.4", witness=recursive.mass_matrix)
+def mass_matrix(finger: Any, q: Any) -> Any:
+    """Mass matrix: the kinetic energy is half qd' M qd."""
+    return lagrange.mass_matrix(finger, q)
+
+
+@per_finger(lambda z: {"C": coriolis(z)}, "eq. 2.17", witness=recursive.coriolis_matrix)
+def coriolis_matrix(finger: Any, q: Any, qd: Any) -> Any:
+    """Coriolis matrix of Christoffel symbols, so that dM/dt - 2 C is skew-symmetric."""
+    return lagrange.coriolis_matrix(finger, q, qd)
+
+
+@per_finger(lambda z: {"gravity": torque(z)}, "eq. 2.17, 5.4", witness=recursive.gravity)
+def gravity(finger: Any, q: Any, g: Any) -> Any:
+    """Joint torques that hold the finger still against gravity g (in base axes)."""
+    return lagrange.gravity(finger, q, g)
+
+
+@per_finger(lambda z: {"bias": torque(z)}, "eq. 2.17", witness=recursive.bias)
+def bias(finger: Any, q: Any, qd: Any, g: Any) -> Any:
+    """Coriolis, centrifugal and gravity torques together: C qd + gravity."""
+    return lagrange.bias(finger, q, qd, g)
+
+
+@per_finger(lambda z: {"tau": torque(z)}, "eq. 2.4 to 2.15, 2.17", witness=recursive.inverse_dynamics)
+def inverse_dynamics(finger: Any, q: Any, qd: Any, qdd: Any, g: Any) -> Any:
+    """Joint torques that produce the accelerations qdd: M qdd + C qd + gravity."""
+    return lagrange.inverse_dynamics(finger, q, qd, qdd, g)
+
+
+@per_finger(
+    lambda z: {"qdd": Port((z.joints,), rad / s**2)}, "eq. 2.1, solved for qdd", witness=recursive.forward_dynamics
+)
+def forward_dynamics(finger: Any, q: Any, qd: Any, tau: Any, g: Any) -> Any:
+    """Joint accelerations under the joint torques tau."""
+    return lagrange.forward_dynamics(finger, q, qd, tau, g)
+
+
+@per_finger(
+    lambda z: {"M": inertia(z), "C": coriolis(z), "gravity": torque(z)}, "eq. 2.17", witness=recursive.dynamics
+)
+def dynamics(finger: Any, q: Any, qd: Any, g: Any) -> Any:
+    """Mass matrix, Coriolis matrix and gravity torques in one call that shares their work."""
+    return lagrange.dynamics(finger, q, qd, g)
+
+
+@per_finger(
+    lambda z: {"kinetic": Port((), J), "potential": Port((), J)}, "eq. 2.16, 5.4", witness=recursive.energy
+)
+def energy(finger: Any, q: Any, qd: Any, g: Any) -> Any:
+    """Kinetic energy and potential energy in the gravity field g (zero at the base frame's origin)."""
+    return lagrange.energy(finger, q, qd, g)
+
+
+# -- tendons ----------------------------------------------------------------------------------------------
+
+
+@per_finger(lambda z: {"h": Port((z.tendons,), m)}, "eq. 5.5, 5.18, 5.22", witness=tendons_ad.tendon_lengths)
+def tendon_lengths(finger: Any, q: Any) -> Any:
+    """Length of every tendon's path in the finger, from its routing."""
+    return tendons.tendon_lengths(finger, q)
+
+
+@per_finger(
+    lambda z: {"P": Port((z.tendons, z.joints), m / rad)}, "eq. 5.6, 5.9, 5.21", witness=tendons_ad.coupling
+)
+def coupling(finger: Any, q: Any) -> Any:
+    """Coupling matrix P = dh/dq: tendon velocities are P qd."""
+    return tendons.coupling(finger, q)
+
+
+@per_finger(
+    lambda z: {"dP": Port((z.tendons, z.joints, z.joints), m / rad**2)},
+    "eq. 5.11",
+    witness=tendons_ad.coupling_derivative,
+)
+def coupling_derivative(finger: Any, q: Any) -> Any:
+    """Second derivatives of the tendon lengths: dP[i, j, k] = d2 h_i / dq_j dq_k."""
+    return tendons.coupling_derivative(finger, q)
+
+
+@per_finger(lambda z: {"tau": torque(z)}, "eq. 5.8", witness=tendons_ad.joint_torque)
+def joint_torque(finger: Any, q: Any, f: Any) -> Any:
+    """Joint torques -P' f of the tendon forces f."""
+    return tendons.joint_torque(finger, q, f)
+
+
+@per_finger(
+    lambda z: {"K": Port((z.joints, z.joints), N * m / rad)}, "eq. 5.12, 5.23", witness=tendons_ad.joint_stiffness
+)
+def joint_stiffness(finger: Any, q: Any, f: Any, k: Any) -> Any:
+    """Joint stiffness -d tau/dq felt through tendons of stiffness k that pull with forces f."""
+    return tendons.joint_stiffness(finger, q, f, k)

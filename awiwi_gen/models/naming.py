@@ -1,0 +1,109 @@
+"""Names for subexpressions, and derivatives that see through them.
+
+SymPy writes expressions as trees: a rotation used nine times is written nine times, and its derivative many times more. A
+`Named` symbol stands for such an expression and remembers it, so a derivation stays as small as the graph it describes.
+"""
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+import sympy
+from sympy import Expr
+
+
+class Named(sympy.Dummy):
+    """A real symbol that stands for `definition`; whoever reads the expression looks the meaning up there."""
+
+    __slots__ = ("definition",)
+    definition: Expr
+
+    def __new__(cls, name: str, definition: Expr) -> "Named":
+        named: Named = super().__new__(cls, name, real=True)
+        named.definition = definition
+        return named
+
+
+class Derivation:
+    """The names and the derivatives of one derivation.
+
+    Names are numbered from zero and SymPy sorts symbols by name, so the same derivation always spells the same expressions,
+    whatever was derived before it.
+    """
+
+    def __init__(self, prefix: str = "t") -> None:
+        self._prefix = prefix
+        self._names: dict[Expr, Named] = {}
+        self._known: dict[frozenset[tuple[Expr, Expr]], dict[Expr, Expr]] = {}
+
+    def name(self, expr: Expr) -> Expr:
+        """A symbol standing for `expr`; atoms and signed atoms stand for themselves."""
+        if expr.is_Atom or (-expr).is_Atom:
+            return expr
+        if expr not in self._names:
+            self._names[expr] = Named(f"{self._prefix}{len(self._names):05d}", expr)
+        return self._names[expr]
+
+    def name_all(self, matrix: sympy.Matrix) -> sympy.Matrix:
+        """`name` applied to each entry of a matrix."""
+        return matrix.applyfunc(self.name)
+
+    def partial(self, expr: Expr, symbol: Expr) -> Expr:
+        """d expr / d symbol, through all names."""
+        return self.along(expr, {symbol: sympy.S.One})
+
+    def along(self, expr: Expr, direction: Mapping[Expr, Expr]) -> Expr:
+        """Rate of `expr` while each symbol of `direction` changes at the given rate (a total derivative through all names)."""
+        known = self._known.setdefault(frozenset(direction.items()), dict(direction))
+        return self._rate(expr, known)
+
+    def _rate(self, expr: Expr, known: dict[Expr, Expr]) -> Expr:
+        """The chain rule, each shared subexpression once; `known` holds the rates found so far, the symbols' own to begin with."""
+        if expr not in known:
+            known[expr] = self._chain_rule(expr, known)
+        return known[expr]
+
+    def _chain_rule(self, expr: Expr, known: dict[Expr, Expr]) -> Expr:
+        if isinstance(expr, Named):
+            return self.name(self._rate(expr.definition, known))
+        if expr.is_Atom:
+            return sympy.S.Zero
+        rates = [self._rate(arg, known) for arg in expr.args]
+        if all(rate is sympy.S.Zero for rate in rates):
+            return sympy.S.Zero
+        if expr.is_Add:
+            return sympy.Add(*rates)
+        if expr.is_Mul:
+            return sympy.Add(*(sympy.Mul(rate, *(arg for k, arg in enumerate(expr.args) if k != i))
+                               for i, rate in enumerate(rates) if rate is not sympy.S.Zero))
+        return sympy.Add(*(sympy.Mul(slope, rate) for slope, rate in zip(_SLOPES[expr.func](*expr.args), rates)))
+
+
+def _power_slope(base: Expr, exponent: Expr) -> tuple[Expr, Expr]:
+    if not exponent.is_Number:
+        raise ValueError(f"exponent {exponent} of {base} is not a number")
+    return exponent * base ** (exponent - 1), sympy.S.Zero
+
+
+# Partial derivatives of each function with respect to each of its arguments: all the functions a finger needs.
+_SLOPES: dict[Any, Callable[..., tuple[Expr, ...]]] = {
+    sympy.Pow: _power_slope,
+    sympy.sin: lambda x: (sympy.cos(x),),
+    sympy.cos: lambda x: (-sympy.sin(x),),
+    sympy.acos: lambda x: (-1 / sympy.sqrt(1 - x**2),),
+    sympy.atan2: lambda y, x: (x / (x**2 + y**2), -y / (x**2 + y**2)),
+}
+
+
+def definitions(expressions: Iterable[Expr]) -> list[tuple[Named, Expr]]:
+    """All names that `expressions` use, directly or not, with their meaning; each after the names it needs itself."""
+    found: dict[Named, Expr] = {}
+
+    def visit(expr: Expr) -> None:
+        for named in sorted(expr.atoms(Named), key=lambda symbol: symbol.name):
+            if named not in found:
+                visit(named.definition)
+                found[named] = named.definition
+
+    for expression in expressions:
+        visit(expression)
+    return list(found.items())

@@ -1,0 +1,42 @@
+"""Reading the tree of a finger: names and structure, no physics. Both routes of every quantity start from here.
+
+A finger is anything with these attributes (the hand file's `Finger` and its symbolic copies are):
+
+    links[i]      joint, turn, offset[3], mass, com[3], inertia.{xx,yy,zz,xy,xz,yz}, four_bar (or None)
+    pulleys[i]    joint, radius
+    tendons[i]    rest, over (senses and joints: "+flexion", "-pip"), span (None or from_[3], to[3], joint)
+    couplings[i]  follower, leader
+
+The leaves are numbers or symbols of either algebra. Independent joints are counted along the chain, base to tip.
+"""
+
+from typing import Any
+
+Finger = Any
+
+
+def leaders(finger: Finger) -> dict[str, str]:
+    """Follower -> leader, for each coupled joint."""
+    return {coupling.follower: coupling.leader for coupling in finger.couplings}
+
+
+def coordinates(finger: Finger) -> dict[str, int]:
+    """Joint -> index in q of the coordinate that moves it; a follower has its leader's."""
+    follows = leaders(finger)
+    free = [link.joint for link in finger.links if link.joint not in follows]
+    return {link.joint: free.index(follows.get(link.joint, link.joint)) for link in finger.links}
+
+
+def radius(finger: Finger, joint: str) -> Any:
+    """Radius of the pulley around a joint [m]."""
+    return next(pulley.radius for pulley in finger.pulleys if pulley.joint == joint)
+
+
+def quarter_turns(turn: str) -> tuple[int, int]:
+    """A fixed turn such as "x+90" as (axis, quarter turns): (0, 1). No turn is (2, 0)."""
+    return (2, 0) if turn == "none" else ("xyz".index(turn[0]), int(turn[1:]) // 90)
+
+
+def sense(over: str) -> tuple[int, str]:
+    """A pulley a tendon rolls on, "-pip", as (sign, joint): (-1, "pip")."""
+    return (1 if over[0] == "+" else -1), over[1:]

@@ -1,0 +1,160 @@
+"""One kernel from its derivations to its C text: bound, compared, optimised, printed; a pure function.
+
+Its result, a `Record`, is kept by the digest of everything it depends on, so that a changed number costs the
+kernels that use it and no others.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from awiwi_gen.cache import Cache, code_digest, key, libraries
+from awiwi_gen.emit.c import CFunction, c_function
+from awiwi_gen.emit.files import cost_line, describe, kernel_file
+from awiwi_gen.emit.options import Options
+from awiwi_gen.errors import VerificationError
+from awiwi_gen.ir.cost import cost
+from awiwi_gen.ir.graph import Graph
+from awiwi_gen.ir.passes import optimise
+from awiwi_gen.ir.passes.bind import bind
+from awiwi_gen.kernel import Kernel
+from awiwi_gen.verify.physics import Law, obey
+from awiwi_gen.verify.reference import Reference, ball_values, disagreement, reference
+from awiwi_gen.verify.samples import SEED, draw
+from awiwi_gen.verify.verdict import Verdict, judge
+
+ROUTES_AGREE = 1e-40  # level 4
+PASSES_AGREE = 1e-50  # level 2
+
+
+@dataclass(frozen=True)
+class Record:
+    """What is known of a kernel before it is compiled; ``digest`` names what it was made from."""
+
+    digest: str
+    graph: Graph
+    function: CFunction
+    file: str
+    route: str
+    agreement: float
+    passes: float
+    reference: Reference
+
+
+def derivation_key(kernel: Kernel, route: str) -> str:
+    """What a derivation depends on: the structure of the part and the code of the physics, no number."""
+    code = code_digest("awiwi_gen/models", "awiwi_gen/kernels", "awiwi_gen/derive.py", "awiwi_gen/ir/graph.py",
+                       "awiwi_gen/ir/from_sympy.py", "awiwi_gen/ir/from_casadi.py", "awiwi_gen/units.py")  # fmt: skip
+    return key(kernel.structure, kernel.family, route, code, libraries())
+
+
+def record_key(kernel: Kernel, graphs: Mapping[str, Graph], prefix: str, options: Options) -> str:
+    """What a record depends on: the derivations, the numbers in them, the ports, the compiler's own code."""
+    values = kernel.part.quantities()
+    used = {path: str(values[path].value) for graph in graphs.values() for path in graph.params}
+    code = code_digest("awiwi_gen/ir", "awiwi_gen/emit", "awiwi_gen/records.py", "awiwi_gen/kernel.py", "templates",
+                       "awiwi_gen/verify/reference.py", "awiwi_gen/verify/samples.py")  # fmt: skip
+    digests = {route: graph.digest for route, graph in graphs.items()}
+    ports = (dict(kernel.inputs), dict(kernel.outputs), kernel.doc, kernel.source)
+    return key(kernel.name, digests, json.dumps(used, sort_keys=True), ports, prefix, options, code, libraries())
+
+
+def load_graphs(kernel: Kernel, cache: Cache) -> dict[str, Graph]:
+    """The derivations of a kernel by all its routes, from the cache."""
+    found: dict[str, Graph] = {}
+    for route in kernel.routes:
+        graph = cache.get("derived", derivation_key(kernel, route))
+        if not isinstance(graph, Graph):
+            raise VerificationError(f"{kernel.name}: its derivation by {route} is missing from the cache")
+        found[route] = graph
+    return found
+
+
+def make_record(kernel: Kernel, graphs: Mapping[str, Graph], prefix: str, options: Options, digest: str) -> Record:
+    """Bind, compare the routes, optimise the cheaper one, print it.
+
+    Raises VerificationError where two routes, or the graphs before and after a pass, differ.
+    """
+    values = {path: quantity.value for path, quantity in kernel.part.quantities().items()}
+    numbers = values if options.params == "baked" else {}
+    bound = {route: bind(graph, numbers) for route, graph in graphs.items()}
+    candidates = {route: optimise(graph) for route, graph in bound.items()}
+    route = min(candidates, key=lambda name: cost(candidates[name][-1][1]).weight)
+    inputs = draw(kernel.inputs, kernel.path, options.dtype)
+    exact = {name: ball_values(graph, inputs, values) for name, graph in bound.items()}
+    definition = next(iter(exact.values()))
+    agreement = max(disagreement(definition, other) for other in exact.values())
+    if not agreement <= ROUTES_AGREE:
+        raise VerificationError(f"{kernel.name}: its derivations {', '.join(exact)} differ by {agreement:.1e}")
+    before, passes = exact[route], 0.0
+    for name, graph in candidates[route]:
+        after = ball_values(graph, inputs, values)
+        change = disagreement(before, after)
+        if not change <= PASSES_AGREE:
+            raise VerificationError(f"{kernel.name}: pass {name} changes its value by {change:.1e}")
+        before, passes = after, max(passes, change)
+    final = candidates[route][-1][1]
+    function = c_function(
+        kernel.name,
+        prefix,
+        final,
+        {name: port.shape for name, port in kernel.inputs.items()},
+        describe(kernel, cost_line(cost(final).as_dict())),
+        options,
+        part=kernel.path,
+    )
+    used = {f"{kernel.path}.{path}": str(values[path]) for graph in graphs.values() for path in graph.params}
+    text = kernel_file(function, key(json.dumps(used, sort_keys=True)))
+    return Record(digest, final, function, text, route, agreement, passes, reference(definition))
+
+
+def judge_record(kernel: Kernel, record: Record, function: Callable[..., Any], options: Options) -> Verdict:
+    """Levels 1 and 3 for one compiled kernel, joined with levels 2 and 4 of its record."""
+    return judge(
+        kernel.name,
+        record.graph,
+        record.reference,
+        draw(kernel.inputs, kernel.path, options.dtype),
+        {path: quantity.value for path, quantity in kernel.part.quantities().items()},
+        function,
+        {name: port.shape for name, port in kernel.inputs.items()},
+        record.agreement,
+        record.passes,
+        SEED,
+        options.dtype,
+    )
+
+
+def physics(members: Sequence[tuple[Kernel, Record]], options: Options) -> list[Law]:
+    """Level 5 for the kernels of one part."""
+    first = members[0][0]
+    ports = {name: port for kernel, _ in members for name, port in kernel.inputs.items()}
+    values = {path: quantity.value for path, quantity in first.part.quantities().items()}
+    graphs = {kernel.family: record.graph for kernel, record in members}
+    return obey(first.path, graphs, draw(ports, first.path, options.dtype), values)
+
+
+def manifest_entry(kernel: Kernel, record: Record) -> dict[str, Any]:
+    """A kernel as plain data: what ``list --json`` shows and what a library is loaded from."""
+
+    def port(name: str, spec: Any, ranged: bool) -> dict[str, Any]:
+        entry: dict[str, Any] = {"name": name, "shape": list(spec.shape), "unit": spec.unit_text}
+        if ranged:
+            bounds = spec.bounds()
+            entry |= {"low": [low for low, _ in bounds], "high": [high for _, high in bounds]}
+        return entry
+
+    return {
+        "name": kernel.name,
+        "doc": kernel.doc,
+        "source": kernel.source,
+        "part": kernel.path,
+        "route": record.route,
+        "params": bool(record.graph.params),
+        "inputs": [port(name, spec, True) for name, spec in kernel.inputs.items()],
+        "outputs": [port(name, spec, False) for name, spec in kernel.outputs.items()],
+        "cost": record.function.cost.as_dict(),
+    }

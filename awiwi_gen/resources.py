@@ -1,0 +1,18 @@
+"""Where the files that travel with the package are: in the wheel inside it, in a checkout beside it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+_PACKAGE = Path(__file__).resolve().parent
+
+
+def _find(name: str) -> Path:
+    inside = _PACKAGE / name
+    return inside if inside.is_dir() else _PACKAGE.parent / name
+
+
+TEMPLATES = _find("templates")
+CSRC = _find("csrc")
+DEFAULT_HAND = _PACKAGE / "hand.toml"
+SOURCES = (_PACKAGE, TEMPLATES, CSRC)

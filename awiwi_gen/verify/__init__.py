@@ -1,0 +1,1 @@
+"""Proof that the compiled kernels compute what was derived."""

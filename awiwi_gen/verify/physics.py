@@ -1,0 +1,237 @@
+"""Level 5: laws of mechanics that a finger's kernels must obey together, checked at 256 bits.
+
+Each law is a function of the finger's graphs at the sample points and returns a residual and a scale; it is
+skipped where a kernel it needs was not generated. Derivatives along the motion are central differences with
+a step of 2^-90, so their truncation stays below 1e-40.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from flint import arb
+
+from awiwi_gen.ir.algebras import Balls, ball
+from awiwi_gen.ir.graph import Graph, Node
+from awiwi_gen.ir.interpret import evaluate
+
+STEP = arb(2) ** -90
+LIMIT = 1e-40
+POSITIVE = 1e-12  # smallest eigenvalue over largest, below which a mass matrix is not credible
+
+Tensor = np.ndarray[Any, Any]  # of balls; the first axis runs over the samples
+
+
+@dataclass(frozen=True)
+class Law:
+    """One law on one part: the worst residual relative to the size of its terms."""
+
+    part: str
+    statement: str
+    worst: float
+    passed: bool
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        return asdict(self)
+
+
+class Motion:
+    """A finger in motion at the samples: its kernels there, and their rates along the motion."""
+
+    def __init__(self, graphs: Mapping[str, Graph], inputs: Mapping[str, Tensor], values: Mapping[str, Fraction]):
+        self.graphs, self.values = graphs, values
+        self.samples = len(next(iter(inputs.values())))
+        self.inputs = {n: np.vectorize(arb, otypes=[object])(a.astype(np.float64)) for n, a in inputs.items()}
+
+    def at(self, family: str, inputs: Mapping[str, Tensor] | None = None) -> dict[str, Tensor]:
+        """The outputs of a kernel, shaped, at the samples or at other inputs."""
+        graph, given = self.graphs[family], inputs or self.inputs
+
+        def leaf(node: Node) -> list[arb]:
+            if node[0] == "param":
+                return [ball(self.values[node[1]])] * self.samples
+            return list(given[node[1]][:, node[2]])
+
+        found = evaluate(graph, Balls(self.samples), leaf)
+        return {o.name: _array(found[o.name]).reshape(self.samples, *o.shape) for o in graph.outputs}
+
+    def rate(self, family: str, output: str, **velocities: Tensor) -> Tensor:
+        """Derivative of an output along given velocities of the inputs."""
+        ahead, behind = (
+            self.at(family, self.inputs | {n: self.inputs[n] + sign * STEP * v for n, v in velocities.items()})[output]
+            for sign in (1, -1)
+        )
+        return (ahead - behind) / (2 * STEP)
+
+
+def _array(columns: list[list[arb]]) -> Tensor:
+    array = np.empty((len(columns[0]) if columns else 0, len(columns)), dtype=object)
+    for i, column in enumerate(columns):
+        array[:, i] = column
+    return array
+
+
+def _times(matrix: Tensor, vector: Tensor) -> Tensor:
+    return (matrix @ vector[..., None])[..., 0]
+
+
+def _dot(a: Tensor, b: Tensor) -> Tensor:
+    return (a * b).sum(axis=-1)
+
+
+def _turned(matrix: Tensor) -> Tensor:
+    return np.swapaxes(matrix, -1, -2)
+
+
+# -- the laws: the arguments after the motion name the kernels' outputs they need --------------------------
+
+Residual = tuple[Tensor, Tensor]
+
+
+def the_mass_matrix_is_symmetric(x: Motion, mass_matrix: Any) -> Residual:
+    return mass_matrix["M"] - _turned(mass_matrix["M"]), mass_matrix["M"]
+
+
+def half_qd_M_qd_is_the_kinetic_energy(x: Motion, mass_matrix: Any, energy: Any) -> Residual:
+    qd = x.inputs["qd"]
+    return _dot(qd, _times(mass_matrix["M"], qd)) / 2 - energy["kinetic"], energy["kinetic"]
+
+
+def the_rate_of_M_less_2C_is_skew_symmetric(x: Motion, mass_matrix: Any, coriolis_matrix: Any) -> Residual:
+    skew = x.rate("mass_matrix", "M", q=x.inputs["qd"]) - 2 * coriolis_matrix["C"]
+    return skew + _turned(skew), coriolis_matrix["C"]
+
+
+def gravity_is_the_gradient_of_the_potential(x: Motion, gravity: Any, energy: Any) -> Residual:
+    power = x.rate("energy", "potential", q=x.inputs["qd"])
+    return power - _dot(gravity["gravity"], x.inputs["qd"]), power
+
+
+def bias_is_C_qd_plus_gravity(x: Motion, bias: Any, coriolis_matrix: Any, gravity: Any) -> Residual:
+    return bias["bias"] - _times(coriolis_matrix["C"], x.inputs["qd"]) - gravity["gravity"], bias["bias"]
+
+
+def inverse_dynamics_is_M_qdd_plus_bias(x: Motion, inverse_dynamics: Any, mass_matrix: Any, bias: Any) -> Residual:
+    tau = inverse_dynamics["tau"]
+    return tau - _times(mass_matrix["M"], x.inputs["qdd"]) - bias["bias"], tau
+
+
+def forward_dynamics_solves_the_equations_of_motion(
+    x: Motion, forward_dynamics: Any, mass_matrix: Any, bias: Any
+) -> Residual:
+    tau = _times(mass_matrix["M"], forward_dynamics["qdd"]) + bias["bias"]
+    return tau - x.inputs["tau"], tau
+
+
+def the_fused_dynamics_equal_the_separate_ones(
+    x: Motion, dynamics: Any, mass_matrix: Any, coriolis_matrix: Any, gravity: Any
+) -> Residual:
+    parts = [("M", mass_matrix["M"]), ("C", coriolis_matrix["C"]), ("gravity", gravity["gravity"])]
+    scaled = [((dynamics[n] - v) / abs(v).max()).reshape(x.samples, -1) for n, v in parts]
+    return np.concatenate(scaled, axis=1), np.array([[arb(1)]])
+
+
+def energy_changes_by_the_power_of_the_joint_torques(x: Motion, energy: Any, inverse_dynamics: Any) -> Residual:
+    along = {"q": x.inputs["qd"], "qd": x.inputs["qdd"]}
+    rate = x.rate("energy", "kinetic", **along) + x.rate("energy", "potential", **along)
+    return rate - _dot(inverse_dynamics["tau"], x.inputs["qd"]), rate
+
+
+def rotations_are_orthogonal(x: Motion, link_poses: Any) -> Residual:
+    R = link_poses["T"][..., :3, :3]
+    return R @ _turned(R) - np.eye(3, dtype=int), np.array([[arb(1)]])
+
+
+def the_jacobian_gives_the_velocity_of_the_tip(x: Motion, jacobian: Any, fingertip_pose: Any) -> Residual:
+    twist, rate = _times(jacobian["J"], x.inputs["qd"]), x.rate("fingertip_pose", "T", q=x.inputs["qd"])
+    return rate[:, :3, 3] - twist[:, :3], twist[:, :3]
+
+
+def the_jacobian_gives_the_angular_velocity_of_the_tip(x: Motion, jacobian: Any, fingertip_pose: Any) -> Residual:
+    omega = _times(jacobian["J"], x.inputs["qd"])[:, 3:]
+    spin = x.rate("fingertip_pose", "T", q=x.inputs["qd"])[:, :3, :3] @ _turned(fingertip_pose["T"][:, :3, :3])
+    return np.stack([spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0]], axis=1) - omega, omega
+
+
+def the_coupling_is_the_derivative_of_the_tendon_lengths(x: Motion, coupling: Any, tendon_lengths: Any) -> Residual:
+    rate = x.rate("tendon_lengths", "h", q=x.inputs["qd"])
+    return rate - _times(coupling["P"], x.inputs["qd"]), rate
+
+
+def the_coupling_derivative_is_the_rate_of_the_coupling(x: Motion, coupling_derivative: Any, coupling: Any) -> Residual:
+    rate = _times(coupling_derivative["dP"], x.inputs["qd"][:, None, :])
+    return x.rate("coupling", "P", q=x.inputs["qd"]) - rate, coupling["P"]
+
+
+def the_power_of_the_joints_is_taken_from_the_tendons(x: Motion, joint_torque: Any, tendon_lengths: Any) -> Residual:
+    power = _dot(joint_torque["tau"], x.inputs["qd"])
+    return power + _dot(x.inputs["f"], x.rate("tendon_lengths", "h", q=x.inputs["qd"])), power
+
+
+def the_joint_stiffness_is_symmetric(x: Motion, joint_stiffness: Any) -> Residual:
+    return joint_stiffness["K"] - _turned(joint_stiffness["K"]), joint_stiffness["K"]
+
+
+def the_joint_stiffness_is_the_falling_torque(x: Motion, joint_stiffness: Any, coupling: Any, joint_torque: Any) -> Residual:
+    qd = x.inputs["qd"]
+    stretching = x.inputs["k"] * _times(coupling["P"], qd)
+    rate = x.rate("joint_torque", "tau", q=qd, f=stretching)
+    return rate + _times(joint_stiffness["K"], qd), rate
+
+
+LAWS: tuple[Callable[..., Residual], ...] = (
+    the_mass_matrix_is_symmetric,
+    half_qd_M_qd_is_the_kinetic_energy,
+    the_rate_of_M_less_2C_is_skew_symmetric,
+    gravity_is_the_gradient_of_the_potential,
+    bias_is_C_qd_plus_gravity,
+    inverse_dynamics_is_M_qdd_plus_bias,
+    forward_dynamics_solves_the_equations_of_motion,
+    the_fused_dynamics_equal_the_separate_ones,
+    energy_changes_by_the_power_of_the_joint_torques,
+    rotations_are_orthogonal,
+    the_jacobian_gives_the_velocity_of_the_tip,
+    the_jacobian_gives_the_angular_velocity_of_the_tip,
+    the_coupling_is_the_derivative_of_the_tendon_lengths,
+    the_coupling_derivative_is_the_rate_of_the_coupling,
+    the_power_of_the_joints_is_taken_from_the_tendons,
+    the_joint_stiffness_is_symmetric,
+    the_joint_stiffness_is_the_falling_torque,
+)
+
+
+def obey(
+    part: str, graphs: Mapping[str, Graph], inputs: Mapping[str, Tensor], values: Mapping[str, Fraction]
+) -> list[Law]:
+    """Check all laws that the given kernels (by family name) can be asked for."""
+    motion = Motion(graphs, inputs, values)
+    found = {family: motion.at(family) for family in graphs}
+    laws = []
+    for law in LAWS:
+        needs = list(inspect.signature(law).parameters)[1:]
+        if all(family in graphs for family in needs):
+            residual, terms = law(motion, *(found[family] for family in needs))
+            worst = _relative(residual, terms)
+            laws.append(Law(part, law.__name__.replace("_", " "), worst, worst <= LIMIT))
+    if "mass_matrix" in graphs:
+        eigenvalues = np.linalg.eigvalsh(np.vectorize(lambda x: float(x.mid()))(found["mass_matrix"]["M"]))
+        ratio = float(np.min(eigenvalues[:, 0] / eigenvalues[:, -1]))
+        laws.append(Law(part, "the mass matrix is positive definite", max(0.0, -ratio), ratio > POSITIVE))
+    return laws
+
+
+def _relative(residual: Tensor, terms: Tensor) -> float:
+    """Largest residual over the largest term; infinity for anything that is not a number."""
+    largest = max((x.abs_upper() for x in residual.flat), default=arb(0))
+    scale = max((abs(x).mid() for x in terms.flat), default=arb(0))
+    if not largest.is_finite() or not all(x.is_finite() for x in residual.flat):
+        return float("inf")
+    if largest == 0:
+        return 0.0
+    return float(largest / scale) if scale > 0 else float("inf")

@@ -1,0 +1,76 @@
+"""High-precision values of a kernel at the sample points, and how far its graphs agree on them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from flint import arb
+
+from awiwi_gen.ir.algebras import Balls, ball
+from awiwi_gen.ir.graph import Graph, Node
+from awiwi_gen.ir.interpret import evaluate
+
+Array = np.ndarray[Any, Any]
+BallArrays = dict[str, list[list[arb]]]
+
+
+@dataclass(frozen=True)
+class Reference:
+    """Exact values rounded to a sum of two doubles, (samples, size) per output: some 106 bits."""
+
+    high: dict[str, Array]
+    low: dict[str, Array]
+
+    def error(self, output: str, computed: Array) -> Array:
+        """Absolute errors of computed values."""
+        error: Array = np.abs((computed.astype(np.float64) - self.high[output]) - self.low[output])
+        return error
+
+
+def ball_values(graph: Graph, inputs: Mapping[str, Array], values: Mapping[str, Fraction]) -> BallArrays:
+    """A graph in ball arithmetic at all samples: per output, per element, a list over the samples."""
+    samples = len(next(iter(inputs.values())))
+
+    def leaf(node: Node) -> list[arb]:
+        if node[0] == "param":
+            return [ball(values[node[1]])] * samples
+        return [arb(x) for x in inputs[node[1]][:, node[2]].astype(np.float64).tolist()]
+
+    return evaluate(graph, Balls(samples), leaf)
+
+
+def reference(values: BallArrays) -> Reference:
+    """Round ball values to pairs of doubles."""
+    high, low = {}, {}
+    for name, elements in values.items():
+        high[name] = np.array([[float(x.mid()) for x in e] for e in elements]).T
+        low[name] = np.array(
+            [
+                [float((x - arb(h)).mid()) for x, h in zip(e, column, strict=True)]
+                for e, column in zip(elements, high[name].T, strict=True)
+            ]
+        ).T
+    return Reference(high, low)
+
+
+def disagreement(a: BallArrays, b: BallArrays) -> float:
+    """Worst difference over all outputs and samples, relative to the largest value of that output.
+
+    The radius of the balls counts, so two results agree only if both are known well enough; anything that
+    is not a number gives infinity.
+    """
+    worst = 0.0
+    for name, elements in a.items():
+        pairs = [(x, y) for u, v in zip(elements, b[name], strict=True) for x, y in zip(u, v, strict=True)]
+        scale = max((abs(x).mid() for x, _ in pairs), default=arb(0))
+        for x, y in pairs:
+            difference = (x - y).abs_upper()
+            if not difference.is_finite() or not scale.is_finite():
+                return float("inf")
+            if difference > 0:
+                worst = max(worst, float(difference / scale) if scale > 0 else float("inf"))
+    return worst

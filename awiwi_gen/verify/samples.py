@@ -1,0 +1,34 @@
+"""Where kernels are tried: limits, the straight finger, corners, and the inside of every port's range."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from awiwi_gen.kernel import Port
+
+SAMPLES = 320
+SEED = 20120301  # printed with every report; the samples of a part depend on it and on the part's name only
+
+Array = np.ndarray[Any, Any]
+
+
+def draw(ports: Mapping[str, Port], part: str, dtype: type = np.float64, samples: int = SAMPLES) -> dict[str, Array]:
+    """Arrays (samples, size) for every input port.
+
+    Row 0 is zero (the straight finger at rest) as far as the range allows, rows 1 and 2 are the lower and
+    the upper limits, every eighth row a corner of the box, the others are uniform.
+    """
+    drawn = {}
+    for name, port in ports.items():
+        random = np.random.default_rng([SEED, zlib.crc32(f"{part}.{name}".encode())])
+        low, high = np.array(port.bounds()).T.reshape(2, port.size)
+        rows = random.uniform(low, high, (samples, port.size))
+        corners = np.where(random.random((samples, port.size)) < 0.5, low, high)
+        rows[::8] = corners[::8]
+        rows[0], rows[1], rows[2] = np.clip(0.0, low, high), low, high
+        drawn[name] = rows.astype(dtype)
+    return drawn

@@ -1,0 +1,111 @@
+"""The comparison of one compiled kernel with its reference, and what it says."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from awiwi_gen.ir.algebras import Bounded, Floats
+from awiwi_gen.ir.graph import Graph, Node
+from awiwi_gen.ir.interpret import evaluate
+from awiwi_gen.verify.reference import Reference
+
+Array = np.ndarray[Any, Any]
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What was found for one kernel; ``passed`` only if every level passed.
+
+    ``bit_exact`` (level 1): the C equals the float interpreter in every bit. ``passes`` (level 2) and
+    ``agreement`` (level 4): worst relative difference at 256 bits between the graphs before and after a
+    pass, and between the routes. Level 3: ``worst_ulp`` in units in the last place, ``worst_scaled_error``
+    relative to the largest value of the output, ``bound_use`` the largest share of its rounding error bound
+    that an error reached; above 1 the C computes something else.
+    """
+
+    name: str
+    passed: bool
+    bit_exact: bool
+    worst_ulp: float
+    worst_scaled_error: float
+    bound_use: float
+    agreement: float
+    passes: float
+    samples: int
+    seed: int
+    reasons: tuple[str, ...] = ()
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        return asdict(self)
+
+
+def float_values(graph: Graph, inputs: Mapping[str, Array], params: Mapping[str, Any], algebra: Any) -> dict[str, Any]:
+    """A graph in an algebra on arrays; per output an array (samples, size), or (…) pairs stacked likewise."""
+    samples = len(next(iter(inputs.values())))
+
+    def leaf(node: Node) -> Any:
+        if node[0] == "param":
+            return algebra.const(params[node[1]])
+        column = inputs[node[1]][:, node[2]]
+        return (column.astype(np.float64), np.zeros(samples)) if isinstance(algebra, Bounded) else column
+
+    with np.errstate(all="ignore"):
+        return evaluate(graph, algebra, leaf)
+
+
+def stack(columns: list[Any], samples: int) -> Array:
+    """Columns (or constants) as an array (samples, size)."""
+    return np.stack([np.broadcast_to(np.asarray(c), (samples,)) for c in columns], axis=1)
+
+
+def judge(
+    name: str,
+    graph: Graph,
+    reference: Reference,
+    inputs: Mapping[str, Array],
+    params: Mapping[str, Any],
+    call: Callable[..., Any],
+    shapes: Mapping[str, tuple[int, ...]],
+    agreement: float,
+    passes: float,
+    seed: int,
+    dtype: type,
+) -> Verdict:
+    """Levels 1 and 3 for one compiled kernel, joined with what is known of its graphs."""
+    samples = len(next(iter(inputs.values())))
+    arrays = {port: a.reshape(samples, *shapes[port]) for port, a in inputs.items()}
+    raw = call(**arrays)
+    outputs = [o.name for o in graph.outputs]
+    computed = dict(zip(outputs, raw if len(outputs) > 1 else (raw,), strict=True))
+    computed = {port: np.asarray(a).reshape(samples, -1) for port, a in computed.items()}
+    mirrored = float_values(graph, inputs, params, Floats(dtype))
+    bounds = float_values(graph, inputs, params, Bounded(dtype))
+    exact = True
+    worst_ulp = worst_scaled = bound_use = 0.0
+    reasons = []
+    for port, values in computed.items():
+        mirror = stack(mirrored[port], samples).astype(dtype)
+        exact &= bool(np.array_equal(values.view(f"u{values.itemsize}"), mirror.view(f"u{mirror.itemsize}")))
+        error = reference.error(port, values)
+        limit = stack([b[1] for b in bounds[port]], samples)
+        if not np.isfinite(values).all():
+            reasons.append(f"{port} is not finite inside the documented range")
+            error = np.where(np.isfinite(error), error, np.inf)
+        scale = float(np.max(np.abs(reference.high[port]), initial=0.0)) or 1.0
+        spacing = np.spacing(np.abs(reference.high[port]).astype(dtype)).astype(np.float64)
+        worst_ulp = max(worst_ulp, float(np.max(error / spacing, initial=0.0)))
+        worst_scaled = max(worst_scaled, float(np.max(error, initial=0.0)) / scale)
+        share = np.divide(error, limit, out=np.where(error > 0, np.inf, 0.0), where=limit > 0)
+        bound_use = max(bound_use, float(np.max(share, initial=0.0)))
+    if not exact:
+        reasons.append("the C differs from the interpreter in some bits")
+    if not bound_use <= 1:
+        reasons.append(f"its error is {bound_use:.3g} times what rounding explains")
+    return Verdict(
+        name, not reasons, exact, worst_ulp, worst_scaled, bound_use, agreement, passes, samples, seed, tuple(reasons)
+    )

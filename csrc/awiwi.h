@@ -1,0 +1,7 @@
+/* The one header of the firmware interface. Preprocessed, it is also what Python is told. */
+#ifndef AWIWI_H
+#define AWIWI_H
+
+#include "kernels.h"
+
+#endif
