@@ -135,15 +135,15 @@ def _glue_object(name: str, glue: str, directory: Path, store: Cache) -> Path:
     target = store.directory / "objects" / digest
     if target.exists():
         return target
-    import cffi
+    import cffi.recompiler
 
     parts = json.loads(glue)
     ffi = cffi.FFI()
     ffi.cdef(re.sub(r"^#.*$", "", parts["declared"], flags=re.M) + "\n".join(parts["prototypes"]))
-    ffi.set_source(name, '#include "awiwi.h"\n' + "\n".join(parts["loops"]))
+    preamble = '#include "awiwi.h"\n' + "\n".join(parts["loops"])
     with tempfile.TemporaryDirectory() as scratch:
         source, made = Path(scratch) / f"{name}.c", Path(scratch) / f"{name}.o"
-        ffi.emit_c_code(str(source))
+        cffi.recompiler.make_c_source(ffi, name, preamble, str(source))
         python = sysconfig.get_paths()["include"]
         compiler().run(
             *GLUE_FLAGS, f"-I{python}", f"-I{directory}", f"-I{CSRC}", "-c", str(source), "-o", str(made)

@@ -30,7 +30,8 @@ if TYPE_CHECKING:
 __all__ = ["HandFile", "key_path"]
 
 Model = TypeVar("Model", bound=BaseModel)
-_MOST_BYTES = 1_000_000  # a hand file has about 10 kB; a disk image must not be parsed to learn that it is none
+_MOST_BYTES = 1_000_000  # a hand file has about 15 kB; a disk image must not be parsed to learn that it is none
+_MOST_COLUMNS = 1000  # the time to parse a dotted key grows with its square
 
 
 def key_path(keys: Keys) -> str:
@@ -76,18 +77,21 @@ class HandFile:
     @classmethod
     def parse(cls, text: str, name: str) -> HandFile:
         """Parse TOML text. Raises `InputError` with line and column."""
+        for line, content in enumerate(text.split("\n"), start=1):
+            if len(content) > _MOST_COLUMNS:
+                raise InputError(Fault(file=name, line=line, message=f"is longer than {_MOST_COLUMNS} characters"))
         try:
             return cls(name, text, tomllib.loads(text))
         except RecursionError:
-            message, line = "nests its brackets too deeply", None
+            fault = Fault(file=name, message="nests its brackets too deeply")
         except ValueError as error:  # a TOMLDecodeError, or an integer of more digits than Python reads
             found = re.search(r" \(at (?:line (\d+), column (\d+)|end of document)\)$", str(error))
             at_end = found is not None and found[1] is None
-            line = text.count("\n") + 1 if at_end else int(found[1]) if found else None
+            place = text.count("\n") + 1 if at_end else int(found[1]) if found else None
             column = " at its end" if at_end else f" in column {found[2]}" if found else ""
             reason = str(error)[: found.start() if found else 200]
-            message = f"is not TOML{column}: {reason[:1].lower()}{reason[1:]}"
-        raise InputError(Fault(file=name, line=line, message=message))
+            fault = Fault(file=name, line=place, message=f"is not TOML{column}: {reason[:1].lower()}{reason[1:]}")
+        raise InputError(fault)
 
     def validated(self, schema: type[Model]) -> Model:
         """Hold the data against a schema. Raises `InputError` with all faults."""

@@ -28,6 +28,7 @@ from awiwi_gen.verify.verdict import Verdict, judge
 
 ROUTES_AGREE = 1e-40  # level 4
 PASSES_AGREE = 1e-50  # level 2
+HOPELESS = 2  # passes seldom halve a cost
 
 
 @dataclass(frozen=True)
@@ -73,6 +74,15 @@ def load_graphs(kernel: Kernel, cache: Cache) -> dict[str, Graph]:
     return found
 
 
+def cheapest(bound: Mapping[str, Graph]) -> tuple[str, list[tuple[str, Graph]]]:
+    """The route whose C costs least, and its stages; a route that starts out far behind is not optimised."""
+    raw = {route: cost(graph).weight for route, graph in bound.items()}
+    promising = [route for route, weight in raw.items() if weight <= HOPELESS * min(raw.values())]
+    stages = {route: optimise(bound[route]) for route in promising}
+    best = min(stages, key=lambda route: cost(stages[route][-1][1]).weight)
+    return best, stages[best]
+
+
 def make_record(kernel: Kernel, graphs: Mapping[str, Graph], prefix: str, options: Options, digest: str) -> Record:
     """Bind, compare the routes, optimise the cheaper one, print it.
 
@@ -81,8 +91,7 @@ def make_record(kernel: Kernel, graphs: Mapping[str, Graph], prefix: str, option
     values = {path: quantity.value for path, quantity in kernel.part.quantities().items()}
     numbers = values if options.params == "baked" else {}
     bound = {route: bind(graph, numbers) for route, graph in graphs.items()}
-    candidates = {route: optimise(graph) for route, graph in bound.items()}
-    route = min(candidates, key=lambda name: cost(candidates[name][-1][1]).weight)
+    route, optimised = cheapest(bound)
     inputs = draw(kernel.inputs, kernel.path, options.dtype)
     exact = {name: ball_values(graph, inputs, values) for name, graph in bound.items()}
     definition = next(iter(exact.values()))
@@ -90,13 +99,13 @@ def make_record(kernel: Kernel, graphs: Mapping[str, Graph], prefix: str, option
     if not agreement <= ROUTES_AGREE:
         raise VerificationError(f"{kernel.name}: its derivations {', '.join(exact)} differ by {agreement:.1e}")
     before, passes = exact[route], 0.0
-    for name, graph in candidates[route]:
+    for name, graph in optimised:
         after = ball_values(graph, inputs, values)
         change = disagreement(before, after)
         if not change <= PASSES_AGREE:
             raise VerificationError(f"{kernel.name}: pass {name} changes its value by {change:.1e}")
         before, passes = after, max(passes, change)
-    final = candidates[route][-1][1]
+    final = optimised[-1][1]
     function = c_function(
         kernel.name,
         prefix,

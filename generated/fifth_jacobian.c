@@ -4,7 +4,7 @@
  * Source: eq. 5.3, differentiated.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   out  J[6][4] in m/rad, 1
- * Cost: 43 add, 70 mul, 2 div, 9 neg, 1 sqrt, 5 sincos.
+ * Cost: 45 add, 66 mul, 2 div, 7 neg, 1 sqrt, 5 sincos.
  * Inputs: sha256 41e0b066350c1515c23653124cb3764011a2af2cb74c560413362bf44f18b5d9.
  */
 #include <math.h>
@@ -34,52 +34,50 @@ void awiwi_fifth_jacobian(const double q[restrict 4], double J[restrict 24])
     const double t17 = sqrt(5.625e-05*t15 - t16*t16);
     const double t18 = t10*t16 - t13*t17;
     const double t19 = t13*t16 + t10*t17;
-    const double t20 = 0.006477089970083198*t18 + 0.0037811777952706273*t19;
-    const double t21 = 17777.777777777777*t20;
+    const double t20 = 17777.777777777777*(0.006477089970083198*t18 + 0.0037811777952706273*t19);
     const double sin_q1 = sin(q[1]);
     const double cos_q1 = cos(q[1]);
     const double cos_q2 = cos(q[2]);
-    const double t22 = cos(t0);
-    const double t23 = cos(t2);
-    const double t24 = 0.018*t23;
-    const double t25 = 0.022*t22 + t24;
-    const double t26 = 0.033*cos_q2 + t25;
-    const double t27 = t26 + 0.006;
-    const double t28 = 0.0036*sin_q1 - cos_q1*t27;
-    const double t29 = t28 - 0.004;
-    const double t30 = 0.0037811777952706273*t18 - 0.006477089970083198*t19;
-    const double t31 = 17777.777777777777*t30;
-    const double t32 = t7*t21 - t29*t31;
-    const double t33 = t10 - t18;
-    const double t34 = t13 - t19;
-    const double t35 = (t12*t33 - t10*t34)/(t18*t34 - t19*t33) + 1.0;
-    const double t36 = sin_q1*t21;
-    const double t37 = cos_q1*t21;
-    const double t38 = t7*t31 + t29*t21;
-    const double t39 = sin_q1*t31;
-    const double t40 = cos_q1*t31;
-    J[0] = t32*t35 - (t10 + t32);
-    J[1] = -(64.0*cos_q1*t20) - t27*t36;
-    J[2] = -(t26*t31) - t6*t37;
-    J[3] = -(t25*t31 + t5*t37) - 0.7692307692307693*(t24*t31 + t4*t37);
+    const double t21 = cos(t0);
+    const double t22 = cos(t2);
+    const double t23 = 0.018*t22;
+    const double t24 = 0.022*t21 + t23;
+    const double t25 = 0.033*cos_q2 + t24;
+    const double t26 = t25 + 0.006;
+    const double t27 = 0.0036*sin_q1 - cos_q1*t26;
+    const double t28 = t27 - 0.004;
+    const double t29 = 17777.777777777777*(0.006477089970083198*t19 - 0.0037811777952706273*t18);
+    const double t30 = t7*t20 + t28*t29;
+    const double t31 = t10 - t18;
+    const double t32 = t13 - t19;
+    const double t33 = (t12*t31 - t10*t32)/(t18*t32 - t19*t31) + 1.0;
+    const double t34 = cos_q1*t20;
+    const double t35 = sin_q1*t20;
+    const double t36 = t7*t29 - t28*t20;
+    const double t37 = cos_q1*t29;
+    const double t38 = sin_q1*t29;
+    J[0] = t30*t33 - (t10 + t30);
+    J[1] = -(0.0036*t34) - t26*t35;
+    J[2] = t25*t29 - t6*t34;
+    J[3] = t24*t29 - t5*t34 + 0.7692307692307693*(t23*t29 - t4*t34);
     J[4] = 0.0;
-    J[5] = -t28;
+    J[5] = -t27;
     J[6] = -(sin_q1*t6);
-    J[7] = -(0.013846153846153847*sin_q1*t3) - sin_q1*t5;
-    J[8] = t12 - t38 + t38*t35;
-    J[9] = -(64.0*cos_q1*t30) - t27*t39;
-    J[10] = t26*t21 - t6*t40;
-    J[11] = t25*t21 - t5*t40 + 0.7692307692307693*(t24*t21 - t4*t40);
+    J[7] = -(0.7692307692307693*(sin_q1*t4)) - sin_q1*t5;
+    J[8] = t12 + t36 - t36*t33;
+    J[9] = 0.0036*t37 + t26*t38;
+    J[10] = t25*t20 + t6*t37;
+    J[11] = t24*t20 + t5*t37 + 0.7692307692307693*(t23*t20 + t4*t37);
     J[12] = 0.0;
-    J[13] = -t31;
-    J[14] = t36;
-    J[15] = 31452.991452991453*sin_q1*t20;
-    J[16] = t35 - 1.0;
+    J[13] = t29;
+    J[14] = t35;
+    J[15] = t35 + 0.7692307692307693*t35;
+    J[16] = t33 - 1.0;
     J[17] = 0.0;
     J[18] = -cos_q1;
     J[19] = -1.7692307692307692*cos_q1;
     J[20] = 0.0;
-    J[21] = t21;
-    J[22] = t39;
-    J[23] = 31452.991452991453*sin_q1*t30;
+    J[21] = t20;
+    J[22] = -t38;
+    J[23] = -t38 - 0.7692307692307693*t38;
 }

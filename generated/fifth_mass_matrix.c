@@ -4,7 +4,7 @@
  * Source: eq. 2.17, 5.4.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   out  M[4][4] in kg m^2
- * Cost: 133 add, 163 mul, 2 div, 3 neg, 1 sqrt, 5 sincos.
+ * Cost: 133 add, 163 mul, 2 div, 4 neg, 1 sqrt, 5 sincos.
  * Inputs: sha256 1b4f2a45bcee4bea15ec85840eb1f3dc49fd8ba8ccf8ee50af2ad1ca522f359a.
  */
 #include <math.h>
@@ -88,15 +88,15 @@ void awiwi_fifth_mass_matrix(const double q[restrict 4], double M[restrict 16])
     const double t68 = t44 - t33;
     const double t69 = 0.006*cos_q1;
     const double t70 = t2*(t36*t52 - t24*t66) + t4*(t36*t49 + t24*t67) - (0.004*t36 + cos_q1*(0.006*t36 + t68) - t69*t24 - sin_q1*t41)*t64;
-    const double t71 = t43 - t32;
-    const double t72 = t58*t35 + t59*t23 + t71;
-    const double t73 = t31 - t42;
-    const double t74 = t56*t34 + t57*t22 - t73;
-    const double t75 = t58*t34 + t59*t22 + t74;
-    const double t76 = 0.004*t34 + cos_q1*(0.006*t34 + t75) - t69*t22 - sin_q1*t39;
-    const double t77 = t2*(t35*t52 - t23*t66) + t4*(t35*t49 + t23*t67) - (0.004*t35 + cos_q1*(0.006*t35 + t72) - t69*t23 - sin_q1*t40)*t64 - 0.7692307692307693*(t76*t15 + (-t76 - t2*(t34*t52 - t22*t66) - t4*(t34*t49 + t22*t67)));
+    const double t71 = t42 - t31;
+    const double t72 = t56*t34 + t57*t22 + t71;
+    const double t73 = t58*t34 + t59*t22 + t72;
+    const double t74 = 0.004*t34 + cos_q1*(0.006*t34 + t73) - t69*t22 - sin_q1*t39;
+    const double t75 = t43 - t32;
+    const double t76 = t58*t35 + t59*t23 + t75;
+    const double t77 = t2*(t35*t52 - t23*t66) + t4*(t35*t49 + t23*t67) + 0.7692307692307693*(-(t74*t15) - (-t74 - t2*(t34*t52 - t22*t66) - t4*(t34*t49 + t22*t67))) - (0.004*t35 + cos_q1*(0.006*t35 + t76) - t69*t23 - sin_q1*t40)*t64;
     const double t78 = t62 + 0.7692307692307693*t61;
-    const double t79 = t72 + 0.7692307692307693*t75;
+    const double t79 = t76 + 0.7692307692307693*t73;
     M[0] = 2.0*t15*(t46 + t2*t53 - t4*t54) + 2.03e-06 - 0.02*(t1*t53 - t3*t54) - t46*(t15*t15 + 1.0);
     M[1] = t65;
     M[2] = t70;
@@ -112,5 +112,5 @@ void awiwi_fifth_mass_matrix(const double q[restrict 4], double M[restrict 16])
     M[12] = t77;
     M[13] = t78;
     M[14] = t79;
-    M[15] = t71 + 1.5384615384615385*t74 - 0.591715976331361*t73;
+    M[15] = t75 + 0.591715976331361*t71 + 1.5384615384615385*t72;
 }

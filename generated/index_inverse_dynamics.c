@@ -7,7 +7,7 @@
  *   in   qdd[4] in rad/s^2, -2000 to 2000
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  tau[4] in N m
- * Cost: 113 add, 125 mul, 4 sincos.
+ * Cost: 113 add, 123 mul, 4 sincos.
  * Inputs: sha256 3111373cde589691558afe839d151a7b960ef034f13613b5010ff777ad2e903d.
  */
 #include <math.h>
@@ -71,17 +71,17 @@ void awiwi_index_inverse_dynamics(const double q[restrict 4], const double qd[re
     const double t48 = t7*t35 + 1.14e-08;
     const double t49 = 0.0298*t7;
     const double t50 = t14*t38 + 4.4e-09;
-    const double t51 = 3.22e-05*t0 + 0.0001245*t1 + qdd[1]*t2 + t3*(1.244876e-06*cos_q1 - 9.6e-09*sin_q1) + t4*t8 + t9*t10 + t11*t15 + 0.005*t25 + t26*t31 + qdd[0]*(t34 + t37 + t40 + 1.03491e-06) + t41*t44 + 0.006*(qdd[0]*t9 + t44 - t28*t45) - t28*t46 - (7.5326e-07*t6 - 5.8e-09*t7)*(t17 - t21) - t42*t47 - t29*t48 - (6.6e-09*t13 - 1.24e-09*t14)*(t17 - t23) - t24*(0.005*qd[0]*qd[0] + t29*t49 + t47 - qdd[0]*t26) - t30*t50;
-    const double t52 = 0.006*qd[0]*qd[0] + t0;
+    const double t51 = 3.22e-05*t0 + 0.0001245*t1 + qdd[1]*t2 + t3*(1.244876e-06*cos_q1 - 9.6e-09*sin_q1) + t4*t8 + t9*t10 + t11*t15 + 0.005*t25 + t26*t31 + qdd[0]*(t34 + t37 + t40 + 1.03491e-06) + t41*t44 + 0.006*(qdd[0]*t9 + t44 - t28*t45) - t28*t46 - (7.5326e-07*t6 - 5.8e-09*t7)*(t17 - t21) - t42*t47 - t29*t48 - (6.6e-09*t13 - 1.24e-09*t14)*(t17 - t23) - t24*(0.005*t17 + t29*t49 + t47 - qdd[0]*t26) - t30*t50;
+    const double t52 = 0.006*t17 + t0;
     const double t53 = t3 + t20;
     const double t54 = t53 + t22;
     const double t55 = t11*t24 - t54*t16;
     const double t56 = 0.04038*sin_q1;
     const double t57 = qdd[1]*t56 + t18*t41 + t52;
     const double t58 = g[2] + t3*t56 - qdd[1]*t41;
-    const double t59 = qdd[0]*t15 + t16*(0.005*qdd[0] + t4*t49 + t57 + t26*t21) - t24*(t58 + t49*t53 - t4*t26) - (t54 - t23)*t50 - t11*(t39 - 3.9075e-07 - t40);
-    const double t60 = qdd[0]*t8 + t43*t57 + t26*t55 + t49*t25 + t59 - t42*t58 - (t53 - t21)*t48 - t4*(t36 - 5.25816e-06 - t37);
-    const double t61 = qdd[0]*t2 + t45*t52 + t17*t46 + t41*(t4*t42 + t55 - t53*t43) + t56*(t4*t43 + t21*t42 + t25) + t60 - g[2]*t9 - qdd[1]*(t33 - 2.1745844e-05 - t34);
+    const double t59 = qdd[0]*t15 + t16*(0.005*qdd[0] + t4*t49 + t57 + t26*t21) + t11*(t40 - (t39 - 3.9075e-07)) - t24*(t58 + t49*t53 - t4*t26) - (t54 - t23)*t50;
+    const double t60 = qdd[0]*t8 + t43*t57 + t4*(t37 - (t36 - 5.25816e-06)) + t26*t55 + t49*t25 + t59 - t42*t58 - (t53 - t21)*t48;
+    const double t61 = qdd[0]*t2 + t45*t52 + t17*t46 + qdd[1]*(t34 - (t33 - 2.1745844e-05)) + t41*(t4*t42 + t55 - t53*t43) + t56*(t4*t43 + t21*t42 + t25) + t60 - g[2]*t9;
     tau[0] = t51;
     tau[1] = t61;
     tau[2] = t60;

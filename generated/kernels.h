@@ -24,7 +24,7 @@ void awiwi_thumb_fingertip_pose(const double q[4], double T[16]);
  * Source: eq. 5.2.
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   out  T[4][4][4] in 1, m
- * Cost: 14 add, 35 mul, 13 neg, 4 sincos.
+ * Cost: 14 add, 32 mul, 12 neg, 4 sincos.
  */
 void awiwi_thumb_link_poses(const double q[4], double T[64]);
 
@@ -52,7 +52,7 @@ void awiwi_thumb_mass_matrix(const double q[4], double M[16]);
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   in   qd[4] in rad/s, -20 to 20
  *   out  C[4][4] in N m s/rad
- * Cost: 172 add, 175 mul, 5 neg, 3 sincos.
+ * Cost: 173 add, 166 mul, 5 neg, 3 sincos.
  */
 void awiwi_thumb_coriolis_matrix(const double q[4], const double qd[4], double C[16]);
 
@@ -73,7 +73,7 @@ void awiwi_thumb_gravity(const double q[4], const double g[3], double gravity[4]
  *   in   qd[4] in rad/s, -20 to 20
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  bias[4] in N m
- * Cost: 111 add, 146 mul, 4 sincos.
+ * Cost: 111 add, 133 mul, 4 sincos.
  */
 void awiwi_thumb_bias(const double q[4], const double qd[4], const double g[3], double bias[4]);
 
@@ -85,7 +85,7 @@ void awiwi_thumb_bias(const double q[4], const double qd[4], const double g[3], 
  *   in   qdd[4] in rad/s^2, -2000 to 2000
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  tau[4] in N m
- * Cost: 131 add, 143 mul, 1 neg, 4 sincos.
+ * Cost: 131 add, 142 mul, 1 neg, 4 sincos.
  */
 void awiwi_thumb_inverse_dynamics(const double q[4], const double qd[4], const double qdd[4], const double g[3], double tau[4]);
 
@@ -97,7 +97,7 @@ void awiwi_thumb_inverse_dynamics(const double q[4], const double qd[4], const d
  *   in   tau[4] in N m, -1 to 1
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  qdd[4] in rad/s^2
- * Cost: 172 add, 201 mul, 4 div, 3 neg, 4 sincos.
+ * Cost: 172 add, 188 mul, 4 div, 2 neg, 4 sincos.
  */
 void awiwi_thumb_forward_dynamics(const double q[4], const double qd[4], const double tau[4], const double g[3], double qdd[4]);
 
@@ -110,7 +110,7 @@ void awiwi_thumb_forward_dynamics(const double q[4], const double qd[4], const d
  *   out  M[4][4] in kg m^2
  *   out  C[4][4] in N m s/rad
  *   out  gravity[4] in N m
- * Cost: 200 add, 212 mul, 11 neg, 4 sincos.
+ * Cost: 201 add, 203 mul, 10 neg, 4 sincos.
  */
 void awiwi_thumb_dynamics(const double q[4], const double qd[4], const double g[3], double M[16], double C[16], double gravity[4]);
 
@@ -122,7 +122,7 @@ void awiwi_thumb_dynamics(const double q[4], const double qd[4], const double g[
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  kinetic[1] in J
  *   out  potential[1] in J
- * Cost: 76 add, 105 mul, 2 neg, 4 sincos.
+ * Cost: 76 add, 100 mul, 4 neg, 4 sincos.
  */
 void awiwi_thumb_energy(const double q[4], const double qd[4], const double g[3], double kinetic[1], double potential[1]);
 
@@ -140,7 +140,7 @@ void awiwi_thumb_tendon_lengths(const double q[4], double h[8]);
  * Source: eq. 5.6, 5.9, 5.21.
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   out  P[8][4] in m/rad
- * Cost: 44 add, 58 mul, 4 div, 4 sqrt, 2 sincos.
+ * Cost: 44 add, 58 mul, 4 div, 2 neg, 4 sqrt, 2 sincos.
  */
 void awiwi_thumb_coupling(const double q[4], double P[32]);
 
@@ -159,7 +159,7 @@ void awiwi_thumb_coupling_derivative(const double q[4], double dP[128]);
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   in   f[8] in N, 0 to 100
  *   out  tau[4] in N m
- * Cost: 62 add, 61 mul, 4 div, 4 sqrt, 2 sincos.
+ * Cost: 62 add, 61 mul, 4 div, 3 neg, 4 sqrt, 2 sincos.
  */
 void awiwi_thumb_joint_torque(const double q[4], const double f[8], double tau[4]);
 
@@ -170,7 +170,7 @@ void awiwi_thumb_joint_torque(const double q[4], const double f[8], double tau[4
  *   in   f[8] in N, 0 to 100
  *   in   k[8] in N/m, 1000 to 50000
  *   out  K[4][4] in N m/rad
- * Cost: 125 add, 185 mul, 8 div, 4 sqrt, 2 sincos.
+ * Cost: 126 add, 187 mul, 8 div, 4 sqrt, 2 sincos.
  */
 void awiwi_thumb_joint_stiffness(const double q[4], const double f[8], const double k[8], double K[16]);
 
@@ -206,7 +206,7 @@ void awiwi_index_jacobian(const double q[4], double J[24]);
  * Source: eq. 2.17, 5.4.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   out  M[4][4] in kg m^2
- * Cost: 44 add, 44 mul, 3 sincos.
+ * Cost: 44 add, 44 mul, 1 neg, 3 sincos.
  */
 void awiwi_index_mass_matrix(const double q[4], double M[16]);
 
@@ -216,7 +216,7 @@ void awiwi_index_mass_matrix(const double q[4], double M[16]);
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   qd[4] in rad/s, -20 to 20
  *   out  C[4][4] in N m s/rad
- * Cost: 92 add, 93 mul, 5 neg, 3 sincos.
+ * Cost: 96 add, 93 mul, 4 neg, 3 sincos.
  */
 void awiwi_index_coriolis_matrix(const double q[4], const double qd[4], double C[16]);
 
@@ -237,7 +237,7 @@ void awiwi_index_gravity(const double q[4], const double g[3], double gravity[4]
  *   in   qd[4] in rad/s, -20 to 20
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  bias[4] in N m
- * Cost: 71 add, 90 mul, 1 neg, 4 sincos.
+ * Cost: 71 add, 88 mul, 1 neg, 4 sincos.
  */
 void awiwi_index_bias(const double q[4], const double qd[4], const double g[3], double bias[4]);
 
@@ -249,7 +249,7 @@ void awiwi_index_bias(const double q[4], const double qd[4], const double g[3], 
  *   in   qdd[4] in rad/s^2, -2000 to 2000
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  tau[4] in N m
- * Cost: 113 add, 125 mul, 4 sincos.
+ * Cost: 113 add, 123 mul, 4 sincos.
  */
 void awiwi_index_inverse_dynamics(const double q[4], const double qd[4], const double qdd[4], const double g[3], double tau[4]);
 
@@ -261,7 +261,7 @@ void awiwi_index_inverse_dynamics(const double q[4], const double qd[4], const d
  *   in   tau[4] in N m, -1 to 1
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  qdd[4] in rad/s^2
- * Cost: 131 add, 145 mul, 4 div, 4 sincos.
+ * Cost: 131 add, 143 mul, 4 div, 4 sincos.
  */
 void awiwi_index_forward_dynamics(const double q[4], const double qd[4], const double tau[4], const double g[3], double qdd[4]);
 
@@ -274,7 +274,7 @@ void awiwi_index_forward_dynamics(const double q[4], const double qd[4], const d
  *   out  M[4][4] in kg m^2
  *   out  C[4][4] in N m s/rad
  *   out  gravity[4] in N m
- * Cost: 139 add, 132 mul, 6 neg, 4 sincos.
+ * Cost: 140 add, 132 mul, 6 neg, 4 sincos.
  */
 void awiwi_index_dynamics(const double q[4], const double qd[4], const double g[3], double M[16], double C[16], double gravity[4]);
 
@@ -286,7 +286,7 @@ void awiwi_index_dynamics(const double q[4], const double qd[4], const double g[
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  kinetic[1] in J
  *   out  potential[1] in J
- * Cost: 61 add, 76 mul, 4 sincos.
+ * Cost: 61 add, 77 mul, 4 sincos.
  */
 void awiwi_index_energy(const double q[4], const double qd[4], const double g[3], double kinetic[1], double potential[1]);
 
@@ -323,7 +323,7 @@ void awiwi_index_coupling_derivative(const double q[4], double dP[128]);
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   f[8] in N, 0 to 100
  *   out  tau[4] in N m
- * Cost: 7 add, 4 mul.
+ * Cost: 7 add, 4 mul, 2 neg.
  */
 void awiwi_index_joint_torque(const double q[4], const double f[8], double tau[4]);
 
@@ -370,7 +370,7 @@ void awiwi_middle_jacobian(const double q[4], double J[24]);
  * Source: eq. 2.17, 5.4.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   out  M[4][4] in kg m^2
- * Cost: 44 add, 44 mul, 3 sincos.
+ * Cost: 44 add, 44 mul, 1 neg, 3 sincos.
  */
 void awiwi_middle_mass_matrix(const double q[4], double M[16]);
 
@@ -380,7 +380,7 @@ void awiwi_middle_mass_matrix(const double q[4], double M[16]);
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   qd[4] in rad/s, -20 to 20
  *   out  C[4][4] in N m s/rad
- * Cost: 92 add, 93 mul, 5 neg, 3 sincos.
+ * Cost: 96 add, 93 mul, 4 neg, 3 sincos.
  */
 void awiwi_middle_coriolis_matrix(const double q[4], const double qd[4], double C[16]);
 
@@ -401,7 +401,7 @@ void awiwi_middle_gravity(const double q[4], const double g[3], double gravity[4
  *   in   qd[4] in rad/s, -20 to 20
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  bias[4] in N m
- * Cost: 71 add, 90 mul, 1 neg, 4 sincos.
+ * Cost: 71 add, 88 mul, 1 neg, 4 sincos.
  */
 void awiwi_middle_bias(const double q[4], const double qd[4], const double g[3], double bias[4]);
 
@@ -413,7 +413,7 @@ void awiwi_middle_bias(const double q[4], const double qd[4], const double g[3],
  *   in   qdd[4] in rad/s^2, -2000 to 2000
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  tau[4] in N m
- * Cost: 113 add, 125 mul, 4 sincos.
+ * Cost: 113 add, 123 mul, 4 sincos.
  */
 void awiwi_middle_inverse_dynamics(const double q[4], const double qd[4], const double qdd[4], const double g[3], double tau[4]);
 
@@ -425,7 +425,7 @@ void awiwi_middle_inverse_dynamics(const double q[4], const double qd[4], const 
  *   in   tau[4] in N m, -1 to 1
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  qdd[4] in rad/s^2
- * Cost: 131 add, 145 mul, 4 div, 4 sincos.
+ * Cost: 131 add, 143 mul, 4 div, 4 sincos.
  */
 void awiwi_middle_forward_dynamics(const double q[4], const double qd[4], const double tau[4], const double g[3], double qdd[4]);
 
@@ -438,7 +438,7 @@ void awiwi_middle_forward_dynamics(const double q[4], const double qd[4], const 
  *   out  M[4][4] in kg m^2
  *   out  C[4][4] in N m s/rad
  *   out  gravity[4] in N m
- * Cost: 139 add, 132 mul, 6 neg, 4 sincos.
+ * Cost: 140 add, 132 mul, 6 neg, 4 sincos.
  */
 void awiwi_middle_dynamics(const double q[4], const double qd[4], const double g[3], double M[16], double C[16], double gravity[4]);
 
@@ -450,7 +450,7 @@ void awiwi_middle_dynamics(const double q[4], const double qd[4], const double g
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  kinetic[1] in J
  *   out  potential[1] in J
- * Cost: 61 add, 76 mul, 4 sincos.
+ * Cost: 61 add, 77 mul, 4 sincos.
  */
 void awiwi_middle_energy(const double q[4], const double qd[4], const double g[3], double kinetic[1], double potential[1]);
 
@@ -487,7 +487,7 @@ void awiwi_middle_coupling_derivative(const double q[4], double dP[128]);
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   f[8] in N, 0 to 100
  *   out  tau[4] in N m
- * Cost: 7 add, 4 mul.
+ * Cost: 7 add, 4 mul, 2 neg.
  */
 void awiwi_middle_joint_torque(const double q[4], const double f[8], double tau[4]);
 
@@ -534,7 +534,7 @@ void awiwi_ring_jacobian(const double q[3], double J[18]);
  * Source: eq. 2.17, 5.4.
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   out  M[3][3] in kg m^2
- * Cost: 48 add, 49 mul, 3 sincos.
+ * Cost: 48 add, 49 mul, 1 neg, 3 sincos.
  */
 void awiwi_ring_mass_matrix(const double q[3], double M[9]);
 
@@ -544,7 +544,7 @@ void awiwi_ring_mass_matrix(const double q[3], double M[9]);
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   in   qd[3] in rad/s, -20 to 20
  *   out  C[3][3] in N m s/rad
- * Cost: 99 add, 101 mul, 2 neg, 3 sincos.
+ * Cost: 103 add, 101 mul, 2 neg, 3 sincos.
  */
 void awiwi_ring_coriolis_matrix(const double q[3], const double qd[3], double C[9]);
 
@@ -565,7 +565,7 @@ void awiwi_ring_gravity(const double q[3], const double g[3], double gravity[3])
  *   in   qd[3] in rad/s, -20 to 20
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  bias[3] in N m
- * Cost: 72 add, 94 mul, 4 sincos.
+ * Cost: 72 add, 92 mul, 4 sincos.
  */
 void awiwi_ring_bias(const double q[3], const double qd[3], const double g[3], double bias[3]);
 
@@ -577,7 +577,7 @@ void awiwi_ring_bias(const double q[3], const double qd[3], const double g[3], d
  *   in   qdd[3] in rad/s^2, -2000 to 2000
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  tau[3] in N m
- * Cost: 114 add, 130 mul, 4 sincos.
+ * Cost: 114 add, 128 mul, 4 sincos.
  */
 void awiwi_ring_inverse_dynamics(const double q[3], const double qd[3], const double qdd[3], const double g[3], double tau[3]);
 
@@ -589,7 +589,7 @@ void awiwi_ring_inverse_dynamics(const double q[3], const double qd[3], const do
  *   in   tau[3] in N m, -1 to 1
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  qdd[3] in rad/s^2
- * Cost: 123 add, 137 mul, 3 div, 4 sincos.
+ * Cost: 123 add, 135 mul, 3 div, 4 sincos.
  */
 void awiwi_ring_forward_dynamics(const double q[3], const double qd[3], const double tau[3], const double g[3], double qdd[3]);
 
@@ -602,7 +602,7 @@ void awiwi_ring_forward_dynamics(const double q[3], const double qd[3], const do
  *   out  M[3][3] in kg m^2
  *   out  C[3][3] in N m s/rad
  *   out  gravity[3] in N m
- * Cost: 147 add, 148 mul, 3 neg, 4 sincos.
+ * Cost: 152 add, 145 mul, 3 neg, 4 sincos.
  */
 void awiwi_ring_dynamics(const double q[3], const double qd[3], const double g[3], double M[9], double C[9], double gravity[3]);
 
@@ -614,7 +614,7 @@ void awiwi_ring_dynamics(const double q[3], const double qd[3], const double g[3
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  kinetic[1] in J
  *   out  potential[1] in J
- * Cost: 61 add, 78 mul, 4 sincos.
+ * Cost: 61 add, 79 mul, 4 sincos.
  */
 void awiwi_ring_energy(const double q[3], const double qd[3], const double g[3], double kinetic[1], double potential[1]);
 
@@ -651,7 +651,7 @@ void awiwi_ring_coupling_derivative(const double q[3], double dP[54]);
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   in   f[6] in N, 0 to 100
  *   out  tau[3] in N m
- * Cost: 5 add, 3 mul.
+ * Cost: 5 add, 3 mul, 1 neg.
  */
 void awiwi_ring_joint_torque(const double q[3], const double f[6], double tau[3]);
 
@@ -671,7 +671,7 @@ void awiwi_ring_joint_stiffness(const double q[3], const double f[6], const doub
  * Source: eq. 5.2, 5.3, table 5.1.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   out  T[4][4] in 1, m
- * Cost: 29 add, 47 mul, 1 div, 4 neg, 1 sqrt, 5 sincos.
+ * Cost: 29 add, 47 mul, 1 div, 3 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_fingertip_pose(const double q[4], double T[16]);
 
@@ -680,7 +680,7 @@ void awiwi_fifth_fingertip_pose(const double q[4], double T[16]);
  * Source: eq. 5.2.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   out  T[5][4][4] in 1, m
- * Cost: 43 add, 81 mul, 1 div, 14 neg, 1 sqrt, 5 sincos.
+ * Cost: 38 add, 88 mul, 1 div, 12 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_link_poses(const double q[4], double T[80]);
 
@@ -689,7 +689,7 @@ void awiwi_fifth_link_poses(const double q[4], double T[80]);
  * Source: eq. 5.3, differentiated.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   out  J[6][4] in m/rad, 1
- * Cost: 43 add, 70 mul, 2 div, 9 neg, 1 sqrt, 5 sincos.
+ * Cost: 45 add, 66 mul, 2 div, 7 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_jacobian(const double q[4], double J[24]);
 
@@ -698,7 +698,7 @@ void awiwi_fifth_jacobian(const double q[4], double J[24]);
  * Source: eq. 2.17, 5.4.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   out  M[4][4] in kg m^2
- * Cost: 133 add, 163 mul, 2 div, 3 neg, 1 sqrt, 5 sincos.
+ * Cost: 133 add, 163 mul, 2 div, 4 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_mass_matrix(const double q[4], double M[16]);
 
@@ -708,7 +708,7 @@ void awiwi_fifth_mass_matrix(const double q[4], double M[16]);
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   in   qd[4] in rad/s, -20 to 20
  *   out  C[4][4] in N m s/rad
- * Cost: 424 add, 476 mul, 2 div, 8 neg, 1 sqrt, 5 sincos.
+ * Cost: 426 add, 456 mul, 2 div, 8 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_coriolis_matrix(const double q[4], const double qd[4], double C[16]);
 
@@ -729,7 +729,7 @@ void awiwi_fifth_gravity(const double q[4], const double g[3], double gravity[4]
  *   in   qd[4] in rad/s, -20 to 20
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  bias[4] in N m
- * Cost: 225 add, 277 mul, 2 div, 2 neg, 1 sqrt, 5 sincos.
+ * Cost: 225 add, 262 mul, 2 div, 2 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_bias(const double q[4], const double qd[4], const double g[3], double bias[4]);
 
@@ -741,7 +741,7 @@ void awiwi_fifth_bias(const double q[4], const double qd[4], const double g[3], 
  *   in   qdd[4] in rad/s^2, -2000 to 2000
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  tau[4] in N m
- * Cost: 240 add, 278 mul, 2 div, 1 neg, 1 sqrt, 5 sincos.
+ * Cost: 240 add, 274 mul, 2 div, 4 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_inverse_dynamics(const double q[4], const double qd[4], const double qdd[4], const double g[3], double tau[4]);
 
@@ -753,7 +753,7 @@ void awiwi_fifth_inverse_dynamics(const double q[4], const double qd[4], const d
  *   in   tau[4] in N m, -1 to 1
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  qdd[4] in rad/s^2
- * Cost: 346 add, 405 mul, 6 div, 4 neg, 1 sqrt, 5 sincos.
+ * Cost: 346 add, 390 mul, 6 div, 4 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_forward_dynamics(const double q[4], const double qd[4], const double tau[4], const double g[3], double qdd[4]);
 
@@ -766,7 +766,7 @@ void awiwi_fifth_forward_dynamics(const double q[4], const double qd[4], const d
  *   out  M[4][4] in kg m^2
  *   out  C[4][4] in N m s/rad
  *   out  gravity[4] in N m
- * Cost: 477 add, 549 mul, 2 div, 9 neg, 1 sqrt, 5 sincos.
+ * Cost: 479 add, 526 mul, 2 div, 9 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_dynamics(const double q[4], const double qd[4], const double g[3], double M[16], double C[16], double gravity[4]);
 
@@ -778,7 +778,7 @@ void awiwi_fifth_dynamics(const double q[4], const double qd[4], const double g[
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  kinetic[1] in J
  *   out  potential[1] in J
- * Cost: 140 add, 197 mul, 2 div, 1 neg, 1 sqrt, 5 sincos.
+ * Cost: 140 add, 187 mul, 2 div, 4 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_energy(const double q[4], const double qd[4], const double g[3], double kinetic[1], double potential[1]);
 
@@ -815,7 +815,7 @@ void awiwi_fifth_coupling_derivative(const double q[4], double dP[128]);
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   in   f[8] in N, 0 to 100
  *   out  tau[4] in N m
- * Cost: 6 add, 4 mul.
+ * Cost: 6 add, 4 mul, 1 neg.
  */
 void awiwi_fifth_joint_torque(const double q[4], const double f[8], double tau[4]);
 

@@ -5,7 +5,7 @@
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   qd[4] in rad/s, -20 to 20
  *   out  C[4][4] in N m s/rad
- * Cost: 92 add, 93 mul, 5 neg, 3 sincos.
+ * Cost: 96 add, 93 mul, 4 neg, 3 sincos.
  * Inputs: sha256 925decdd0ac07a3c765340aecf22c7b472ac68f2f016aca01dc4f72ca466be81.
  */
 #include <math.h>
@@ -29,7 +29,7 @@ void awiwi_middle_coriolis_matrix(const double q[restrict 4], const double qd[re
     const double t10 = 8.34e-09*t8 - 1.252e-09*t9;
     const double t11 = qd[0]*t10;
     const double t12 = 3.78e-05*t8 - 8.4e-07*t9;
-    const double t13 = 0.004*t12;
+    const double t13 = qd[0]*t12;
     const double t14 = sin_q1*(2.771021e-05*cos_q1 - 8.92e-08*sin_q1) + 4.46e-08;
     const double t15 = qd[1]*t14;
     const double t16 = 0.044*cos_q1;
@@ -40,8 +40,8 @@ void awiwi_middle_coriolis_matrix(const double q[restrict 4], const double qd[re
     const double t21 = t19*t20;
     const double t22 = t17*t18 + t21;
     const double t23 = t16*t22;
-    const double t24 = 0.044*qd[1];
-    const double t25 = t24*sin_q1;
+    const double t24 = 0.044*sin_q1;
+    const double t25 = qd[1]*t24;
     const double t26 = 0.0002426*t3 - 1.3e-06*t4;
     const double t27 = t4*(6.78634e-06*t3 - 2.56e-08*t4) + 1.28e-08;
     const double t28 = t17*t27;
@@ -55,49 +55,45 @@ void awiwi_middle_coriolis_matrix(const double q[restrict 4], const double qd[re
     const double t36 = t6 + t25*t26 + t28 + t30 + t35;
     const double t37 = -t1 - t15 - t23 - t36;
     const double t38 = 3.3e-06*cos_q1 + 0.0007128*sin_q1;
-    const double t39 = t19*t10 + t19*t13;
-    const double t40 = t17*t5 + t39;
-    const double t41 = t18 + t20;
-    const double t42 = t27 + t33 + 0.033*(t3*t20 + t4*t12);
-    const double t43 = cos_q1*t41;
+    const double t39 = t19*t12;
+    const double t40 = t19*t10 + 0.004*t39;
+    const double t41 = t17*t5 + t40;
+    const double t42 = 0.006*qd[0];
+    const double t43 = t18 + t20;
     const double t44 = t26 + t12;
-    const double t45 = sin_q1*t44;
-    const double t46 = t16 + 0.006;
-    const double t47 = qd[0]*t33;
-    const double t48 = 0.044*sin_q1;
-    const double t49 = qd[0]*t46;
-    const double t50 = t20*(t49 + qd[0]*t29) + t47;
-    const double t51 = t18*t49 + qd[0]*(t27 + t31*t12) + t50;
-    const double t52 = t10 + t13;
-    const double t53 = t5 + t52;
-    const double t54 = t19*t12;
-    const double t55 = t48*(t17*t26 + t54);
-    const double t56 = cos_q1*t24;
-    const double t57 = t31*t54;
-    const double t58 = (t56 + t17*t29)*t20;
-    const double t59 = t58 + t34;
-    const double t60 = t56*t18 + t28 + t57 + t59;
-    const double t61 = qd[0]*t53 + (t60 - t36);
-    const double t62 = t24*(t43 - t45) - t61;
-    const double t63 = cos_q1*t20 - sin_q1*t12;
-    const double t64 = t59 - t35;
-    const double t65 = t58 - t32 - t64;
-    const double t66 = t30 + t65 - t57;
-    const double t67 = qd[0]*t52 + t64;
-    C[0] = t1 + (t6 + t11 + qd[0]*t13) + t37 - 0.006*(qd[1]*t38 + t22);
-    C[1] = qd[1]*t0 + t40 - qd[0]*(0.006*(t38 + t41) + (t14 + t42 + 0.044*(t43 + t45)));
-    C[2] = t40 - qd[0]*(t46*t41 + t42);
-    C[3] = t39 - qd[0]*((t46 + t29)*t20) - t47;
-    C[4] = qd[0]*(0.006*t38 + t14) + t48*(qd[0]*t44) + t51;
-    C[5] = qd[0]*(t0 + t53) + (t15 + t55 + t60) + t37;
-    C[6] = t55 - t23 - t62;
-    C[7] = -(0.044*t19*t63) - t66;
-    C[8] = t51;
-    C[9] = t61;
-    C[10] = -t62;
-    C[11] = -t66;
-    C[12] = t50;
-    C[13] = t67;
-    C[14] = t67 - t24*t63;
-    C[15] = -t65;
+    const double t45 = t27 + t29*t20 + t31*t12 + t33;
+    const double t46 = qd[0]*t33;
+    const double t47 = t42 + qd[0]*t16;
+    const double t48 = (t47 + qd[0]*t29)*t20 + t46;
+    const double t49 = t47*t18 + qd[0]*t27 + t31*t13 + t48;
+    const double t50 = t10 + 0.004*t12;
+    const double t51 = t5 + t50;
+    const double t52 = t24*(t17*t26 + t39);
+    const double t53 = qd[1]*t16;
+    const double t54 = t31*t39;
+    const double t55 = (t53 + t17*t29)*t20;
+    const double t56 = t55 + t34;
+    const double t57 = t53*t18 + t28 + t54 + t56;
+    const double t58 = qd[0]*t51 + (t57 - t36);
+    const double t59 = t53*t43 - t25*t44 - t58;
+    const double t60 = t56 - t35;
+    const double t61 = t55 - t32 - t60;
+    const double t62 = t30 + t61 - t54;
+    const double t63 = qd[0]*t50 + t60;
+    C[0] = t1 + (t6 + t11 + 0.004*t13) + t37 - 0.006*(qd[1]*t38 + t22);
+    C[1] = qd[1]*t0 + t41 - t42*(t38 + t43) - qd[0]*(t14 + t16*t43 + t24*t44 + t45);
+    C[2] = t41 - qd[0]*(t16 + 0.006)*t43 - qd[0]*t45;
+    C[3] = t40 - t20*(qd[0]*(t16 + t29 + 0.006)) - t46;
+    C[4] = t42*t38 + qd[0]*t14 + t24*(qd[0]*t26 + t13) + t49;
+    C[5] = qd[0]*(t0 + t51) + (t15 + t52 + t57) + t37;
+    C[6] = t52 - t23 - t59;
+    C[7] = t24*t39 - t16*t21 - t62;
+    C[8] = t49;
+    C[9] = t58;
+    C[10] = -t59;
+    C[11] = -t62;
+    C[12] = t48;
+    C[13] = t63;
+    C[14] = t25*t12 + t63 - t53*t20;
+    C[15] = -t61;
 }

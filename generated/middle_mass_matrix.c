@@ -4,7 +4,7 @@
  * Source: eq. 2.17, 5.4.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   out  M[4][4] in kg m^2
- * Cost: 44 add, 44 mul, 3 sincos.
+ * Cost: 44 add, 44 mul, 1 neg, 3 sincos.
  * Inputs: sha256 e62e10a0c5f174abe387898095f5e44e9b4bd4c4d0e8ad5e213f8ec3d580acd9.
  */
 #include <math.h>
@@ -36,25 +36,27 @@ void awiwi_middle_mass_matrix(const double q[restrict 4], double M[restrict 16])
     const double t18 = 1.3e-06*t1 + 0.0002426*t6 + t14;
     const double t19 = t10 - 4.9495e-07;
     const double t20 = t9 + t19 - 0.066*t6*t14 - 6.8272e-06;
-    const double t21 = t12 - t20;
-    const double t22 = t21 + 0.044*(cos_q1*t7 + sin_q1*t18);
-    const double t23 = t11 - t19;
-    const double t24 = t23 + 0.033*(t1*t5 + t6*t14);
-    const double t25 = 0.044*(cos_q1*t5 + sin_q1*t14) + t24;
+    const double t21 = 0.044*cos_q1;
+    const double t22 = 0.044*sin_q1;
+    const double t23 = t12 - t20;
+    const double t24 = t21*t7 + t22*t18 + t23;
+    const double t25 = t19 - t11;
+    const double t26 = 0.033*(t1*t5 + t6*t14) - t25;
+    const double t27 = t21*t5 + t22*t14 + t26;
     M[0] = 0.012*(0.0007128*cos_q1 + t7 - 3.3e-06*sin_q1) + t13 + 1.070408e-06;
     M[1] = t17;
     M[2] = t16;
     M[3] = t15;
     M[4] = t17;
     M[5] = t13 + (0.088*sin_q1*t18 + 2.78102e-05 - t8 - t20);
-    M[6] = t22;
-    M[7] = t25;
+    M[6] = t24;
+    M[7] = t27;
     M[8] = t16;
-    M[9] = t22;
-    M[10] = t21;
-    M[11] = t24;
+    M[9] = t24;
+    M[10] = t23;
+    M[11] = t26;
     M[12] = t15;
-    M[13] = t25;
-    M[14] = t24;
-    M[15] = t23;
+    M[13] = t27;
+    M[14] = t26;
+    M[15] = -t25;
 }

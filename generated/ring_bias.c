@@ -6,7 +6,7 @@
  *   in   qd[3] in rad/s, -20 to 20
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  bias[3] in N m
- * Cost: 72 add, 94 mul, 4 sincos.
+ * Cost: 72 add, 92 mul, 4 sincos.
  * Inputs: sha256 629681b331d715cabc79e549054515e6ff19ef45f5083fc8fb3efe64fdde7fbb.
  */
 #include <math.h>
@@ -23,50 +23,50 @@ void awiwi_ring_bias(const double q[restrict 3], const double qd[restrict 3], co
     const double sin_q1 = sin(q[1]);
     const double t2 = g[0]*sin_q0 - g[1]*cos_q0;
     const double t3 = 0.000615*cos_q1 - 3e-06*sin_q1;
-    const double t4 = 0.082*qd[0]*qd[1]*sin_q1 - t2;
-    const double t5 = q[1] + q[2];
-    const double t6 = cos(t5);
-    const double t7 = sin(t5);
-    const double t8 = 0.0002108*t6 - 1.2e-06*t7;
-    const double t9 = 2.0*qd[0];
-    const double t10 = qd[1]*t9;
-    const double t11 = sin_q1*(2.23216e-05*cos_q1 - 7.9e-08*sin_q1) + 3.95e-08;
-    const double t12 = qd[0]*qd[0];
-    const double t13 = t12 + t1;
-    const double t14 = qd[1] + qd[2];
-    const double t15 = qd[2]*(qd[1] + t14);
-    const double t16 = t13 + t15;
-    const double t17 = t10 + qd[2]*t9;
-    const double t18 = t7*(5.463e-06*t6 - 2.352e-08*t7) + 1.176e-08;
-    const double t19 = 0.0305*t6;
-    const double t20 = 1.5714285714285714*qd[0]*qd[2] + t17;
-    const double t21 = t5 + 0.7857142857142857*q[2];
-    const double t22 = cos(t21);
-    const double t23 = sin(t21);
-    const double t24 = 8e-07*t22 + 3.6e-05*t23;
-    const double t25 = t20*t24;
-    const double t26 = 0.7857142857142857*qd[2];
-    const double t27 = t26*(t26 + 2.0*t14);
-    const double t28 = t16 + t27;
-    const double t29 = 0.041*cos_q1;
-    const double t30 = 1.2e-06*t6 + 0.0002108*t7;
-    const double t31 = t17*t30 + t25;
-    const double t32 = t23*(4.4334e-07*t22 - 1.04e-08*t23) + 5.2e-09;
-    const double t33 = 3.6e-05*t22 - 8e-07*t23;
-    const double t34 = 0.0305*t7;
-    const double t35 = 3e-06*cos_q1 + 0.000615*sin_q1;
-    const double t36 = 2.64e-05*t0 + t1*(1.0264e-06*cos_q1 - 9.6e-09*sin_q1) + t2*(t3 + 0.0001245) - t4*t8 - t10*t11 - (6.2216e-07*t6 - 5.44e-09*t7)*(t12 - t16) - t17*t18 - t19*t25 - (7.8e-09*t22 - 1.24e-09*t23)*(t12 - t28) - t29*t31 - t20*t32 - t33*(0.004*qd[0]*qd[0] + t4 + t17*t34 - 0.004*t28) - 0.006*(t10*t35 + t31);
-    const double t37 = 0.006*qd[0]*qd[0] + t0;
-    const double t38 = 0.041*sin_q1;
-    const double t39 = t28*t33;
-    const double t40 = t1 + t15;
-    const double t41 = t40 + t27;
-    const double t42 = t41*t24;
-    const double t43 = g[2] + t1*t38;
-    const double t44 = t13*t29 + t37;
-    const double t45 = t24*(t44 + t19*t16) - t33*(t43 + t34*t40) - (t41 - t28)*t32;
-    const double t46 = t43*t8 + t19*t42 + (t40 - t16)*t18 - t30*t44 - t34*t39 - t45;
-    bias[0] = t36;
-    bias[1] = t35*t37 + t12*t11 + t38*(t16*t8 + t39) - g[2]*t3 - t29*(t40*t30 + t42) - t46;
+    const double t4 = qd[0]*qd[0];
+    const double t5 = t4 + t1;
+    const double t6 = qd[1] + qd[2];
+    const double t7 = qd[2]*(qd[1] + t6);
+    const double t8 = t5 + t7;
+    const double t9 = 0.7857142857142857*qd[2];
+    const double t10 = t9*(t9 + 2.0*t6);
+    const double t11 = t8 + t10;
+    const double t12 = q[1] + q[2];
+    const double t13 = t12 + 0.7857142857142857*q[2];
+    const double t14 = cos(t13);
+    const double t15 = sin(t13);
+    const double t16 = 3.6e-05*t14 - 8e-07*t15;
+    const double t17 = t11*t16;
+    const double t18 = 0.082*qd[0]*qd[1]*sin_q1 - t2;
+    const double t19 = cos(t12);
+    const double t20 = sin(t12);
+    const double t21 = 0.0002108*t19 - 1.2e-06*t20;
+    const double t22 = 2.0*qd[0];
+    const double t23 = qd[1]*t22;
+    const double t24 = sin_q1*(2.23216e-05*cos_q1 - 7.9e-08*sin_q1) + 3.95e-08;
+    const double t25 = t23 + qd[2]*t22;
+    const double t26 = 0.0305*t20;
+    const double t27 = t20*(5.463e-06*t19 - 2.352e-08*t20) + 1.176e-08;
+    const double t28 = 0.0305*t19;
+    const double t29 = 1.5714285714285714*qd[0]*qd[2] + t25;
+    const double t30 = 8e-07*t14 + 3.6e-05*t15;
+    const double t31 = t29*t30;
+    const double t32 = 0.041*cos_q1;
+    const double t33 = 1.2e-06*t19 + 0.0002108*t20;
+    const double t34 = t25*t33 + t31;
+    const double t35 = t15*(4.4334e-07*t14 - 1.04e-08*t15) + 5.2e-09;
+    const double t36 = 3e-06*cos_q1 + 0.000615*sin_q1;
+    const double t37 = 2.64e-05*t0 + t1*(1.0264e-06*cos_q1 - 9.6e-09*sin_q1) + t2*(t3 + 0.0001245) + 0.004*t17 - t18*t21 - t23*t24 - (6.2216e-07*t19 - 5.44e-09*t20)*(t4 - t8) - t16*(0.004*t4 + t18 + t25*t26) - t25*t27 - t28*t31 - (7.8e-09*t14 - 1.24e-09*t15)*(t4 - t11) - t32*t34 - t29*t35 - 0.006*(t23*t36 + t34);
+    const double t38 = 0.006*t4 + t0;
+    const double t39 = 0.041*sin_q1;
+    const double t40 = t1 + t7;
+    const double t41 = t40 + t10;
+    const double t42 = t41*t30;
+    const double t43 = g[2] + t1*t39;
+    const double t44 = t5*t32 + t38;
+    const double t45 = t30*(t44 + t28*t8) - t16*(t43 + t26*t40) - (t41 - t11)*t35;
+    const double t46 = t43*t21 + t28*t42 + (t40 - t8)*t27 - t33*t44 - t26*t17 - t45;
+    bias[0] = t37;
+    bias[1] = t36*t38 + t4*t24 + t39*(t8*t21 + t17) - g[2]*t3 - t32*(t40*t33 + t42) - t46;
     bias[2] = 0.7857142857142857*t45 - t46;
 }

@@ -5,7 +5,7 @@
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   in   qd[3] in rad/s, -20 to 20
  *   out  C[3][3] in N m s/rad
- * Cost: 99 add, 101 mul, 2 neg, 3 sincos.
+ * Cost: 103 add, 101 mul, 2 neg, 3 sincos.
  * Inputs: sha256 a18c82b509413609fce20c7b5c5a91059311db5ecac033280a43e336fb4fab18.
  */
 #include <math.h>
@@ -29,7 +29,7 @@ void awiwi_ring_coriolis_matrix(const double q[restrict 3], const double qd[rest
     const double t10 = 7.8e-09*t8 - 1.24e-09*t9;
     const double t11 = qd[0]*t10;
     const double t12 = 3.6e-05*t8 - 8e-07*t9;
-    const double t13 = 0.004*t12;
+    const double t13 = qd[0]*t12;
     const double t14 = sin_q1*(2.23216e-05*cos_q1 - 7.9e-08*sin_q1) + 3.95e-08;
     const double t15 = qd[1]*t14;
     const double t16 = 0.041*cos_q1;
@@ -40,8 +40,8 @@ void awiwi_ring_coriolis_matrix(const double q[restrict 3], const double qd[rest
     const double t21 = t19*t20;
     const double t22 = t17*t18 + t21;
     const double t23 = t16*t22;
-    const double t24 = 0.041*qd[1];
-    const double t25 = t24*sin_q1;
+    const double t24 = 0.041*sin_q1;
+    const double t25 = qd[1]*t24;
     const double t26 = 0.0002108*t3 - 1.2e-06*t4;
     const double t27 = t4*(5.463e-06*t3 - 2.352e-08*t4) + 1.176e-08;
     const double t28 = t17*t27;
@@ -55,42 +55,39 @@ void awiwi_ring_coriolis_matrix(const double q[restrict 3], const double qd[rest
     const double t36 = t6 + t25*t26 + t28 + t30 + t35;
     const double t37 = -t1 - t15 - t23 - t36;
     const double t38 = 3e-06*cos_q1 + 0.000615*sin_q1;
-    const double t39 = t19*t10 + t19*t13;
-    const double t40 = t17*t5 + t39;
-    const double t41 = t18 + t20;
-    const double t42 = t27 + t33 + 0.0305*(t3*t20 + t4*t12);
-    const double t43 = cos_q1*t41;
+    const double t39 = t19*t12;
+    const double t40 = t19*t10 + 0.004*t39;
+    const double t41 = t17*t5 + t40;
+    const double t42 = 0.006*qd[0];
+    const double t43 = t18 + t20;
     const double t44 = t26 + t12;
-    const double t45 = sin_q1*t44;
-    const double t46 = t16 + 0.006;
-    const double t47 = qd[0]*t33;
-    const double t48 = 0.041*sin_q1;
-    const double t49 = qd[0]*t46;
-    const double t50 = t20*(t49 + qd[0]*t29) + t47;
-    const double t51 = t18*t49 + qd[0]*(t27 + t31*t12) + t50;
-    const double t52 = t10 + t13;
-    const double t53 = t5 + t52;
-    const double t54 = t19*t12;
-    const double t55 = t48*(t17*t26 + t54);
-    const double t56 = cos_q1*t24;
-    const double t57 = t31*t54;
-    const double t58 = (t56 + t17*t29)*t20;
-    const double t59 = t58 + t34;
-    const double t60 = t56*t18 + t28 + t57 + t59;
-    const double t61 = qd[0]*t53 + (t60 - t36);
-    const double t62 = t24*(t43 - t45) - t61;
-    const double t63 = cos_q1*t20 - sin_q1*t12;
-    const double t64 = t59 - t35;
-    const double t65 = t58 - t32 - t64;
-    const double t66 = t30 + t65 - t57;
-    const double t67 = qd[0]*t52 + t64;
-    C[0] = t1 + (t6 + t11 + qd[0]*t13) + t37 - 0.006*(qd[1]*t38 + t22);
-    C[1] = qd[1]*t0 + t40 - qd[0]*(0.006*(t38 + t41) + (t14 + t42 + 0.041*(t43 + t45)));
-    C[2] = t40 - 0.7857142857142857*(qd[0]*((t46 + t29)*t20) + t47 - t39) - qd[0]*(t46*t41 + t42);
-    C[3] = qd[0]*(0.006*t38 + t14) + t48*(qd[0]*t44) + t51;
-    C[4] = qd[0]*(t0 + t53) + (t15 + t55 + t60) + t37;
-    C[5] = t55 - t23 - t62 - 0.7857142857142857*(0.041*t19*t63 + t66);
-    C[6] = t51 + 0.7857142857142857*t50;
-    C[7] = t61 + 0.7857142857142857*t67;
-    C[8] = -(0.6173469387755102*t65) - t62 - 0.7857142857142857*(t24*t63 - t67 + t66);
+    const double t45 = t27 + t29*t20 + t31*t12 + t33;
+    const double t46 = qd[0]*t33;
+    const double t47 = t41 + 0.7857142857142857*(t40 - t20*(qd[0]*(t16 + t29 + 0.006)) - t46) - qd[0]*(t16 + 0.006)*t43 - qd[0]*t45;
+    const double t48 = t42 + qd[0]*t16;
+    const double t49 = (t48 + qd[0]*t29)*t20 + t46;
+    const double t50 = t48*t18 + qd[0]*t27 + t31*t13 + t49;
+    const double t51 = t10 + 0.004*t12;
+    const double t52 = t5 + t51;
+    const double t53 = t24*(t17*t26 + t39);
+    const double t54 = qd[1]*t16;
+    const double t55 = t31*t39;
+    const double t56 = (t54 + t17*t29)*t20;
+    const double t57 = t56 + t34;
+    const double t58 = t54*t18 + t28 + t55 + t57;
+    const double t59 = qd[0]*t52 + (t58 - t36);
+    const double t60 = t54*t43 - t25*t44 - t59;
+    const double t61 = t57 - t35;
+    const double t62 = t56 - t32 - t61;
+    const double t63 = t30 + t62 - t55;
+    const double t64 = qd[0]*t51 + t61;
+    C[0] = t1 + (t6 + t11 + 0.004*t13) + t37 - 0.006*(qd[1]*t38 + t22);
+    C[1] = qd[1]*t0 + t41 - t42*(t38 + t43) - qd[0]*(t14 + t16*t43 + t24*t44 + t45);
+    C[2] = t47;
+    C[3] = t42*t38 + qd[0]*t14 + t24*(qd[0]*t26 + t13) + t50;
+    C[4] = qd[0]*(t0 + t52) + (t15 + t53 + t58) + t37;
+    C[5] = t53 - t23 - t60 - 0.7857142857142857*(t16*t21 + t63 - t24*t39);
+    C[6] = t50 + 0.7857142857142857*t49;
+    C[7] = t59 + 0.7857142857142857*t64;
+    C[8] = -(0.6173469387755102*t62) - t60 - 0.7857142857142857*(t54*t20 - t25*t12 - t64 + t63);
 }

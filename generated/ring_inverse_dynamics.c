@@ -7,7 +7,7 @@
  *   in   qdd[3] in rad/s^2, -2000 to 2000
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  tau[3] in N m
- * Cost: 114 add, 130 mul, 4 sincos.
+ * Cost: 114 add, 128 mul, 4 sincos.
  * Inputs: sha256 d2fd8ea8122210c370a876d04ecdbc1ca49df3b198ba198458bb7b3639479b1a.
  */
 #include <math.h>
@@ -72,17 +72,17 @@ void awiwi_ring_inverse_dynamics(const double q[restrict 3], const double qd[res
     const double t49 = t7*t36 + 1.176e-08;
     const double t50 = 0.0305*t7;
     const double t51 = t14*t39 + 5.2e-09;
-    const double t52 = 2.64e-05*t0 + 0.0001245*t1 + qdd[1]*t2 + t3*(1.0264e-06*cos_q1 - 9.6e-09*sin_q1) + t4*t8 + t9*t10 + t11*t15 + 0.004*t26 + t27*t32 + qdd[0]*(t35 + t38 + t41 + 9.9165e-07) + t42*t45 + 0.006*(qdd[0]*t9 + t45 - t29*t46) - t29*t47 - (6.2216e-07*t6 - 5.44e-09*t7)*(t17 - t21) - t43*t48 - t30*t49 - (7.8e-09*t13 - 1.24e-09*t14)*(t17 - t24) - t25*(0.004*qd[0]*qd[0] + t30*t50 + t48 - qdd[0]*t27) - t31*t51;
-    const double t53 = 0.006*qd[0]*qd[0] + t0;
+    const double t52 = 2.64e-05*t0 + 0.0001245*t1 + qdd[1]*t2 + t3*(1.0264e-06*cos_q1 - 9.6e-09*sin_q1) + t4*t8 + t9*t10 + t11*t15 + 0.004*t26 + t27*t32 + qdd[0]*(t35 + t38 + t41 + 9.9165e-07) + t42*t45 + 0.006*(qdd[0]*t9 + t45 - t29*t46) - t29*t47 - (6.2216e-07*t6 - 5.44e-09*t7)*(t17 - t21) - t43*t48 - t30*t49 - (7.8e-09*t13 - 1.24e-09*t14)*(t17 - t24) - t25*(0.004*t17 + t30*t50 + t48 - qdd[0]*t27) - t31*t51;
+    const double t53 = 0.006*t17 + t0;
     const double t54 = t3 + t20;
     const double t55 = t54 + t23;
     const double t56 = t11*t25 - t55*t16;
     const double t57 = 0.041*sin_q1;
     const double t58 = qdd[1]*t57 + t18*t42 + t53;
     const double t59 = g[2] + t3*t57 - qdd[1]*t42;
-    const double t60 = qdd[0]*t15 + t16*(0.004*qdd[0] + t4*t50 + t58 + t27*t21) - t25*(t59 + t50*t54 - t4*t27) - (t55 - t24)*t51 - t11*(t40 - 4.6375e-07 - t41);
-    const double t61 = qdd[0]*t8 + t44*t58 + t27*t56 + t50*t26 + t60 - t43*t59 - (t54 - t21)*t49 - t4*(t37 - 5.50074e-06 - t38);
-    const double t62 = qdd[0]*t2 + t46*t53 + t17*t47 + t42*(t4*t43 + t56 - t54*t44) + t57*(t4*t44 + t21*t43 + t26) + t61 - g[2]*t9 - qdd[1]*(t34 - 2.24125e-05 - t35);
+    const double t60 = qdd[0]*t15 + t16*(0.004*qdd[0] + t4*t50 + t58 + t27*t21) + t11*(t41 - (t40 - 4.6375e-07)) - t25*(t59 + t50*t54 - t4*t27) - (t55 - t24)*t51;
+    const double t61 = qdd[0]*t8 + t44*t58 + t4*(t38 - (t37 - 5.50074e-06)) + t27*t56 + t50*t26 + t60 - t43*t59 - (t54 - t21)*t49;
+    const double t62 = qdd[0]*t2 + t46*t53 + t17*t47 + qdd[1]*(t35 - (t34 - 2.24125e-05)) + t42*(t4*t43 + t56 - t54*t44) + t57*(t4*t44 + t21*t43 + t26) + t61 - g[2]*t9;
     tau[0] = t52;
     tau[1] = t62;
     tau[2] = t61 + 0.7857142857142857*t60;

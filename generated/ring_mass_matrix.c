@@ -4,7 +4,7 @@
  * Source: eq. 2.17, 5.4.
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   out  M[3][3] in kg m^2
- * Cost: 48 add, 49 mul, 3 sincos.
+ * Cost: 48 add, 49 mul, 1 neg, 3 sincos.
  * Inputs: sha256 d58f38e02f25804f1cbc849cf9a3a2f485a8ffffebf33c0f77b384b71638e328.
  */
 #include <math.h>
@@ -41,8 +41,8 @@ void awiwi_ring_mass_matrix(const double q[restrict 3], double M[restrict 9])
     const double t23 = 0.041*sin_q1;
     const double t24 = t12 - t21;
     const double t25 = t20 - t11;
-    const double t26 = t25 - 0.0305*(t1*t5 + t6*t14);
-    const double t27 = t22*t7 + t23*t19 + t24 + 0.7857142857142857*(t22*t5 + t23*t14 - t26);
+    const double t26 = 0.0305*(t1*t5 + t6*t14) - t25;
+    const double t27 = t22*t7 + t23*t19 + t24 + 0.7857142857142857*(t22*t5 + t23*t14 + t26);
     M[0] = 0.012*(0.000615*cos_q1 + t7 - 3e-06*sin_q1) + t13 + 9.9165e-07;
     M[1] = t17;
     M[2] = t18;
@@ -51,5 +51,5 @@ void awiwi_ring_mass_matrix(const double q[restrict 3], double M[restrict 9])
     M[5] = t27;
     M[6] = t18;
     M[7] = t27;
-    M[8] = t24 - 0.6173469387755102*t25 - 1.5714285714285714*t26;
+    M[8] = t24 + 0.6173469387755102*(-t25) + 1.5714285714285714*t26;
 }

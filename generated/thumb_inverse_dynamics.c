@@ -7,7 +7,7 @@
  *   in   qdd[4] in rad/s^2, -2000 to 2000
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  tau[4] in N m
- * Cost: 131 add, 143 mul, 1 neg, 4 sincos.
+ * Cost: 131 add, 142 mul, 1 neg, 4 sincos.
  * Inputs: sha256 b7fe551f96056cda15630ccc8e1048458a04fd2c391240ea725523ad5d20e299.
  */
 #include <math.h>
@@ -95,7 +95,7 @@ void awiwi_thumb_inverse_dynamics(const double q[restrict 4], const double qd[re
     const double t70 = t60*t45 + t55*t61 + t34*t63 + t13*(t64 - t33) + t52*t56 + t48*(t66*t49 + t50*t67) - t25*t58 - t44*t8 - t65*t12 - t69;
     const double t71 = cos_q1*(2.95e-08*t58 + 0.001071*t41 + 4.2129e-05*t43 + 1.58e-07*(t59 - t30) + t70 + 0.045*t57 - 2.19e-07*t8);
     const double t72 = 1.5405e-06*qdd[0] + 9e-06*t0 + 0.000204*t1 + sin_q1*t54 + 0.006*(0.001071*t43 + t57 - 1.08e-05*t8) + t71;
-    const double t73 = qdd[0]*(2.95e-08*cos_q1 + 1.58e-07*sin_q1) + 4.5686e-07*t58 + 4.2129e-05*t5 + 2.19e-07*(t59 - t28) + t60*t15 + 1.08e-05*t62 + t68*t24 + t55*t37 - t65*t25 - t66*t38 - t9*t13 - 0.001071*t36 - t16*t23 - t44*(t28 - t64) - t52*t51 - t46*(t28 - t67) - t50*t53 - 0.045*(t34*t9 + t51 - t55*t15);
+    const double t73 = 2.95e-08*t42 + 1.58e-07*t6 + 4.5686e-07*t58 + 4.2129e-05*t5 + 2.19e-07*(t59 - t28) + t60*t15 + 1.08e-05*t62 + t68*t24 + t55*t37 - t65*t25 - t66*t38 - t9*t13 - 0.001071*t36 - t16*t23 - t44*(t28 - t64) - t52*t51 - t46*(t28 - t67) - t50*t53 - 0.045*(t34*t9 + t51 - t55*t15);
     tau[0] = t72;
     tau[1] = t73;
     tau[2] = t70;

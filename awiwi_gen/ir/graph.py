@@ -126,6 +126,9 @@ class Builder:
 
     def add(self, refs: Iterable[Ref]) -> Ref:
         """The sum of any number of references; like terms are collected."""
+        refs = list(refs)
+        if self._all_unlike(refs):
+            return self._sum(sorted(refs, key=node_of))
         coefficients: dict[int, Fraction] = {}
         constant = Fraction(0)
         for ref in refs:
@@ -138,6 +141,23 @@ class Builder:
         terms.sort(key=node_of)
         if constant:
             terms.append(self.const(constant))
+        return self._sum(terms)
+
+    def _all_unlike(self, refs: list[Ref]) -> bool:
+        """Whether no two terms differ by a rational factor only, and none is a constant: the common case."""
+        seen = set()
+        for ref in refs:
+            node = self.nodes[node_of(ref)]
+            if node[0] == "const":
+                return False
+            is_scaled = node[0] == "mul" and self.nodes[node[1]][0] == "const"
+            base = node[2:] if is_scaled else node[1:] if node[0] == "mul" else (node_of(ref),)
+            if base in seen:
+                return False
+            seen.add(base)
+        return True
+
+    def _sum(self, terms: list[Ref]) -> Ref:
         if not terms:
             return self.const(0)
         if len(terms) == 1:
@@ -346,28 +366,41 @@ def canonical(graph: Graph) -> Graph:
             height[index] = 1 + max((height[node_of(r)] for r in operands(node)), default=-1)
             levels.setdefault(height[index], []).append(index)
 
-    builder = Builder()
+    nodes: list[Node] = []
+    numbers: dict[Node, int] = {}
     renamed: list[Ref] = [0] * len(graph.nodes)
 
     def new(ref: Ref) -> Ref:
         return renamed[ref] if ref >= 0 else ~renamed[~ref]
 
-    def key(index: int) -> tuple[Any, ...]:
-        node = graph.nodes[index]
+    def moved(node: Node) -> Node:
+        """The node with renamed operands, those of sums and products sorted; constants where they belong."""
         if node[0] in LEAVES:
             return node
         refs = [new(r) for r in node[1:]]
-        values = [builder.value(r) for r in refs]
-        variables = [r for r, v in zip(refs, values, strict=True) if v is None]
-        constants = [v for v in values if v is not None]
-        return (node[0], len(variables), sorted(map(node_of, variables)), variables, constants)
+        if node[0] in VARIADIC:
+            is_sum = node[0] == "add"
+            refs.sort(key=lambda r: (is_sum == (nodes[node_of(r)][0] == "const"), node_of(r)))
+        return (node[0], *refs)
+
+    def key(node: Node) -> tuple[Any, ...]:
+        if node[0] in LEAVES:
+            return node
+        variables = [r for r in node[1:] if nodes[node_of(r)][0] != "const"]
+        constants = [nodes[node_of(r)][1] * (1 if r >= 0 else -1) for r in node[1:] if nodes[node_of(r)][0] == "const"]
+        return (node[0], len(variables), [node_of(r) for r in variables], variables, constants)
 
     for level in sorted(levels):
-        for index in sorted(levels[level], key=key):
-            node = graph.nodes[index]
-            renamed[index] = copy_node(builder, node, tuple(new(r) for r in operands(node)))
+        for node, index in sorted(((moved(graph.nodes[i]), i) for i in levels[level]), key=lambda pair: key(pair[0])):
+            turned = node[0] == "add" and node[1] < 0
+            if turned:
+                node = (node[0], *(~r for r in node[1:]))
+            number = numbers.setdefault(node, len(nodes))
+            if number == len(nodes):
+                nodes.append(node)
+            renamed[index] = ~number if turned else number
     outputs = tuple(Output(o.name, o.shape, tuple(new(r) for r in o.elements)) for o in graph.outputs)
-    return prune(Graph(tuple(builder.nodes), outputs))
+    return Graph(tuple(nodes), outputs)
 
 
 def prune(graph: Graph) -> Graph:

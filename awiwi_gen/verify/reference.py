@@ -44,17 +44,17 @@ def ball_values(graph: Graph, inputs: Mapping[str, Array], values: Mapping[str, 
 
 
 def reference(values: BallArrays) -> Reference:
-    """Round ball values to pairs of doubles."""
+    """Round ball values to pairs of doubles; a ball that contains zero is zero."""
     high, low = {}, {}
     for name, elements in values.items():
-        high[name] = np.array([[float(x.mid()) for x in e] for e in elements]).T
-        low[name] = np.array(
-            [
-                [float((x - arb(h)).mid()) for x, h in zip(e, column, strict=True)]
-                for e, column in zip(elements, high[name].T, strict=True)
-            ]
-        ).T
+        centres = [[ZERO if x.contains(0) else x.mid() for x in column] for column in elements]
+        first = [[float(x) for x in column] for column in centres]
+        rest = [[float(x - h) for x, h in zip(c, f, strict=True)] for c, f in zip(centres, first, strict=True)]
+        high[name], low[name] = np.array(first).T, np.array(rest).T
     return Reference(high, low)
+
+
+ZERO = arb(0)
 
 
 def disagreement(a: BallArrays, b: BallArrays) -> float:
