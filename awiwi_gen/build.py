@@ -114,18 +114,25 @@ def _glue_source(manifest: dict[str, Any], declared: str) -> str:
     """JSON of what the wrapper is made from: declarations, and loops over batches."""
     loops, prototypes = [], []
     scalar, prefix = manifest["c_type"], manifest["prefix"]
+    if any(entry["params"] for entry in manifest["kernels"]):
+        head = f"const {prefix}_params *default_params(void)"
+        prototypes.append(f"{head};")
+        loops.append(f"static {head} {{ return &{prefix}_default_params; }}")
     for entry in manifest["kernels"]:
         sizes = {p["name"]: prod(p["shape"]) for p in entry["inputs"] + entry["outputs"]}
         inputs, outputs = ([p["name"] for p in entry[side]] for side in ("inputs", "outputs"))
         signature = [f"const {scalar} *{n}, ptrdiff_t step_{n}" for n in inputs]
         signature += [f"{scalar} *{n}" for n in outputs]
         call = [f"{n} + i*step_{n}" for n in inputs] + [f"{n} + i*{sizes[n]}" for n in outputs]
+        if entry["status"]:
+            signature.append("int *status")
         if entry["params"]:
             signature.insert(0, f"const {prefix}_params *p")
             call.insert(0, "p")
         head = f"void batch_{entry['name']}(ptrdiff_t n, {', '.join(signature)})"
         prototypes.append(f"{head};")
-        body = f"for (ptrdiff_t i = 0; i < n; i++) {prefix}_{entry['name']}({', '.join(call)});"
+        keep = "status[i] = " if entry["status"] else ""
+        body = f"for (ptrdiff_t i = 0; i < n; i++) {keep}{prefix}_{entry['name']}({', '.join(call)});"
         loops.append(f"static {head} {{ {body} }}")
     return json.dumps({"declared": declared, "prototypes": prototypes, "loops": loops})
 

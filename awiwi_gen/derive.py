@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from math import prod
 from typing import Any
 
 from awiwi_gen.errors import DimensionError
@@ -41,9 +42,9 @@ class Deriver:
             arguments.append(sympy.Matrix(symbols))
         result = kernel.routes["sympy"](self._trees["sympy"], *arguments)
         outputs = []
-        for (name, port), value in zip(kernel.outputs.items(), _several(kernel, result), strict=True):
+        for (name, shape), value in zip(kernel.results.items(), _several(kernel, result), strict=True):
             elements = lower_sympy(builder, _flat(value), leaves)
-            outputs.append(Output(name, port.shape, tuple(elements)))
+            outputs.append(Output(name, shape, tuple(elements)))
         return _checked(kernel, builder.graph(outputs))
 
     def _casadi(self, kernel: Kernel) -> Graph:
@@ -66,16 +67,16 @@ class Deriver:
         result = kernel.routes["casadi"](tree, *arguments)
         values = [ca.vertcat(*(ca.vec(ca.SX(v).T) for v in _rows(value))) for value in _several(kernel, result)]
         outputs = [
-            Output(name, port.shape, tuple(elements))
-            for (name, port), elements in zip(
-                kernel.outputs.items(), lower_casadi(builder, values, leaves), strict=True
+            Output(name, shape, tuple(elements))
+            for (name, shape), elements in zip(
+                kernel.results.items(), lower_casadi(builder, values, leaves), strict=True
             )
         ]
         return _checked(kernel, builder.graph(outputs))
 
 
 def _several(kernel: Kernel, result: Any) -> tuple[Any, ...]:
-    return tuple(result) if len(kernel.outputs) > 1 else (result,)
+    return tuple(result) if len(kernel.results) > 1 else (result,)
 
 
 def _rows(value: Any) -> Iterable[Any]:
@@ -88,9 +89,9 @@ def _flat(value: Any) -> list[Any]:
 
 
 def _checked(kernel: Kernel, graph: Graph) -> Graph:
-    for output, port in zip(graph.outputs, kernel.outputs.values(), strict=True):
-        if len(output.elements) != port.size:
-            raise ValueError(f"{kernel.name}: {output.name} has {len(output.elements)} elements, not {port.size}")
+    for output in graph.outputs:
+        if len(output.elements) != prod(output.shape):
+            raise ValueError(f"{kernel.name}: {output.name} has {len(output.elements)} elements, not {output.shape}")
     return graph
 
 

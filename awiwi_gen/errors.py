@@ -18,6 +18,8 @@ from typing import ClassVar
 
 __all__ = ["AwiwiError", "BuildError", "DimensionError", "Fault", "InputError", "OutputError", "VerificationError"]
 
+_MOST_SHOWN = 100  # a terminal is not scrolled back farther than that; `faults` has them all
+
 
 class AwiwiError(Exception):
     """Root of the tree; the command line prints it and leaves with `exit_code`."""
@@ -58,7 +60,9 @@ class InputError(AwiwiError, ValueError):
         super().__init__(self.faults)  # what pickle hands back to this constructor in another process
 
     def __str__(self) -> str:
-        return "\n".join(str(fault) for fault in self.faults)
+        lines = [str(fault) for fault in self.faults[:_MOST_SHOWN]]
+        more = len(self.faults) - len(lines)
+        return "\n".join(lines + [f"... and {more} more"] * (more > 0))
 
 
 class OutputError(InputError):

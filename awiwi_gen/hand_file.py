@@ -220,7 +220,9 @@ def _lines_of_keys(text: str) -> dict[Keys, int]:
     elements: dict[Keys, int] = {}  # how many [[tables]] of this name there were so far
 
     def mark(keys: Keys, node: Node) -> None:
-        for end in range(1, min(len(keys), 12) + 1):  # the schema is 8 deep; a key of 1000 dots must not cost its square
+        for end in range(
+            1, min(len(keys), 12) + 1
+        ):  # the schema is 8 deep; a key of 1000 dots must not cost its square
             lines.setdefault(keys[:end], node.start_point.row + 1)
 
     def value(keys: Keys, node: Node) -> None:

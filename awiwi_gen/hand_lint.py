@@ -166,17 +166,17 @@ def _inertia(link: Link) -> Iterator[Complaint]:
     rod = link.mass.value * sum(c.value**2 for c in link.com) / 3 or Fraction(1)
     ways = []
     for key, value in tensor.items():
-        for factor in _SLIPS:
+        for slip, factor in enumerate(_SLIPS):
             mended = tensor | {key: value * factor}
             if _is_of_a_body(mended):
                 across = (mended["xx"] + mended["yy"] + mended["zz"]) / 2
-                ways.append((abs(math.log(across / rod)), key, factor))
+                ways.append((abs(math.log(across / rod)), slip, key))
     message = "breaks the triangle inequality of the principal moments: no body is like that"
     if not ways:
         yield (), message
         return
-    _, key, factor = min(ways)
-    much = f"{1 / factor} times too large" if factor < 1 else f"{factor} times too small"
+    _, slip, key = min(ways)
+    much = f"{1 / _SLIPS[slip]} times too large" if _SLIPS[slip] < 1 else f"{_SLIPS[slip]} times too small"
     yield (key,), f'= "{given[key]}" {message}; {key} is probably {much} (a slipped decimal point?)'
 
 

@@ -10,6 +10,7 @@ from typing import Any
 from awiwi_gen.units import Unit
 
 Route = Callable[..., Any]
+GUARDS = "guards"
 
 
 @dataclass(frozen=True)
@@ -54,6 +55,9 @@ class Kernel:
     ``part`` is the piece of the hand the routes receive as their first argument, ``path`` its place in the
     hand file. Kernels of parts with equal ``structure`` share their derivation. The first route is the
     definition, the others are independent ways to the same result.
+
+    ``guards`` say in words what must hold for the result to exist. Routes of a guarded kernel return, after
+    their outputs, one expression per guard that is positive where it holds; the C then returns a status.
     """
 
     name: str
@@ -65,6 +69,13 @@ class Kernel:
     part: Any = field(repr=False)
     path: str = ""
     structure: str = ""
+    guards: tuple[str, ...] = ()
+
+    @property
+    def results(self) -> dict[str, tuple[int, ...]]:
+        """Shapes of all that a route returns: the outputs, then the guards if there are any."""
+        shapes = {name: port.shape for name, port in self.outputs.items()}
+        return {**shapes, GUARDS: (len(self.guards),)} if self.guards else shapes
 
     @property
     def family(self) -> str:

@@ -18,7 +18,8 @@ class KernelFunction:
     """One compiled kernel. Call it with arrays in the order, or by the names, of its inputs.
 
     An input of shape (4,) takes arrays (..., 4); leading dimensions broadcast against each other. One output
-    comes as an array, several as a named tuple. Raises InputError (a ValueError) for shapes that do not fit.
+    comes as an array, several as a named tuple. Kernels that can fail add a field ``status``, an integer array
+    over the leading dimensions with 0 for success. Raises InputError (a ValueError) for shapes that do not fit.
     """
 
     def __init__(self, entry: Mapping[str, Any], dtype: type, ffi: Any, batch: Any, params: Any) -> None:
@@ -32,7 +33,9 @@ class KernelFunction:
         self.dtype = np.dtype(dtype)
         self._ffi, self._batch, self._params = ffi, batch, params
         self._pointer = "double[]" if self.dtype == np.float64 else "float[]"
-        self._result = namedtuple(self.name, [o["name"] for o in self.outputs])  # type: ignore[misc] # noqa: PYI024
+        fields = [o["name"] for o in self.outputs] + (["status"] if entry["status"] else [])
+        self._has_status: bool = entry["status"]
+        self._result = namedtuple(self.name, fields)  # type: ignore[misc] # noqa: PYI024
 
     @property
     def signature(self) -> str:
@@ -66,6 +69,9 @@ class KernelFunction:
             arguments += [self._ffi.from_buffer(self._pointer, array), step]
         results = [np.empty(lead + tuple(o["shape"]), self.dtype) for o in self.outputs]
         arguments += [self._ffi.from_buffer(self._pointer, r, require_writable=True) for r in results]
+        if self._has_status:
+            results.append(np.empty(lead, np.intc))
+            arguments.append(self._ffi.from_buffer("int[]", results[-1], require_writable=True))
         self._batch(*arguments)
         return results[0] if len(results) == 1 else self._result(*results)
 
@@ -101,7 +107,7 @@ class Library(Mapping[str, KernelFunction]):
         self.digest: str = ffi.string(getattr(lib, f"{prefix}_model_digest")).decode()
         self._kernels = {}
         for entry in manifest["kernels"]:
-            params = ffi.addressof(lib, f"{prefix}_default_params") if entry["params"] else None
+            params = lib.default_params() if entry["params"] else None
             batch = getattr(lib, f"batch_{entry['name']}")
             self._kernels[entry["name"]] = KernelFunction(entry, dtype, ffi, batch, params)
 

@@ -163,6 +163,7 @@ def manifest_entry(kernel: Kernel, record: Record) -> dict[str, Any]:
         "part": kernel.path,
         "route": record.route,
         "params": bool(record.graph.params),
+        "status": bool(kernel.guards),
         "inputs": [port(name, spec, True) for name, spec in kernel.inputs.items()],
         "outputs": [port(name, spec, False) for name, spec in kernel.outputs.items()],
         "cost": record.function.cost.as_dict(),

@@ -46,7 +46,8 @@ def print_proof(proof: Proof, manifest: Mapping[str, Any]) -> None:
     parts = dict.fromkeys(law.part for law in proof.laws)
     for part in parts:
         laws = [law for law in proof.laws if law.part == part]
-        print(f"{part}: {len(laws)} laws of physics hold to {max(law.worst for law in laws):.0e}")
+        kept = [law for law in laws if law.passed]
+        print(f"{part}: {len(kept)} of {len(laws)} laws of physics hold, to {max((k.worst for k in kept), default=0):.0e}")
     for law in proof.laws:
         if not law.passed:
             print(f"{law.part} FAILS: {law.statement} (by {law.worst:.1e})")

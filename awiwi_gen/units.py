@@ -255,7 +255,8 @@ def _parse_product(whole: str, text: str) -> tuple[Fraction, Unit]:
     for word in text.replace("*", " ").replace("·", " ").split() or [""]:
         factor = _FACTOR.fullmatch(word)
         if factor is None or factor["symbol"] not in _SYMBOLS:
-            raise _fault(whole, f"has an unknown unit {word!r}{_suggestion(factor['symbol'] if factor else word)}")
+            hint = _suggestion(factor["symbol"] if factor else word)
+            raise _fault(whole, f'has the unknown unit "{word}"{hint}')
         symbol_scale, symbol_unit = _SYMBOLS[factor["symbol"]]
         power = int(factor["power"] or 1)
         scale, unit = scale * symbol_scale**power, unit * symbol_unit**power

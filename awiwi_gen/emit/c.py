@@ -15,6 +15,7 @@ from math import prod
 from awiwi_gen.emit.options import Options
 from awiwi_gen.ir.cost import Cost, cost
 from awiwi_gen.ir.graph import LEAVES, Graph, Node, Ref, node_of, operands
+from awiwi_gen.kernel import GUARDS
 
 LINE = 100  # longer expressions are cut into named parts
 ATOM, PRODUCT, SUM = 3, 2, 1  # how tightly a printed expression binds
@@ -52,10 +53,11 @@ def c_function(
     """Print a graph. ``inputs`` maps port names to shapes; ``part`` is where its parameters live."""
     printer = Printer(graph, options, f"p->{identifier(part)}_" if part else "p->")
     arguments = [f"const {options.c_type} {port}[%s{prod(shape)}]" for port, shape in inputs.items()]
-    arguments += [f"{options.c_type} {o.name}[%s{len(o.elements)}]" for o in graph.outputs]
+    arguments += [f"{options.c_type} {o.name}[%s{len(o.elements)}]" for o in graph.outputs if o.name != GUARDS]
     if graph.params:
         arguments.insert(0, f"const {prefix}_params *%sp")
-    signature = f"void {prefix}_{name}({', '.join(arguments)})"
+    result = "int" if any(o.name == GUARDS for o in graph.outputs) else "void"
+    signature = f"{result} {prefix}_{name}({', '.join(arguments)})"
     read = {node[1] for node in graph.nodes if node[0] == "input"}
     unused = tuple(f"(void){port};" for port in inputs if port not in read)
     return CFunction(
@@ -89,6 +91,10 @@ class Printer:
             )
             self.texts.append(self.declare(node, text[0]) if named else text)
         for output in self.graph.outputs:
+            if output.name == GUARDS:
+                positive = [f"{self.operand(ref, SUM)} > {self.options.literal(Fraction(0))}" for ref in output.elements]
+                self.lines.append(f"return {' && '.join(positive)} ? 0 : 1;")
+                continue
             for position, ref in enumerate(output.elements):
                 self.lines.append(f"{output.name}[{position}] = {self.operand(ref, SUM)};")
         return self.lines
@@ -112,7 +118,7 @@ class Printer:
         if operation == "input":
             return f"{node[1]}[{node[2]}]", ATOM
         if operation == "param":
-            return self.params + identifier(node[1]), ATOM
+            return self.parameter(node[1]), ATOM
         refs = operands(node)
         if operation == "add":
             text = self.operand(refs[0], SUM)
@@ -126,6 +132,10 @@ class Printer:
         if operation == "inv":
             return f"{self.options.literal(Fraction(1))}/{self.operand(refs[0], ATOM)}", PRODUCT
         return f"{self.options.function(operation)}({', '.join(self.operand(r, SUM) for r in refs)})", ATOM
+
+    def parameter(self, path: str) -> str:
+        """How a number of the hand is read."""
+        return self.params + identifier(path)
 
     def operand(self, ref: Ref, binding: int) -> str:
         """The text of a reference, in parentheses if it binds less tightly than asked."""

@@ -24,46 +24,60 @@ def quotients(graph: Graph) -> Graph:
 
 
 def orient(graph: Graph) -> Graph:
-    """Turn nodes that are only used with a minus, and start every sum with a positive term."""
-    negative, positive = _signs_of_use(graph)
-    nodes: list[Node] = []
-    turned = [False] * len(graph.nodes)
+    """Let minus signs fall where they cost nothing, and start every sum with a positive term.
+
+    Walks from the outputs down: a node whose uses would all pay for a minus computes its negative instead,
+    by turning its terms, its constant, or a factor that only it uses.
+    """
+    nodes = list(graph.nodes)
+    uses = graph.uses
+    outputs = [list(output.elements) for output in graph.outputs]
+    paid = [0] * len(nodes)  # uses with a minus that would be an operation, less those without
+    for ref in graph.roots:
+        paid[node_of(ref)] += 1 if ref < 0 else -uses[node_of(ref)]
+    turned = [False] * len(nodes)
+    for index in range(len(nodes) - 1, -1, -1):
+        operation, *refs = nodes[index]
+        if operation in LEAVES:
+            continue
+        if paid[index] == uses[index]:
+            turned[index] = _turn(nodes, uses, operation, refs)
+        for ref in refs:
+            free = operation == "add" and nodes[node_of(ref)][0] != "add"
+            paid[node_of(ref)] += 1 if ref < 0 and not free else -uses[node_of(ref)]
+        nodes[index] = (operation, *refs)
 
     def new(ref: Ref) -> Ref:
         return ~ref if turned[node_of(ref)] else ref
 
-    for index, node in enumerate(graph.nodes):
-        if node[0] in LEAVES:
-            nodes.append(node)
-            continue
-        refs = [new(ref) for ref in node[1:]]
-        only_negative = bool(negative[index]) and not positive[index]
-        if node[0] == "add":
-            if only_negative or all(ref < 0 for ref in refs):
-                refs = [~ref for ref in refs]
-                turned[index] = True
-            refs.sort(key=lambda ref: ref < 0)
-        elif node[0] == "mul" and graph.nodes[node_of(refs[0])][0] == "const" and only_negative:
-            refs[0] = ~refs[0]
-            turned[index] = True
-        nodes.append((node[0], *refs))
-    outputs = tuple(Output(o.name, o.shape, tuple(new(r) for r in o.elements)) for o in graph.outputs)
-    return Graph(tuple(nodes), outputs)
+    for index, (operation, *refs) in enumerate(nodes):
+        if operation not in LEAVES:
+            refs = [new(ref) for ref in refs]
+            if operation == "add":
+                refs.sort(key=lambda ref: ref < 0)
+            nodes[index] = (operation, *refs)
+    return Graph(
+        tuple(nodes),
+        tuple(
+            Output(o.name, o.shape, tuple(new(r) for r in elements))
+            for o, elements in zip(graph.outputs, outputs, strict=True)
+        ),
+    )
 
 
-def _signs_of_use(graph: Graph) -> tuple[list[int], list[int]]:
-    """How often each node is used with a minus that costs an operation, and how often without."""
-    negative = [0] * len(graph.nodes)
-    positive = [0] * len(graph.nodes)
-    for node in graph.nodes:
-        for ref in operands(node):
-            if node[0] == "add" and graph.nodes[node_of(ref)][0] == "mul":
-                positive[node_of(ref)] += 1  # a sum takes either sign of a product for nothing
-            else:
-                (positive if ref >= 0 else negative)[node_of(ref)] += 1
-    for ref in graph.roots:
-        (positive if ref >= 0 else negative)[node_of(ref)] += 1
-    return negative, positive
+def _turn(nodes: list[Node], uses: tuple[int, ...], operation: str, refs: list[Ref]) -> bool:
+    """Negate a node in place at no cost; False where that is impossible."""
+    if operation == "add":
+        refs[:] = [~ref for ref in refs]
+        return True
+    if operation not in ("mul", "div"):
+        return False
+    for place, ref in enumerate(refs):
+        kind = nodes[node_of(ref)][0]
+        if kind == "const" or (kind == "add" and uses[node_of(ref)] == 1):
+            refs[place] = ~ref
+            return True
+    return False
 
 
 def schedule(graph: Graph) -> Graph:

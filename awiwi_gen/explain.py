@@ -1,0 +1,78 @@
+"""What a kernel computes, told to a person: its meaning, ports, source, cost, and the mathematics behind it."""
+
+from __future__ import annotations
+
+import difflib
+from typing import Any
+
+from awiwi_gen.emit.c import Printer
+from awiwi_gen.emit.options import Options
+from awiwi_gen.errors import InputError
+from awiwi_gen.ir.graph import Graph
+from awiwi_gen.ir.passes import optimise
+from awiwi_gen.kernel import Kernel, Port
+from awiwi_gen.pipeline import Job, derive_missing, make_records
+from awiwi_gen.records import load_graphs
+
+MOST_LINES = 60
+
+
+def explanation(job: Job, name: str) -> dict[str, Any]:
+    """Everything worth telling about a kernel. Raises InputError for an unknown name, with near ones."""
+    known = {kernel.name: kernel for kernel in job.kernels}
+    if name not in known:
+        near = ", ".join(difflib.get_close_matches(name, known, 3)) or "see awiwi-gen list"
+        raise InputError(f"no kernel {name!r}; did you mean {near}?")
+    kernel = known[name]
+    alone = Job(job.hand, job.options, name, job.store, job.progress)
+    derive_missing(alone)
+    (record,) = make_records(alone)
+    definition = load_graphs(kernel, job.store)[next(iter(kernel.routes))]
+    return {
+        "name": name,
+        "doc": kernel.doc,
+        "source": kernel.source,
+        "part": kernel.path,
+        "inputs": {n: _port(p) for n, p in kernel.inputs.items()},
+        "outputs": {n: _port(p) for n, p in kernel.outputs.items()},
+        "guards": list(kernel.guards),
+        "route": record.route,
+        "cost": record.function.cost.as_dict(),
+        "numbers": {path: str(kernel.part.quantities()[path]) for path in definition.params},
+        "mathematics": mathematics(definition),
+    }
+
+
+def mathematics(definition: Graph) -> list[str]:
+    """The definition with the hand's numbers by name, as assignments; long ones end in an ellipsis."""
+    graph = optimise(definition)[-1][1]
+    lines = [line.removeprefix("const double ").rstrip(";") for line in Names(graph, Options(), "").statements()]
+    return lines if len(lines) <= MOST_LINES else [*lines[:MOST_LINES], f"... and {len(lines) - MOST_LINES} more lines"]
+
+
+class Names(Printer):
+    """Prints numbers of the hand by their path in the hand file."""
+
+    def parameter(self, path: str) -> str:
+        """``links[1].mass`` as it stands in the file."""
+        return path
+
+
+def _port(port: Port) -> dict[str, Any]:
+    told: dict[str, Any] = {"shape": list(port.shape), "unit": port.unit_text}
+    return told if port.low is None else told | {"range": port.bounds()}
+
+
+def explanation_lines(told: dict[str, Any]) -> list[str]:
+    """The same as text."""
+    lines = [told["name"], f"  {told['doc']}", "", f"  source     {told['source']}"]
+    for side in ("inputs", "outputs"):
+        for name, port in told[side].items():
+            shape = "".join(f"[{n}]" for n in port["shape"])
+            lines.append(f"  {side[:-1]:9}  {name}{shape} in {port['unit']}")
+    counts = ", ".join(f"{n} {what}" for what, n in told["cost"].items() if n and what != "operations")
+    lines += [f"  cost       {told['cost']['operations']} operations ({counts or 'only moves'}), route {told['route']}"]
+    lines += [f"  returns 1 unless {guard}" for guard in told["guards"]]
+    lines += ["", f"  definition, with the numbers of {told['part']}:", *(f"    {line}" for line in told["mathematics"])]
+    lines += ["", "  numbers:", *(f"    {path} = {value}" for path, value in told["numbers"].items())]
+    return lines
