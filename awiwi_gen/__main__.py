@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Callable
-from enum import Enum
+from enum import StrEnum
 from functools import wraps
 from pathlib import Path
 from typing import Annotated, Any
@@ -26,14 +26,14 @@ app = typer.Typer(
 )
 
 
-class Scalar(str, Enum):
+class Scalar(StrEnum):
     """Scalar type of the generated C."""
 
     f64 = "f64"
     f32 = "f32"
 
 
-class Params(str, Enum):
+class Params(StrEnum):
     """Where the hand's numbers are: constants in the code, or fields of a struct."""
 
     baked = "baked"
@@ -156,11 +156,11 @@ def list_(
     from awiwi_gen.report import print_json, print_table
 
     if assumed:
-        rows = [(path, str(quantity)) for path, quantity in make_job(hand).hand.assumed().items()]
+        guesses = {path: str(quantity) for path, quantity in make_job(hand).hand.assumed().items()}
         if as_json:
-            print_json([{"path": path, "value": value} for path, value in rows])
+            print_json([{"path": path, "value": value} for path, value in guesses.items()])
         else:
-            print_table(("number", "assumed value"), rows)
+            print_table(("number", "assumed value"), list(guesses.items()))
         return 0
     entries = require(output)["kernels"]
     if as_json:

@@ -62,7 +62,8 @@ class Cache:
         """What was put under this digest, or None."""
         try:
             with (self.directory / kind / digest).open("rb") as file:
-                return pickle.load(file)  # noqa: S301 our own files
+                found: object = pickle.load(file)  # noqa: S301 our own files
+                return found
         except (OSError, pickle.PickleError, EOFError, AttributeError, ImportError, IndexError):
             return None
 

@@ -8,7 +8,8 @@ from typing import Any
 
 from awiwi_gen.errors import DimensionError
 from awiwi_gen.ir.algebras import Dimensions
-from awiwi_gen.ir.graph import Builder, Graph, Node, Output
+from awiwi_gen.ir.builder import Builder
+from awiwi_gen.ir.graph import Graph, Node, Output
 from awiwi_gen.ir.interpret import evaluate
 from awiwi_gen.kernel import Kernel
 
@@ -22,7 +23,7 @@ class Deriver:
 
     def derive(self, kernel: Kernel, route: str) -> Graph:
         """The graph of a kernel by the route of that name ("sympy" or "casadi")."""
-        return getattr(self, f"_{route}")(kernel)
+        return {"sympy": self._sympy, "casadi": self._casadi}[route](kernel)
 
     def _sympy(self, kernel: Kernel) -> Graph:
         import sympy

@@ -10,7 +10,7 @@ from awiwi_gen.emit.options import Options
 from awiwi_gen.errors import InputError
 from awiwi_gen.ir.graph import Graph
 from awiwi_gen.ir.passes import optimise
-from awiwi_gen.kernel import Kernel, Port
+from awiwi_gen.kernel import Port
 from awiwi_gen.pipeline import Job, derive_missing, make_records
 from awiwi_gen.records import load_graphs
 
@@ -73,6 +73,10 @@ def explanation_lines(told: dict[str, Any]) -> list[str]:
     counts = ", ".join(f"{n} {what}" for what, n in told["cost"].items() if n and what != "operations")
     lines += [f"  cost       {told['cost']['operations']} operations ({counts or 'only moves'}), route {told['route']}"]
     lines += [f"  returns 1 unless {guard}" for guard in told["guards"]]
-    lines += ["", f"  definition, with the numbers of {told['part']}:", *(f"    {line}" for line in told["mathematics"])]
+    lines += [
+        "",
+        f"  definition, with the numbers of {told['part']}:",
+        *(f"    {line}" for line in told["mathematics"]),
+    ]
     lines += ["", "  numbers:", *(f"    {path} = {value}" for path, value in told["numbers"].items())]
     return lines

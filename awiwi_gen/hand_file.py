@@ -118,7 +118,7 @@ class HandFile:
 
 
 def _complaints(schema: type[BaseModel], errors: list[ErrorDetails]) -> Iterator[tuple[Keys, str]]:
-    """Say each error of pydantic in this file's words. A misspelt key is one fault, not an unknown and a missing one."""
+    """Say each error of pydantic in this file's words. A misspelt key is one fault: not unknown and missing."""
     absent = {error["loc"] for error in errors if error["type"] == "missing"}
     for error in errors:
         if error["type"] != "extra_forbidden":
@@ -148,11 +148,10 @@ def _predicate(error: ErrorDetails, expected: str) -> str:
         case "literal_error":
             near = difflib.get_close_matches(str(error["input"]), re.findall(r"'([^']+)'", context["expected"]), n=1)
             return f"is not one of {context['expected']}" + (f'; did you mean "{near[0]}"?' if near else "")
-        case "too_short" | "too_long":
-            bound = (
-                f"at least {context['min_length']}" if "min_length" in context else f"at most {context['max_length']}"
-            )
-            return f"has {context['actual_length']} entries; expected {bound}"
+        case "too_short":
+            return f"has {len(error['input'])} entries; expected at least {context['min_length']}"
+        case "too_long":
+            return f"has {len(error['input'])} entries; expected at most {context['max_length']}"
         case "string_type":
             return f"is not text; expected {expected}"
         case "tuple_type":

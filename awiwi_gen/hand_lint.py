@@ -1,6 +1,6 @@
 """Physics and cross-references: what a schema cannot see in a hand file.
 
-Each check yields complaints, `(keys, predicate)` pairs, relative to the table it was given. Arithmetic is exact wherever
+Each check yields complaints, `(keys, predicate)` pairs, relative to the table it was given. Arithmetic is exact where
 the numbers allow it, so that a flat plate, whose moments fulfil xx + yy = zz, is not refused for a rounding error.
 """
 
@@ -19,7 +19,8 @@ __all__ = ["complaints"]
 Complaint = tuple[Keys, str]
 Tensor = dict[str, Fraction]
 
-_SLIPS = (Fraction(1, 10), Fraction(10), Fraction(1, 100), Fraction(100), Fraction(1, 1000), Fraction(1000))
+_SLIPS = [Fraction(10) ** places for places in (-3, -2, -1, 1, 2, 3)]
+_CLOSURE_STEPS = 1000
 _WIDEST_GYRATION = 1.0  # m; with a plausible mass and a plausible moment, their ratio can still be absurd
 
 
@@ -161,22 +162,23 @@ def _inertia(link: Link) -> Iterator[Complaint]:
         yield (), f"is too large for a mass of {link.mass}: radius of gyration {gyration:.3g} m"
     if _is_of_a_body(tensor):
         return
-    # Moving one decimal point may mend it. Of several ways the likeliest leaves a bone: a rod from the joint through
-    # its centre of mass, at distance c in the middle, has m (2 c)^2 / 12 across.
+    # Moving one decimal point may mend it. Of several ways the likeliest moves it by one place, in a moment rather than
+    # a product, and leaves a bone: a rod from the joint, with its centre c half way, has m (2 c)^2 / 12 across.
     rod = link.mass.value * sum(c.value**2 for c in link.com) / 3 or Fraction(1)
     ways = []
     for key, value in tensor.items():
-        for slip, factor in enumerate(_SLIPS):
+        for factor in _SLIPS:
             mended = tensor | {key: value * factor}
             if _is_of_a_body(mended):
                 across = (mended["xx"] + mended["yy"] + mended["zz"]) / 2
-                ways.append((abs(math.log(across / rod)), slip, key))
+                by_one = factor in (10, Fraction(1, 10))
+                ways.append((not by_one, key[0] != key[1], abs(math.log(across / rod)), key, factor))
     message = "breaks the triangle inequality of the principal moments: no body is like that"
     if not ways:
         yield (), message
         return
-    _, slip, key = min(ways)
-    much = f"{1 / _SLIPS[slip]} times too large" if _SLIPS[slip] < 1 else f"{_SLIPS[slip]} times too small"
+    *_, key, factor = min(ways)
+    much = f"{1 / factor} times too large" if factor < 1 else f"{factor} times too small"
     yield (key,), f'= "{given[key]}" {message}; {key} is probably {much} (a slipped decimal point?)'
 
 
@@ -199,19 +201,14 @@ def _closure(bar: FourBar, low: Quantity, high: Quantity) -> Iterator[Complaint]
     """The linkage closes, short of its dead points, over the whole range of its joint."""
     ground, crank, coupler, rocker = (float(side) for side in (bar.ground, bar.crank, bar.coupler, bar.rocker))
     shortest, longest = abs(coupler - rocker), coupler + rocker
-    steps = 1000
-    for step in range(steps + 1):
-        angle = float(low) + (float(high) - float(low)) * step / steps
-        turned = float(bar.reference) + angle
+    for step in range(_CLOSURE_STEPS + 1):
+        joint = float(low) + (float(high) - float(low)) * step / _CLOSURE_STEPS
+        turned = float(bar.reference) + joint
         gap = math.sqrt(max(0.0, ground**2 + crank**2 - 2 * ground * crank * math.cos(turned)))
         if not shortest * (1 + 1e-6) < gap < longest * (1 - 1e-6):
-            yield (
-                (),
-                (
-                    f"does not close at a joint angle of {math.degrees(angle):.4g} deg (crank at {math.degrees(turned):.4g} "
-                    f"deg): coupler and rocker bridge {shortest * 1e3:.4g} to {longest * 1e3:.4g} mm, not {gap * 1e3:.4g} mm"
-                ),
-            )
+            angles = f"a joint angle of {math.degrees(joint):.4g} deg (crank at {math.degrees(turned):.4g} deg)"
+            bridge = f"coupler and rocker bridge {shortest * 1e3:.4g} to {longest * 1e3:.4g} mm, not {gap * 1e3:.4g} mm"
+            yield (), f"does not close at {angles}: {bridge}"
             return
 
 
@@ -219,7 +216,7 @@ def _closure(bar: FourBar, low: Quantity, high: Quantity) -> Iterator[Complaint]
 
 
 def _drive(finger: Finger) -> Iterator[Complaint]:
-    """Tendons only pull, so each independent joint needs one on either side; and together they must tell joints apart."""
+    """Tendons only pull, so each independent joint needs one on either side; together they must tell joints apart."""
     order = [link.joint for link in finger.links]
     spanned = {joint for tendon in finger.tendons if tendon.span for joint in order[: order.index(tendon.span.joint)]}
     by_pulleys = [joint for joint in finger.joints if joint not in spanned]

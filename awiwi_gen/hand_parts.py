@@ -58,10 +58,13 @@ class Measure:
 
     def read(self, value: object) -> Quantity:
         """Check one value of the file. Raises `ValueError` with a predicate: 'is a force; expected a length ...'."""
-        if not isinstance(value, str):
-            is_number = isinstance(value, int | float) and not isinstance(value, bool)
-            lack = "has no unit; expected text:" if is_number else "is not text; expected"
-            raise ValueError(f"{lack} {self.expected}")  # noqa: TRY004 the only kind of error that pydantic collects
+        match value:
+            case str():
+                pass
+            case int() | float() if not isinstance(value, bool):
+                raise ValueError(f"has no unit; expected text: {self.expected}")
+            case _:
+                raise ValueError(f"is not text; expected {self.expected}")
         try:
             quantity = parse_quantity(value)
         except InputError as error:
@@ -96,15 +99,15 @@ Point = Annotated[tuple[Length, Length, Length], Field(strict=False, examples=['
 _C = """alignas alignof asm auto bool break case char const constexpr continue default do double else enum extern false
     float for fortran goto if inline int long nullptr register restrict return short signed sizeof static static_assert
     struct switch thread_local true typedef typeof union unsigned void volatile while"""
-_CPP = """and and_eq bitand bitor catch char8_t char16_t char32_t class co_await co_return co_yield compl concept const_cast
-    consteval constinit decltype delete dynamic_cast explicit export final friend import module mutable namespace new
-    noexcept not not_eq operator or or_eq override private protected public reinterpret_cast requires static_cast
-    template this throw try typeid typename using virtual wchar_t xor xor_eq"""
+_CPP = """and and_eq bitand bitor catch char8_t char16_t char32_t class co_await co_return co_yield compl concept
+    const_cast consteval constinit decltype delete dynamic_cast explicit export final friend import module mutable
+    namespace new noexcept not not_eq operator or or_eq override private protected public reinterpret_cast requires
+    static_cast template this throw try typeid typename using virtual wchar_t xor xor_eq"""
 _KEYWORDS = frozenset(f"{_C} {_CPP}".split())
 # A finger's name begins the names of its kernels, so it may not be the first word of a kernel of the whole hand.
-_KERNELS = """backstepping batch calibration cascade finger force forearm friction guiding hand impedance joint joints lever
-    lqr model motor observer optimal palm params pole sdre self spring status step stiffness tendon tendons test version
-    wrist"""
+_KERNELS = """backstepping batch calibration cascade finger force forearm friction guiding hand impedance joint joints
+    lever lqr model motor observer optimal palm params pole sdre self spring status step stiffness tendon tendons test
+    version wrist"""
 _TAKEN = frozenset(_KERNELS.split())
 
 
@@ -203,7 +206,7 @@ class Part(BaseModel):
 
 
 def _leaves(node: object) -> Iterator[tuple[str, Quantity, str]]:
-    """All (relative path, quantity, source) below a node; the nearest `source` above a number is the one that counts."""
+    """All (relative path, quantity, source) below a node; the nearest `source` above a number counts."""
     match node:
         case Quantity():
             yield "", node, ""
@@ -252,7 +255,7 @@ def _join(path: str, below: str) -> str:
 
 
 class Inertia(Part):
-    """Inertia tensor about the centre of mass in link axes; `xy` is the tensor's entry, minus the integral of x y dm."""
+    """Inertia tensor about the centre of mass in link axes; `xy` is an entry of it: minus the integral of x y dm."""
 
     xx: Moment
     yy: Moment

@@ -35,7 +35,7 @@ class KernelFunction:
         self._pointer = "double[]" if self.dtype == np.float64 else "float[]"
         fields = [o["name"] for o in self.outputs] + (["status"] if entry["status"] else [])
         self._has_status: bool = entry["status"]
-        self._result = namedtuple(self.name, fields)  # type: ignore[misc] # noqa: PYI024
+        self._result = namedtuple(self.name, fields)  # type: ignore[misc]
 
     @property
     def signature(self) -> str:

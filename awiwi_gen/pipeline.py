@@ -124,7 +124,7 @@ def make_records(job: Job) -> list[Record]:
         if digest in absent
     ]
     job.parallel("emit", _record_task, tasks)
-    return [job.store.get("records", digest) for digest in keys]
+    return [job.store.get("records", digest) for digest in keys]  # type: ignore[misc]
 
 
 def _record_task(task: tuple[Any, ...]) -> None:

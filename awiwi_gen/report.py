@@ -47,7 +47,9 @@ def print_proof(proof: Proof, manifest: Mapping[str, Any]) -> None:
     for part in parts:
         laws = [law for law in proof.laws if law.part == part]
         kept = [law for law in laws if law.passed]
-        print(f"{part}: {len(kept)} of {len(laws)} laws of physics hold, to {max((k.worst for k in kept), default=0):.0e}")
+        print(
+            f"{part}: {len(kept)} of {len(laws)} laws of physics hold, to {max((k.worst for k in kept), default=0):.0e}"
+        )
     for law in proof.laws:
         if not law.passed:
             print(f"{law.part} FAILS: {law.statement} (by {law.worst:.1e})")
@@ -76,7 +78,10 @@ def print_table(columns: Sequence[str], rows: Sequence[Sequence[str]], title: st
         print(title)
     widths = [max(len(str(r[i])) for r in [columns, *rows]) for i in range(len(columns))]
     for row in [columns, *rows]:
-        cells = [c.ljust(w) if i in (0, len(columns) - 1) else c.rjust(w) for i, (c, w) in enumerate(zip(row, widths, strict=True))]
+        cells = [
+            c.ljust(w) if i in (0, len(columns) - 1) else c.rjust(w)
+            for i, (c, w) in enumerate(zip(row, widths, strict=True))
+        ]
         print("  ".join(cells).rstrip())
 
 

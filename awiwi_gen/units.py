@@ -20,8 +20,8 @@ from awiwi_gen.errors import Fault, InputError
 
 # fmt: off
 __all__ = [
-    "A", "Hz", "J", "N", "Pa", "Quantity", "Unit", "V", "W", "kg", "m", "name_of", "one", "parse_quantity", "parse_unit",
-    "rad", "s",
+    "A", "Hz", "J", "N", "Pa", "Quantity", "Unit", "V", "W", "kg", "m", "name_of", "one", "parse_quantity",
+    "parse_unit", "rad", "s",
 ]
 # fmt: on
 

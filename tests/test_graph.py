@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from awiwi_gen.ir.graph import Builder, Graph, Node, Output, canonical, node_of, operands
+from awiwi_gen.ir.builder import Builder
+from awiwi_gen.ir.graph import Graph, Node, Output, canonical, node_of, operands
 from awiwi_gen.ir.passes import PIPELINES, stages
 from awiwi_gen.ir.passes.bind import bind
 from awiwi_gen.ir.passes.factor import factor

@@ -106,9 +106,10 @@ def test_nonsense_is_refused_with_a_reason(text: str, message: str) -> None:
 @given(st.text(max_size=90))
 def test_any_text_is_a_quantity_or_an_input_error(text: str) -> None:
     try:
-        assert math.isfinite(parse_quantity(text))
-    except InputError as error:
-        assert len(error.faults) == 1
+        quantity = parse_quantity(text)
+    except InputError:
+        return
+    assert math.isfinite(quantity)
 
 
 @given(st.fractions(-(10**9), 10**9, max_denominator=10**6), units)
@@ -133,7 +134,7 @@ def test_units_are_equal_when_their_dimensions_are() -> None:
     assert N * m == J == kg * m**2 / s**2 == W * s
     assert m * rad == m
     assert len({N * m, J, N * m / rad}) == 1
-    assert N != N * m
+    assert N * m != N
     assert (m**2) ** Fraction(1, 2) == m
 
 

@@ -92,7 +92,9 @@ class Printer:
             self.texts.append(self.declare(node, text[0]) if named else text)
         for output in self.graph.outputs:
             if output.name == GUARDS:
-                positive = [f"{self.operand(ref, SUM)} > {self.options.literal(Fraction(0))}" for ref in output.elements]
+                positive = [
+                    f"{self.operand(ref, SUM)} > {self.options.literal(Fraction(0))}" for ref in output.elements
+                ]
                 self.lines.append(f"return {' && '.join(positive)} ? 0 : 1;")
                 continue
             for position, ref in enumerate(output.elements):

@@ -47,7 +47,9 @@ def describe(kernel: Kernel, cost_line: str) -> tuple[str, ...]:
     lines += [f"  in   {_port(name, port)}" for name, port in kernel.inputs.items()]
     lines += [f"  out  {_port(name, port)}" for name, port in kernel.outputs.items()]
     if kernel.guards:
-        lines += _wrapped(f"Returns 0 where {' and '.join(kernel.guards)}; elsewhere 1, and what is not defined is NaN.")
+        lines += _wrapped(
+            f"Returns 0 where {' and '.join(kernel.guards)}; elsewhere 1, and what is not defined is NaN."
+        )
     return (*lines, cost_line)
 
 

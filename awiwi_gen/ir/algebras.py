@@ -56,7 +56,8 @@ def libm(operation: str, dtype: type) -> Callable[..., Any]:
     function = getattr(_c_library(), operation + ("f" if single else ""))
     arity = 2 if operation == "atan2" else 1
     function.argtypes, function.restype = [real] * arity, real
-    return np.frompyfunc(function, arity, 1)
+    ufunc: Callable[..., Any] = np.frompyfunc(function, arity, 1)
+    return ufunc
 
 
 @cache
@@ -103,7 +104,7 @@ def ball(value: Fraction | float | int) -> arb:
     return arb(value)
 
 
-UNIT_ROUNDOFF = {np.float64: 2.0**-53, np.float32: 2.0**-24}
+UNIT_ROUNDOFF: dict[type, float] = {np.float64: 2.0**-53, np.float32: 2.0**-24}
 LIBM_ULPS = 4.0  # what is granted to a C library's function, in units of roundoff of its result
 
 

@@ -7,7 +7,8 @@ from fractions import Fraction
 
 import casadi as ca
 
-from awiwi_gen.ir.graph import Builder, Ref
+from awiwi_gen.ir.builder import Builder
+from awiwi_gen.ir.graph import Ref
 
 _UNARY = {
     ca.OP_SIN: "sin", ca.OP_COS: "cos", ca.OP_TAN: "tan", ca.OP_ASIN: "asin", ca.OP_ACOS: "acos",

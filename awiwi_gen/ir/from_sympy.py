@@ -10,7 +10,8 @@ from fractions import Fraction
 
 import sympy
 
-from awiwi_gen.ir.graph import Builder, Ref
+from awiwi_gen.ir.builder import Builder
+from awiwi_gen.ir.graph import Ref
 
 FUNCTIONS = {
     sympy.sin: "sin", sympy.cos: "cos", sympy.tan: "tan", sympy.asin: "asin", sympy.acos: "acos",
@@ -18,9 +19,7 @@ FUNCTIONS = {
 }  # fmt: skip
 
 
-def lower_sympy(
-    builder: Builder, expressions: Iterable[sympy.Expr], leaves: Mapping[sympy.Symbol, Ref]
-) -> list[Ref]:
+def lower_sympy(builder: Builder, expressions: Iterable[sympy.Expr], leaves: Mapping[sympy.Symbol, Ref]) -> list[Ref]:
     """References to the given expressions; shared sub-expressions are visited once."""
     memo: dict[sympy.Expr, Ref] = dict(leaves)
 

@@ -5,7 +5,7 @@ A node is a plain tuple. Leaves are ``("const", Fraction)``, ``("input", port, e
 the value of node ``i`` and ``~i`` means *minus* that value. Negation therefore is no node of its own, and two
 expressions that differ by sign only share one node.
 
-Canonical form, kept by `Builder`:
+Canonical form, kept by `builder.Builder`:
 
 - constants are exact, non-negative fractions (``-2`` is the reference ``~i`` of the constant 2);
 - ``add`` and ``mul`` take any number of operands, sorted by node; like terms and powers are collected;
@@ -19,9 +19,8 @@ The floating-point meaning of a node is fixed too: operands are combined from le
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
-from fractions import Fraction
 from functools import cached_property
 from typing import Any
 
@@ -29,15 +28,7 @@ Node = tuple[Any, ...]
 Ref = int
 
 LEAVES = frozenset({"const", "input", "param"})
-ODD = frozenset({"sin", "tan", "asin", "atan"})
-EVEN = frozenset({"cos", "fabs"})
-UNARY = ODD | EVEN | {"sqrt", "acos", "exp", "log"}
-BINARY = frozenset({"div", "atan2"})
 VARIADIC = frozenset({"add", "mul"})
-OPERATIONS = UNARY | BINARY | VARIADIC | {"inv"}
-
-# Longer fractions are rounded to this many bits: far beyond the 200 bits at which passes are compared.
-FRACTION_BITS = 512
 
 
 def node_of(ref: Ref) -> int:
@@ -93,214 +84,6 @@ class Graph:
         return hashlib.sha256(repr((self.nodes, self.outputs)).encode()).hexdigest()
 
 
-class Builder:
-    """Makes nodes in canonical form; equal expressions get equal references."""
-
-    def __init__(self) -> None:
-        self.nodes: list[Node] = []
-        self._index: dict[Node, int] = {}
-
-    # -- leaves -------------------------------------------------------------------------------------------
-
-    def const(self, value: Fraction | int) -> Ref:
-        """A constant; any sign."""
-        value = shorten(Fraction(value))
-        return self._intern(("const", value)) if value >= 0 else ~self._intern(("const", -value))
-
-    def input(self, port: str, element: int) -> Ref:
-        """Element number ``element`` (row by row) of an input port."""
-        return self._intern(("input", port, element))
-
-    def param(self, path: str) -> Ref:
-        """A number of the hand, by its path in the hand file."""
-        return self._intern(("param", path))
-
-    def value(self, ref: Ref) -> Fraction | None:
-        """The value of a reference to a constant; None for anything else."""
-        node = self.nodes[node_of(ref)]
-        if node[0] != "const":
-            return None
-        return node[1] if ref >= 0 else -node[1]
-
-    # -- arithmetic ---------------------------------------------------------------------------------------
-
-    def add(self, refs: Iterable[Ref]) -> Ref:
-        """The sum of any number of references; like terms are collected."""
-        refs = list(refs)
-        if self._all_unlike(refs):
-            return self._sum(sorted(refs, key=node_of))
-        coefficients: dict[int, Fraction] = {}
-        constant = Fraction(0)
-        for ref in refs:
-            coefficient, base = self.split(ref)
-            if base is None:
-                constant += coefficient
-            else:
-                coefficients[base] = coefficients.get(base, Fraction(0)) + coefficient
-        terms = [self.scaled(c, base) for base, c in coefficients.items() if c]
-        terms.sort(key=node_of)
-        if constant:
-            terms.append(self.const(constant))
-        return self._sum(terms)
-
-    def _all_unlike(self, refs: list[Ref]) -> bool:
-        """Whether no two terms differ by a rational factor only, and none is a constant: the common case."""
-        seen = set()
-        for ref in refs:
-            node = self.nodes[node_of(ref)]
-            if node[0] == "const":
-                return False
-            is_scaled = node[0] == "mul" and self.nodes[node[1]][0] == "const"
-            base = node[2:] if is_scaled else node[1:] if node[0] == "mul" else (node_of(ref),)
-            if base in seen:
-                return False
-            seen.add(base)
-        return True
-
-    def _sum(self, terms: list[Ref]) -> Ref:
-        if not terms:
-            return self.const(0)
-        if len(terms) == 1:
-            return terms[0]
-        if terms[0] < 0:
-            return ~self._intern(("add", *(~t for t in terms)))
-        return self._intern(("add", *terms))
-
-    def mul(self, refs: Sequence[Ref]) -> Ref:
-        """The product of any number of references; powers are collected, numbers multiplied."""
-        coefficient = Fraction(1)
-        powers: dict[int, int] = {}
-        numbers = [ref for ref in refs if self.nodes[node_of(ref)][0] == "const"]
-        for ref in refs:
-            if ref < 0:
-                ref, coefficient = ~ref, -coefficient
-            node = self.nodes[ref]
-            if node[0] == "const":
-                coefficient *= node[1]
-            elif numbers and node[0] == "mul" and self.value(node[1]) is not None:
-                coefficient *= self.nodes[node[1]][1]
-                for factor in node[2:]:
-                    powers[factor] = powers.get(factor, 0) + 1
-            elif node[0] == "inv":
-                powers[node[1]] = powers.get(node[1], 0) - 1
-            else:
-                powers[ref] = powers.get(ref, 0) + 1
-        if not coefficient:
-            return self.const(0)
-        factors: list[Ref] = []
-        for base, power in powers.items():
-            factors += [base] * power if power > 0 else [self.inv(base)] * -power
-        return self._product(coefficient, factors)
-
-    def inv(self, ref: Ref) -> Ref:
-        """The reciprocal."""
-        if ref < 0:
-            return ~self.inv(~ref)
-        node = self.nodes[ref]
-        if node[0] == "const" and node[1]:
-            return self.const(1 / node[1])
-        if node[0] == "inv":
-            return int(node[1])
-        if node[0] == "mul" and self.value(node[1]) is not None:  # keep numbers out of denominators
-            rest = self._product(Fraction(1), list(node[2:]))
-            return self._product(1 / self.nodes[node[1]][1], [self.inv(rest)])
-        return self._intern(("inv", ref))
-
-    def sub(self, a: Ref, b: Ref) -> Ref:
-        """``a - b``."""
-        return self.add((a, ~b))
-
-    def div(self, a: Ref, b: Ref) -> Ref:
-        """``a / b``, kept as a product with a reciprocal."""
-        return self.mul((a, self.inv(b)))
-
-    def power(self, base: Ref, exponent: int) -> Ref:
-        """An integer power."""
-        return self.mul([base] * exponent) if exponent >= 0 else self.inv(self.mul([base] * -exponent))
-
-    def call(self, operation: str, *refs: Ref) -> Ref:
-        """A function such as ``sin`` or ``atan2``; the signs of odd and even functions are pulled out."""
-        if operation in EVEN:
-            refs = tuple(node_of(ref) for ref in refs)
-        elif operation in ODD and refs[0] < 0:
-            return ~self.call(operation, ~refs[0])
-        if all(self.value(ref) == 0 for ref in refs) and operation in AT_ZERO:
-            return self.const(AT_ZERO[operation])
-        if operation == "sqrt" and self.value(refs[0]) == 1:
-            return refs[0]
-        return self._intern((operation, *refs))
-
-    def make(self, operation: str, refs: Sequence[Ref]) -> Ref:
-        """Any operation by name: what a pass uses to rebuild a node."""
-        if operation == "add":
-            return self.add(refs)
-        if operation == "mul":
-            return self.mul(refs)
-        if operation == "inv":
-            return self.inv(refs[0])
-        if operation == "div":
-            return self.div(*refs)
-        return self.call(operation, *refs)
-
-    # -- taking terms apart -------------------------------------------------------------------------------
-
-    def split(self, ref: Ref) -> tuple[Fraction, int | None]:
-        """A term as (rational coefficient, the rest); the rest of a constant is None."""
-        sign = 1 if ref >= 0 else -1
-        base = node_of(ref)
-        node = self.nodes[base]
-        if node[0] == "const":
-            return sign * node[1], None
-        if node[0] == "mul" and self.nodes[node[1]][0] == "const":
-            return sign * self.nodes[node[1]][1], self._product(Fraction(1), list(node[2:]))
-        return Fraction(sign), base
-
-    def scaled(self, coefficient: Fraction, base: int) -> Ref:
-        """``coefficient * base`` for a base without coefficient of its own."""
-        if coefficient == 1:
-            return base
-        if coefficient == -1:
-            return ~base
-        node = self.nodes[base]
-        return self._product(coefficient, list(node[1:]) if node[0] == "mul" else [base])
-
-    def _product(self, coefficient: Fraction, factors: list[Ref]) -> Ref:
-        if coefficient < 0:
-            return ~self._product(-coefficient, factors)
-        ordered = sorted(factors)
-        coefficient = shorten(coefficient)
-        if coefficient != 1:
-            ordered = [self.const(coefficient), *ordered]
-        if not ordered:
-            return self.const(1)
-        return ordered[0] if len(ordered) == 1 else self._intern(("mul", *ordered))
-
-    def _intern(self, node: Node) -> int:
-        index = self._index.get(node)
-        if index is None:
-            index = self._index[node] = len(self.nodes)
-            self.nodes.append(node)
-        return index
-
-    # -- finishing ----------------------------------------------------------------------------------------
-
-    def graph(self, outputs: Iterable[Output]) -> Graph:
-        """The graph of these outputs: unreachable nodes dropped, the rest in canonical order."""
-        return canonical(Graph(tuple(self.nodes), tuple(outputs)))
-
-
-AT_ZERO = {"sin": 0, "cos": 1, "tan": 0, "asin": 0, "atan": 0, "exp": 1, "sqrt": 0, "fabs": 0}
-
-
-def shorten(value: Fraction) -> Fraction:
-    """The fraction itself, or a dyadic neighbour when exact arithmetic has made it very long."""
-    excess = value.denominator.bit_length() - FRACTION_BITS
-    if excess <= 0 or value.numerator == 0:
-        return value
-    scale = FRACTION_BITS + max(0, value.denominator.bit_length() - value.numerator.bit_length())
-    return Fraction(round(value * (1 << scale)), 1 << scale)
-
-
 def reachable(graph: Graph) -> list[bool]:
     """Which nodes the outputs depend on."""
     marked = [False] * len(graph.nodes)
@@ -311,45 +94,6 @@ def reachable(graph: Graph) -> list[bool]:
             for ref in operands(graph.nodes[index]):
                 marked[node_of(ref)] = True
     return marked
-
-
-def rebuild(graph: Graph, rule: Callable[[Builder, Node, tuple[Ref, ...]], Ref]) -> Graph:
-    """Replay a graph node by node: ``rule(builder, old node, new operands)`` returns the new reference."""
-    builder = Builder()
-    renamed: list[Ref] = [0] * len(graph.nodes)
-    marked = reachable(graph)
-
-    def new(ref: Ref) -> Ref:
-        return renamed[ref] if ref >= 0 else ~renamed[~ref]
-
-    for index, node in enumerate(graph.nodes):
-        if marked[index]:
-            renamed[index] = rule(builder, node, tuple(new(ref) for ref in operands(node)))
-    return builder.graph(Output(o.name, o.shape, tuple(new(r) for r in o.elements)) for o in graph.outputs)
-
-
-def copy_node(builder: Builder, node: Node, refs: tuple[Ref, ...]) -> Ref:
-    """The rule that changes nothing."""
-    if node[0] == "const":
-        return builder.const(node[1])
-    if node[0] == "input":
-        return builder.input(node[1], node[2])
-    if node[0] == "param":
-        return builder.param(node[1])
-    return builder.make(node[0], refs)
-
-
-def graft(builder: Builder, graph: Graph, leaves: Mapping[Node, Ref]) -> dict[str, list[Ref]]:
-    """Replay a graph inside another builder with some leaves replaced; returns the output references."""
-    renamed: list[Ref] = []
-
-    def new(ref: Ref) -> Ref:
-        return renamed[ref] if ref >= 0 else ~renamed[~ref]
-
-    for node in graph.nodes:
-        given = leaves.get(node)
-        renamed.append(copy_node(builder, node, tuple(new(r) for r in operands(node))) if given is None else given)
-    return {o.name: [new(r) for r in o.elements] for o in graph.outputs}
 
 
 def canonical(graph: Graph) -> Graph:

@@ -42,9 +42,7 @@ def evaluate(graph: Graph, algebra: Algebra[T], leaf: Callable[[Node], T]) -> di
     return {output.name: [at(ref) for ref in output.elements] for output in graph.outputs}
 
 
-def _node(
-    node: Node, algebra: Algebra[T], leaf: Callable[[Node], T], values: list[T], at: Callable[[Ref], T]
-) -> T:
+def _node(node: Node, algebra: Algebra[T], leaf: Callable[[Node], T], values: list[T], at: Callable[[Ref], T]) -> T:
     operation = node[0]
     if operation == "const":
         return algebra.const(node[1])

@@ -16,6 +16,7 @@ from typing import Any
 from awiwi_gen.hand import Finger, Hand
 from awiwi_gen.kernel import Kernel, Port, Route
 from awiwi_gen.models import chain, lagrange, recursive, tendons, tendons_ad
+from awiwi_gen.models.derivatives import derivatives_of
 from awiwi_gen.units import J, N, Unit, kg, m, one, rad, s
 
 
@@ -80,8 +81,8 @@ def input_ports(hand: Hand, finger: Finger, size: Size) -> dict[str, Port]:
     """The ports an argument name stands for, with the ranges of this hand."""
     n, limits = (size.joints,), hand.limits
     ranges = [link for link in finger.links if link.joint in finger.joints]
-    low = tuple(float(link.low) for link in ranges)
-    high = tuple(float(link.high) for link in ranges)
+    low = tuple(float(link.low) for link in ranges if link.low is not None)
+    high = tuple(float(link.high) for link in ranges if link.high is not None)
 
     def symmetric(shape: tuple[int, ...], unit: Unit, limit: Any) -> Port:
         return Port(shape, unit, -float(limit), float(limit))
@@ -108,6 +109,11 @@ def torque(size: Size) -> Port:
 def inertia(size: Size) -> Port:
     """A joint-space inertia."""
     return Port((size.joints, size.joints), kg * m**2)
+
+
+def stiffness(size: Size) -> Port:
+    """Torques per change of the joint angles."""
+    return Port((size.joints, size.joints), N * m / rad)
 
 
 def coriolis(size: Size) -> Port:
@@ -173,6 +179,17 @@ def inverse_dynamics(finger: Any, q: Any, qd: Any, qdd: Any, g: Any) -> Any:
     return lagrange.inverse_dynamics(finger, q, qd, qdd, g)
 
 
+by_definition, by_witness = derivatives_of(lagrange.inverse_dynamics, recursive.inverse_dynamics, "q", "qd")
+
+
+@per_finger(
+    lambda z: {"dtau_dq": stiffness(z), "dtau_dqd": coriolis(z)}, "eq. 2.17, differentiated", witness=by_witness
+)
+def inverse_dynamics_derivatives(finger: Any, q: Any, qd: Any, qdd: Any, g: Any) -> Any:
+    """Partial derivatives of the inverse dynamics with respect to the positions and the velocities."""
+    return by_definition(finger, q, qd, qdd, g)
+
+
 @per_finger(
     lambda z: {"qdd": Port((z.joints,), rad / s**2)}, "eq. 2.1, solved for qdd", witness=recursive.forward_dynamics
 )
@@ -231,7 +248,7 @@ def joint_torque(finger: Any, q: Any, f: Any) -> Any:
 
 
 @per_finger(
-    lambda z: {"K": Port((z.joints, z.joints), N * m / rad)}, "eq. 5.12, 5.23", witness=tendons_ad.joint_stiffness
+    lambda z: {"K": stiffness(z)}, "eq. 5.12, 5.23", witness=tendons_ad.joint_stiffness
 )
 def joint_stiffness(finger: Any, q: Any, f: Any, k: Any) -> Any:
     """Joint stiffness -d tau/dq felt through tendons of stiffness k that pull with forces f."""

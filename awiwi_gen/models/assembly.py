@@ -23,27 +23,29 @@ from awiwi_gen.models.tree import Finger, coordinates, leaders, quarter_turns, r
 
 @dataclass
 class Moments:
-    """Mass moments of a body: m [kg], h (3) [kg m], S (3 x 3) [kg m^2]."""
+    """Mass moments of a body: m [kg], h (3) [kg m], S (3 x 3) [kg m^2] and its trace, which no rotation changes."""
 
     mass: SX
     first: SX
     second: SX
+    trace: SX
 
     def __add__(self, other: "Moments") -> "Moments":
-        return Moments(self.mass + other.mass, self.first + other.first, self.second + other.second)
+        return Moments(self.mass + other.mass, self.first + other.first, self.second + other.second, self.trace + other.trace)
 
     def moved(self, by: SX) -> "Moments":
         """The same body about a point from which its old reference point lies at `by`."""
-        mixed = self.first @ by.T
-        return Moments(self.mass, self.first + self.mass * by, self.second + mixed + mixed.T + self.mass * by @ by.T)
+        mixed, squared = self.first @ by.T, self.mass * by @ by.T
+        return Moments(self.mass, self.first + self.mass * by, self.second + mixed + mixed.T + squared,
+                       self.trace + 2 * ca.trace(mixed) + ca.trace(squared))
 
     def turned(self, rotation: SX) -> "Moments":
         """The same body in other axes."""
-        return Moments(self.mass, rotation @ self.first, rotation @ self.second @ rotation.T)
+        return Moments(self.mass, rotation @ self.first, rotation @ self.second @ rotation.T, self.trace)
 
     def inertia(self, spin: SX) -> SX:
-        """Angular momentum per unit of time of a turn `spin` about the reference point."""
-        return ca.trace(self.second) * spin - self.second @ spin
+        """Angular momentum (3) [kg m^2] about the reference point, per unit of `spin`."""
+        return self.trace * spin - self.second @ spin
 
 
 @dataclass
@@ -144,7 +146,7 @@ def _parts(finger: Finger, q: SX) -> Iterator[_Part]:
         if link.four_bar is not None:
             loop = _FourBar(link.four_bar, own)
             crank = ca.vertcat(link.four_bar.crank, 0, 0)
-            yield _Part(coordinate, turn, own + link.four_bar.reference, None, SX(1), SX(0), crank, _nothing(), None)
+            yield _Part(coordinate, turn, own + link.four_bar.reference, None, SX(1), SX(0), crank, nothing(), None)
             yield _Part(coordinate, None, None, loop.direction, loop.rate - 1, loop.bend, offset, _body(link), index)
         else:
             ratio = SX(1)
@@ -194,25 +196,26 @@ def _dot2(a: tuple[SX, SX], b: tuple[SX, SX]) -> SX:
     return a[0] * b[0] + a[1] * b[1]
 
 
-def _nothing() -> Moments:
-    return Moments(SX(0), SX.zeros(3), SX.zeros(3, 3))
+def nothing() -> Moments:
+    return Moments(SX(0), SX.zeros(3), SX.zeros(3, 3), SX(0))
 
 
 def _body(link: Finger) -> Moments:
     """A link's mass moments about its joint, in its own axes."""
     i, centre = link.inertia, ca.vertcat(*link.com)
     tensor = ca.vertcat(ca.horzcat(i.xx, i.xy, i.xz), ca.horzcat(i.xy, i.yy, i.yz), ca.horzcat(i.xz, i.yz, i.zz))
-    about_centre = ca.trace(tensor) / 2 * SX.eye(3) - tensor
-    return Moments(SX(link.mass), link.mass * centre, about_centre + link.mass * centre @ centre.T)
+    second = ca.trace(tensor) / 2 * SX.eye(3) - tensor
+    return Moments(SX(link.mass), SX.zeros(3), second, ca.trace(second)).moved(centre)
 
 
 def _move_towards_palm(parts: list[_Part]) -> SX:
     """Move what lies on each joint's axis to the body before; returns the first moment the palm receives, in base axes."""
     for part, previous in reversed(list(zip(parts, [None, *parts[:-1]]))):
         turn = SX.eye(3) if part.turn is None else part.turn
-        on_axis = Moments(part.body.mass, SX.zeros(3), SX.zeros(3, 3))
-        on_axis.first[2], on_axis.second[2, 2] = part.body.first[2], part.body.second[2, 2]
-        part.body = Moments(SX(0), SX(part.body.first), SX(part.body.second))
+        body = part.body
+        on_axis = Moments(body.mass, SX.zeros(3), SX.zeros(3, 3), body.second[2, 2])
+        on_axis.first[2], on_axis.second[2, 2] = body.first[2], body.second[2, 2]
+        part.body = Moments(SX(0), SX(body.first), SX(body.second), body.second[0, 0] + body.second[1, 1])
         part.body.first[2] = part.body.second[2, 2] = 0
         on_axis = on_axis.turned(turn)
         if previous is not None:
@@ -228,7 +231,7 @@ def _turned_about_z(body: Moments, c: SX, s: SX) -> Moments:
     xz, yz = c * xz - s * yz, s * xz + c * yz
     second = ca.vertcat(ca.horzcat(xx, xy, xz), ca.horzcat(xy, yy, yz), ca.horzcat(xz, yz, zz))
     x, y, z = ca.vertsplit(body.first)
-    return Moments(body.mass, ca.vertcat(c * x - s * y, s * x + c * y, z), second)
+    return Moments(body.mass, ca.vertcat(c * x - s * y, s * x + c * y, z), second, body.trace)
 
 
 def _sum_of_angles(base: tuple[SX, SX], angle: SX) -> tuple[SX, SX]:

@@ -8,8 +8,10 @@ Wensing 2021). Vectors live in the working axes of `assembly`, where the mass of
 import casadi as ca
 from casadi import SX
 
-from awiwi_gen.models.assembly import Assembly, Moments, assemble
+from awiwi_gen.models.assembly import Assembly, Moments, assemble, nothing
 from awiwi_gen.models.tree import Finger
+
+_Z = SX([0, 0, 1])
 
 
 def link_poses(finger: Finger, q: SX) -> list[SX]:
@@ -121,22 +123,29 @@ def _axes(assembly: Assembly) -> list[SX]:
 
 
 def _newton_euler(assembly: Assembly, qd: SX, qdd: SX, g: SX) -> SX:
-    """Joint torques (n) of a motion; zeros among the arguments cost nothing."""
-    spin, turning, acceleration = SX.zeros(3), SX.zeros(3), -assembly.turn @ g
-    gradient = SX.zeros(3, 3)
+    """Joint torques (n) of a motion; zeros among the arguments cost nothing.
+
+    A gradient takes a vector that stands still in a body to its second derivative in time.
+    """
+    frame_spin, frame_turning, frame_gradient = SX.zeros(3), SX.zeros(3), SX.zeros(3, 3)
+    swing, swing_rate = SX(0), SX(0)
+    acceleration = -assembly.turn @ g
     loads = []
     for joint in assembly.joints:
-        own = joint.rate * qd[joint.coordinate]
-        own_rate = joint.rate * qdd[joint.coordinate] + joint.bend * qd[joint.coordinate] ** 2
-        acceleration, before = joint.forth(acceleration), joint.forth(spin)
-        spin = before + joint.axis * own
-        turning = joint.forth(turning) + ca.cross(before, joint.axis) * own + joint.axis * own_rate
+        rate = qd[joint.coordinate]
+        swing += joint.rate * rate
+        swing_rate += joint.rate * qdd[joint.coordinate] + joint.bend * rate**2
+        acceleration = joint.forth(acceleration)
         if joint.turn is None:
-            gradient = _spun(gradient, before, spin, own, own_rate)
+            spin = frame_spin + _Z * swing
+            gradient = frame_gradient + _swung(frame_spin, swing, swing_rate)
         else:
-            gradient = ca.skew(turning) + ca.skew(spin) @ ca.skew(spin)
+            frame_turning = joint.forth(frame_turning + ca.cross(frame_spin, _Z) * swing + _Z * swing_rate)
+            frame_spin = spin = joint.forth(frame_spin + _Z * swing)
+            frame_gradient = gradient = ca.skew(frame_turning) + ca.skew(spin) @ ca.skew(spin)
+            swing, swing_rate = SX(0), SX(0)
         body = joint.body
-        loads.append((gradient @ body.first, _swirl(gradient, body.second) + ca.cross(body.first, acceleration)))
+        loads.append((gradient @ body.first, _swirl(body, spin, gradient) + ca.cross(body.first, acceleration)))
         acceleration = acceleration + gradient @ joint.offset
 
     torques = SX.zeros(qd.numel())
@@ -149,33 +158,29 @@ def _newton_euler(assembly: Assembly, qd: SX, qdd: SX, g: SX) -> SX:
     return torques
 
 
-def _spun(gradient: SX, before: SX, spin: SX, own: SX, own_rate: SX) -> SX:
-    """The acceleration gradient (3 x 3) of a body that turns by `own` about z faster than one with `gradient`.
-
-    The gradient takes a vector fixed in the body to its second derivative in time. An additional turn about z leaves the derivative of
-    z itself alone, so this is cheaper than starting from the spin.
-    """
-    x, y, _ = ca.vertsplit(before)
-    inward = own * (before[2] + spin[2])
-    return gradient + ca.vertcat(
-        ca.horzcat(-inward, -own_rate, 0), ca.horzcat(own_rate, -inward, 0), ca.horzcat(2 * x * own, 2 * y * own, 0))
+def _swung(frame_spin: SX, swing: SX, swing_rate: SX) -> SX:
+    """What turning about z in a frame adds to the gradient of the frame; how z itself moves does not change."""
+    x, y, z = ca.vertsplit(frame_spin)
+    inward = swing * (2 * z + swing)
+    return ca.vertcat(
+        ca.horzcat(-inward, -swing_rate, 0), ca.horzcat(swing_rate, -inward, 0), ca.horzcat(2 * x * swing, 2 * y * swing, 0))
 
 
-def _swirl(gradient: SX, second: SX) -> SX:
-    """Moment of the inertia forces of a body about its joint: integral of r x (gradient r) dm."""
-    moment = []
-    for i in range(3):
-        j, k = (i + 1) % 3, (i + 2) % 3
-        moment.append(gradient[k, j] * second[j, j] - gradient[j, k] * second[k, k]
-                      + (gradient[k, k] - gradient[j, j]) * second[j, k]
-                      + gradient[k, i] * second[i, j] - gradient[j, i] * second[i, k])
-    return ca.vertcat(*moment)
+def _swirl(body: Moments, spin: SX, gradient: SX) -> SX:
+    """Moment (3) of a body's inertia forces about its joint: the integral of r x (gradient r) dm."""
+    s, a = body.second, gradient
+    x, y, z = ca.vertsplit(spin)
+    return ca.vertcat(
+        a[2, 1] * s[1, 1] - a[1, 2] * s[2, 2] + (z**2 - y**2) * s[1, 2] + a[2, 0] * s[0, 1] - a[1, 0] * s[0, 2],
+        a[0, 2] * s[2, 2] - a[2, 0] * s[0, 0] + (x**2 - z**2) * s[0, 2] + a[0, 1] * s[1, 2] - a[2, 1] * s[0, 1],
+        # The moment of inertia about z, unlike S_xx and S_yy alone, does not change while the body turns about z.
+        2 * x * y * s[0, 0] - a[0, 1] * (body.trace - s[2, 2]) + (y**2 - x**2) * s[0, 1] + a[1, 2] * s[0, 2] - a[0, 2] * s[1, 2])
 
 
 def _mass_matrix(assembly: Assembly, n: int) -> SX:
     """Composite bodies: the force that a unit acceleration of one joint needs, felt by all joints before."""
     joints, mass = assembly.joints, SX.zeros(n, n)
-    beyond = Moments(SX(0), SX.zeros(3), SX.zeros(3, 3))
+    beyond = nothing()
     for last in reversed(range(len(joints))):
         joint = joints[last]
         beyond = joint.body + beyond.moved(joint.offset)
@@ -197,45 +202,60 @@ def _gather(mass: SX, one, other, entry: SX) -> None:
 
 
 def _coriolis_matrix(assembly: Assembly, qd: SX) -> SX:
+    """The recursion of `_mass_matrix` one derivative later.
+
+    Unit turning of a joint moves each point beyond it with velocity axis x r; the derivative of this, summed over the points' masses,
+    is the column of the joint. Velocities are relative to the working axes (`flow` and `whirl` are the integrals of r' and
+    r' r^T dm), of which only what turns within the axes has any.
+    """
     joints, n = assembly.joints, qd.numel()
-    motions = []
-    spin, velocity = SX.zeros(3), SX.zeros(3)
+    motions, frame_spin, swing = [], SX.zeros(3), SX(0)
     for joint in joints:
-        spin, velocity = joint.forth(spin) + joint.axis * (joint.rate * qd[joint.coordinate]), joint.forth(velocity)
-        motions.append((spin, velocity))
-        velocity = velocity + ca.cross(spin, joint.offset)
+        swing += joint.rate * qd[joint.coordinate]
+        if joint.turn is None:
+            motions.append((frame_spin, swing, SX(0)))
+        else:
+            frame_spin = joint.forth(frame_spin + _Z * swing)
+            motions.append((frame_spin, SX(0), swing))
+            swing = SX(0)
 
     coriolis = SX.zeros(n, n)
-    beyond = Moments(SX(0), SX.zeros(3), SX.zeros(3, 3))
-    momentum, whirl = SX.zeros(3), SX.zeros(3, 3)
+    beyond, flow, whirl = nothing(), SX.zeros(3), SX.zeros(3, 3)
     for last in reversed(range(len(joints))):
-        joint, (spin, velocity) = joints[last], motions[last]
-        whirl = whirl + momentum @ joint.offset.T + velocity @ joint.body.first.T + ca.skew(spin) @ joint.body.second
-        momentum = momentum + ca.cross(spin, joint.body.first)
+        joint, (frame_spin, swing, turned) = joints[last], motions[last]
+        around = swing * ca.skew(joint.axis)
+        whirl = whirl + flow @ joint.offset.T + around @ joint.offset @ beyond.first.T + around @ joint.body.second
+        flow = flow + around @ joint.body.first
         beyond = joint.body + beyond.moved(joint.offset)
-        tilting = ca.cross(spin, joint.axis)
+        stretch = ca.trace(whirl) * joint.axis
+        force1 = ca.cross(frame_spin, ca.cross(joint.axis, beyond.first)) + ca.cross(joint.axis, flow)
+        moment1 = ca.cross(beyond.second @ frame_spin, joint.axis) + stretch - whirl @ joint.axis
         force2, moment2 = ca.cross(joint.axis, beyond.first), beyond.inertia(joint.axis)
-        force1 = ca.cross(tilting, beyond.first) + ca.cross(joint.axis, momentum)
-        moment1 = (beyond.inertia(tilting) + ca.trace(whirl) * joint.axis - whirl @ joint.axis
-                   - ca.cross(beyond.first, ca.cross(joint.axis, velocity)))
-        moment3 = ca.trace(whirl) * joint.axis - whirl.T @ joint.axis
+        moment3 = beyond.second @ ca.cross(frame_spin, joint.axis) + stretch - whirl.T @ joint.axis
         bend = joint.bend * qd[joint.coordinate]
+        row, parallel = ca.dot(joint.axis, moment1), True
         for i in reversed(range(last + 1)):
-            one, (spin, velocity) = joints[i], motions[i]
+            one, (frame_spin, swing, _) = joints[i], motions[i]
+            spin = frame_spin + one.axis * swing
             if i < last:
                 force1, moment1, force2, moment2, moment3 = map(joints[i + 1].back, (force1, moment1, force2, moment2, moment3))
                 moment1 = moment1 + ca.cross(one.offset, force1)
                 moment2 = moment2 + ca.cross(one.offset, force2)
+                moment3 = moment3 + ca.cross(ca.cross(spin, one.offset), force2)
+                parallel = parallel and one.turn is None
             mass = ca.dot(one.axis, moment2)
             coriolis[one.coordinate, joint.coordinate] += one.rate * (
                 joint.rate * ca.dot(one.axis, moment1) + mass * bend)
             if i < last:
-                entry = (ca.dot(ca.cross(spin, one.axis), moment2) - ca.dot(ca.cross(one.axis, velocity), force2)
-                         + ca.dot(one.axis, moment3))
+                if parallel:
+                    row = row - spin[2] * ca.dot(one.offset, force2)
+                else:
+                    row = ca.dot(one.axis, moment3) + ca.dot(ca.cross(spin, one.axis), moment2)
                 coriolis[joint.coordinate, one.coordinate] += joint.rate * (
-                    one.rate * entry + mass * one.bend * qd[one.coordinate])
-        beyond, momentum = joint.body_back(beyond), joint.back(momentum)
-        whirl = joint.back(joint.back(whirl).T).T
+                    one.rate * row + mass * one.bend * qd[one.coordinate])
+        beyond, flow, whirl = joint.body_back(beyond), joint.back(flow), joint.back(joint.back(whirl).T).T
+        flow = flow + turned * ca.cross(_Z, beyond.first)
+        whirl = whirl + turned * ca.skew(_Z) @ beyond.second
     return coriolis
 
 

@@ -67,7 +67,8 @@ class Motion:
             self.at(family, self.inputs | {n: self.inputs[n] + sign * STEP * v for n, v in velocities.items()})[output]
             for sign in (1, -1)
         )
-        return (ahead - behind) / (2 * STEP)
+        rate: Tensor = (ahead - behind) / (2 * STEP)
+        return rate
 
 
 def _array(columns: list[list[arb]]) -> Tensor:
@@ -78,11 +79,13 @@ def _array(columns: list[list[arb]]) -> Tensor:
 
 
 def _times(matrix: Tensor, vector: Tensor) -> Tensor:
-    return (matrix @ vector[..., None])[..., 0]
+    product: Tensor = (matrix @ vector[..., None])[..., 0]
+    return product
 
 
 def _dot(a: Tensor, b: Tensor) -> Tensor:
-    return (a * b).sum(axis=-1)
+    product: Tensor = (a * b).sum(axis=-1)
+    return product
 
 
 def _turned(matrix: Tensor) -> Tensor:
@@ -159,6 +162,13 @@ def the_jacobian_gives_the_angular_velocity_of_the_tip(x: Motion, jacobian: Any,
     return np.stack([spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0]], axis=1) - omega, omega
 
 
+def the_derivatives_are_the_rates_of_the_inverse_dynamics(x: Motion, inverse_dynamics_derivatives: Any, inverse_dynamics: Any
+) -> Residual:
+    d, qd, qdd = inverse_dynamics_derivatives, x.inputs["qd"], x.inputs["qdd"]
+    rate = x.rate("inverse_dynamics", "tau", q=qd, qd=qdd)
+    return rate - _times(d["dtau_dq"], qd) - _times(d["dtau_dqd"], qdd), rate
+
+
 def the_coupling_is_the_derivative_of_the_tendon_lengths(x: Motion, coupling: Any, tendon_lengths: Any) -> Residual:
     rate = x.rate("tendon_lengths", "h", q=x.inputs["qd"])
     return rate - _times(coupling["P"], x.inputs["qd"]), rate
@@ -178,7 +188,9 @@ def the_joint_stiffness_is_symmetric(x: Motion, joint_stiffness: Any) -> Residua
     return joint_stiffness["K"] - _turned(joint_stiffness["K"]), joint_stiffness["K"]
 
 
-def the_joint_stiffness_is_the_falling_torque(x: Motion, joint_stiffness: Any, coupling: Any, joint_torque: Any) -> Residual:
+def the_joint_stiffness_is_the_falling_torque(
+    x: Motion, joint_stiffness: Any, coupling: Any, joint_torque: Any
+) -> Residual:
     qd = x.inputs["qd"]
     stretching = x.inputs["k"] * _times(coupling["P"], qd)
     rate = x.rate("joint_torque", "tau", q=qd, f=stretching)
@@ -198,6 +210,7 @@ LAWS: tuple[Callable[..., Residual], ...] = (
     rotations_are_orthogonal,
     the_jacobian_gives_the_velocity_of_the_tip,
     the_jacobian_gives_the_angular_velocity_of_the_tip,
+    the_derivatives_are_the_rates_of_the_inverse_dynamics,
     the_coupling_is_the_derivative_of_the_tendon_lengths,
     the_coupling_derivative_is_the_rate_of_the_coupling,
     the_power_of_the_joints_is_taken_from_the_tendons,

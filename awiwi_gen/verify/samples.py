@@ -22,7 +22,7 @@ def draw(ports: Mapping[str, Port], part: str, dtype: type = np.float64, samples
     Row 0 is zero (the straight finger at rest) as far as the range allows, rows 1 and 2 are the lower and
     the upper limits, every eighth row a corner of the box, the others are uniform.
     """
-    drawn = {}
+    drawn: dict[str, Array] = {}
     for name, port in ports.items():
         random = np.random.default_rng([SEED, zlib.crc32(f"{part}.{name}".encode())])
         low, high = np.array(port.bounds()).T.reshape(2, port.size)

@@ -95,7 +95,7 @@ def judge(
     worst_ulp = worst_scaled = bound_use = 0.0
     reasons = []
     for port, values in computed.items():
-        mirror = stack(mirrored[port], samples).astype(dtype)
+        mirror: Array = stack(mirrored[port], samples).astype(dtype)
         exact &= bool(np.array_equal(values.view(f"u{values.itemsize}"), mirror.view(f"u{mirror.itemsize}")))
         error = reference.error(port, values)
         limit = stack([b[1] for b in bounds[port]], samples)

@@ -8,7 +8,8 @@ from fractions import Fraction
 from flint import arb, ctx
 
 from awiwi_gen.ir.algebras import FLINT_NAMES, ball
-from awiwi_gen.ir.graph import LEAVES, VARIADIC, Builder, Graph, Node, Ref, rebuild
+from awiwi_gen.ir.builder import Builder, rebuild
+from awiwi_gen.ir.graph import LEAVES, VARIADIC, Graph, Node, Ref
 
 FOLDING_BITS = 400  # the rounding of a folded square root stays far below what the pass checks resolve
 

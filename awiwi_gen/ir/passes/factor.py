@@ -7,7 +7,8 @@ from __future__ import annotations
 
 from collections import Counter
 
-from awiwi_gen.ir.graph import Builder, Graph, Node, Ref, copy_node, node_of, rebuild
+from awiwi_gen.ir.builder import Builder, copy_node, rebuild
+from awiwi_gen.ir.graph import Graph, Node, Ref, node_of
 
 
 def factor(graph: Graph) -> Graph:
@@ -17,7 +18,8 @@ def factor(graph: Graph) -> Graph:
     def rule(builder: Builder, node: Node, refs: tuple[Ref, ...]) -> Ref:
         if node[0] != "add":
             return copy_node(builder, node, refs)
-        private, fixed = [], []
+        private: list[Ref] = []
+        fixed: list[Ref] = []
         for old, ref in zip(node[1:], refs, strict=True):
             is_product = builder.nodes[node_of(ref)][0] == "mul"
             (private if is_product and uses[node_of(old)] == 1 else fixed).append(ref)

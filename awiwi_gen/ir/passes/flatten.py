@@ -5,7 +5,8 @@ Products are always merged: what several of them share is found again by `share`
 
 from __future__ import annotations
 
-from awiwi_gen.ir.graph import Builder, Graph, Node, Ref, node_of, rebuild
+from awiwi_gen.ir.builder import Builder, rebuild
+from awiwi_gen.ir.graph import Graph, Node, Ref, node_of
 
 
 def flatten(graph: Graph) -> Graph:

@@ -9,7 +9,8 @@ import heapq
 from collections import Counter
 from itertools import combinations
 
-from awiwi_gen.ir.graph import Builder, Graph, Output, Ref, copy_node, node_of, operands
+from awiwi_gen.ir.builder import Builder, copy_node
+from awiwi_gen.ir.graph import Graph, Output, Ref, node_of, operands
 
 Pair = tuple[Ref, Ref]
 
@@ -64,7 +65,9 @@ def _extract(groups: dict[int, list[Ref]], first_free: int) -> dict[int, Pair]:
     return pairs
 
 
-def _replace(groups: dict[int, list[Ref]], where: dict[Pair, Counter[int]], index: int, pair: Pair, new: int) -> set[Pair]:
+def _replace(
+    groups: dict[int, list[Ref]], where: dict[Pair, Counter[int]], index: int, pair: Pair, new: int
+) -> set[Pair]:
     """Write one group with ``new`` in place of the pair; returns the pairs that it newly contains."""
     terms = groups[index]
     for a, b in combinations(terms, 2):
