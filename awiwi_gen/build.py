@@ -67,7 +67,7 @@ def headers(directory: Path) -> str:
 
 
 def compile_objects(directory: Path, store: Cache) -> list[Path]:
-    """Objects of all C files of a generated directory; only those not in the cache are compiled."""
+    """Objects of all C files of a generated directory and of csrc; only those not in the cache are compiled."""
     cc, shared = compiler(), headers(directory)
     includes = (f"-I{directory}", f"-I{CSRC}")
 
@@ -82,7 +82,7 @@ def compile_objects(directory: Path, store: Cache) -> list[Path]:
         return target
 
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        return list(pool.map(compile_one, sorted(directory.glob("*.c"))))
+        return list(pool.map(compile_one, [*sorted(directory.glob("*.c")), *sorted(CSRC.glob("*.c"))]))
 
 
 def declarations(directory: Path) -> str:

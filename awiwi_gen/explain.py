@@ -26,8 +26,8 @@ def explanation(job: Job, name: str) -> dict[str, Any]:
     kernel = known[name]
     alone = Job(job.hand, job.options, name, job.store, job.progress)
     derive_missing(alone)
-    (record,) = make_records(alone)
-    definition = load_graphs(kernel, job.store)[next(iter(kernel.routes))]
+    record = make_records(alone)[name]
+    definition = next(iter(load_graphs(kernel, job.store).values()), None)
     return {
         "name": name,
         "doc": kernel.doc,
@@ -38,8 +38,8 @@ def explanation(job: Job, name: str) -> dict[str, Any]:
         "guards": list(kernel.guards),
         "route": record.route,
         "cost": record.function.cost.as_dict(),
-        "numbers": {path: str(kernel.part.quantities()[path]) for path in definition.params},
-        "mathematics": mathematics(definition),
+        "numbers": {p: str(kernel.part.quantities()[p]) for p in (definition.params if definition else ())},
+        "mathematics": mathematics(definition) if definition else [f"{kernel.solver.problem}, by iteration"],
     }
 
 

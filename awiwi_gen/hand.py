@@ -15,11 +15,14 @@ from typing import Annotated
 
 from pydantic import Field
 
+from awiwi_gen.hand_actuation import Fibre, Motor, Spring
 from awiwi_gen.hand_file import HandFile
 from awiwi_gen.hand_lint import complaints
+from awiwi_gen.hand_lint_actuation import actuator_complaints
 from awiwi_gen.hand_parts import Finger, FingerName, Limits, Link, Part, Prefix, Title
+from awiwi_gen.hand_wrist import Wrist
 
-__all__ = ["Finger", "Hand", "Limits", "Link"]
+__all__ = ["Fibre", "Finger", "Hand", "Limits", "Link", "Motor", "Spring", "Wrist"]
 
 _PACKAGED = Path(__file__).with_name("hand.toml")
 
@@ -33,6 +36,10 @@ class Hand(Part):
     fingers: Annotated[
         dict[FingerName, Finger], Field(min_length=1, max_length=8, examples=["[[fingers.index.links]]"])
     ]
+    wrist: Wrist | None = None
+    motor: Motor | None = None
+    spring: Spring | None = None
+    tendon: Fibre | None = None
 
     @classmethod
     def load(cls, path: str | os.PathLike[str] | None = None) -> Hand:
@@ -50,6 +57,8 @@ class Hand(Part):
     @classmethod
     def _checked(cls, file: HandFile) -> Hand:
         hand = file.validated(cls)
-        if found := list(complaints(hand.limits, hand.fingers)):
+        found = list(complaints(hand.limits, hand.fingers, hand.wrist))
+        found += actuator_complaints(hand.motor, hand.spring, hand.tendon, hand.fingers)
+        if found:
             raise file.error(found)
         return hand

@@ -10,11 +10,13 @@ import difflib
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from fractions import Fraction
+from typing import Protocol
 
 from awiwi_gen.hand_parts import Finger, FourBar, Keys, Limits, Link, Part, covers
+from awiwi_gen.hand_wrist import Wrist, closure
 from awiwi_gen.units import Quantity
 
-__all__ = ["complaints"]
+__all__ = ["Complaint", "below", "complaints", "sources"]
 
 Complaint = tuple[Keys, str]
 Tensor = dict[str, Fraction]
@@ -24,19 +26,33 @@ _CLOSURE_STEPS = 1000
 _WIDEST_GYRATION = 1.0  # m; with a plausible mass and a plausible moment, their ratio can still be absurd
 
 
-def complaints(limits: Limits, fingers: Mapping[str, Finger]) -> Iterator[Complaint]:
+def complaints(limits: Limits, fingers: Mapping[str, Finger], wrist: Wrist | None = None) -> Iterator[Complaint]:
     """All that is wrong with a hand whose single values are all right."""
-    yield from _below(("limits",), _limits(limits))
+    yield from below(("limits",), _limits(limits))
     for name, finger in fingers.items():
-        yield from _below(("fingers", name), _finger(finger))
+        yield from below(("fingers", name), _finger(finger))
+    if wrist:
+        yield from below(("wrist",), _wrist(wrist, sum(len(finger.tendons) for finger in fingers.values())))
 
 
-def _below(keys: Keys, found: Iterable[Complaint]) -> Iterator[Complaint]:
+class Sourced(Protocol):
+    """A part of a hand that tells where its numbers come from."""
+
+    @property
+    def source(self) -> str | dict[str, str]:
+        """One source for all numbers, or one for each key."""
+
+    def sources(self) -> dict[str, str]:
+        """The source of every number below, by path."""
+
+
+def below(keys: Keys, found: Iterable[Complaint]) -> Iterator[Complaint]:
+    """The complaints of a part, as those of the whole that has it at `keys`."""
     return (((*keys, *inner), message) for inner, message in found)
 
 
 def _limits(limits: Limits) -> Iterator[Complaint]:
-    yield from _sources(limits)
+    yield from sources(limits)
     yield from _upside_down(limits, "tendon_stiffness_low", "tendon_stiffness_high")
 
 
@@ -46,13 +62,22 @@ def _upside_down(part: Part, low: str, high: str) -> Iterator[Complaint]:
         yield (low,), f'= "{bottom}" is not below {high} = "{top}"'
 
 
+def _wrist(wrist: Wrist, tendons: int) -> Iterator[Complaint]:
+    yield from sources(wrist)
+    if len(wrist.tendons) != tendons:
+        yield ("tendons",), f"has {len(wrist.tendons)} entries, but the fingers have {tendons} tendons; each passes here"
+    swings = {"q71": wrist.q71, "q73": wrist.q73}.items()
+    backwards = [fault for key, swing in swings for fault in below((key,), _upside_down(swing, "low", "high"))]
+    yield from backwards or closure(wrist)
+
+
 def _finger(finger: Finger) -> Iterator[Complaint]:
     for index, link in enumerate(finger.links):
-        yield from _below(("links", index), _link(link, follows=link.joint in finger.leaders))
-    for index, part in enumerate(finger.pulleys):
-        yield from _below(("pulleys", index), _sources(part))
+        yield from below(("links", index), _link(link, follows=link.joint in finger.leaders))
+    for index, pulley in enumerate(finger.pulleys):
+        yield from below(("pulleys", index), sources(pulley))
     for index, tendon in enumerate(finger.tendons):
-        yield from _below(("tendons", index), _sources(tendon))
+        yield from below(("tendons", index), sources(tendon))
     misnamed = [*_names(finger)]
     yield from misnamed
     if not misnamed:  # who pulls what can only be told when every name has its joint
@@ -84,14 +109,10 @@ def _names(finger: Finger) -> Iterator[Complaint]:
         if not tendon.over and not tendon.span:
             yield ("tendons", number), "neither winds over a pulley nor has a span; it would pull nothing"
         if tendon.span:
-            yield from _known(
-                ("tendons", number, "span", "joint"), tendon.span.joint, tendon.span.joint, joints, "joint"
-            )
-            if tendon.span.joint == joints[0]:
-                yield (
-                    ("tendons", number, "span", "joint"),
-                    f'= "{joints[0]}" stands still in the palm; no joint moves it',
-                )
+            keys, end = ("tendons", number, "span", "joint"), tendon.span.joint
+            yield from _known(keys, end, end, joints, "joint")
+            if end == joints[0]:
+                yield keys, f'= "{end}" stands still in the palm; no joint moves it'
     yield from _couplings(finger, joints, pulleys)
 
 
@@ -118,12 +139,11 @@ def _known(keys: Keys, shown: str, name: str, known: list[str], kind: str) -> It
         yield keys, f'= "{shown}" names no {kind} of this finger; {hint}'
 
 
-def _sources(part: Part) -> Iterator[Complaint]:
+def sources(part: Sourced) -> Iterator[Complaint]:
     """Each number has a source, and each source has a number."""
-    source = getattr(part, "source")  # noqa: B009 the parts given here have one
     told = part.sources()
-    if isinstance(source, dict):
-        for key in source:
+    if isinstance(part.source, dict):
+        for key in part.source:
             if key != "default" and not any(covers(key, path) for path in told):
                 near = difflib.get_close_matches(key, [path.partition("[")[0] for path in told], n=1)
                 hint = f'; did you mean "{near[0]}"?' if near else ""
@@ -136,7 +156,7 @@ def _sources(part: Part) -> Iterator[Complaint]:
 
 
 def _link(link: Link, follows: bool) -> Iterator[Complaint]:
-    yield from _sources(link)
+    yield from sources(link)
     for key in ("low", "high"):
         given = getattr(link, key)
         if given is None and not follows:
@@ -145,13 +165,13 @@ def _link(link: Link, follows: bool) -> Iterator[Complaint]:
             yield (key,), f'= "{given}" is one too many: this joint follows another, which has the range'
     if link.low and link.high and not follows:
         yield from _upside_down(link, "low", "high")
-    yield from _below(("inertia",), _inertia(link))
+    yield from below(("inertia",), _inertia(link))
     if link.four_bar:
-        yield from _below(("four_bar",), _sources(link.four_bar))
+        yield from below(("four_bar",), sources(link.four_bar))
         if follows:
             yield ("four_bar",), "turns with a joint that follows another; it needs a joint of its own"
         elif link.low and link.high:
-            yield from _below(("four_bar",), _closure(link.four_bar, link.low, link.high))
+            yield from below(("four_bar",), _closure(link.four_bar, link.low, link.high))
 
 
 def _inertia(link: Link) -> Iterator[Complaint]:
@@ -229,23 +249,16 @@ def _drive(finger: Finger) -> Iterator[Complaint]:
                 row[by_pulleys.index(joint)] += 1 if name[0] == "+" else -1
     idle = False
     for column, joint in enumerate(by_pulleys):
-        found = {sense: any(row[column] * sense > 0 for row in senses) for sense in (1, -1)}
-        idle = idle or not all(found.values())
-        missing = " nor ".join(f'"{sign}{joint}"' for sense, sign in ((1, "+"), (-1, "-")) if not found[sense])
+        pulls = {"+": any(row[column] > 0 for row in senses), "-": any(row[column] < 0 for row in senses)}
+        missing = [f'"{sign}{joint}"' for sign, pulled in pulls.items() if not pulled]
         if missing:
-            yield (
-                ("links", order.index(joint), "joint"),
-                (f'= "{joint}" has no tendon over {missing}; tendons only pull, so a joint needs both senses'),
-            )
+            idle = True
+            need = f"has no tendon over {' nor '.join(missing)}; tendons only pull, so a joint needs both senses"
+            yield ("links", order.index(joint), "joint"), f'= "{joint}" {need}'
     rank = _rank([[Fraction(sense) for sense in row] for row in senses])
     if not idle and rank < len(by_pulleys):
-        yield (
-            ("tendons",),
-            (
-                f"move only {rank} of the {len(by_pulleys)} joints {', '.join(by_pulleys)} independently; "
-                "their lengths would not tell the joint angles"
-            ),
-        )
+        joints = f"{rank} of the {len(by_pulleys)} joints {', '.join(by_pulleys)}"
+        yield ("tendons",), f"move only {joints} independently; their lengths would not tell the joint angles"
 
 
 def _rank(rows: list[list[Fraction]]) -> int:

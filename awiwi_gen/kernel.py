@@ -49,6 +49,25 @@ class Port:
 
 
 @dataclass(frozen=True)
+class Solver:
+    """What makes a kernel that must iterate: a template that binds a solver of csrc to generated kernels.
+
+    ``uses`` are the families of the kernels of the same part that it calls, ``arrays`` become C constants,
+    ``strings`` go to the template as they are. ``problem`` names what is solved, so that verification knows
+    well-posed inputs and their exact solution; a compiled result may differ from that by ``tolerance`` of
+    the largest, per scalar type.
+    """
+
+    template: str
+    problem: str
+    uses: tuple[str, ...]
+    arrays: Mapping[str, tuple[float, ...]]
+    strings: Mapping[str, str]
+    iterations: int
+    tolerance: Mapping[str, float]
+
+
+@dataclass(frozen=True)
 class Kernel:
     """One function of the C interface.
 
@@ -70,12 +89,20 @@ class Kernel:
     path: str = ""
     structure: str = ""
     guards: tuple[str, ...] = ()
+    solver: Solver | None = None
 
     @property
     def results(self) -> dict[str, tuple[int, ...]]:
         """Shapes of all that a route returns: the outputs, then the guards if there are any."""
         shapes = {name: port.shape for name, port in self.outputs.items()}
         return {**shapes, GUARDS: (len(self.guards),)} if self.guards else shapes
+
+    @property
+    def needs(self) -> dict[str, str]:
+        """Names of the kernels its solver calls, by family."""
+        if self.solver is None:
+            return {}
+        return {family: self.name.removesuffix(self.family) + family for family in self.solver.uses}
 
     @property
     def family(self) -> str:

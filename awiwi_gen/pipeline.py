@@ -11,7 +11,7 @@ from __future__ import annotations
 import fnmatch
 import json
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass, field
 from functools import cached_property, partial
@@ -54,14 +54,21 @@ class Job:
         return {"hand": self.hand.digest(), "generator": code, "libraries": libraries(), "options": choice}
 
     @cached_property
-    def kernels(self) -> list[Any]:
-        """The kernels asked for. Raises InputError if the pattern matches none."""
+    def catalog(self) -> list[Any]:
+        """All kernels of the hand."""
         from awiwi_gen.kernels import catalog
 
-        found = [kernel for kernel in catalog(self.hand) if fnmatch.fnmatch(kernel.name, self.only)]
-        if not found:
+        return catalog(self.hand)
+
+    @cached_property
+    def kernels(self) -> list[Any]:
+        """The kernels asked for and those they call. Raises InputError if the pattern matches none."""
+        known = self.catalog
+        wanted = {kernel.name for kernel in known if fnmatch.fnmatch(kernel.name, self.only)}
+        if not wanted:
             raise InputError(f"--only {self.only}: no kernel has such a name; awiwi-gen list shows them")
-        return found
+        wanted |= {name for kernel in known if kernel.name in wanted for name in kernel.needs.values()}
+        return [kernel for kernel in known if kernel.name in wanted]
 
     def parallel(self, stage: str, function: Callable[[Any], Any], items: Sequence[Any]) -> list[Any]:
         """Apply a function to items on all cores, in order, with progress."""
@@ -93,8 +100,8 @@ def generate(job: Job, directory: Path) -> bool:
     from awiwi_gen.records import manifest_entry
 
     records = make_records(job)
-    functions = [record.function for record in records]
-    files = {f"{kernel.name}.c": record.file for kernel, record in zip(job.kernels, records, strict=True)}
+    functions = [record.function for record in records.values()]
+    files = {f"{name}.c": record.file for name, record in records.items()}
     quantities = {path: quantity for path, quantity in job.hand.quantities().items() if path.startswith("fingers.")}
     files |= shared_files(job.hand.prefix, functions, job.hand.digest(), quantities, job.options)
     manifest = {
@@ -104,34 +111,50 @@ def generate(job: Job, directory: Path) -> bool:
         "digest": job.hand.digest(),
         "inputs": job.inputs,
         "files": {name: sha256(text) for name, text in sorted(files.items())},
-        "kernels": [manifest_entry(k, r) for k, r in zip(job.kernels, records, strict=True)],
+        "kernels": [manifest_entry(kernel, records[kernel.name]) for kernel in job.kernels],
     }
     install(directory, {**files, MANIFEST: json.dumps(manifest, indent=1, ensure_ascii=False) + "\n"})
     return True
 
 
-def make_records(job: Job) -> list[Record]:
-    """Derive what is not derived yet, then bind, compare, optimise and print every kernel."""
-    from awiwi_gen.records import load_graphs, record_key
+def make_records(job: Job) -> dict[str, Record]:
+    """Derive what is not derived yet, then bind, compare, optimise and print every kernel.
+
+    Kernels with solvers come second: they are built from the records of the kernels they call.
+    """
+    from awiwi_gen.records import load_graphs, make_record, make_solver_record, record_key, solver_key
 
     derive_missing(job)
-    graphs = [load_graphs(kernel, job.store) for kernel in job.kernels]
-    keys = [record_key(k, g, job.hand.prefix, job.options) for k, g in zip(job.kernels, graphs, strict=True)]
-    absent = set(job.store.missing("records", keys))
+    made: dict[str, Record] = {}
+    closed = [kernel for kernel in job.kernels if kernel.solver is None]
+    graphs = [load_graphs(kernel, job.store) for kernel in closed]
     tasks = [
-        (kernel, own, job.hand.prefix, job.options, digest, job.store)
-        for kernel, own, digest in zip(job.kernels, graphs, keys, strict=True)
-        if digest in absent
+        (record_key(kernel, own, job.hand.prefix, job.options), make_record, (kernel, own))
+        for kernel, own in zip(closed, graphs, strict=True)
     ]
-    job.parallel("emit", _record_task, tasks)
-    return [job.store.get("records", digest) for digest in keys]  # type: ignore[misc]
+    made |= zip((kernel.name for kernel in closed), _kept_records(job, "emit", tasks), strict=True)
+    iterating = [kernel for kernel in job.kernels if kernel.solver is not None]
+    used = [{family: made[name] for family, name in kernel.needs.items()} for kernel in iterating]
+    tasks = [
+        (solver_key(kernel, own, job.hand.prefix, job.options), make_solver_record, (kernel, own))
+        for kernel, own in zip(iterating, used, strict=True)
+    ]
+    made |= zip((kernel.name for kernel in iterating), _kept_records(job, "solve", tasks), strict=True)
+    return {kernel.name: made[kernel.name] for kernel in job.kernels}
+
+
+def _kept_records(job: Job, stage: str, tasks: Sequence[tuple[str, Any, tuple[Any, ...]]]) -> list[Any]:
+    """Records by their keys, those that are not kept yet made on all cores."""
+    keys = [digest for digest, _, _ in tasks]
+    absent = set(job.store.missing("records", keys))
+    work = [(*task, job.hand.prefix, job.options, job.store) for task in tasks if task[0] in absent]
+    job.parallel(stage, _record_task, work)
+    return [job.store.get("records", digest) for digest in keys]
 
 
 def _record_task(task: tuple[Any, ...]) -> None:
-    from awiwi_gen.records import make_record
-
-    kernel, graphs, prefix, options, digest, store = task
-    store.put("records", digest, make_record(kernel, graphs, prefix, options, digest))
+    digest, make, given, prefix, options, store = task
+    store.put("records", digest, make(*given, prefix, options, digest))
 
 
 def derive_missing(job: Job) -> None:
@@ -193,24 +216,28 @@ def _examine(job: Job, directory: Path) -> Proof:
     shared = headers(directory)
     records = make_records(job)
     verdicts = []
-    for kernel, record in zip(job.kernels, records, strict=True):
+    for kernel in job.kernels:
+        record, used = records[kernel.name], {family: records[name] for family, name in kernel.needs.items()}
         text = (directory / f"{kernel.name}.c").read_text(encoding="utf-8")
         digest = key(text, shared, record.digest, code_digest(), compiler())
-        examine = partial(judge_record, kernel, record, library[kernel.name], job.options)
+        examine = partial(judge_record, kernel, record, used, library[kernel.name], job.options)
         verdicts.append(job.store.memo("verdicts", digest, examine))
         job.progress("verify", len(verdicts), len(job.kernels))
     return Proof(verdicts, _obey_physics(job, records))
 
 
-def _obey_physics(job: Job, records: Sequence[Record]) -> list[Law]:
+def _obey_physics(job: Job, records: Mapping[str, Record]) -> list[Law]:
     parts: dict[str, list[tuple[Any, Record]]] = {}
-    for kernel, record in zip(job.kernels, records, strict=True):
-        parts.setdefault(kernel.path, []).append((kernel, record))
+    for kernel in job.kernels:
+        parts.setdefault(kernel.path, []).append((kernel, records[kernel.name]))
     keys = [key(*(record.digest for _, record in members), code_digest()) for members in parts.values()]
     absent = set(job.store.missing("laws", keys))
+    ports: dict[str, dict[str, Any]] = {}
+    for kernel in job.catalog:  # a law may need a velocity that none of the kernels asked for takes
+        ports.setdefault(kernel.path, {}).update(kernel.inputs)
     tasks = [
-        (members, digest, job.options, job.store)
-        for members, digest in zip(parts.values(), keys, strict=True)
+        (members, ports[path], digest, job.options, job.store)
+        for (path, members), digest in zip(parts.items(), keys, strict=True)
         if digest in absent
     ]
     job.parallel("physics", _physics_task, tasks)
@@ -220,8 +247,8 @@ def _obey_physics(job: Job, records: Sequence[Record]) -> list[Law]:
 def _physics_task(task: tuple[Any, ...]) -> None:
     from awiwi_gen.records import physics
 
-    members, digest, options, store = task
-    store.put("laws", digest, physics(members, options))
+    members, ports, digest, options, store = task
+    store.put("laws", digest, physics(members, ports, options))
 
 
 def cached_tree(job: Job) -> Path:

@@ -9,22 +9,25 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any
 
 from awiwi_gen.cache import Cache, code_digest, key, libraries
 from awiwi_gen.emit.c import CFunction, c_function
 from awiwi_gen.emit.files import cost_line, describe, kernel_file
 from awiwi_gen.emit.options import Options
+from awiwi_gen.emit.solver import solver_function
 from awiwi_gen.errors import VerificationError
 from awiwi_gen.ir.cost import cost
 from awiwi_gen.ir.graph import Graph
 from awiwi_gen.ir.passes import optimise
 from awiwi_gen.ir.passes.bind import bind
-from awiwi_gen.kernel import Kernel
+from awiwi_gen.kernel import Kernel, Port, Solver
+from awiwi_gen.verify.problems import PROBLEMS
 from awiwi_gen.verify.physics import Law, obey
 from awiwi_gen.verify.reference import Reference, ball_values, disagreement, reference
 from awiwi_gen.verify.samples import SEED, draw
-from awiwi_gen.verify.verdict import Verdict, judge
+from awiwi_gen.verify.verdict import Verdict, judge, judge_solver
 
 ROUTES_AGREE = 1e-40  # level 4
 PASSES_AGREE = 1e-50  # level 2
@@ -36,7 +39,7 @@ class Record:
     """What is known of a kernel before it is compiled; ``digest`` names what it was made from."""
 
     digest: str
-    graph: Graph
+    graph: Graph | None
     function: CFunction
     file: str
     route: str
@@ -57,10 +60,15 @@ def record_key(kernel: Kernel, graphs: Mapping[str, Graph], prefix: str, options
     values = kernel.part.quantities()
     used = {path: str(values[path].value) for graph in graphs.values() for path in graph.params}
     code = code_digest("awiwi_gen/ir", "awiwi_gen/emit", "awiwi_gen/records.py", "awiwi_gen/kernel.py", "templates",
-                       "awiwi_gen/verify/reference.py", "awiwi_gen/verify/samples.py")  # fmt: skip
+                       "awiwi_gen/verify/reference.py", "awiwi_gen/verify/samples.py", "awiwi_gen/verify/problems.py")  # fmt: skip
     digests = {route: graph.digest for route, graph in graphs.items()}
-    ports = (dict(kernel.inputs), dict(kernel.outputs), kernel.doc, kernel.source)
+    ports = (dict(kernel.inputs), dict(kernel.outputs), kernel.doc, kernel.source, kernel.solver)
     return key(kernel.name, digests, json.dumps(used, sort_keys=True), ports, prefix, options, code, libraries())
+
+
+def solver_key(kernel: Kernel, used: Mapping[str, Record], prefix: str, options: Options) -> str:
+    """What a record of a kernel with a solver depends on: the kernels it calls, and itself."""
+    return key(record_key(kernel, {}, prefix, options), *(record.digest for record in used.values()))
 
 
 def load_graphs(kernel: Kernel, cache: Cache) -> dict[str, Graph]:
@@ -88,7 +96,7 @@ def make_record(kernel: Kernel, graphs: Mapping[str, Graph], prefix: str, option
 
     Raises VerificationError where two routes, or the graphs before and after a pass, differ.
     """
-    values = {path: quantity.value for path, quantity in kernel.part.quantities().items()}
+    values = _values(kernel)
     numbers = values if options.params == "baked" else {}
     bound = {route: bind(graph, numbers) for route, graph in graphs.items()}
     route, optimised = cheapest(bound)
@@ -120,14 +128,53 @@ def make_record(kernel: Kernel, graphs: Mapping[str, Graph], prefix: str, option
     return Record(digest, final, function, text, route, agreement, passes, reference(definition))
 
 
-def judge_record(kernel: Kernel, record: Record, function: Callable[..., Any], options: Options) -> Verdict:
+def make_solver_record(
+    kernel: Kernel, used: Mapping[str, Record], prefix: str, options: Options, digest: str
+) -> Record:
+    """Bind a solver to the kernels it uses, and find the exact solutions it is to be held against."""
+    solver = _solver(kernel)
+    runtime = any(record.graph is not None and record.graph.params for record in used.values())
+    functions = {family: record.function for family, record in used.items()}
+    function, text = solver_function(kernel, solver, prefix, options, functions, runtime)
+    inputs = solver_inputs(kernel, used, options)
+    exact = PROBLEMS[solver.problem].solve(inputs, _graphs(used), _values(kernel))
+    return Record(digest, None, function, text, "solver", 0.0, 0.0, exact)
+
+
+def solver_inputs(kernel: Kernel, used: Mapping[str, Record], options: Options) -> dict[str, Any]:
+    """Well-posed sample inputs of a kernel with a solver."""
+    solver = _solver(kernel)
+    drawn = draw(kernel.inputs, kernel.path, options.dtype)
+    return PROBLEMS[solver.problem].sample(drawn, _graphs(used), _values(kernel))
+
+
+def _solver(kernel: Kernel) -> Solver:
+    if kernel.solver is None:
+        raise ValueError(f"{kernel.name} has no solver")
+    return kernel.solver
+
+
+def _graphs(used: Mapping[str, Record]) -> dict[str, Graph]:
+    return {family: record.graph for family, record in used.items() if record.graph is not None}
+
+
+def _values(kernel: Kernel) -> dict[str, Fraction]:
+    return {path: quantity.value for path, quantity in kernel.part.quantities().items()}
+
+
+def judge_record(
+    kernel: Kernel, record: Record, used: Mapping[str, Record], function: Callable[..., Any], options: Options
+) -> Verdict:
     """Levels 1 and 3 for one compiled kernel, joined with levels 2 and 4 of its record."""
+    if record.graph is None:
+        inputs, tolerance = solver_inputs(kernel, used, options), _solver(kernel).tolerance[options.scalar]
+        return judge_solver(kernel.name, record.reference, inputs, function, tolerance, SEED)
     return judge(
         kernel.name,
         record.graph,
         record.reference,
         draw(kernel.inputs, kernel.path, options.dtype),
-        {path: quantity.value for path, quantity in kernel.part.quantities().items()},
+        _values(kernel),
         function,
         {name: port.shape for name, port in kernel.inputs.items()},
         record.agreement,
@@ -137,13 +184,11 @@ def judge_record(kernel: Kernel, record: Record, function: Callable[..., Any], o
     )
 
 
-def physics(members: Sequence[tuple[Kernel, Record]], options: Options) -> list[Law]:
+def physics(members: Sequence[tuple[Kernel, Record]], ports: Mapping[str, Port], options: Options) -> list[Law]:
     """Level 5 for the kernels of one part."""
     first = members[0][0]
-    ports = {name: port for kernel, _ in members for name, port in kernel.inputs.items()}
-    values = {path: quantity.value for path, quantity in first.part.quantities().items()}
-    graphs = {kernel.family: record.graph for kernel, record in members}
-    return obey(first.path, graphs, draw(ports, first.path, options.dtype), values)
+    graphs = {kernel.family: record.graph for kernel, record in members if record.graph is not None}
+    return obey(first.path, graphs, draw(ports, first.path, options.dtype), _values(first))
 
 
 def manifest_entry(kernel: Kernel, record: Record) -> dict[str, Any]:
@@ -162,8 +207,8 @@ def manifest_entry(kernel: Kernel, record: Record) -> dict[str, Any]:
         "source": kernel.source,
         "part": kernel.path,
         "route": record.route,
-        "params": bool(record.graph.params),
-        "status": bool(kernel.guards),
+        "params": "_params *" in record.function.prototype,
+        "status": record.function.prototype.startswith("int "),
         "inputs": [port(name, spec, True) for name, spec in kernel.inputs.items()],
         "outputs": [port(name, spec, False) for name, spec in kernel.outputs.items()],
         "cost": record.function.cost.as_dict(),

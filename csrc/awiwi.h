@@ -2,6 +2,7 @@
 #ifndef AWIWI_H
 #define AWIWI_H
 
+#include "awiwi_solvers.h"
 #include "kernels.h"
 
 #endif

@@ -4,7 +4,7 @@
  * Source: eq. 5.2, 5.3, table 5.1.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   out  T[4][4] in 1, m
- * Cost: 29 add, 47 mul, 1 div, 3 neg, 1 sqrt, 5 sincos.
+ * Cost: 28 add, 47 mul, 1 div, 4 neg, 1 sqrt, 5 sincos.
  * Inputs: sha256 28edf41a51f84ef24222facbdc6e1021f809ccdd8b122d41df2ba55b8d1b95d9.
  */
 #include <math.h>
@@ -13,47 +13,49 @@
 
 void awiwi_fifth_fingertip_pose(const double q[restrict 4], double T[restrict 16])
 {
+    const double cos_q1 = cos(q[1]);
     const double t0 = q[2] + q[3];
     const double t1 = t0 + 0.7692307692307693*q[3];
-    const double t2 = sin(t1);
-    const double t3 = q[0] + 1.0471975511965979;
-    const double t4 = cos(t3);
-    const double t5 = 0.01*t4;
-    const double t6 = t5 - 0.012;
-    const double t7 = sin(t3);
-    const double t8 = 0.01*t7;
-    const double t9 = t8*t8 + t6*t6;
-    const double t10 = 1.0/t9;
-    const double t11 = (t9 + 5.625e-05 - 0.000121)*(0.5*t10);
-    const double t12 = sqrt(5.625e-05*t10 - t11*t11);
-    const double t13 = t6*t11 + t8*t12;
-    const double t14 = t8*t11 - t6*t12;
-    const double t15 = 17777.777777777777*(0.006477089970083198*t13 - 0.0037811777952706273*t14);
-    const double t16 = cos(t1);
-    const double cos_q1 = cos(q[1]);
-    const double t17 = 17777.777777777777*(0.006477089970083198*t14 + 0.0037811777952706273*t13);
-    const double t18 = cos_q1*t17;
+    const double t2 = cos(t1);
+    const double t3 = cos_q1*t2;
+    const double t4 = q[0] + 1.0471975511965979;
+    const double t5 = cos(t4);
+    const double t6 = 0.00024*t5 - 0.000244;
+    const double t7 = 1.0/t6;
+    const double t8 = 67.22093858258893*t7;
+    const double t9 = 0.01*t5;
+    const double t10 = t9 - 0.012;
+    const double t11 = t6 + 6.475e-05;
+    const double t12 = sin(t4);
+    const double t13 = 0.01*t12;
+    const double t14 = sqrt(-(5.625e-05*t6) - 0.25*t11*t11);
+    const double t15 = 0.5*t10*t11 - t13*t14;
+    const double t16 = 115.1482661348124*t7;
+    const double t17 = 0.005*t12*t11 + t10*t14;
+    const double t18 = t8*t15 + t16*t17;
+    const double t19 = sin(t1);
+    const double t20 = t8*t17 - t16*t15;
+    const double t21 = cos_q1*t19;
     const double sin_q1 = sin(q[1]);
     const double sin_q2 = sin(q[2]);
-    const double t19 = sin(t0);
-    const double t20 = 0.033*sin_q2 + (0.022*t19 + 0.018*t2) - 0.006;
+    const double t22 = sin(t0);
+    const double t23 = 0.033*sin_q2 + 0.022*t22 + 0.018*t19 - 0.006;
     const double cos_q2 = cos(q[2]);
-    const double t21 = cos(t0);
-    const double t22 = 0.033*cos_q2 + (0.022*t21 + 0.018*t16) + 0.006;
-    const double t23 = 0.0036*sin_q1 - cos_q1*t22 - 0.004;
-    const double t24 = cos_q1*t15;
-    T[0] = t2*t15 + t16*t18;
-    T[1] = t16*t15 - t2*t18;
-    T[2] = sin_q1*t17;
-    T[3] = t5 + (t20*t15 - t23*t17);
-    T[4] = sin_q1*t16;
-    T[5] = -(sin_q1*t2);
+    const double t24 = cos(t0);
+    const double t25 = 0.033*cos_q2 + 0.022*t24 + 0.018*t2 + 0.006;
+    const double t26 = 0.0036*sin_q1 - cos_q1*t25 - 0.004;
+    T[0] = t3*t18 - t19*t20;
+    T[1] = -(t2*t20) - t21*t18;
+    T[2] = sin_q1*t18;
+    T[3] = t9 - t23*t20 - t26*t18;
+    T[4] = sin_q1*t2;
+    T[5] = -(sin_q1*t19);
     T[6] = -cos_q1;
-    T[7] = 0.0036*cos_q1 + sin_q1*t22;
-    T[8] = t2*t17 - t16*t24;
-    T[9] = t16*t17 + t2*t24;
-    T[10] = -(sin_q1*t15);
-    T[11] = t8 + (t20*t17 + t23*t15);
+    T[7] = 0.0036*cos_q1 + sin_q1*t25;
+    T[8] = t19*t18 + t3*t20;
+    T[9] = t2*t18 - t21*t20;
+    T[10] = sin_q1*t20;
+    T[11] = t13 + t23*t18 - t26*t20;
     T[12] = 0.0;
     T[13] = 0.0;
     T[14] = 0.0;

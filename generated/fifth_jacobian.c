@@ -4,7 +4,7 @@
  * Source: eq. 5.3, differentiated.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   out  J[6][4] in m/rad, 1
- * Cost: 45 add, 66 mul, 2 div, 7 neg, 1 sqrt, 5 sincos.
+ * Cost: 38 add, 64 mul, 2 div, 12 neg, 1 sqrt, 5 sincos.
  * Inputs: sha256 41e0b066350c1515c23653124cb3764011a2af2cb74c560413362bf44f18b5d9.
  */
 #include <math.h>
@@ -13,71 +13,67 @@
 
 void awiwi_fifth_jacobian(const double q[restrict 4], double J[restrict 24])
 {
-    const double sin_q2 = sin(q[2]);
-    const double t0 = q[2] + q[3];
+    const double t0 = q[0] + 1.0471975511965979;
     const double t1 = sin(t0);
-    const double t2 = t0 + 0.7692307692307693*q[3];
-    const double t3 = sin(t2);
-    const double t4 = 0.018*t3;
-    const double t5 = 0.022*t1 + t4;
-    const double t6 = 0.033*sin_q2 + t5;
-    const double t7 = t6 - 0.006;
-    const double t8 = q[0] + 1.0471975511965979;
-    const double t9 = sin(t8);
-    const double t10 = 0.01*t9;
-    const double t11 = cos(t8);
-    const double t12 = 0.01*t11;
-    const double t13 = t12 - 0.012;
-    const double t14 = t10*t10 + t13*t13;
-    const double t15 = 1.0/t14;
-    const double t16 = (t14 + 5.625e-05 - 0.000121)*(0.5*t15);
-    const double t17 = sqrt(5.625e-05*t15 - t16*t16);
-    const double t18 = t10*t16 - t13*t17;
-    const double t19 = t13*t16 + t10*t17;
-    const double t20 = 17777.777777777777*(0.006477089970083198*t18 + 0.0037811777952706273*t19);
+    const double t2 = 0.01*t1;
+    const double sin_q2 = sin(q[2]);
+    const double t3 = q[2] + q[3];
+    const double t4 = sin(t3);
+    const double t5 = t3 + 0.7692307692307693*q[3];
+    const double t6 = sin(t5);
+    const double t7 = 0.018*t6;
+    const double t8 = 0.022*t4 + t7;
+    const double t9 = 0.033*sin_q2 + t8;
+    const double t10 = t9 - 0.006;
+    const double t11 = cos(t0);
+    const double t12 = 0.00024*t11 - 0.000244;
+    const double t13 = 1.0/t12;
+    const double t14 = t12 + 6.475e-05;
+    const double t15 = 0.01*t11;
+    const double t16 = t15 - 0.012;
+    const double t17 = sqrt(-(5.625e-05*t12) - 0.25*t14*t14);
+    const double t18 = t13*(0.005*t1*t14 + t16*t17);
+    const double t19 = t13*(0.5*t16*t14 - t2*t17);
+    const double t20 = 115.1482661348124*t18 + 67.22093858258893*t19;
     const double sin_q1 = sin(q[1]);
     const double cos_q1 = cos(q[1]);
     const double cos_q2 = cos(q[2]);
-    const double t21 = cos(t0);
-    const double t22 = cos(t2);
+    const double t21 = cos(t3);
+    const double t22 = cos(t5);
     const double t23 = 0.018*t22;
     const double t24 = 0.022*t21 + t23;
     const double t25 = 0.033*cos_q2 + t24;
     const double t26 = t25 + 0.006;
     const double t27 = 0.0036*sin_q1 - cos_q1*t26;
     const double t28 = t27 - 0.004;
-    const double t29 = 17777.777777777777*(0.006477089970083198*t19 - 0.0037811777952706273*t18);
-    const double t30 = t7*t20 + t28*t29;
-    const double t31 = t10 - t18;
-    const double t32 = t13 - t19;
-    const double t33 = (t12*t31 - t10*t32)/(t18*t32 - t19*t31) + 1.0;
-    const double t34 = cos_q1*t20;
-    const double t35 = sin_q1*t20;
-    const double t36 = t7*t29 - t28*t20;
-    const double t37 = cos_q1*t29;
-    const double t38 = sin_q1*t29;
-    J[0] = t30*t33 - (t10 + t30);
-    J[1] = -(0.0036*t34) - t26*t35;
-    J[2] = t25*t29 - t6*t34;
-    J[3] = t24*t29 - t5*t34 + 0.7692307692307693*(t23*t29 - t4*t34);
+    const double t29 = 67.22093858258893*t18 - 115.1482661348124*t19;
+    const double t30 = (0.00012*t1 + t2*t19 - t15*t18)/t17 - 1.0 + 1.0;
+    const double t31 = cos_q1*t20;
+    const double t32 = sin_q1*t20;
+    const double t33 = cos_q1*t29;
+    const double t34 = sin_q1*t29;
+    J[0] = -t2 - (t10*t20 - t28*t29)*t30;
+    J[1] = -(0.0036*t31) - t26*t32;
+    J[2] = -(t25*t29) - t9*t31;
+    J[3] = -(t24*t29) - t8*t31 - 0.7692307692307693*(t23*t29 + t7*t31);
     J[4] = 0.0;
     J[5] = -t27;
-    J[6] = -(sin_q1*t6);
-    J[7] = -(0.7692307692307693*(sin_q1*t4)) - sin_q1*t5;
-    J[8] = t12 + t36 - t36*t33;
-    J[9] = 0.0036*t37 + t26*t38;
-    J[10] = t25*t20 + t6*t37;
-    J[11] = t24*t20 + t5*t37 + 0.7692307692307693*(t23*t20 + t4*t37);
+    J[6] = -(sin_q1*t9);
+    J[7] = sin_q1*(-(0.013846153846153847*t6) - t8);
+    J[8] = t15 - (t10*t29 + t28*t20)*t30;
+    J[9] = -(0.0036*t33) - t26*t34;
+    J[10] = t25*t20 - t9*t33;
+    J[11] = t24*t20 + 0.7692307692307693*(t23*t20 - t7*t33) - t8*t33;
     J[12] = 0.0;
-    J[13] = t29;
-    J[14] = t35;
-    J[15] = t35 + 0.7692307692307693*t35;
-    J[16] = t33 - 1.0;
+    J[13] = -t29;
+    J[14] = t32;
+    J[15] = 1.7692307692307692*t32;
+    J[16] = -t30;
     J[17] = 0.0;
     J[18] = -cos_q1;
     J[19] = -1.7692307692307692*cos_q1;
     J[20] = 0.0;
     J[21] = t20;
-    J[22] = -t38;
-    J[23] = -t38 - 0.7692307692307693*t38;
+    J[22] = t34;
+    J[23] = 1.7692307692307692*t34;
 }

@@ -18,7 +18,7 @@ void awiwi_fifth_joint_stiffness(const double q[restrict 4], const double f[rest
     const double t0 = k[2] + k[5];
     const double t1 = k[3] + k[4];
     const double t2 = t0 + t1;
-    const double t3 = -4.8e-05*(t1 - t0);
+    const double t3 = 4.8e-05*(t0 - t1);
     K[0] = 6.4e-05*(k[0] + k[1]);
     K[1] = 0.0;
     K[2] = 0.0;

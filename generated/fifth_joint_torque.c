@@ -5,7 +5,7 @@
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   in   f[8] in N, 0 to 100
  *   out  tau[4] in N m
- * Cost: 6 add, 4 mul, 1 neg.
+ * Cost: 6 add, 4 mul.
  * Inputs: sha256 fc64e49011f94c883d0dff8d313f87b0ec40722e48a38df7128230bbe8804bb6.
  */
 #include "kernels.h"
@@ -15,8 +15,8 @@ void awiwi_fifth_joint_torque(const double q[restrict 4], const double f[restric
     (void)q;
     const double t0 = f[2] - f[5];
     const double t1 = f[3] - f[4];
-    tau[0] = 0.008*(f[1] - f[0]);
-    tau[1] = 0.008*(-t0 - t1);
+    tau[0] = -0.008*(f[0] - f[1]);
+    tau[1] = -0.008*(t0 + t1);
     tau[2] = -0.006*(t0 - t1);
-    tau[3] = 0.005*(f[7] - f[6]);
+    tau[3] = -0.005*(f[6] - f[7]);
 }

@@ -5,8 +5,8 @@
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   qd[4] in rad/s, -20 to 20
  *   out  C[4][4] in N m s/rad
- * Cost: 96 add, 93 mul, 4 neg, 3 sincos.
- * Inputs: sha256 d656039a82e5cc36fd950fbf14d89d5569fbe9e63b3577ac15a4335b498c7780.
+ * Cost: 66 add, 70 mul, 1 neg, 3 sincos.
+ * Inputs: sha256 4a1df65b0c8638d215a4cf8272fbe31418399eaeed4f098ae5abb6462e91dd88.
  */
 #include <math.h>
 
@@ -14,86 +14,68 @@
 
 void awiwi_index_coriolis_matrix(const double q[restrict 4], const double qd[restrict 4], double C[restrict 16])
 {
-    const double cos_q1 = cos(q[1]);
+    const double t0 = qd[1] + qd[2];
+    const double t1 = q[1] + q[2];
+    const double t2 = sin(t1);
+    const double t3 = 0.0298*t2;
+    const double t4 = q[3] + t1;
+    const double t5 = cos(t4);
+    const double t6 = sin(t4);
+    const double t7 = 3.2e-05*t5 - 8e-07*t6;
+    const double t8 = t3*t7;
+    const double t9 = qd[3] + t0;
+    const double t10 = cos(t1);
+    const double t11 = 8e-07*t5 + 3.2e-05*t6;
+    const double t12 = 0.0298*t10*t11;
+    const double t13 = t9*t12;
+    const double t14 = t2*(5.22042e-06*t10 - 2.28e-08*t2) + 1.14e-08;
+    const double t15 = t6*(3.7034e-07*t5 - 8.8e-09*t6) + 4.4e-09;
+    const double t16 = t0*t14 + t9*t15;
+    const double t17 = -(t0*t8) - t13 - t16;
     const double sin_q1 = sin(q[1]);
-    const double t0 = 1.244876e-06*cos_q1 - 9.6e-09*sin_q1;
-    const double t1 = qd[0]*t0;
-    const double t2 = q[1] + q[2];
-    const double t3 = cos(t2);
-    const double t4 = sin(t2);
-    const double t5 = 7.5326e-07*t3 - 5.8e-09*t4;
-    const double t6 = qd[0]*t5;
-    const double t7 = q[3] + t2;
-    const double t8 = cos(t7);
-    const double t9 = sin(t7);
-    const double t10 = 6.6e-09*t8 - 1.24e-09*t9;
-    const double t11 = qd[0]*t10;
-    const double t12 = 3.2e-05*t8 - 8e-07*t9;
-    const double t13 = qd[0]*t12;
-    const double t14 = sin_q1*(2.1654944e-05*cos_q1 - 7.72e-08*sin_q1) + 3.86e-08;
-    const double t15 = qd[1]*t14;
-    const double t16 = 0.04038*cos_q1;
-    const double t17 = qd[1] + qd[2];
-    const double t18 = 1.2e-06*t3 + 0.0002062*t4;
-    const double t19 = qd[3] + t17;
-    const double t20 = 8e-07*t8 + 3.2e-05*t9;
-    const double t21 = t19*t20;
-    const double t22 = t17*t18 + t21;
-    const double t23 = t16*t22;
-    const double t24 = 0.04038*sin_q1;
-    const double t25 = qd[1]*t24;
-    const double t26 = 0.0002062*t3 - 1.2e-06*t4;
-    const double t27 = t4*(5.22042e-06*t3 - 2.28e-08*t4) + 1.14e-08;
-    const double t28 = t17*t27;
-    const double t29 = 0.0298*t3;
-    const double t30 = t29*t21;
-    const double t31 = 0.0298*t4;
-    const double t32 = t11 + t12*(0.005*qd[0] + t25 + t17*t31);
-    const double t33 = t9*(3.7034e-07*t8 - 8.8e-09*t9) + 4.4e-09;
-    const double t34 = t19*t33;
-    const double t35 = t32 + t34;
-    const double t36 = t6 + t25*t26 + t28 + t30 + t35;
-    const double t37 = -t1 - t15 - t23 - t36;
-    const double t38 = 3e-06*cos_q1 + 0.0006058*sin_q1;
-    const double t39 = t19*t12;
-    const double t40 = t19*t10 + 0.005*t39;
-    const double t41 = t17*t5 + t40;
-    const double t42 = 0.006*qd[0];
-    const double t43 = t18 + t20;
-    const double t44 = t26 + t12;
-    const double t45 = t27 + t29*t20 + t31*t12 + t33;
-    const double t46 = qd[0]*t33;
-    const double t47 = t42 + qd[0]*t16;
-    const double t48 = (t47 + qd[0]*t29)*t20 + t46;
-    const double t49 = t47*t18 + qd[0]*t27 + t31*t13 + t48;
-    const double t50 = t10 + 0.005*t12;
-    const double t51 = t5 + t50;
-    const double t52 = t24*(t17*t26 + t39);
-    const double t53 = qd[1]*t16;
-    const double t54 = t31*t39;
-    const double t55 = (t53 + t17*t29)*t20;
-    const double t56 = t55 + t34;
-    const double t57 = t53*t18 + t28 + t54 + t56;
-    const double t58 = qd[0]*t51 + (t57 - t36);
-    const double t59 = t53*t43 - t25*t44 - t58;
-    const double t60 = t56 - t35;
-    const double t61 = t55 - t32 - t60;
-    const double t62 = t30 + t61 - t54;
-    const double t63 = qd[0]*t50 + t60;
-    C[0] = t1 + (t6 + t11 + 0.005*t13) + t37 - 0.006*(qd[1]*t38 + t22);
-    C[1] = qd[1]*t0 + t41 - t42*(t38 + t43) - qd[0]*(t14 + t16*t43 + t24*t44 + t45);
-    C[2] = t41 - qd[0]*(t16 + 0.006)*t43 - qd[0]*t45;
-    C[3] = t40 - t20*(qd[0]*(t16 + t29 + 0.006)) - t46;
-    C[4] = t42*t38 + qd[0]*t14 + t24*(qd[0]*t26 + t13) + t49;
-    C[5] = qd[0]*(t0 + t51) + (t15 + t52 + t57) + t37;
-    C[6] = t52 - t23 - t59;
-    C[7] = t24*t39 - t16*t21 - t62;
-    C[8] = t49;
-    C[9] = t58;
-    C[10] = -t59;
-    C[11] = -t62;
-    C[12] = t48;
-    C[13] = t63;
-    C[14] = t25*t12 + t63 - t53*t20;
-    C[15] = -t61;
+    const double cos_q1 = cos(q[1]);
+    const double t18 = sin_q1*(2.1654944e-05*cos_q1 - 7.72e-08*sin_q1) + 3.86e-08;
+    const double t19 = qd[1]*t18;
+    const double t20 = 0.04038*sin_q1;
+    const double t21 = 0.0002062*t10 - 1.2e-06*t2;
+    const double t22 = t20*(t21 + t7);
+    const double t23 = 0.04038*cos_q1;
+    const double t24 = 1.2e-06*t10 + 0.0002062*t2;
+    const double t25 = t0*t24 + t9*t11;
+    const double t26 = t23*t25;
+    const double t27 = t17 - t19 - qd[1]*t22 - t26;
+    const double t28 = 3e-06*cos_q1 + 0.0006058*sin_q1;
+    const double t29 = t9*t7;
+    const double t30 = t9*(6.6e-09*t5 - 1.24e-09*t6) + 0.005*t29;
+    const double t31 = t0*(7.5326e-07*t10 - 5.8e-09*t2) + t30;
+    const double t32 = 0.006*qd[0];
+    const double t33 = t24 + t11;
+    const double t34 = t23*t33;
+    const double t35 = t14 + t12 + t8 + t15;
+    const double t36 = t32*(t28 + t33) + qd[0]*(t18 + t34 + t22 + t35);
+    const double t37 = t32*t33 + qd[0]*t34 + qd[0]*t35;
+    const double t38 = t23*t11;
+    const double t39 = t32*t11 + qd[0]*t38 + qd[0]*(t12 + t15);
+    const double t40 = t20*(t0*t21 + t29);
+    const double t41 = t3*t29;
+    const double t42 = t0*t12 + t41 + t16;
+    const double t43 = t42 + t17;
+    const double t44 = t41 - t13;
+    const double t45 = t0*(t12 - t8);
+    C[0] = t27 - 0.006*(qd[1]*t28 + t25);
+    C[1] = qd[1]*(1.244876e-06*cos_q1 - 9.6e-09*sin_q1) + t31 - t36;
+    C[2] = t31 - t37;
+    C[3] = t30 - t39;
+    C[4] = t36;
+    C[5] = t19 + qd[1]*t34 + t40 + t42 + t27;
+    C[6] = t40 + t43 - t26;
+    C[7] = t20*t29 + t44 - t9*t38;
+    C[8] = t37;
+    C[9] = qd[1]*(t34 - t22) + t43;
+    C[10] = t43;
+    C[11] = t44;
+    C[12] = t39;
+    C[13] = qd[1]*(t38 - t20*t7) + t45;
+    C[14] = t45;
+    C[15] = 0.0;
 }

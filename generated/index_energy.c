@@ -7,7 +7,7 @@
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  kinetic[1] in J
  *   out  potential[1] in J
- * Cost: 61 add, 77 mul, 4 sincos.
+ * Cost: 52 add, 68 mul, 4 sincos.
  * Inputs: sha256 c0e346d673217a3c0fa9e70826de7816197e0e1f7eac085721ef7fbf00222255.
  */
 #include <math.h>
@@ -16,42 +16,31 @@
 
 void awiwi_index_energy(const double q[restrict 4], const double qd[restrict 4], const double g[restrict 3], double kinetic[restrict 1], double potential[restrict 1])
 {
-    const double t0 = qd[1] + qd[2];
-    const double t1 = 0.04038*qd[1];
-    const double cos_q1 = cos(q[1]);
-    const double t2 = q[1] + q[2];
+    const double t0 = q[1] + q[2];
+    const double t1 = cos(t0);
+    const double t2 = q[3] + t0;
     const double t3 = cos(t2);
     const double t4 = sin(t2);
-    const double t5 = 0.0002062*t3 - 1.2e-06*t4;
+    const double t5 = 3.2e-05*t3 - 8e-07*t4;
+    const double t6 = sin(t0);
+    const double t7 = 8e-07*t3 + 3.2e-05*t4;
+    const double t8 = t1*t5 + t6*t7;
+    const double t9 = 0.0596*t8 + 5.70706e-06;
+    const double t10 = 0.0298*t8 + 4.1116e-07;
+    const double cos_q1 = cos(q[1]);
+    const double t11 = 0.0002062*t1 - 1.2e-06*t6 + t5;
     const double sin_q1 = sin(q[1]);
-    const double t6 = 1.2e-06*t3 + 0.0002062*t4;
-    const double t7 = 0.006*qd[0];
-    const double t8 = 0.0006058*cos_q1 - 3e-06*sin_q1;
-    const double t9 = t7 + 0.04038*qd[0]*cos_q1;
-    const double t10 = q[3] + t2;
-    const double t11 = cos(t10);
-    const double t12 = sin(t10);
-    const double t13 = 3.2e-05*t11 - 8e-07*t12;
-    const double t14 = qd[3] + t0;
-    const double t15 = 0.0298*t0;
-    const double t16 = 8e-07*t11 + 3.2e-05*t12;
-    const double t17 = 9.6e-09*cos_q1 + 1.244876e-06*sin_q1;
-    const double t18 = cos_q1*(2.1654944e-05*cos_q1 - 7.72e-08*sin_q1);
-    const double t19 = t18 - 2.1745844e-05;
-    const double t20 = t18 + 9.09e-08 - t19;
-    const double t21 = 5.8e-09*t3 + 7.5326e-07*t4;
-    const double t22 = t3*(5.22042e-06*t3 - 2.28e-08*t4);
-    const double t23 = t22 - 5.25816e-06;
-    const double t24 = t22 + 3.774e-08 - t23;
-    const double t25 = 1.24e-09*t11 + 6.6e-09*t12;
-    const double t26 = t11*(3.7034e-07*t11 - 8.8e-09*t12);
-    const double t27 = t26 - 3.9075e-07;
-    const double t28 = t26 + 2.041e-08 - t27;
-    const double t29 = qd[1]*(qd[0]*t17 + qd[1]*t20) + qd[0]*(qd[1]*t17 + qd[0]*(t19 + t20)) + (t0*(qd[0]*t21 + t0*t24) + qd[0]*(t0*t21 + qd[0]*(t23 + t24))) + (t14*(qd[0]*t25 + t14*t28) + qd[0]*(t14*t25 + qd[0]*(t27 + t28)));
-    const double t30 = t0*t1*(cos_q1*t5 + sin_q1*t6) + qd[0]*(5.17455e-07*qd[0] + t7*t8 + t9*t5 + (t9 + 0.0298*qd[0]*t3)*t13) + t14*((cos_q1*t1 + t3*t15)*t13 + (0.005*qd[0] + t1*sin_q1 + t15*t4)*t16) + 0.5*t29;
+    const double t12 = 1.2e-06*t1 + 0.0002062*t6 + t7;
+    const double t13 = cos_q1*t11 + sin_q1*t12;
+    const double t14 = t9 + 0.08076*t13 + 2.1836744e-05;
+    const double t15 = 1.24e-09*t3 + 6.6e-09*t4 + 0.005*t7;
+    const double t16 = 5.8e-09*t1 + 7.5326e-07*t6 + t15;
+    const double t17 = 0.0006058*cos_q1 - 3e-06*sin_q1;
+    const double t18 = cos_q1*(2.1654944e-05*cos_q1 - 7.72e-08*sin_q1) + t1*(5.22042e-06*t1 - 2.28e-08*t6) + t3*(3.7034e-07*t3 - 8.8e-09*t4) + 0.012*(t17 + t11) + t14 - 0.0596*t6*t7 - 0.08076*sin_q1*t12 - 2.6359844e-05;
+    const double t19 = 2.0558e-07*qd[3]*qd[3] + qd[2]*(0.5*qd[2]*t9 + qd[3]*t10) + qd[1]*(0.5*qd[1]*t14 + qd[2]*(t9 + 0.04038*t13) + qd[3]*(0.04038*(cos_q1*t5 + sin_q1*t7) + t10)) + qd[0]*(qd[3]*t15 + qd[2]*t16 + qd[1]*(9.6e-09*cos_q1 + 1.244876e-06*sin_q1 + t16) + 0.5*qd[0]*t18);
     const double sin_q0 = sin(q[0]);
     const double cos_q0 = cos(q[0]);
-    const double t31 = 3.22e-05*(g[0]*sin_q0 - g[1]*cos_q0) - g[2]*(3e-06*cos_q1 + 0.0006058*sin_q1 + t6 + t16) - (g[0]*cos_q0 + g[1]*sin_q0)*(t8 + t5 + t13 + 0.0001245);
-    kinetic[0] = t30;
-    potential[0] = t31;
+    const double t20 = 3.22e-05*(g[0]*sin_q0 - g[1]*cos_q0) - g[2]*(3e-06*cos_q1 + 0.0006058*sin_q1 + t12) - (g[0]*cos_q0 + g[1]*sin_q0)*(t17 + t11 + 0.0001245);
+    kinetic[0] = t19;
+    potential[0] = t20;
 }

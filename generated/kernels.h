@@ -24,7 +24,7 @@ void awiwi_thumb_fingertip_pose(const double q[4], double T[16]);
  * Source: eq. 5.2.
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   out  T[4][4][4] in 1, m
- * Cost: 14 add, 32 mul, 12 neg, 4 sincos.
+ * Cost: 14 add, 32 mul, 13 neg, 4 sincos.
  */
 void awiwi_thumb_link_poses(const double q[4], double T[64]);
 
@@ -42,7 +42,7 @@ void awiwi_thumb_jacobian(const double q[4], double J[24]);
  * Source: eq. 2.17, 5.4.
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   out  M[4][4] in kg m^2
- * Cost: 51 add, 53 mul, 4 neg, 3 sincos.
+ * Cost: 49 add, 54 mul, 4 neg, 3 sincos.
  */
 void awiwi_thumb_mass_matrix(const double q[4], double M[16]);
 
@@ -52,7 +52,7 @@ void awiwi_thumb_mass_matrix(const double q[4], double M[16]);
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   in   qd[4] in rad/s, -20 to 20
  *   out  C[4][4] in N m s/rad
- * Cost: 173 add, 166 mul, 5 neg, 3 sincos.
+ * Cost: 134 add, 147 mul, 4 neg, 3 sincos.
  */
 void awiwi_thumb_coriolis_matrix(const double q[4], const double qd[4], double C[16]);
 
@@ -62,7 +62,7 @@ void awiwi_thumb_coriolis_matrix(const double q[4], const double qd[4], double C
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  gravity[4] in N m
- * Cost: 21 add, 29 mul, 4 sincos.
+ * Cost: 19 add, 26 mul, 4 sincos.
  */
 void awiwi_thumb_gravity(const double q[4], const double g[3], double gravity[4]);
 
@@ -73,7 +73,7 @@ void awiwi_thumb_gravity(const double q[4], const double g[3], double gravity[4]
  *   in   qd[4] in rad/s, -20 to 20
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  bias[4] in N m
- * Cost: 111 add, 133 mul, 4 sincos.
+ * Cost: 109 add, 135 mul, 4 sincos.
  */
 void awiwi_thumb_bias(const double q[4], const double qd[4], const double g[3], double bias[4]);
 
@@ -85,9 +85,22 @@ void awiwi_thumb_bias(const double q[4], const double qd[4], const double g[3], 
  *   in   qdd[4] in rad/s^2, -2000 to 2000
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  tau[4] in N m
- * Cost: 131 add, 142 mul, 1 neg, 4 sincos.
+ * Cost: 136 add, 146 mul, 2 neg, 4 sincos.
  */
 void awiwi_thumb_inverse_dynamics(const double q[4], const double qd[4], const double qdd[4], const double g[3], double tau[4]);
+
+/*
+ * Partial derivatives of the inverse dynamics with respect to the positions and the velocities.
+ * Source: eq. 2.17, differentiated.
+ *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
+ *   in   qd[4] in rad/s, -20 to 20
+ *   in   qdd[4] in rad/s^2, -2000 to 2000
+ *   in   g[3] in m/s^2, -9.81 to 9.81
+ *   out  dtau_dq[4][4] in N m/rad
+ *   out  dtau_dqd[4][4] in N m s/rad
+ * Cost: 388 add, 435 mul, 9 neg, 4 sincos.
+ */
+void awiwi_thumb_inverse_dynamics_derivatives(const double q[4], const double qd[4], const double qdd[4], const double g[3], double dtau_dq[16], double dtau_dqd[16]);
 
 /*
  * Joint accelerations under the joint torques tau.
@@ -97,7 +110,7 @@ void awiwi_thumb_inverse_dynamics(const double q[4], const double qd[4], const d
  *   in   tau[4] in N m, -1 to 1
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  qdd[4] in rad/s^2
- * Cost: 172 add, 188 mul, 4 div, 2 neg, 4 sincos.
+ * Cost: 172 add, 191 mul, 3 div, 1 neg, 4 sincos.
  */
 void awiwi_thumb_forward_dynamics(const double q[4], const double qd[4], const double tau[4], const double g[3], double qdd[4]);
 
@@ -110,7 +123,7 @@ void awiwi_thumb_forward_dynamics(const double q[4], const double qd[4], const d
  *   out  M[4][4] in kg m^2
  *   out  C[4][4] in N m s/rad
  *   out  gravity[4] in N m
- * Cost: 201 add, 203 mul, 10 neg, 4 sincos.
+ * Cost: 157 add, 175 mul, 8 neg, 4 sincos.
  */
 void awiwi_thumb_dynamics(const double q[4], const double qd[4], const double g[3], double M[16], double C[16], double gravity[4]);
 
@@ -122,7 +135,7 @@ void awiwi_thumb_dynamics(const double q[4], const double qd[4], const double g[
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  kinetic[1] in J
  *   out  potential[1] in J
- * Cost: 76 add, 100 mul, 4 neg, 4 sincos.
+ * Cost: 66 add, 83 mul, 1 neg, 4 sincos.
  */
 void awiwi_thumb_energy(const double q[4], const double qd[4], const double g[3], double kinetic[1], double potential[1]);
 
@@ -140,7 +153,7 @@ void awiwi_thumb_tendon_lengths(const double q[4], double h[8]);
  * Source: eq. 5.6, 5.9, 5.21.
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   out  P[8][4] in m/rad
- * Cost: 44 add, 58 mul, 4 div, 2 neg, 4 sqrt, 2 sincos.
+ * Cost: 44 add, 58 mul, 4 div, 4 sqrt, 2 sincos.
  */
 void awiwi_thumb_coupling(const double q[4], double P[32]);
 
@@ -149,7 +162,7 @@ void awiwi_thumb_coupling(const double q[4], double P[32]);
  * Source: eq. 5.11.
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   out  dP[8][4][4] in m/rad^2
- * Cost: 101 add, 136 mul, 8 div, 3 neg, 4 sqrt, 2 sincos.
+ * Cost: 101 add, 140 mul, 4 div, 1 neg, 4 sqrt, 2 sincos.
  */
 void awiwi_thumb_coupling_derivative(const double q[4], double dP[128]);
 
@@ -159,7 +172,7 @@ void awiwi_thumb_coupling_derivative(const double q[4], double dP[128]);
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   in   f[8] in N, 0 to 100
  *   out  tau[4] in N m
- * Cost: 62 add, 61 mul, 4 div, 3 neg, 4 sqrt, 2 sincos.
+ * Cost: 62 add, 61 mul, 4 div, 4 sqrt, 2 sincos.
  */
 void awiwi_thumb_joint_torque(const double q[4], const double f[8], double tau[4]);
 
@@ -170,9 +183,32 @@ void awiwi_thumb_joint_torque(const double q[4], const double f[8], double tau[4
  *   in   f[8] in N, 0 to 100
  *   in   k[8] in N/m, 1000 to 50000
  *   out  K[4][4] in N m/rad
- * Cost: 126 add, 187 mul, 8 div, 4 sqrt, 2 sincos.
+ * Cost: 125 add, 173 mul, 4 div, 4 sqrt, 2 sincos.
  */
 void awiwi_thumb_joint_stiffness(const double q[4], const double f[8], const double k[8], double K[16]);
+
+/*
+ * Joint angles whose tendon lengths are nearest to the measured h; start is the last estimate.
+ * Source: eq. 5.14, 5.15, 5.24.
+ *   in   h[8] in m, from [0, 0, 0, 0, -0.01117, -0.01117, -0.01955, -0.01955] to [0.1515, 0.1515, 0.1515, 0.1515, 0.01117, 0.01117, 0.01955, 0.01955]
+ *   in   start[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
+ *   out  q[4] in rad
+ * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
+ * Cost: at most 24 times that of thumb_tendon_lengths and thumb_coupling.
+ */
+int awiwi_thumb_joint_estimate(const double h[8], const double start[4], double q[4]);
+
+/*
+ * Error of the joint estimate: covariance for lengths of standard deviation noise, worst for errors up
+ * to noise.
+ * Source: eq. 5.14, linearised.
+ *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
+ *   in   noise[1] in m, 0 to 0.001
+ *   out  covariance[4][4] in rad^2
+ *   out  worst[4] in rad
+ * Cost: 68 add, 115 mul, 6 div, 2 neg, 6 sqrt, 2 sincos, 8 calls.
+ */
+void awiwi_thumb_joint_estimate_error(const double q[4], const double noise[1], double covariance[16], double worst[4]);
 
 /*
  * Pose of the fingertip: maps fingertip coordinates into the finger's base frame.
@@ -206,7 +242,7 @@ void awiwi_index_jacobian(const double q[4], double J[24]);
  * Source: eq. 2.17, 5.4.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   out  M[4][4] in kg m^2
- * Cost: 44 add, 44 mul, 1 neg, 3 sincos.
+ * Cost: 35 add, 42 mul, 3 sincos.
  */
 void awiwi_index_mass_matrix(const double q[4], double M[16]);
 
@@ -216,7 +252,7 @@ void awiwi_index_mass_matrix(const double q[4], double M[16]);
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   qd[4] in rad/s, -20 to 20
  *   out  C[4][4] in N m s/rad
- * Cost: 96 add, 93 mul, 4 neg, 3 sincos.
+ * Cost: 66 add, 70 mul, 1 neg, 3 sincos.
  */
 void awiwi_index_coriolis_matrix(const double q[4], const double qd[4], double C[16]);
 
@@ -226,7 +262,7 @@ void awiwi_index_coriolis_matrix(const double q[4], const double qd[4], double C
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  gravity[4] in N m
- * Cost: 19 add, 24 mul, 2 neg, 4 sincos.
+ * Cost: 19 add, 24 mul, 4 sincos.
  */
 void awiwi_index_gravity(const double q[4], const double g[3], double gravity[4]);
 
@@ -237,7 +273,7 @@ void awiwi_index_gravity(const double q[4], const double g[3], double gravity[4]
  *   in   qd[4] in rad/s, -20 to 20
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  bias[4] in N m
- * Cost: 71 add, 88 mul, 1 neg, 4 sincos.
+ * Cost: 62 add, 86 mul, 1 neg, 4 sincos.
  */
 void awiwi_index_bias(const double q[4], const double qd[4], const double g[3], double bias[4]);
 
@@ -249,9 +285,22 @@ void awiwi_index_bias(const double q[4], const double qd[4], const double g[3], 
  *   in   qdd[4] in rad/s^2, -2000 to 2000
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  tau[4] in N m
- * Cost: 113 add, 123 mul, 4 sincos.
+ * Cost: 98 add, 124 mul, 4 sincos.
  */
 void awiwi_index_inverse_dynamics(const double q[4], const double qd[4], const double qdd[4], const double g[3], double tau[4]);
+
+/*
+ * Partial derivatives of the inverse dynamics with respect to the positions and the velocities.
+ * Source: eq. 2.17, differentiated.
+ *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
+ *   in   qd[4] in rad/s, -20 to 20
+ *   in   qdd[4] in rad/s^2, -2000 to 2000
+ *   in   g[3] in m/s^2, -9.81 to 9.81
+ *   out  dtau_dq[4][4] in N m/rad
+ *   out  dtau_dqd[4][4] in N m s/rad
+ * Cost: 199 add, 235 mul, 3 neg, 4 sincos.
+ */
+void awiwi_index_inverse_dynamics_derivatives(const double q[4], const double qd[4], const double qdd[4], const double g[3], double dtau_dq[16], double dtau_dqd[16]);
 
 /*
  * Joint accelerations under the joint torques tau.
@@ -261,7 +310,7 @@ void awiwi_index_inverse_dynamics(const double q[4], const double qd[4], const d
  *   in   tau[4] in N m, -1 to 1
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  qdd[4] in rad/s^2
- * Cost: 131 add, 143 mul, 4 div, 4 sincos.
+ * Cost: 113 add, 144 mul, 3 div, 4 sincos.
  */
 void awiwi_index_forward_dynamics(const double q[4], const double qd[4], const double tau[4], const double g[3], double qdd[4]);
 
@@ -274,7 +323,7 @@ void awiwi_index_forward_dynamics(const double q[4], const double qd[4], const d
  *   out  M[4][4] in kg m^2
  *   out  C[4][4] in N m s/rad
  *   out  gravity[4] in N m
- * Cost: 140 add, 132 mul, 6 neg, 4 sincos.
+ * Cost: 97 add, 107 mul, 1 neg, 4 sincos.
  */
 void awiwi_index_dynamics(const double q[4], const double qd[4], const double g[3], double M[16], double C[16], double gravity[4]);
 
@@ -286,7 +335,7 @@ void awiwi_index_dynamics(const double q[4], const double qd[4], const double g[
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  kinetic[1] in J
  *   out  potential[1] in J
- * Cost: 61 add, 77 mul, 4 sincos.
+ * Cost: 52 add, 68 mul, 4 sincos.
  */
 void awiwi_index_energy(const double q[4], const double qd[4], const double g[3], double kinetic[1], double potential[1]);
 
@@ -323,7 +372,7 @@ void awiwi_index_coupling_derivative(const double q[4], double dP[128]);
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   f[8] in N, 0 to 100
  *   out  tau[4] in N m
- * Cost: 7 add, 4 mul, 2 neg.
+ * Cost: 7 add, 4 mul.
  */
 void awiwi_index_joint_torque(const double q[4], const double f[8], double tau[4]);
 
@@ -337,6 +386,28 @@ void awiwi_index_joint_torque(const double q[4], const double f[8], double tau[4
  * Cost: 7 add, 6 mul.
  */
 void awiwi_index_joint_stiffness(const double q[4], const double f[8], const double k[8], double K[16]);
+
+/*
+ * Joint angles whose tendon lengths are nearest to the measured h; start is the last estimate.
+ * Source: eq. 5.14, 5.15, 5.24.
+ *   in   h[8] in m, from [-0.01278, -0.01278, -0.01278, -0.01278, -0.009425, -0.009425, -0.01571, -0.01571] to [0.01278, 0.01278, 0.01278, 0.01278, 0.009425, 0.009425, 0.01571, 0.01571]
+ *   in   start[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
+ *   out  q[4] in rad
+ * Cost: 7 add, 4 mul.
+ */
+void awiwi_index_joint_estimate(const double h[8], const double start[4], double q[4]);
+
+/*
+ * Error of the joint estimate: covariance for lengths of standard deviation noise, worst for errors up
+ * to noise.
+ * Source: eq. 5.14, linearised.
+ *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
+ *   in   noise[1] in m, 0 to 0.001
+ *   out  covariance[4][4] in rad^2
+ *   out  worst[4] in rad
+ * Cost: 10 mul.
+ */
+void awiwi_index_joint_estimate_error(const double q[4], const double noise[1], double covariance[16], double worst[4]);
 
 /*
  * Pose of the fingertip: maps fingertip coordinates into the finger's base frame.
@@ -370,7 +441,7 @@ void awiwi_middle_jacobian(const double q[4], double J[24]);
  * Source: eq. 2.17, 5.4.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   out  M[4][4] in kg m^2
- * Cost: 44 add, 44 mul, 1 neg, 3 sincos.
+ * Cost: 35 add, 42 mul, 3 sincos.
  */
 void awiwi_middle_mass_matrix(const double q[4], double M[16]);
 
@@ -380,7 +451,7 @@ void awiwi_middle_mass_matrix(const double q[4], double M[16]);
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   qd[4] in rad/s, -20 to 20
  *   out  C[4][4] in N m s/rad
- * Cost: 96 add, 93 mul, 4 neg, 3 sincos.
+ * Cost: 66 add, 70 mul, 1 neg, 3 sincos.
  */
 void awiwi_middle_coriolis_matrix(const double q[4], const double qd[4], double C[16]);
 
@@ -390,7 +461,7 @@ void awiwi_middle_coriolis_matrix(const double q[4], const double qd[4], double 
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  gravity[4] in N m
- * Cost: 19 add, 24 mul, 2 neg, 4 sincos.
+ * Cost: 19 add, 24 mul, 4 sincos.
  */
 void awiwi_middle_gravity(const double q[4], const double g[3], double gravity[4]);
 
@@ -401,7 +472,7 @@ void awiwi_middle_gravity(const double q[4], const double g[3], double gravity[4
  *   in   qd[4] in rad/s, -20 to 20
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  bias[4] in N m
- * Cost: 71 add, 88 mul, 1 neg, 4 sincos.
+ * Cost: 62 add, 86 mul, 1 neg, 4 sincos.
  */
 void awiwi_middle_bias(const double q[4], const double qd[4], const double g[3], double bias[4]);
 
@@ -413,9 +484,22 @@ void awiwi_middle_bias(const double q[4], const double qd[4], const double g[3],
  *   in   qdd[4] in rad/s^2, -2000 to 2000
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  tau[4] in N m
- * Cost: 113 add, 123 mul, 4 sincos.
+ * Cost: 98 add, 124 mul, 4 sincos.
  */
 void awiwi_middle_inverse_dynamics(const double q[4], const double qd[4], const double qdd[4], const double g[3], double tau[4]);
+
+/*
+ * Partial derivatives of the inverse dynamics with respect to the positions and the velocities.
+ * Source: eq. 2.17, differentiated.
+ *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
+ *   in   qd[4] in rad/s, -20 to 20
+ *   in   qdd[4] in rad/s^2, -2000 to 2000
+ *   in   g[3] in m/s^2, -9.81 to 9.81
+ *   out  dtau_dq[4][4] in N m/rad
+ *   out  dtau_dqd[4][4] in N m s/rad
+ * Cost: 199 add, 235 mul, 3 neg, 4 sincos.
+ */
+void awiwi_middle_inverse_dynamics_derivatives(const double q[4], const double qd[4], const double qdd[4], const double g[3], double dtau_dq[16], double dtau_dqd[16]);
 
 /*
  * Joint accelerations under the joint torques tau.
@@ -425,7 +509,7 @@ void awiwi_middle_inverse_dynamics(const double q[4], const double qd[4], const 
  *   in   tau[4] in N m, -1 to 1
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  qdd[4] in rad/s^2
- * Cost: 131 add, 143 mul, 4 div, 4 sincos.
+ * Cost: 113 add, 144 mul, 3 div, 4 sincos.
  */
 void awiwi_middle_forward_dynamics(const double q[4], const double qd[4], const double tau[4], const double g[3], double qdd[4]);
 
@@ -438,7 +522,7 @@ void awiwi_middle_forward_dynamics(const double q[4], const double qd[4], const 
  *   out  M[4][4] in kg m^2
  *   out  C[4][4] in N m s/rad
  *   out  gravity[4] in N m
- * Cost: 140 add, 132 mul, 6 neg, 4 sincos.
+ * Cost: 97 add, 107 mul, 1 neg, 4 sincos.
  */
 void awiwi_middle_dynamics(const double q[4], const double qd[4], const double g[3], double M[16], double C[16], double gravity[4]);
 
@@ -450,7 +534,7 @@ void awiwi_middle_dynamics(const double q[4], const double qd[4], const double g
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  kinetic[1] in J
  *   out  potential[1] in J
- * Cost: 61 add, 77 mul, 4 sincos.
+ * Cost: 52 add, 68 mul, 4 sincos.
  */
 void awiwi_middle_energy(const double q[4], const double qd[4], const double g[3], double kinetic[1], double potential[1]);
 
@@ -487,7 +571,7 @@ void awiwi_middle_coupling_derivative(const double q[4], double dP[128]);
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   f[8] in N, 0 to 100
  *   out  tau[4] in N m
- * Cost: 7 add, 4 mul, 2 neg.
+ * Cost: 7 add, 4 mul.
  */
 void awiwi_middle_joint_torque(const double q[4], const double f[8], double tau[4]);
 
@@ -501,6 +585,28 @@ void awiwi_middle_joint_torque(const double q[4], const double f[8], double tau[
  * Cost: 7 add, 6 mul.
  */
 void awiwi_middle_joint_stiffness(const double q[4], const double f[8], const double k[8], double K[16]);
+
+/*
+ * Joint angles whose tendon lengths are nearest to the measured h; start is the last estimate.
+ * Source: eq. 5.14, 5.15, 5.24.
+ *   in   h[8] in m, from [-0.01278, -0.01278, -0.01278, -0.01278, -0.009425, -0.009425, -0.01571, -0.01571] to [0.01278, 0.01278, 0.01278, 0.01278, 0.009425, 0.009425, 0.01571, 0.01571]
+ *   in   start[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
+ *   out  q[4] in rad
+ * Cost: 7 add, 4 mul.
+ */
+void awiwi_middle_joint_estimate(const double h[8], const double start[4], double q[4]);
+
+/*
+ * Error of the joint estimate: covariance for lengths of standard deviation noise, worst for errors up
+ * to noise.
+ * Source: eq. 5.14, linearised.
+ *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
+ *   in   noise[1] in m, 0 to 0.001
+ *   out  covariance[4][4] in rad^2
+ *   out  worst[4] in rad
+ * Cost: 10 mul.
+ */
+void awiwi_middle_joint_estimate_error(const double q[4], const double noise[1], double covariance[16], double worst[4]);
 
 /*
  * Pose of the fingertip: maps fingertip coordinates into the finger's base frame.
@@ -534,7 +640,7 @@ void awiwi_ring_jacobian(const double q[3], double J[18]);
  * Source: eq. 2.17, 5.4.
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   out  M[3][3] in kg m^2
- * Cost: 48 add, 49 mul, 1 neg, 3 sincos.
+ * Cost: 41 add, 47 mul, 3 sincos.
  */
 void awiwi_ring_mass_matrix(const double q[3], double M[9]);
 
@@ -544,7 +650,7 @@ void awiwi_ring_mass_matrix(const double q[3], double M[9]);
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   in   qd[3] in rad/s, -20 to 20
  *   out  C[3][3] in N m s/rad
- * Cost: 103 add, 101 mul, 2 neg, 3 sincos.
+ * Cost: 72 add, 83 mul, 1 neg, 3 sincos.
  */
 void awiwi_ring_coriolis_matrix(const double q[3], const double qd[3], double C[9]);
 
@@ -554,7 +660,7 @@ void awiwi_ring_coriolis_matrix(const double q[3], const double qd[3], double C[
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  gravity[3] in N m
- * Cost: 20 add, 26 mul, 1 neg, 4 sincos.
+ * Cost: 20 add, 26 mul, 4 sincos.
  */
 void awiwi_ring_gravity(const double q[3], const double g[3], double gravity[3]);
 
@@ -565,7 +671,7 @@ void awiwi_ring_gravity(const double q[3], const double g[3], double gravity[3])
  *   in   qd[3] in rad/s, -20 to 20
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  bias[3] in N m
- * Cost: 72 add, 92 mul, 4 sincos.
+ * Cost: 63 add, 89 mul, 1 neg, 4 sincos.
  */
 void awiwi_ring_bias(const double q[3], const double qd[3], const double g[3], double bias[3]);
 
@@ -577,9 +683,22 @@ void awiwi_ring_bias(const double q[3], const double qd[3], const double g[3], d
  *   in   qdd[3] in rad/s^2, -2000 to 2000
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  tau[3] in N m
- * Cost: 114 add, 128 mul, 4 sincos.
+ * Cost: 99 add, 128 mul, 4 sincos.
  */
 void awiwi_ring_inverse_dynamics(const double q[3], const double qd[3], const double qdd[3], const double g[3], double tau[3]);
+
+/*
+ * Partial derivatives of the inverse dynamics with respect to the positions and the velocities.
+ * Source: eq. 2.17, differentiated.
+ *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
+ *   in   qd[3] in rad/s, -20 to 20
+ *   in   qdd[3] in rad/s^2, -2000 to 2000
+ *   in   g[3] in m/s^2, -9.81 to 9.81
+ *   out  dtau_dq[3][3] in N m/rad
+ *   out  dtau_dqd[3][3] in N m s/rad
+ * Cost: 231 add, 283 mul, 5 neg, 4 sincos.
+ */
+void awiwi_ring_inverse_dynamics_derivatives(const double q[3], const double qd[3], const double qdd[3], const double g[3], double dtau_dq[9], double dtau_dqd[9]);
 
 /*
  * Joint accelerations under the joint torques tau.
@@ -589,7 +708,7 @@ void awiwi_ring_inverse_dynamics(const double q[3], const double qd[3], const do
  *   in   tau[3] in N m, -1 to 1
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  qdd[3] in rad/s^2
- * Cost: 123 add, 135 mul, 3 div, 4 sincos.
+ * Cost: 115 add, 129 mul, 3 div, 2 neg, 4 sincos.
  */
 void awiwi_ring_forward_dynamics(const double q[3], const double qd[3], const double tau[3], const double g[3], double qdd[3]);
 
@@ -602,7 +721,7 @@ void awiwi_ring_forward_dynamics(const double q[3], const double qd[3], const do
  *   out  M[3][3] in kg m^2
  *   out  C[3][3] in N m s/rad
  *   out  gravity[3] in N m
- * Cost: 152 add, 145 mul, 3 neg, 4 sincos.
+ * Cost: 109 add, 128 mul, 1 neg, 4 sincos.
  */
 void awiwi_ring_dynamics(const double q[3], const double qd[3], const double g[3], double M[9], double C[9], double gravity[3]);
 
@@ -614,7 +733,7 @@ void awiwi_ring_dynamics(const double q[3], const double qd[3], const double g[3
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  kinetic[1] in J
  *   out  potential[1] in J
- * Cost: 61 add, 79 mul, 4 sincos.
+ * Cost: 54 add, 68 mul, 4 sincos.
  */
 void awiwi_ring_energy(const double q[3], const double qd[3], const double g[3], double kinetic[1], double potential[1]);
 
@@ -651,7 +770,7 @@ void awiwi_ring_coupling_derivative(const double q[3], double dP[54]);
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   in   f[6] in N, 0 to 100
  *   out  tau[3] in N m
- * Cost: 5 add, 3 mul, 1 neg.
+ * Cost: 5 add, 3 mul.
  */
 void awiwi_ring_joint_torque(const double q[3], const double f[6], double tau[3]);
 
@@ -667,11 +786,33 @@ void awiwi_ring_joint_torque(const double q[3], const double f[6], double tau[3]
 void awiwi_ring_joint_stiffness(const double q[3], const double f[6], const double k[6], double K[9]);
 
 /*
+ * Joint angles whose tendon lengths are nearest to the measured h; start is the last estimate.
+ * Source: eq. 5.14, 5.15, 5.24.
+ *   in   h[6] in m, from [-0.01278, -0.01278, -0.01278, -0.01278, -0.008639, -0.008639] to [0.01278, 0.01278, 0.01278, 0.01278, 0.008639, 0.008639]
+ *   in   start[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
+ *   out  q[3] in rad
+ * Cost: 5 add, 3 mul.
+ */
+void awiwi_ring_joint_estimate(const double h[6], const double start[3], double q[3]);
+
+/*
+ * Error of the joint estimate: covariance for lengths of standard deviation noise, worst for errors up
+ * to noise.
+ * Source: eq. 5.14, linearised.
+ *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
+ *   in   noise[1] in m, 0 to 0.001
+ *   out  covariance[3][3] in rad^2
+ *   out  worst[3] in rad
+ * Cost: 7 mul.
+ */
+void awiwi_ring_joint_estimate_error(const double q[3], const double noise[1], double covariance[9], double worst[3]);
+
+/*
  * Pose of the fingertip: maps fingertip coordinates into the finger's base frame.
  * Source: eq. 5.2, 5.3, table 5.1.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   out  T[4][4] in 1, m
- * Cost: 29 add, 47 mul, 1 div, 3 neg, 1 sqrt, 5 sincos.
+ * Cost: 28 add, 47 mul, 1 div, 4 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_fingertip_pose(const double q[4], double T[16]);
 
@@ -680,7 +821,7 @@ void awiwi_fifth_fingertip_pose(const double q[4], double T[16]);
  * Source: eq. 5.2.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   out  T[5][4][4] in 1, m
- * Cost: 38 add, 88 mul, 1 div, 12 neg, 1 sqrt, 5 sincos.
+ * Cost: 38 add, 70 mul, 1 div, 16 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_link_poses(const double q[4], double T[80]);
 
@@ -689,7 +830,7 @@ void awiwi_fifth_link_poses(const double q[4], double T[80]);
  * Source: eq. 5.3, differentiated.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   out  J[6][4] in m/rad, 1
- * Cost: 45 add, 66 mul, 2 div, 7 neg, 1 sqrt, 5 sincos.
+ * Cost: 38 add, 64 mul, 2 div, 12 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_jacobian(const double q[4], double J[24]);
 
@@ -698,7 +839,7 @@ void awiwi_fifth_jacobian(const double q[4], double J[24]);
  * Source: eq. 2.17, 5.4.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   out  M[4][4] in kg m^2
- * Cost: 133 add, 163 mul, 2 div, 4 neg, 1 sqrt, 5 sincos.
+ * Cost: 120 add, 149 mul, 2 div, 1 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_mass_matrix(const double q[4], double M[16]);
 
@@ -708,7 +849,7 @@ void awiwi_fifth_mass_matrix(const double q[4], double M[16]);
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   in   qd[4] in rad/s, -20 to 20
  *   out  C[4][4] in N m s/rad
- * Cost: 426 add, 456 mul, 2 div, 8 neg, 1 sqrt, 5 sincos.
+ * Cost: 333 add, 408 mul, 2 div, 7 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_coriolis_matrix(const double q[4], const double qd[4], double C[16]);
 
@@ -718,7 +859,7 @@ void awiwi_fifth_coriolis_matrix(const double q[4], const double qd[4], double C
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  gravity[4] in N m
- * Cost: 46 add, 66 mul, 2 div, 1 neg, 1 sqrt, 5 sincos.
+ * Cost: 44 add, 64 mul, 2 div, 1 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_gravity(const double q[4], const double g[3], double gravity[4]);
 
@@ -729,7 +870,7 @@ void awiwi_fifth_gravity(const double q[4], const double g[3], double gravity[4]
  *   in   qd[4] in rad/s, -20 to 20
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  bias[4] in N m
- * Cost: 225 add, 262 mul, 2 div, 2 neg, 1 sqrt, 5 sincos.
+ * Cost: 227 add, 258 mul, 2 div, 3 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_bias(const double q[4], const double qd[4], const double g[3], double bias[4]);
 
@@ -741,9 +882,22 @@ void awiwi_fifth_bias(const double q[4], const double qd[4], const double g[3], 
  *   in   qdd[4] in rad/s^2, -2000 to 2000
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  tau[4] in N m
- * Cost: 240 add, 274 mul, 2 div, 4 neg, 1 sqrt, 5 sincos.
+ * Cost: 242 add, 268 mul, 2 div, 3 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_inverse_dynamics(const double q[4], const double qd[4], const double qdd[4], const double g[3], double tau[4]);
+
+/*
+ * Partial derivatives of the inverse dynamics with respect to the positions and the velocities.
+ * Source: eq. 2.17, differentiated.
+ *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
+ *   in   qd[4] in rad/s, -20 to 20
+ *   in   qdd[4] in rad/s^2, -2000 to 2000
+ *   in   g[3] in m/s^2, -9.81 to 9.81
+ *   out  dtau_dq[4][4] in N m/rad
+ *   out  dtau_dqd[4][4] in N m s/rad
+ * Cost: 990 add, 1108 mul, 2 div, 9 neg, 1 sqrt, 5 sincos.
+ */
+void awiwi_fifth_inverse_dynamics_derivatives(const double q[4], const double qd[4], const double qdd[4], const double g[3], double dtau_dq[16], double dtau_dqd[16]);
 
 /*
  * Joint accelerations under the joint torques tau.
@@ -753,7 +907,7 @@ void awiwi_fifth_inverse_dynamics(const double q[4], const double qd[4], const d
  *   in   tau[4] in N m, -1 to 1
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  qdd[4] in rad/s^2
- * Cost: 346 add, 390 mul, 6 div, 4 neg, 1 sqrt, 5 sincos.
+ * Cost: 345 add, 378 mul, 6 div, 2 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_forward_dynamics(const double q[4], const double qd[4], const double tau[4], const double g[3], double qdd[4]);
 
@@ -766,7 +920,7 @@ void awiwi_fifth_forward_dynamics(const double q[4], const double qd[4], const d
  *   out  M[4][4] in kg m^2
  *   out  C[4][4] in N m s/rad
  *   out  gravity[4] in N m
- * Cost: 479 add, 526 mul, 2 div, 9 neg, 1 sqrt, 5 sincos.
+ * Cost: 366 add, 452 mul, 2 div, 8 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_dynamics(const double q[4], const double qd[4], const double g[3], double M[16], double C[16], double gravity[4]);
 
@@ -778,7 +932,7 @@ void awiwi_fifth_dynamics(const double q[4], const double qd[4], const double g[
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  kinetic[1] in J
  *   out  potential[1] in J
- * Cost: 140 add, 187 mul, 2 div, 4 neg, 1 sqrt, 5 sincos.
+ * Cost: 145 add, 183 mul, 2 div, 2 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_energy(const double q[4], const double qd[4], const double g[3], double kinetic[1], double potential[1]);
 
@@ -815,7 +969,7 @@ void awiwi_fifth_coupling_derivative(const double q[4], double dP[128]);
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   in   f[8] in N, 0 to 100
  *   out  tau[4] in N m
- * Cost: 6 add, 4 mul, 1 neg.
+ * Cost: 6 add, 4 mul.
  */
 void awiwi_fifth_joint_torque(const double q[4], const double f[8], double tau[4]);
 
@@ -829,6 +983,28 @@ void awiwi_fifth_joint_torque(const double q[4], const double f[8], double tau[4
  * Cost: 6 add, 5 mul.
  */
 void awiwi_fifth_joint_stiffness(const double q[4], const double f[8], const double k[8], double K[16]);
+
+/*
+ * Joint angles whose tendon lengths are nearest to the measured h; start is the last estimate.
+ * Source: eq. 5.14, 5.15, 5.24.
+ *   in   h[8] in m, from [-0.005585, -0.005585, -0.01169, -0.01169, -0.01169, -0.01169, -0.007854, -0.007854] to [0.005585, 0.005585, 0.01169, 0.01169, 0.01169, 0.01169, 0.007854, 0.007854]
+ *   in   start[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
+ *   out  q[4] in rad
+ * Cost: 6 add, 4 mul.
+ */
+void awiwi_fifth_joint_estimate(const double h[8], const double start[4], double q[4]);
+
+/*
+ * Error of the joint estimate: covariance for lengths of standard deviation noise, worst for errors up
+ * to noise.
+ * Source: eq. 5.14, linearised.
+ *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
+ *   in   noise[1] in m, 0 to 0.001
+ *   out  covariance[4][4] in rad^2
+ *   out  worst[4] in rad
+ * Cost: 8 mul.
+ */
+void awiwi_fifth_joint_estimate_error(const double q[4], const double noise[1], double covariance[16], double worst[4]);
 
 #ifdef __cplusplus
 }

@@ -7,7 +7,7 @@
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  kinetic[1] in J
  *   out  potential[1] in J
- * Cost: 61 add, 77 mul, 4 sincos.
+ * Cost: 52 add, 68 mul, 4 sincos.
  * Inputs: sha256 6dc3171fbd7a3bb4e8ba1b2ad4c5197dcf6b595756784e4b6b74a397a420a135.
  */
 #include <math.h>
@@ -16,42 +16,31 @@
 
 void awiwi_middle_energy(const double q[restrict 4], const double qd[restrict 4], const double g[restrict 3], double kinetic[restrict 1], double potential[restrict 1])
 {
-    const double t0 = qd[1] + qd[2];
-    const double t1 = 0.044*qd[1];
-    const double cos_q1 = cos(q[1]);
-    const double t2 = q[1] + q[2];
+    const double t0 = q[1] + q[2];
+    const double t1 = cos(t0);
+    const double t2 = q[3] + t0;
     const double t3 = cos(t2);
     const double t4 = sin(t2);
-    const double t5 = 0.0002426*t3 - 1.3e-06*t4;
+    const double t5 = 3.78e-05*t3 - 8.4e-07*t4;
+    const double t6 = sin(t0);
+    const double t7 = 8.4e-07*t3 + 3.78e-05*t4;
+    const double t8 = t1*t5 + t6*t7;
+    const double t9 = 0.066*t8 + 7.384428e-06;
+    const double t10 = 0.033*t8 + 5.16368e-07;
+    const double cos_q1 = cos(q[1]);
+    const double t11 = 0.0002426*t1 - 1.3e-06*t6 + t5;
     const double sin_q1 = sin(q[1]);
-    const double t6 = 1.3e-06*t3 + 0.0002426*t4;
-    const double t7 = 0.006*qd[0];
-    const double t8 = 0.0007128*cos_q1 - 3.3e-06*sin_q1;
-    const double t9 = t7 + 0.044*qd[0]*cos_q1;
-    const double t10 = q[3] + t2;
-    const double t11 = cos(t10);
-    const double t12 = sin(t10);
-    const double t13 = 3.78e-05*t11 - 8.4e-07*t12;
-    const double t14 = qd[3] + t0;
-    const double t15 = 0.033*t0;
-    const double t16 = 8.4e-07*t11 + 3.78e-05*t12;
-    const double t17 = 1.166e-08*cos_q1 + 1.16724e-06*sin_q1;
-    const double t18 = cos_q1*(2.771021e-05*cos_q1 - 8.92e-08*sin_q1);
-    const double t19 = t18 - 2.78102e-05;
-    const double t20 = t18 + 9.999e-08 - t19;
-    const double t21 = 6.56e-09*t3 + 7.1078e-07*t4;
-    const double t22 = t3*(6.78634e-06*t3 - 2.56e-08*t4);
-    const double t23 = t22 - 6.8272e-06;
-    const double t24 = t22 + 4.086e-08 - t23;
-    const double t25 = 1.252e-09*t11 + 8.34e-09*t12;
-    const double t26 = t11*(4.73532e-07*t11 - 1.012e-08*t12);
-    const double t27 = t26 - 4.9495e-07;
-    const double t28 = t26 + 2.1418e-08 - t27;
-    const double t29 = qd[1]*(qd[0]*t17 + qd[1]*t20) + qd[0]*(qd[1]*t17 + qd[0]*(t19 + t20)) + (t0*(qd[0]*t21 + t0*t24) + qd[0]*(t0*t21 + qd[0]*(t23 + t24))) + (t14*(qd[0]*t25 + t14*t28) + qd[0]*(t14*t25 + qd[0]*(t27 + t28)));
-    const double t30 = t0*t1*(cos_q1*t5 + sin_q1*t6) + qd[0]*(5.35204e-07*qd[0] + t7*t8 + t9*t5 + (t9 + 0.033*qd[0]*t3)*t13) + t14*((cos_q1*t1 + t3*t15)*t13 + (0.004*qd[0] + t1*sin_q1 + t15*t4)*t16) + 0.5*t29;
+    const double t12 = 1.3e-06*t1 + 0.0002426*t6 + t7;
+    const double t13 = cos_q1*t11 + sin_q1*t12;
+    const double t14 = t9 + 0.088*t13 + 2.791019e-05;
+    const double t15 = 1.252e-09*t3 + 8.34e-09*t4 + 0.004*t7;
+    const double t16 = 6.56e-09*t1 + 7.1078e-07*t6 + t15;
+    const double t17 = 0.0007128*cos_q1 - 3.3e-06*sin_q1;
+    const double t18 = cos_q1*(2.771021e-05*cos_q1 - 8.92e-08*sin_q1) + t1*(6.78634e-06*t1 - 2.56e-08*t6) + t3*(4.73532e-07*t3 - 1.012e-08*t4) + 0.012*(t17 + t11) + t14 - 0.066*t6*t7 - 0.088*sin_q1*t12 - 3.4061942e-05;
+    const double t19 = 2.58184e-07*qd[3]*qd[3] + qd[2]*(0.5*qd[2]*t9 + qd[3]*t10) + qd[1]*(0.5*qd[1]*t14 + qd[2]*(t9 + 0.044*t13) + qd[3]*(0.044*(cos_q1*t5 + sin_q1*t7) + t10)) + qd[0]*(qd[3]*t15 + qd[2]*t16 + qd[1]*(1.166e-08*cos_q1 + 1.16724e-06*sin_q1 + t16) + 0.5*qd[0]*t18);
     const double sin_q0 = sin(q[0]);
     const double cos_q0 = cos(q[0]);
-    const double t31 = 2.806e-05*(g[0]*sin_q0 - g[1]*cos_q0) - g[2]*(3.3e-06*cos_q1 + 0.0007128*sin_q1 + t6 + t16) - (g[0]*cos_q0 + g[1]*sin_q0)*(t8 + t5 + t13 + 0.0001347);
-    kinetic[0] = t30;
-    potential[0] = t31;
+    const double t20 = 2.806e-05*(g[0]*sin_q0 - g[1]*cos_q0) - g[2]*(3.3e-06*cos_q1 + 0.0007128*sin_q1 + t12) - (g[0]*cos_q0 + g[1]*sin_q0)*(t17 + t11 + 0.0001347);
+    kinetic[0] = t19;
+    potential[0] = t20;
 }

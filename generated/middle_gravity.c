@@ -5,7 +5,7 @@
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  gravity[4] in N m
- * Cost: 19 add, 24 mul, 2 neg, 4 sincos.
+ * Cost: 19 add, 24 mul, 4 sincos.
  * Inputs: sha256 8a291a953e0d00c5244930cc5ad24fa3e70d4d07cf2b958617060f4b88419888.
  */
 #include <math.h>
@@ -18,20 +18,20 @@ void awiwi_middle_gravity(const double q[restrict 4], const double g[restrict 3]
     const double sin_q0 = sin(q[0]);
     const double t0 = g[0]*cos_q0 + g[1]*sin_q0;
     const double cos_q1 = cos(q[1]);
+    const double t1 = q[1] + q[2];
+    const double t2 = cos(t1);
+    const double t3 = q[3] + t1;
+    const double t4 = cos(t3);
+    const double t5 = sin(t3);
+    const double t6 = 3.78e-05*t4 - 8.4e-07*t5;
+    const double t7 = sin(t1);
+    const double t8 = 0.0002426*t2 + t6 - 1.3e-06*t7;
     const double sin_q1 = sin(q[1]);
-    const double t1 = 0.0007128*cos_q1 - 3.3e-06*sin_q1;
-    const double t2 = q[1] + q[2];
-    const double t3 = cos(t2);
-    const double t4 = sin(t2);
-    const double t5 = 0.0002426*t3 - 1.3e-06*t4;
-    const double t6 = q[3] + t2;
-    const double t7 = cos(t6);
-    const double t8 = sin(t6);
-    const double t9 = 3.78e-05*t7 - 8.4e-07*t8;
-    const double t10 = g[2]*t9 - t0*(8.4e-07*t7 + 3.78e-05*t8);
-    const double t11 = g[2]*t5 + t10 - t0*(1.3e-06*t3 + 0.0002426*t4);
-    gravity[0] = 2.806e-05*t0 + (g[0]*sin_q0 - g[1]*cos_q0)*(t1 + t5 + t9 + 0.0001347);
-    gravity[1] = (3.3e-06*cos_q1 + 0.0007128*sin_q1)*t0 - g[2]*t1 - t11;
-    gravity[2] = -t11;
-    gravity[3] = -t10;
+    const double t9 = 0.0007128*cos_q1 + t8 - 3.3e-06*sin_q1;
+    const double t10 = 8.4e-07*t4 + 3.78e-05*t5;
+    const double t11 = 1.3e-06*t2 + 0.0002426*t7 + t10;
+    gravity[0] = 2.806e-05*t0 + (g[0]*sin_q0 - g[1]*cos_q0)*(t9 + 0.0001347);
+    gravity[1] = t0*(3.3e-06*cos_q1 + 0.0007128*sin_q1 + t11) - g[2]*t9;
+    gravity[2] = t0*t11 - g[2]*t8;
+    gravity[3] = t0*t10 - g[2]*t6;
 }

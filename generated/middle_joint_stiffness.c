@@ -18,7 +18,7 @@ void awiwi_middle_joint_stiffness(const double q[restrict 4], const double f[res
     const double t0 = k[0] + k[3];
     const double t1 = k[1] + k[2];
     const double t2 = t0 + t1;
-    const double t3 = -5.85e-05*(t1 - t0);
+    const double t3 = 5.85e-05*(t0 - t1);
     const double t4 = k[6] + k[7];
     const double t5 = -2.7e-05*t4;
     K[0] = 8.1e-05*t2;

@@ -5,7 +5,7 @@
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   f[8] in N, 0 to 100
  *   out  tau[4] in N m
- * Cost: 7 add, 4 mul, 2 neg.
+ * Cost: 7 add, 4 mul.
  * Inputs: sha256 6a98ac93d320159725bea4ee759d5d3b1d512df899adaef986e09318a6fe1430.
  */
 #include "kernels.h"
@@ -16,8 +16,8 @@ void awiwi_middle_joint_torque(const double q[restrict 4], const double f[restri
     const double t0 = f[0] - f[3];
     const double t1 = f[1] - f[2];
     const double t2 = f[6] - f[7];
-    tau[0] = 0.009*(-t0 - t1);
+    tau[0] = -0.009*(t0 + t1);
     tau[1] = -0.0065*(t0 - t1);
-    tau[2] = 0.006*(f[5] - f[4] - t2);
-    tau[3] = -0.0045*(-t2);
+    tau[2] = -0.006*(f[4] + t2 - f[5]);
+    tau[3] = 0.0045*t2;
 }

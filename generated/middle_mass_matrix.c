@@ -4,7 +4,7 @@
  * Source: eq. 2.17, 5.4.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   out  M[4][4] in kg m^2
- * Cost: 44 add, 44 mul, 1 neg, 3 sincos.
+ * Cost: 35 add, 42 mul, 3 sincos.
  * Inputs: sha256 e62e10a0c5f174abe387898095f5e44e9b4bd4c4d0e8ad5e213f8ec3d580acd9.
  */
 #include <math.h>
@@ -14,49 +14,44 @@
 void awiwi_middle_mass_matrix(const double q[restrict 4], double M[restrict 16])
 {
     const double cos_q1 = cos(q[1]);
+    const double sin_q1 = sin(q[1]);
     const double t0 = q[1] + q[2];
     const double t1 = cos(t0);
-    const double t2 = q[3] + t0;
-    const double t3 = cos(t2);
-    const double t4 = sin(t2);
-    const double t5 = 3.78e-05*t3 - 8.4e-07*t4;
-    const double t6 = sin(t0);
-    const double t7 = 0.0002426*t1 + t5 - 1.3e-06*t6;
-    const double sin_q1 = sin(q[1]);
-    const double t8 = cos_q1*(2.771021e-05*cos_q1 - 8.92e-08*sin_q1);
-    const double t9 = t1*(6.78634e-06*t1 - 2.56e-08*t6);
-    const double t10 = t3*(4.73532e-07*t3 - 1.012e-08*t4);
-    const double t11 = t10 + 2.1418e-08;
-    const double t12 = t9 + 0.066*t1*t5 + t11 + 4.086e-08;
-    const double t13 = t8 + 0.088*cos_q1*t7 + t12 + 9.999e-08;
-    const double t14 = 8.4e-07*t3 + 3.78e-05*t4;
-    const double t15 = 1.252e-09*t3 + 8.34e-09*t4 + 0.004*t14;
-    const double t16 = 6.56e-09*t1 + 7.1078e-07*t6 + t15;
-    const double t17 = 1.166e-08*cos_q1 + 1.16724e-06*sin_q1 + t16;
-    const double t18 = 1.3e-06*t1 + 0.0002426*t6 + t14;
-    const double t19 = t10 - 4.9495e-07;
-    const double t20 = t9 + t19 - 0.066*t6*t14 - 6.8272e-06;
-    const double t21 = 0.044*cos_q1;
-    const double t22 = 0.044*sin_q1;
-    const double t23 = t12 - t20;
-    const double t24 = t21*t7 + t22*t18 + t23;
-    const double t25 = t19 - t11;
-    const double t26 = 0.033*(t1*t5 + t6*t14) - t25;
-    const double t27 = t21*t5 + t22*t14 + t26;
-    M[0] = 0.012*(0.0007128*cos_q1 + t7 - 3.3e-06*sin_q1) + t13 + 1.070408e-06;
-    M[1] = t17;
-    M[2] = t16;
-    M[3] = t15;
-    M[4] = t17;
-    M[5] = t13 + (0.088*sin_q1*t18 + 2.78102e-05 - t8 - t20);
-    M[6] = t24;
-    M[7] = t27;
-    M[8] = t16;
-    M[9] = t24;
-    M[10] = t23;
-    M[11] = t26;
-    M[12] = t15;
-    M[13] = t27;
-    M[14] = t26;
-    M[15] = -t25;
+    const double t2 = sin(t0);
+    const double t3 = q[3] + t0;
+    const double t4 = cos(t3);
+    const double t5 = sin(t3);
+    const double t6 = 3.78e-05*t4 - 8.4e-07*t5;
+    const double t7 = 0.0002426*t1 + t6 - 1.3e-06*t2;
+    const double t8 = 8.4e-07*t4 + 3.78e-05*t5;
+    const double t9 = t1*t6 + t2*t8;
+    const double t10 = 0.066*t9 + 7.384428e-06;
+    const double t11 = 0.044*cos_q1;
+    const double t12 = 0.044*sin_q1;
+    const double t13 = 1.3e-06*t1 + 0.0002426*t2 + t8;
+    const double t14 = t11*t7 + t12*t13;
+    const double t15 = t10 + 2.0*t14 + 2.791019e-05;
+    const double t16 = cos_q1*(2.771021e-05*cos_q1 - 8.92e-08*sin_q1) + t1*(6.78634e-06*t1 - 2.56e-08*t2) + t4*(4.73532e-07*t4 - 1.012e-08*t5) + 0.012*(0.0007128*cos_q1 + t7 - 3.3e-06*sin_q1) + t15 - 0.066*t2*t8 - 0.088*sin_q1*t13 - 3.4061942e-05;
+    const double t17 = 1.252e-09*t4 + 8.34e-09*t5 + 0.004*t8;
+    const double t18 = 6.56e-09*t1 + 7.1078e-07*t2 + t17;
+    const double t19 = 1.166e-08*cos_q1 + 1.16724e-06*sin_q1 + t18;
+    const double t20 = t14 + t10;
+    const double t21 = 0.033*t9 + 5.16368e-07;
+    const double t22 = t11*t6 + t12*t8 + t21;
+    M[0] = t16;
+    M[1] = t19;
+    M[2] = t18;
+    M[3] = t17;
+    M[4] = t19;
+    M[5] = t15;
+    M[6] = t20;
+    M[7] = t22;
+    M[8] = t18;
+    M[9] = t20;
+    M[10] = t10;
+    M[11] = t21;
+    M[12] = t17;
+    M[13] = t22;
+    M[14] = t21;
+    M[15] = 5.16368e-07;
 }

@@ -2,4 +2,4 @@
  */
 #include "kernels.h"
 
-const char awiwi_model_digest[65] = "5bc24b7714a87a262bed8d9fcae6b1496a52c6ae4eb30ccde3cefa58fc69cf72";
+const char awiwi_model_digest[65] = "3ff8426a5de01f48e852cdaaf46ef55dd612856c5c19df12fa89858bf694af34";

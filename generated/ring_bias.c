@@ -6,7 +6,7 @@
  *   in   qd[3] in rad/s, -20 to 20
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  bias[3] in N m
- * Cost: 72 add, 92 mul, 4 sincos.
+ * Cost: 63 add, 89 mul, 1 neg, 4 sincos.
  * Inputs: sha256 629681b331d715cabc79e549054515e6ff19ef45f5083fc8fb3efe64fdde7fbb.
  */
 #include <math.h>
@@ -18,55 +18,52 @@ void awiwi_ring_bias(const double q[restrict 3], const double qd[restrict 3], co
     const double cos_q0 = cos(q[0]);
     const double sin_q0 = sin(q[0]);
     const double t0 = g[0]*cos_q0 + g[1]*sin_q0;
-    const double t1 = qd[1]*qd[1];
+    const double t1 = g[0]*sin_q0 - g[1]*cos_q0;
     const double cos_q1 = cos(q[1]);
     const double sin_q1 = sin(q[1]);
-    const double t2 = g[0]*sin_q0 - g[1]*cos_q0;
-    const double t3 = 0.000615*cos_q1 - 3e-06*sin_q1;
-    const double t4 = qd[0]*qd[0];
-    const double t5 = t4 + t1;
-    const double t6 = qd[1] + qd[2];
-    const double t7 = qd[2]*(qd[1] + t6);
-    const double t8 = t5 + t7;
-    const double t9 = 0.7857142857142857*qd[2];
-    const double t10 = t9*(t9 + 2.0*t6);
-    const double t11 = t8 + t10;
-    const double t12 = q[1] + q[2];
-    const double t13 = t12 + 0.7857142857142857*q[2];
-    const double t14 = cos(t13);
-    const double t15 = sin(t13);
-    const double t16 = 3.6e-05*t14 - 8e-07*t15;
-    const double t17 = t11*t16;
-    const double t18 = 0.082*qd[0]*qd[1]*sin_q1 - t2;
-    const double t19 = cos(t12);
-    const double t20 = sin(t12);
-    const double t21 = 0.0002108*t19 - 1.2e-06*t20;
-    const double t22 = 2.0*qd[0];
-    const double t23 = qd[1]*t22;
-    const double t24 = sin_q1*(2.23216e-05*cos_q1 - 7.9e-08*sin_q1) + 3.95e-08;
-    const double t25 = t23 + qd[2]*t22;
-    const double t26 = 0.0305*t20;
-    const double t27 = t20*(5.463e-06*t19 - 2.352e-08*t20) + 1.176e-08;
-    const double t28 = 0.0305*t19;
-    const double t29 = 1.5714285714285714*qd[0]*qd[2] + t25;
-    const double t30 = 8e-07*t14 + 3.6e-05*t15;
-    const double t31 = t29*t30;
+    const double t2 = 0.000615*cos_q1 - 3e-06*sin_q1;
+    const double t3 = qd[1]*qd[1];
+    const double t4 = 2.0*qd[0];
+    const double t5 = qd[1]*t4;
+    const double t6 = sin_q1*(2.23216e-05*cos_q1 - 7.9e-08*sin_q1) + 3.95e-08;
+    const double t7 = qd[0]*qd[0];
+    const double t8 = qd[1] + qd[2];
+    const double t9 = t8 + 0.7857142857142857*qd[2];
+    const double t10 = t9*t9;
+    const double t11 = q[1] + q[2];
+    const double t12 = t11 + 0.7857142857142857*q[2];
+    const double t13 = cos(t12);
+    const double t14 = sin(t12);
+    const double t15 = 3.6e-05*t13 - 8e-07*t14;
+    const double t16 = (t7 + t10)*t15;
+    const double t17 = cos(t11);
+    const double t18 = 0.0305*t17;
+    const double t19 = t4*t9;
+    const double t20 = 8e-07*t13 + 3.6e-05*t14;
+    const double t21 = t19*t20;
+    const double t22 = 0.041*sin_q1;
+    const double t23 = t1 - t22*t5;
+    const double t24 = sin(t11);
+    const double t25 = 0.0002108*t17 - 1.2e-06*t24;
+    const double t26 = t8*t8;
+    const double t27 = t8*t4;
+    const double t28 = t24*(5.463e-06*t17 - 2.352e-08*t24) + 1.176e-08;
+    const double t29 = 0.0305*t24;
+    const double t30 = t14*(4.4334e-07*t13 - 1.04e-08*t14) + 5.2e-09;
+    const double t31 = t23*t25 + (t26*(6.2216e-07*t17 - 5.44e-09*t24) - t27*t28) + (t15*(t23 + (-(0.004*t7) - t27*t29)) + (t10*(7.8e-09*t13 - 1.24e-09*t14) - t19*t30));
     const double t32 = 0.041*cos_q1;
-    const double t33 = 1.2e-06*t19 + 0.0002108*t20;
-    const double t34 = t25*t33 + t31;
-    const double t35 = t15*(4.4334e-07*t14 - 1.04e-08*t15) + 5.2e-09;
+    const double t33 = 1.2e-06*t17 + 0.0002108*t24;
+    const double t34 = t27*t33 + t21;
+    const double t35 = 2.64e-05*t0 + 0.0001245*t1 + (t2*t1 + (t3*(1.0264e-06*cos_q1 - 9.6e-09*sin_q1) - t5*t6) + (0.004*t16 - t18*t21 + t31) - t32*t34);
     const double t36 = 3e-06*cos_q1 + 0.000615*sin_q1;
-    const double t37 = 2.64e-05*t0 + t1*(1.0264e-06*cos_q1 - 9.6e-09*sin_q1) + t2*(t3 + 0.0001245) + 0.004*t17 - t18*t21 - t23*t24 - (6.2216e-07*t19 - 5.44e-09*t20)*(t4 - t8) - t16*(0.004*t4 + t18 + t25*t26) - t25*t27 - t28*t31 - (7.8e-09*t14 - 1.24e-09*t15)*(t4 - t11) - t32*t34 - t29*t35 - 0.006*(t23*t36 + t34);
-    const double t38 = 0.006*t4 + t0;
-    const double t39 = 0.041*sin_q1;
-    const double t40 = t1 + t7;
-    const double t41 = t40 + t10;
-    const double t42 = t41*t30;
-    const double t43 = g[2] + t1*t39;
-    const double t44 = t5*t32 + t38;
-    const double t45 = t30*(t44 + t28*t8) - t16*(t43 + t26*t40) - (t41 - t11)*t35;
-    const double t46 = t43*t21 + t28*t42 + (t40 - t8)*t27 - t33*t44 - t26*t17 - t45;
-    bias[0] = t37;
-    bias[1] = t36*t38 + t4*t24 + t39*(t8*t21 + t17) - g[2]*t3 - t32*(t40*t33 + t42) - t46;
-    bias[2] = 0.7857142857142857*t45 - t46;
+    const double t37 = t7 + t26;
+    const double t38 = t10*t20;
+    const double t39 = 0.006*t7 + t0;
+    const double t40 = (t7 + t3)*t32 + t39;
+    const double t41 = g[2] + t3*t22;
+    const double t42 = (t41 + t26*t29)*t15 - t20*(t37*t18 + t40) - t7*t30;
+    const double t43 = t29*t16 - t18*t38 + (t33*t40 - t41*t25 + t7*t28 - t42);
+    bias[0] = t35 - 0.006*(t5*t36 + t34);
+    bias[1] = t22*(t37*t25 + t16) - t32*(t26*t33 + t38) + (t36*t39 - g[2]*t2 + t7*t6 + t43);
+    bias[2] = t43 - 0.7857142857142857*t42;
 }

@@ -7,7 +7,7 @@
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  kinetic[1] in J
  *   out  potential[1] in J
- * Cost: 61 add, 79 mul, 4 sincos.
+ * Cost: 54 add, 68 mul, 4 sincos.
  * Inputs: sha256 002a38e3700c4633fdb4a7f5f3af58489ec3ef1c8d6654b8a99f77e3122edefa.
  */
 #include <math.h>
@@ -16,42 +16,31 @@
 
 void awiwi_ring_energy(const double q[restrict 3], const double qd[restrict 3], const double g[restrict 3], double kinetic[restrict 1], double potential[restrict 1])
 {
-    const double t0 = qd[1] + qd[2];
-    const double t1 = 0.041*qd[1];
-    const double cos_q1 = cos(q[1]);
-    const double t2 = q[1] + q[2];
+    const double t0 = q[1] + q[2];
+    const double t1 = cos(t0);
+    const double t2 = t0 + 0.7857142857142857*q[2];
     const double t3 = cos(t2);
     const double t4 = sin(t2);
-    const double t5 = 0.0002108*t3 - 1.2e-06*t4;
+    const double t5 = 3.6e-05*t3 - 8e-07*t4;
+    const double t6 = sin(t0);
+    const double t7 = 8e-07*t3 + 3.6e-05*t4;
+    const double t8 = t1*t5 + t6*t7;
+    const double t9 = 0.061*t8 + 6.02264e-06;
+    const double t10 = 0.023964285714285716*t8 + 3.804114285714286e-07;
+    const double cos_q1 = cos(q[1]);
     const double sin_q1 = sin(q[1]);
-    const double t6 = 1.2e-06*t3 + 0.0002108*t4;
-    const double t7 = 0.006*qd[0];
-    const double t8 = 0.000615*cos_q1 - 3e-06*sin_q1;
-    const double t9 = t7 + 0.041*qd[0]*cos_q1;
-    const double t10 = t2 + 0.7857142857142857*q[2];
-    const double t11 = cos(t10);
-    const double t12 = sin(t10);
-    const double t13 = 3.6e-05*t11 - 8e-07*t12;
-    const double t14 = t0 + 0.7857142857142857*qd[2];
-    const double t15 = 0.0305*t0;
-    const double t16 = 8e-07*t11 + 3.6e-05*t12;
-    const double t17 = 9.6e-09*cos_q1 + 1.0264e-06*sin_q1;
-    const double t18 = cos_q1*(2.23216e-05*cos_q1 - 7.9e-08*sin_q1);
-    const double t19 = t18 - 2.24125e-05;
-    const double t20 = t18 + 9.09e-08 - t19;
-    const double t21 = 5.44e-09*t3 + 6.2216e-07*t4;
-    const double t22 = t3*(5.463e-06*t3 - 2.352e-08*t4);
-    const double t23 = t22 - 5.50074e-06;
-    const double t24 = t22 + 3.774e-08 - t23;
-    const double t25 = 1.24e-09*t11 + 7.8e-09*t12;
-    const double t26 = t11*(4.4334e-07*t11 - 1.04e-08*t12);
-    const double t27 = t26 - 4.6375e-07;
-    const double t28 = t26 + 2.041e-08 - t27;
-    const double t29 = qd[1]*(qd[0]*t17 + qd[1]*t20) + qd[0]*(qd[1]*t17 + qd[0]*(t19 + t20)) + (t0*(qd[0]*t21 + t0*t24) + qd[0]*(t0*t21 + qd[0]*(t23 + t24))) + (t14*(qd[0]*t25 + t14*t28) + qd[0]*(t14*t25 + qd[0]*(t27 + t28)));
-    const double t30 = t0*t1*(cos_q1*t5 + sin_q1*t6) + qd[0]*(4.95825e-07*qd[0] + t7*t8 + t9*t5 + (t9 + 0.0305*qd[0]*t3)*t13) + t14*((cos_q1*t1 + t3*t15)*t13 + (0.004*qd[0] + t1*sin_q1 + t15*t4)*t16) + 0.5*t29;
+    const double t11 = 1.24e-09*t3 + 7.8e-09*t4;
+    const double t12 = 5.44e-09*t1 + 6.2216e-07*t6 + t11 + 0.004*t7;
+    const double t13 = 0.000615*cos_q1 - 3e-06*sin_q1;
+    const double t14 = 0.0002108*t1 - 1.2e-06*t6 + t5;
+    const double t15 = 1.2e-06*t1 + 0.0002108*t6 + t7;
+    const double t16 = t9 + 0.082*(cos_q1*t14 + sin_q1*t15) + 2.25034e-05;
+    const double t17 = cos_q1*(2.23216e-05*cos_q1 - 7.9e-08*sin_q1) + t1*(5.463e-06*t1 - 2.352e-08*t6) + t3*(4.4334e-07*t3 - 1.04e-08*t4) + 0.012*(t13 + t14) + t16 - 0.061*t6*t7 - 0.082*sin_q1*t15 - 2.738534e-05;
+    const double t18 = qd[1]*(9.6e-09*cos_q1 + 1.0264e-06*sin_q1 + t12) + qd[2]*(0.7857142857142857*t11 + 0.003142857142857143*t7 + t12) + 0.5*qd[0]*t17;
+    const double t19 = qd[2]*(t10 + t9 + 0.041*(cos_q1*(t14 + 0.7857142857142857*t5) + sin_q1*(t15 + 0.7857142857142857*t7)));
     const double sin_q0 = sin(q[0]);
     const double cos_q0 = cos(q[0]);
-    const double t31 = 2.64e-05*(g[0]*sin_q0 - g[1]*cos_q0) - g[2]*(3e-06*cos_q1 + 0.000615*sin_q1 + t6 + t16) - (g[0]*cos_q0 + g[1]*sin_q0)*(t8 + t5 + t13 + 0.0001245);
-    kinetic[0] = t30;
-    potential[0] = t31;
+    const double t20 = 2.64e-05*(g[0]*sin_q0 - g[1]*cos_q0) - g[2]*(3e-06*cos_q1 + 0.000615*sin_q1 + t15) - (g[0]*cos_q0 + g[1]*sin_q0)*(t13 + t14 + 0.0001245);
+    kinetic[0] = 0.5*qd[2]*qd[2]*(t9 + 2.0*t10 + 2.9889469387755104e-07) + qd[0]*t18 + qd[1]*(0.5*qd[1]*t16 + t19);
+    potential[0] = t20;
 }

@@ -5,7 +5,7 @@
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  gravity[3] in N m
- * Cost: 20 add, 26 mul, 1 neg, 4 sincos.
+ * Cost: 20 add, 26 mul, 4 sincos.
  * Inputs: sha256 bdbf3d4216ddd0986e54534ddc122a2523b4a4b40b48d386707d2a96cc08c710.
  */
 #include <math.h>
@@ -18,19 +18,19 @@ void awiwi_ring_gravity(const double q[restrict 3], const double g[restrict 3], 
     const double sin_q0 = sin(q[0]);
     const double t0 = g[0]*cos_q0 + g[1]*sin_q0;
     const double cos_q1 = cos(q[1]);
+    const double t1 = q[1] + q[2];
+    const double t2 = cos(t1);
+    const double t3 = t1 + 0.7857142857142857*q[2];
+    const double t4 = cos(t3);
+    const double t5 = sin(t3);
+    const double t6 = 3.6e-05*t4 - 8e-07*t5;
+    const double t7 = sin(t1);
+    const double t8 = 0.0002108*t2 + t6 - 1.2e-06*t7;
     const double sin_q1 = sin(q[1]);
-    const double t1 = 0.000615*cos_q1 - 3e-06*sin_q1;
-    const double t2 = q[1] + q[2];
-    const double t3 = cos(t2);
-    const double t4 = sin(t2);
-    const double t5 = 0.0002108*t3 - 1.2e-06*t4;
-    const double t6 = t2 + 0.7857142857142857*q[2];
-    const double t7 = cos(t6);
-    const double t8 = sin(t6);
-    const double t9 = 3.6e-05*t7 - 8e-07*t8;
-    const double t10 = g[2]*t9 - t0*(8e-07*t7 + 3.6e-05*t8);
-    const double t11 = g[2]*t5 + t10 - t0*(1.2e-06*t3 + 0.0002108*t4);
-    gravity[0] = 2.64e-05*t0 + (g[0]*sin_q0 - g[1]*cos_q0)*(t1 + t5 + t9 + 0.0001245);
-    gravity[1] = (3e-06*cos_q1 + 0.000615*sin_q1)*t0 - g[2]*t1 - t11;
-    gravity[2] = -t11 - 0.7857142857142857*t10;
+    const double t9 = 0.000615*cos_q1 + t8 - 3e-06*sin_q1;
+    const double t10 = 8e-07*t4 + 3.6e-05*t5;
+    const double t11 = 1.2e-06*t2 + 0.0002108*t7 + t10;
+    gravity[0] = 2.64e-05*t0 + (g[0]*sin_q0 - g[1]*cos_q0)*(t9 + 0.0001245);
+    gravity[1] = t0*(3e-06*cos_q1 + 0.000615*sin_q1 + t11) - g[2]*t9;
+    gravity[2] = t0*t11 - g[2]*t8 - 0.7857142857142857*(g[2]*t6 - t0*t10);
 }

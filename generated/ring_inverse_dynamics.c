@@ -7,7 +7,7 @@
  *   in   qdd[3] in rad/s^2, -2000 to 2000
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  tau[3] in N m
- * Cost: 114 add, 128 mul, 4 sincos.
+ * Cost: 99 add, 128 mul, 4 sincos.
  * Inputs: sha256 d2fd8ea8122210c370a876d04ecdbc1ca49df3b198ba198458bb7b3639479b1a.
  */
 #include <math.h>
@@ -29,61 +29,51 @@ void awiwi_ring_inverse_dynamics(const double q[restrict 3], const double qd[res
     const double t6 = cos(t5);
     const double t7 = sin(t5);
     const double t8 = 5.44e-09*t6 + 6.2216e-07*t7;
-    const double t9 = 0.000615*cos_q1 - 3e-06*sin_q1;
-    const double t10 = 0.006*qdd[0] + t1;
-    const double t11 = t4 + 0.7857142857142857*qdd[2];
-    const double t12 = t5 + 0.7857142857142857*q[2];
-    const double t13 = cos(t12);
-    const double t14 = sin(t12);
-    const double t15 = 1.24e-09*t13 + 7.8e-09*t14;
-    const double t16 = 8e-07*t13 + 3.6e-05*t14;
-    const double t17 = qd[0]*qd[0];
-    const double t18 = t17 + t3;
-    const double t19 = qd[1] + qd[2];
-    const double t20 = qd[2]*(qd[1] + t19);
-    const double t21 = t18 + t20;
-    const double t22 = 0.7857142857142857*qd[2];
-    const double t23 = t22*(t22 + 2.0*t19);
-    const double t24 = t21 + t23;
-    const double t25 = 3.6e-05*t13 - 8e-07*t14;
-    const double t26 = t11*t16 + t24*t25;
-    const double t27 = 0.0305*t6;
-    const double t28 = 2.0*qd[0];
-    const double t29 = qd[1]*t28;
-    const double t30 = t29 + qd[2]*t28;
-    const double t31 = 1.5714285714285714*qd[0]*qd[2] + t30;
-    const double t32 = qdd[0]*t25 - t31*t16;
-    const double t33 = 2.23216e-05*cos_q1 - 7.9e-08*sin_q1;
-    const double t34 = cos_q1*t33;
-    const double t35 = t34 + 9.09e-08;
-    const double t36 = 5.463e-06*t6 - 2.352e-08*t7;
-    const double t37 = t6*t36;
-    const double t38 = t37 + 3.774e-08;
-    const double t39 = 4.4334e-07*t13 - 1.04e-08*t14;
-    const double t40 = t13*t39;
-    const double t41 = t40 + 2.041e-08;
-    const double t42 = 0.041*cos_q1;
-    const double t43 = 0.0002108*t6 - 1.2e-06*t7;
-    const double t44 = 1.2e-06*t6 + 0.0002108*t7;
-    const double t45 = qdd[0]*t43 + t32 - t30*t44;
-    const double t46 = 3e-06*cos_q1 + 0.000615*sin_q1;
-    const double t47 = sin_q1*t33 + 3.95e-08;
-    const double t48 = 0.082*qd[0]*qd[1]*sin_q1 - qdd[0]*t42 - t10;
-    const double t49 = t7*t36 + 1.176e-08;
-    const double t50 = 0.0305*t7;
-    const double t51 = t14*t39 + 5.2e-09;
-    const double t52 = 2.64e-05*t0 + 0.0001245*t1 + qdd[1]*t2 + t3*(1.0264e-06*cos_q1 - 9.6e-09*sin_q1) + t4*t8 + t9*t10 + t11*t15 + 0.004*t26 + t27*t32 + qdd[0]*(t35 + t38 + t41 + 9.9165e-07) + t42*t45 + 0.006*(qdd[0]*t9 + t45 - t29*t46) - t29*t47 - (6.2216e-07*t6 - 5.44e-09*t7)*(t17 - t21) - t43*t48 - t30*t49 - (7.8e-09*t13 - 1.24e-09*t14)*(t17 - t24) - t25*(0.004*t17 + t30*t50 + t48 - qdd[0]*t27) - t31*t51;
-    const double t53 = 0.006*t17 + t0;
-    const double t54 = t3 + t20;
-    const double t55 = t54 + t23;
-    const double t56 = t11*t25 - t55*t16;
-    const double t57 = 0.041*sin_q1;
-    const double t58 = qdd[1]*t57 + t18*t42 + t53;
-    const double t59 = g[2] + t3*t57 - qdd[1]*t42;
-    const double t60 = qdd[0]*t15 + t16*(0.004*qdd[0] + t4*t50 + t58 + t27*t21) + t11*(t41 - (t40 - 4.6375e-07)) - t25*(t59 + t50*t54 - t4*t27) - (t55 - t24)*t51;
-    const double t61 = qdd[0]*t8 + t44*t58 + t4*(t38 - (t37 - 5.50074e-06)) + t27*t56 + t50*t26 + t60 - t43*t59 - (t54 - t21)*t49;
-    const double t62 = qdd[0]*t2 + t46*t53 + t17*t47 + qdd[1]*(t35 - (t34 - 2.24125e-05)) + t42*(t4*t43 + t56 - t54*t44) + t57*(t4*t44 + t21*t43 + t26) + t61 - g[2]*t9;
-    tau[0] = t52;
-    tau[1] = t62;
-    tau[2] = t61 + 0.7857142857142857*t60;
+    const double t9 = qd[1] + qd[2];
+    const double t10 = t9*t9;
+    const double t11 = 0.000615*cos_q1 - 3e-06*sin_q1;
+    const double t12 = 0.006*qdd[0] + t1;
+    const double t13 = t4 + 0.7857142857142857*qdd[2];
+    const double t14 = t5 + 0.7857142857142857*q[2];
+    const double t15 = cos(t14);
+    const double t16 = sin(t14);
+    const double t17 = 1.24e-09*t15 + 7.8e-09*t16;
+    const double t18 = t9 + 0.7857142857142857*qd[2];
+    const double t19 = t18*t18;
+    const double t20 = 8e-07*t15 + 3.6e-05*t16;
+    const double t21 = qd[0]*qd[0];
+    const double t22 = 3.6e-05*t15 - 8e-07*t16;
+    const double t23 = t13*t20 + (t21 + t19)*t22;
+    const double t24 = 0.0305*t6;
+    const double t25 = 2.0*qd[0];
+    const double t26 = t25*t18;
+    const double t27 = qdd[0]*t22 - t26*t20;
+    const double t28 = 2.23216e-05*cos_q1 - 7.9e-08*sin_q1;
+    const double t29 = 5.463e-06*t6 - 2.352e-08*t7;
+    const double t30 = 4.4334e-07*t15 - 1.04e-08*t16;
+    const double t31 = 0.041*cos_q1;
+    const double t32 = 0.0002108*t6 - 1.2e-06*t7;
+    const double t33 = t9*t25;
+    const double t34 = 1.2e-06*t6 + 0.0002108*t7;
+    const double t35 = qdd[0]*t32 + t27 - t33*t34;
+    const double t36 = qd[1]*t25;
+    const double t37 = 3e-06*cos_q1 + 0.000615*sin_q1;
+    const double t38 = sin_q1*t28 + 3.95e-08;
+    const double t39 = 0.082*qd[0]*qd[1]*sin_q1 - qdd[0]*t31 - t12;
+    const double t40 = t7*t29 + 1.176e-08;
+    const double t41 = t16*t30 + 5.2e-09;
+    const double t42 = 2.64e-05*t0 + 0.0001245*t1 + qdd[1]*t2 + t3*(1.0264e-06*cos_q1 - 9.6e-09*sin_q1) + t4*t8 + t10*(6.2216e-07*t6 - 5.44e-09*t7) + t11*t12 + t13*t17 + t19*(7.8e-09*t15 - 1.24e-09*t16) + 0.004*t23 + t24*t27 + qdd[0]*(cos_q1*t28 + 9.09e-08 + (t6*t29 + 3.774e-08) + (t15*t30 + 2.041e-08) + 9.9165e-07) + t31*t35 + 0.006*(qdd[0]*t11 + t35 - t36*t37) - t36*t38 - t32*t39 - t33*t40 - t22*(0.004*t21 + 0.061*qd[0]*t9*t7 + t39 - qdd[0]*t24) - t26*t41;
+    const double t43 = 0.006*t21 + t0;
+    const double t44 = t13*t22 - t19*t20;
+    const double t45 = 0.041*sin_q1;
+    const double t46 = t21 + t10;
+    const double t47 = qdd[1]*t45 + (t21 + t3)*t31 + t43;
+    const double t48 = 0.0305*t7;
+    const double t49 = g[2] + t3*t45 - qdd[1]*t31;
+    const double t50 = 4.8416e-07*t13 + qdd[0]*t17 + t20*(0.004*qdd[0] + t4*t48 + t46*t24 + t47) + t21*t41 - t22*(t49 + t10*t48 - t4*t24);
+    const double t51 = 5.53848e-06*t4 + qdd[0]*t8 + t34*t47 + t21*t40 + t24*t44 + t48*t23 + t50 - t32*t49;
+    const double t52 = 2.25034e-05*qdd[1] + qdd[0]*t2 + t37*t43 + t21*t38 + t31*(t4*t32 + t44 - t10*t34) + t45*(t4*t34 + t46*t32 + t23) + t51 - g[2]*t11;
+    tau[0] = t42;
+    tau[1] = t52;
+    tau[2] = t51 + 0.7857142857142857*t50;
 }

@@ -18,7 +18,7 @@ void awiwi_ring_joint_stiffness(const double q[restrict 3], const double f[restr
     const double t0 = k[0] + k[3];
     const double t1 = k[1] + k[2];
     const double t2 = t0 + t1;
-    const double t3 = -5.85e-05*(t1 - t0);
+    const double t3 = 5.85e-05*(t0 - t1);
     K[0] = 8.1e-05*t2;
     K[1] = t3;
     K[2] = 0.0;

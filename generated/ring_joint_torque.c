@@ -5,7 +5,7 @@
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   in   f[6] in N, 0 to 100
  *   out  tau[3] in N m
- * Cost: 5 add, 3 mul, 1 neg.
+ * Cost: 5 add, 3 mul.
  * Inputs: sha256 f80c5937d3fb31c3c493cc21c311bbee377d7e4a85c9442b26bfcff48d3c3dd6.
  */
 #include "kernels.h"
@@ -15,7 +15,7 @@ void awiwi_ring_joint_torque(const double q[restrict 3], const double f[restrict
     (void)q;
     const double t0 = f[0] - f[3];
     const double t1 = f[1] - f[2];
-    tau[0] = 0.009*(-t0 - t1);
+    tau[0] = -0.009*(t0 + t1);
     tau[1] = -0.0065*(t0 - t1);
-    tau[2] = 0.0055*(f[5] - f[4]);
+    tau[2] = -0.0055*(f[4] - f[5]);
 }

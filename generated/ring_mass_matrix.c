@@ -4,7 +4,7 @@
  * Source: eq. 2.17, 5.4.
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   out  M[3][3] in kg m^2
- * Cost: 48 add, 49 mul, 1 neg, 3 sincos.
+ * Cost: 41 add, 47 mul, 3 sincos.
  * Inputs: sha256 d58f38e02f25804f1cbc849cf9a3a2f485a8ffffebf33c0f77b384b71638e328.
  */
 #include <math.h>
@@ -14,42 +14,34 @@
 void awiwi_ring_mass_matrix(const double q[restrict 3], double M[restrict 9])
 {
     const double cos_q1 = cos(q[1]);
+    const double sin_q1 = sin(q[1]);
     const double t0 = q[1] + q[2];
     const double t1 = cos(t0);
-    const double t2 = t0 + 0.7857142857142857*q[2];
-    const double t3 = cos(t2);
-    const double t4 = sin(t2);
-    const double t5 = 3.6e-05*t3 - 8e-07*t4;
-    const double t6 = sin(t0);
-    const double t7 = 0.0002108*t1 + t5 - 1.2e-06*t6;
-    const double sin_q1 = sin(q[1]);
-    const double t8 = cos_q1*(2.23216e-05*cos_q1 - 7.9e-08*sin_q1);
-    const double t9 = t1*(5.463e-06*t1 - 2.352e-08*t6);
-    const double t10 = t3*(4.4334e-07*t3 - 1.04e-08*t4);
-    const double t11 = t10 + 2.041e-08;
-    const double t12 = t9 + 0.061*t1*t5 + t11 + 3.774e-08;
-    const double t13 = t8 + 0.082*cos_q1*t7 + t12 + 9.09e-08;
-    const double t14 = 8e-07*t3 + 3.6e-05*t4;
-    const double t15 = 1.24e-09*t3 + 7.8e-09*t4 + 0.004*t14;
-    const double t16 = 5.44e-09*t1 + 6.2216e-07*t6 + t15;
-    const double t17 = 9.6e-09*cos_q1 + 1.0264e-06*sin_q1 + t16;
-    const double t18 = t16 + 0.7857142857142857*t15;
-    const double t19 = 1.2e-06*t1 + 0.0002108*t6 + t14;
-    const double t20 = t10 - 4.6375e-07;
-    const double t21 = t9 + t20 - 0.061*t6*t14 - 5.50074e-06;
-    const double t22 = 0.041*cos_q1;
-    const double t23 = 0.041*sin_q1;
-    const double t24 = t12 - t21;
-    const double t25 = t20 - t11;
-    const double t26 = 0.0305*(t1*t5 + t6*t14) - t25;
-    const double t27 = t22*t7 + t23*t19 + t24 + 0.7857142857142857*(t22*t5 + t23*t14 + t26);
-    M[0] = 0.012*(0.000615*cos_q1 + t7 - 3e-06*sin_q1) + t13 + 9.9165e-07;
-    M[1] = t17;
-    M[2] = t18;
-    M[3] = t17;
-    M[4] = t13 + (0.082*sin_q1*t19 + 2.24125e-05 - t8 - t21);
-    M[5] = t27;
-    M[6] = t18;
-    M[7] = t27;
-    M[8] = t24 + 0.6173469387755102*(-t25) + 1.5714285714285714*t26;
+    const double t2 = sin(t0);
+    const double t3 = t0 + 0.7857142857142857*q[2];
+    const double t4 = cos(t3);
+    const double t5 = sin(t3);
+    const double t6 = 3.6e-05*t4 - 8e-07*t5;
+    const double t7 = 0.0002108*t1 + t6 - 1.2e-06*t2;
+    const double t8 = 8e-07*t4 + 3.6e-05*t5;
+    const double t9 = t1*t6 + t2*t8;
+    const double t10 = 0.061*t9 + 6.02264e-06;
+    const double t11 = 1.2e-06*t1 + 0.0002108*t2 + t8;
+    const double t12 = t10 + 0.082*(cos_q1*t7 + sin_q1*t11) + 2.25034e-05;
+    const double t13 = cos_q1*(2.23216e-05*cos_q1 - 7.9e-08*sin_q1) + t1*(5.463e-06*t1 - 2.352e-08*t2) + t4*(4.4334e-07*t4 - 1.04e-08*t5) + 0.012*(0.000615*cos_q1 + t7 - 3e-06*sin_q1) + t12 - 0.061*t2*t8 - 0.082*sin_q1*t11 - 2.738534e-05;
+    const double t14 = 1.24e-09*t4 + 7.8e-09*t5;
+    const double t15 = 5.44e-09*t1 + 6.2216e-07*t2 + t14 + 0.004*t8;
+    const double t16 = 9.6e-09*cos_q1 + 1.0264e-06*sin_q1 + t15;
+    const double t17 = 0.7857142857142857*t14 + 0.003142857142857143*t8 + t15;
+    const double t18 = 0.023964285714285716*t9 + 3.804114285714286e-07;
+    const double t19 = t18 + t10 + 0.041*(cos_q1*(t7 + 0.7857142857142857*t6) + sin_q1*(t11 + 0.7857142857142857*t8));
+    M[0] = t13;
+    M[1] = t16;
+    M[2] = t17;
+    M[3] = t16;
+    M[4] = t12;
+    M[5] = t19;
+    M[6] = t17;
+    M[7] = t19;
+    M[8] = t10 + 2.0*t18 + 2.9889469387755104e-07;
 }

@@ -4,7 +4,7 @@
  * Source: eq. 5.6, 5.9, 5.21.
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   out  P[8][4] in m/rad
- * Cost: 44 add, 58 mul, 4 div, 2 neg, 4 sqrt, 2 sincos.
+ * Cost: 44 add, 58 mul, 4 div, 4 sqrt, 2 sincos.
  * Inputs: sha256 587a65bca3163563dc3b07fe3ba2c07934dd21d567d7f82f1bc6b0fb691a7376.
  */
 #include <math.h>
@@ -35,10 +35,10 @@ void awiwi_thumb_coupling(const double q[restrict 4], double P[restrict 32])
     const double t15 = t14 - 0.025;
     const double t16 = t15*t15;
     const double t17 = 0.5/sqrt(t16 + t11*t11 + t10*t10);
-    const double t18 = 2.0*t3*t15;
-    const double t19 = 2.0*cos_q0;
-    const double t20 = t19*t14;
-    const double t21 = 2.0*sin_q0;
+    const double t18 = 2.0*sin_q0;
+    const double t19 = t18*t14;
+    const double t20 = 2.0*t3*t15;
+    const double t21 = 2.0*cos_q0;
     const double t22 = t21*t14;
     const double t23 = t1 - t2;
     const double t24 = t23 + 0.006;
@@ -53,8 +53,8 @@ void awiwi_thumb_coupling(const double q[restrict 4], double P[restrict 32])
     const double t33 = t32*t32;
     const double t34 = 0.5/sqrt(t33 + t30*t30 + t29*t29);
     const double t35 = 2.0*t23*t32;
-    const double t36 = t19*t31;
-    const double t37 = t21*t31;
+    const double t36 = t21*t31;
+    const double t37 = t18*t31;
     const double t38 = t0 - t5;
     const double t39 = t7 + t8;
     const double t40 = t39 - 0.002;
@@ -66,7 +66,7 @@ void awiwi_thumb_coupling(const double q[restrict 4], double P[restrict 32])
     const double t46 = t43 - 0.03;
     const double t47 = 0.5/sqrt(t33 + t46*t46 + t45*t45);
     P[0] = 2.0*(t6*t10 - t9*t11)*t17;
-    P[1] = -((t18 + t20*t10 - t22*t11)*t17);
+    P[1] = (t19*t11 - t20 - t22*t10)*t17;
     P[2] = 0.0;
     P[3] = 0.0;
     P[4] = 2.0*(t26*t29 - t28*t30)*t34;
@@ -74,7 +74,7 @@ void awiwi_thumb_coupling(const double q[restrict 4], double P[restrict 32])
     P[6] = 0.0;
     P[7] = 0.0;
     P[8] = 2.0*(t38*t40 - t39*t41)*t42;
-    P[9] = -((t18 + t22*t41 - t20*t40)*t42);
+    P[9] = (t22*t40 - t20 - t19*t41)*t42;
     P[10] = 0.0;
     P[11] = 0.0;
     P[12] = 2.0*(t43*t45 - t44*t46)*t47;

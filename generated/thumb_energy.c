@@ -7,7 +7,7 @@
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  kinetic[1] in J
  *   out  potential[1] in J
- * Cost: 76 add, 100 mul, 4 neg, 4 sincos.
+ * Cost: 66 add, 83 mul, 1 neg, 4 sincos.
  * Inputs: sha256 46e4c11520cb35f8c8b39b4a5f744de13eafc538dda122a909bd753de6881cc0.
  */
 #include <math.h>
@@ -16,50 +16,39 @@
 
 void awiwi_thumb_energy(const double q[restrict 4], const double qd[restrict 4], const double g[restrict 3], double kinetic[restrict 1], double potential[restrict 1])
 {
-    const double t0 = 0.006*qd[0];
-    const double cos_q1 = cos(q[1]);
-    const double t1 = qd[0]*cos_q1;
-    const double sin_q1 = sin(q[1]);
-    const double t2 = qd[0]*sin_q1;
-    const double t3 = 0.045*qd[1];
     const double cos_q2 = cos(q[2]);
+    const double t0 = q[2] + q[3];
+    const double t1 = cos(t0);
+    const double t2 = sin(t0);
+    const double t3 = 6.6e-05*t1 - 1.2e-06*t2;
     const double sin_q2 = sin(q[2]);
-    const double t4 = 0.0003315*cos_q2 - 2.7e-06*sin_q2;
-    const double t5 = 2.7e-06*cos_q2 + 0.0003315*sin_q2;
-    const double t6 = qd[2] + t1;
-    const double t7 = qd[3] + t6;
-    const double t8 = q[2] + q[3];
-    const double t9 = cos(t8);
-    const double t10 = sin(t8);
-    const double t11 = 6.6e-05*t9 - 1.2e-06*t10;
-    const double t12 = t0 + 0.045*t1;
-    const double t13 = 0.032*cos_q2;
-    const double t14 = 0.032*sin_q2;
-    const double t15 = 1.2e-06*t9 + 6.6e-05*t10;
-    const double t16 = qd[1]*(4.258586e-05*qd[1] + 2.95e-08*t1 + 1.58e-07*t2) + t1*(2.95e-08*qd[1] + 4.2129e-05*t1 - 2.19e-07*t2) + t2*(1.58e-07*qd[1] + 4.5686e-07*t2 - 2.19e-07*t1);
-    const double t17 = 4.46e-09*cos_q2 - 3.59e-08*sin_q2;
-    const double t18 = 3.59e-08*cos_q2 + 4.46e-09*sin_q2;
-    const double t19 = 8.96344e-06*cos_q2 - 5.97e-08*sin_q2;
-    const double t20 = cos_q2*t19;
-    const double t21 = t20 - 9.07425e-06;
-    const double t22 = t20 + 1.1081e-07;
-    const double t23 = t21 - t22;
-    const double t24 = sin_q2*t19 + 2.985e-08;
-    const double t25 = -(t6*(qd[1]*t17 + t2*t18 - t6*(-t23))) - qd[1]*(t6*t17 - t2*t24 - qd[1]*(t21 - t23)) - t2*(t6*t18 + t2*(t22 + t23) - qd[1]*t24);
-    const double t26 = 2e-09*t9 - 3e-09*t10;
-    const double t27 = 3e-09*t9 + 2e-09*t10;
-    const double t28 = 9.8376e-07*t9 - 1.84e-08*t10;
-    const double t29 = t9*t28;
-    const double t30 = t29 - 1.038e-06;
-    const double t31 = t29 + 5.424e-08;
-    const double t32 = t30 - t31;
-    const double t33 = t10*t28 + 9.2e-09;
-    const double t34 = -(t7*(qd[1]*t26 + t2*t27 - t7*(-t32))) - qd[1]*(t7*t26 - t2*t33 - qd[1]*(t30 - t32)) - t2*(t7*t27 + t2*(t31 + t32) - qd[1]*t33);
-    const double t35 = 7.7025e-07*qd[0]*qd[0] + t0*(0.001071*t1 - 1.08e-05*t2) + t3*(qd[1]*t4 + t2*t5) + t7*t11*(t12 + t13*t6) + t6*(t4*t12 + t14*t7*t15) + (t3 + qd[1]*t13 + t14*t2)*(qd[1]*t11 + t2*t15) + 0.5*(t16 + t25 + t34);
+    const double t4 = 1.2e-06*t1 + 6.6e-05*t2;
+    const double t5 = cos_q2*t3 + sin_q2*t4;
+    const double t6 = 0.064*t5 + 1.02773e-05;
+    const double t7 = 0.032*t5 + 1.09224e-06;
+    const double t8 = 2e-09*t1 - 3e-09*t2;
+    const double t9 = 4.46e-09*cos_q2 + t8 - 3.59e-08*sin_q2;
+    const double t10 = 0.0003315*cos_q2 - 2.7e-06*sin_q2 + t3;
+    const double t11 = 0.09*t10;
+    const double t12 = -t11 - t6 - 4.258586e-05;
+    const double t13 = 8.96344e-06*cos_q2 - 5.97e-08*sin_q2;
+    const double t14 = 9.8376e-07*t1 - 1.84e-08*t2;
+    const double t15 = cos_q2*t13 + t1*t14;
+    const double cos_q1 = cos(q[1]);
+    const double sin_q1 = sin(q[1]);
+    const double t16 = 2.7e-06*cos_q2 + 0.0003315*sin_q2 + t4;
+    const double t17 = cos_q1*(t9 - 2.95e-08) - sin_q1*(sin_q2*t13 + t2*t14 + 0.045*t16 + 0.032*(cos_q2*t4 + sin_q2*t3) + 1.9705e-07);
+    const double t18 = 0.064*cos_q2*t3 + t15 + t11 + 4.229405e-05;
+    const double t19 = t10 + 0.001071;
+    const double t20 = 3e-09*t1 + 2e-09*t2;
+    const double t21 = 3.59e-08*cos_q2 + 4.46e-09*sin_q2 + t20;
+    const double t22 = t18 + t12 + 0.012*(1.08e-05*sin_q1 - cos_q1*t19) + cos_q1*(2.0*sin_q1*(t21 + 2.19e-07) - cos_q1*(t18 - 4.5686e-07)) - 1.5405e-06;
+    const double t23 = qd[1]*t17 + 0.5*qd[0]*t22 - qd[2]*(0.006*t10 + cos_q1*(0.045*t10 + t6) - sin_q1*t21) - qd[3]*(0.006*t3 + cos_q1*(0.045*t3 + t7) - sin_q1*t20);
+    const double t24 = 5.4612e-07*qd[3]*qd[3] + qd[2]*(0.5*qd[2]*t6 + qd[3]*t7) - qd[1]*(qd[3]*t8 + qd[2]*t9 + 0.5*qd[1]*(0.064*sin_q2*t4 + t12 + 1.011225e-05 - t15)) - qd[0]*t23;
     const double sin_q0 = sin(q[0]);
     const double cos_q0 = cos(q[0]);
-    const double t36 = g[0]*cos_q0 + g[1]*sin_q0;
-    const double t37 = (g[0]*sin_q0 - g[1]*cos_q0)*(t5 + t15 + 9e-06) - 0.000204*t36 - 1.08e-05*(g[2]*cos_q1 - sin_q1*t36) - (g[2]*sin_q1 + cos_q1*t36)*(t4 + t11 + 0.001071);
-    kinetic[0] = t35;
-    potential[0] = t37;
+    const double t25 = g[0]*cos_q0 + g[1]*sin_q0;
+    const double t26 = (g[0]*sin_q0 - g[1]*cos_q0)*(t16 + 9e-06) - 0.000204*t25 - 1.08e-05*(g[2]*cos_q1 - sin_q1*t25) - (g[2]*sin_q1 + cos_q1*t25)*t19;
+    kinetic[0] = t24;
+    potential[0] = t26;
 }

@@ -5,7 +5,7 @@
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   in   f[8] in N, 0 to 100
  *   out  tau[4] in N m
- * Cost: 62 add, 61 mul, 4 div, 3 neg, 4 sqrt, 2 sincos.
+ * Cost: 62 add, 61 mul, 4 div, 4 sqrt, 2 sincos.
  * Inputs: sha256 587a65bca3163563dc3b07fe3ba2c07934dd21d567d7f82f1bc6b0fb691a7376.
  */
 #include <math.h>
@@ -31,41 +31,41 @@ void awiwi_thumb_joint_torque(const double q[restrict 4], const double f[restric
     const double t10 = t8 - t9;
     const double t11 = t7 + t10;
     const double t12 = t1 - 0.002;
-    const double t13 = -t5 - t12;
+    const double t13 = t5 + t12;
     const double t14 = 0.047*sin_q1;
     const double t15 = 0.0025*cos_q1;
     const double t16 = t15 - 0.025;
     const double t17 = t14 + t16;
     const double t18 = t17*t17;
     const double t19 = f[3]/sqrt(t18 + t11*t11 + t13*t13);
-    const double t20 = t8 + t9;
-    const double t21 = t7 + t20;
-    const double t22 = t12 - t5;
-    const double t23 = t16 - t14;
-    const double t24 = t23*t23;
-    const double t25 = f[0]/sqrt(t24 + t21*t21 + t22*t22);
-    const double t26 = t2 + t4;
-    const double t27 = t7 - t10;
-    const double t28 = t12 - t26;
-    const double t29 = f[1]/sqrt(t18 + t27*t27 + t28*t28);
-    const double t30 = t20 - t7;
-    const double t31 = t26 + t12;
-    const double t32 = f[2]/sqrt(t24 + t30*t30 + t31*t31);
-    const double t33 = -(((-t1 - t5)*t11 - (t6 + t10)*t13)*t19) - ((t1 - t5)*t21 - (t6 + t20)*t22)*t25 - ((t1 - t26)*t27 - (t6 - t10)*t28)*t29 - ((t1 + t26)*t30 - (t20 - t6)*t31)*t32;
-    const double t34 = 2.0*(t3 - t0)*t17;
+    const double t20 = t2 + t4;
+    const double t21 = t8 + t9;
+    const double t22 = t7 - t21;
+    const double t23 = t20 + t12;
+    const double t24 = t14 - t16;
+    const double t25 = t24*t24;
+    const double t26 = f[2]/sqrt(t25 + t22*t22 + t23*t23);
+    const double t27 = t7 + t21;
+    const double t28 = t5 - t12;
+    const double t29 = f[0]/sqrt(t25 + t27*t27 + t28*t28);
+    const double t30 = t7 - t10;
+    const double t31 = t20 - t12;
+    const double t32 = f[1]/sqrt(t18 + t30*t30 + t31*t31);
+    const double t33 = ((t1 + t5)*t11 - (t6 + t10)*t13)*t19 + ((t1 + t20)*t22 - (t6 - t21)*t23)*t26 - ((t1 - t5)*t27 + (t6 + t21)*t28)*t29 - ((t1 - t20)*t30 + (t6 - t10)*t31)*t32;
+    const double t34 = 2.0*(t0 - t3)*t17;
     const double t35 = cos_q0*t15;
     const double t36 = cos_q0*t14;
     const double t37 = t35 + t36;
     const double t38 = sin_q0*t15;
     const double t39 = sin_q0*t14;
     const double t40 = t38 + t39;
-    const double t41 = 2.0*(t0 + t3)*t23;
-    const double t42 = t36 - t35;
-    const double t43 = t39 - t38;
-    const double t44 = (t34 - 2.0*(t37*t13 + t40*t11))*t19 + (t34 + 2.0*(t37*t28 + t40*t27))*t29 + (t41 + 2.0*(t42*t22 + t43*t21))*t25 + (t41 + 2.0*(t42*t31 + t43*t30))*t32;
-    const double t45 = f[7] - f[6];
+    const double t41 = 2.0*(t0 + t3)*t24;
+    const double t42 = t35 - t36;
+    const double t43 = t38 - t39;
+    const double t44 = (t34 - 2.0*(t37*t13 - t40*t11))*t19 + (t34 + 2.0*(t37*t31 - t40*t30))*t32 + (t41 - 2.0*(t42*t28 - t43*t27))*t29 + (t41 + 2.0*(t42*t23 - t43*t22))*t26;
+    const double t45 = f[6] - f[7];
     tau[0] = t33;
-    tau[1] = 0.5*t44;
-    tau[2] = -0.008*(f[4] + t45 - f[5]);
-    tau[3] = 0.006*t45;
+    tau[1] = -0.5*t44;
+    tau[2] = -0.008*(f[4] - f[5] - t45);
+    tau[3] = -0.006*t45;
 }

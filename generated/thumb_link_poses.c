@@ -4,7 +4,7 @@
  * Source: eq. 5.2.
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   out  T[4][4][4] in 1, m
- * Cost: 14 add, 32 mul, 12 neg, 4 sincos.
+ * Cost: 14 add, 32 mul, 13 neg, 4 sincos.
  * Inputs: sha256 cd912ab3289456ec069beac4761440cf1d21f475ca4f2bc6f55b373b40f43897.
  */
 #include <math.h>
@@ -23,9 +23,9 @@ void awiwi_thumb_link_poses(const double q[restrict 4], double T[restrict 64])
     const double t3 = cos_q1*sin_q0;
     const double t4 = sin_q0*sin_q1;
     const double t5 = 0.006*sin_q0;
-    const double cos_q2 = cos(q[2]);
     const double sin_q2 = sin(q[2]);
-    const double t6 = cos_q2*t0 - sin_q0*sin_q2;
+    const double cos_q2 = cos(q[2]);
+    const double t6 = sin_q0*sin_q2 - cos_q2*t0;
     const double t7 = t2 + 0.045*t0;
     const double t8 = cos_q0*sin_q2 + cos_q2*t3;
     const double t9 = t5 + 0.045*t3;
@@ -66,7 +66,7 @@ void awiwi_thumb_link_poses(const double q[restrict 4], double T[restrict 64])
     T[29] = 0.0;
     T[30] = 0.0;
     T[31] = 1.0;
-    T[32] = t6;
+    T[32] = -t6;
     T[33] = -(cos_q2*sin_q0) - sin_q2*t0;
     T[34] = -t1;
     T[35] = t7;
@@ -85,7 +85,7 @@ void awiwi_thumb_link_poses(const double q[restrict 4], double T[restrict 64])
     T[48] = t13*t0 - sin_q0*t14;
     T[49] = -(sin_q0*t13) - t0*t14;
     T[50] = -t1;
-    T[51] = t7 + 0.032*t6;
+    T[51] = t7 - 0.032*t6;
     T[52] = cos_q0*t14 + t13*t3;
     T[53] = cos_q0*t13 - t3*t14;
     T[54] = -t4;

@@ -4,7 +4,7 @@
  * Source: eq. 2.17, 5.4.
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   out  M[4][4] in kg m^2
- * Cost: 51 add, 53 mul, 4 neg, 3 sincos.
+ * Cost: 49 add, 54 mul, 4 neg, 3 sincos.
  * Inputs: sha256 eb684d40ad53461219ce6205f05b311d2262086fa4be9e6eb81e8ea245c94e57.
  */
 #include <math.h>
@@ -14,52 +14,49 @@
 void awiwi_thumb_mass_matrix(const double q[restrict 4], double M[restrict 16])
 {
     const double cos_q2 = cos(q[2]);
+    const double t0 = q[2] + q[3];
+    const double t1 = cos(t0);
+    const double t2 = sin(t0);
+    const double t3 = 6.6e-05*t1 - 1.2e-06*t2;
     const double sin_q2 = sin(q[2]);
-    const double t0 = 8.96344e-06*cos_q2 - 5.97e-08*sin_q2;
-    const double t1 = cos_q2*t0;
-    const double t2 = q[2] + q[3];
-    const double t3 = cos(t2);
-    const double t4 = sin(t2);
-    const double t5 = 9.8376e-07*t3 - 1.84e-08*t4;
-    const double t6 = t3*t5;
-    const double t7 = t6 - 1.038e-06;
-    const double t8 = 1.2e-06*t3 + 6.6e-05*t4;
-    const double t9 = t1 + t7 - 0.064*sin_q2*t8 - 9.07425e-06;
+    const double t4 = 0.0003315*cos_q2 + t3 - 2.7e-06*sin_q2;
+    const double t5 = 0.09*t4;
+    const double t6 = 0.032*cos_q2;
+    const double t7 = 0.032*sin_q2;
+    const double t8 = 1.2e-06*t1 + 6.6e-05*t2;
+    const double t9 = t6*t3 + t7*t8;
+    const double t10 = 2.0*t9 + 1.02773e-05;
+    const double t11 = t5 + t10 + 4.258586e-05;
+    const double t12 = 8.96344e-06*cos_q2 - 5.97e-08*sin_q2;
+    const double t13 = 9.8376e-07*t1 - 1.84e-08*t2;
+    const double t14 = cos_q2*t12 + t1*t13;
+    const double t15 = 0.064*cos_q2*t3 + t14 + t5 + 4.229405e-05;
     const double sin_q1 = sin(q[1]);
     const double cos_q1 = cos(q[1]);
-    const double t10 = 6.6e-05*t3 - 1.2e-06*t4;
-    const double t11 = 0.0003315*cos_q2 + t10 - 2.7e-06*sin_q2;
-    const double t12 = 3e-09*t3 + 2e-09*t4;
-    const double t13 = 3.59e-08*cos_q2 + 4.46e-09*sin_q2 + t12;
-    const double t14 = t6 + 5.424e-08;
-    const double t15 = t1 + 0.064*cos_q2*t10 + t14 + 1.1081e-07;
-    const double t16 = 0.09*t11 + t15 + 4.2129e-05;
-    const double t17 = 1.99736e-06 - t9 - 0.012*(1.08e-05*sin_q1 - cos_q1*(t11 + 0.001071)) - cos_q1*(2.0*sin_q1*(t13 + 2.19e-07) - cos_q1*(t16 - 4.5686e-07));
-    const double t18 = 0.032*cos_q2;
-    const double t19 = 0.032*sin_q2;
-    const double t20 = sin_q1*(sin_q2*t0 + t18*t8 + t19*t10 + t4*t5 + 0.045*(2.7e-06*cos_q2 + 0.0003315*sin_q2 + t8) + 1.9705e-07);
-    const double t21 = 2e-09*t3 - 3e-09*t4;
-    const double t22 = 4.46e-09*cos_q2 + t21 - 3.59e-08*sin_q2;
-    const double t23 = t20 - cos_q1*(t22 - 2.95e-08);
-    const double t24 = t15 - t9;
-    const double t25 = 0.006*t11 + cos_q1*(0.045*t11 + t24) - sin_q1*t13;
-    const double t26 = t14 - t7;
-    const double t27 = t18*t10 + t19*t8 + t26;
-    const double t28 = 0.006*t10 + cos_q1*(0.045*t10 + t27) - sin_q1*t12;
-    M[0] = t17;
-    M[1] = t23;
-    M[2] = t25;
-    M[3] = t28;
-    M[4] = t23;
-    M[5] = t16 + 4.5686e-07;
-    M[6] = -t22;
-    M[7] = -t21;
-    M[8] = t25;
-    M[9] = -t22;
-    M[10] = t24;
-    M[11] = t27;
-    M[12] = t28;
-    M[13] = -t21;
-    M[14] = t27;
-    M[15] = t26;
+    const double t16 = 3e-09*t1 + 2e-09*t2;
+    const double t17 = 3.59e-08*cos_q2 + 4.46e-09*sin_q2 + t16;
+    const double t18 = t11 + 1.5405e-06 - t15 - 0.012*(1.08e-05*sin_q1 - cos_q1*(t4 + 0.001071)) - cos_q1*(2.0*sin_q1*(t17 + 2.19e-07) - cos_q1*(t15 - 4.5686e-07));
+    const double t19 = sin_q1*(sin_q2*t12 + t6*t8 + t7*t3 + t2*t13 + 0.045*(2.7e-06*cos_q2 + 0.0003315*sin_q2 + t8) + 1.9705e-07);
+    const double t20 = 2e-09*t1 - 3e-09*t2;
+    const double t21 = 4.46e-09*cos_q2 + t20 - 3.59e-08*sin_q2;
+    const double t22 = t19 - cos_q1*(t21 - 2.95e-08);
+    const double t23 = 0.006*t4 + cos_q1*(0.045*t4 + t10) - sin_q1*t17;
+    const double t24 = t9 + 1.09224e-06;
+    const double t25 = 0.006*t3 + cos_q1*(0.045*t3 + t24) - sin_q1*t16;
+    M[0] = t18;
+    M[1] = t22;
+    M[2] = t23;
+    M[3] = t25;
+    M[4] = t22;
+    M[5] = t14 + t11 - 0.064*sin_q2*t8 - 1.011225e-05;
+    M[6] = -t21;
+    M[7] = -t20;
+    M[8] = t23;
+    M[9] = -t21;
+    M[10] = t10;
+    M[11] = t24;
+    M[12] = t25;
+    M[13] = -t20;
+    M[14] = t24;
+    M[15] = 1.09224e-06;
 }

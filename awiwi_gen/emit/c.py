@@ -21,6 +21,7 @@ LINE = 100  # longer expressions are cut into named parts
 ATOM, PRODUCT, SUM = 3, 2, 1  # how tightly a printed expression binds
 
 Text = tuple[str, int]
+Shape = tuple[int, ...]
 
 
 @dataclass(frozen=True)
@@ -52,23 +53,35 @@ def c_function(
 ) -> CFunction:
     """Print a graph. ``inputs`` maps port names to shapes; ``part`` is where its parameters live."""
     printer = Printer(graph, options, f"p->{identifier(part)}_" if part else "p->")
-    arguments = [f"const {options.c_type} {port}[%s{prod(shape)}]" for port, shape in inputs.items()]
-    arguments += [f"{options.c_type} {o.name}[%s{len(o.elements)}]" for o in graph.outputs if o.name != GUARDS]
-    if graph.params:
-        arguments.insert(0, f"const {prefix}_params *%sp")
-    result = "int" if any(o.name == GUARDS for o in graph.outputs) else "void"
-    signature = f"{result} {prefix}_{name}({', '.join(arguments)})"
+    outputs = {o.name: o.shape for o in graph.outputs if o.name != GUARDS}
+    result = "int" if len(outputs) < len(graph.outputs) else "void"
+    prototype, definition = signature(f"{result} {prefix}_{name}", inputs, outputs, options, graph.params and prefix)
     read = {node[1] for node in graph.nodes if node[0] == "input"}
     unused = tuple(f"(void){port};" for port in inputs if port not in read)
     return CFunction(
         name=name,
-        prototype=signature.replace("%s", ""),
-        definition=signature.replace("[%s", "[restrict ").replace("*%s", "*restrict "),
+        prototype=prototype,
+        definition=definition,
         comment=comment,
         statements=unused + tuple(printer.statements()),
         cost=cost(graph),
         includes_math=any(node[0] not in LEAVES | {"add", "mul", "div", "inv"} for node in graph.nodes),
     )
+
+
+def signature(
+    head: str, inputs: Mapping[str, Shape], outputs: Mapping[str, Shape], options: Options, params: object
+) -> tuple[str, str]:
+    """Prototype and definition of a function; the definition also promises that its arrays do not overlap.
+
+    ``params`` is the prefix of the parameter struct where one is read, else false.
+    """
+    arguments = [f"const {options.c_type} {port}[%s{prod(shape)}]" for port, shape in inputs.items()]
+    arguments += [f"{options.c_type} {port}[%s{prod(shape)}]" for port, shape in outputs.items()]
+    if params:
+        arguments.insert(0, f"const {params}_params *%sp")
+    text = f"{head}({', '.join(arguments)})"
+    return text.replace("%s", ""), text.replace("[%s", "[restrict ").replace("*%s", "*restrict ")
 
 
 class Printer:

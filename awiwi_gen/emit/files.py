@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from fractions import Fraction
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import jinja2
+import numpy as np
 
 from awiwi_gen.emit.c import CFunction, identifier
 from awiwi_gen.emit.options import Options
@@ -46,6 +48,8 @@ def describe(kernel: Kernel, cost_line: str) -> tuple[str, ...]:
     lines = [*_wrapped(kernel.doc), f"Source: {kernel.source}."]
     lines += [f"  in   {_port(name, port)}" for name, port in kernel.inputs.items()]
     lines += [f"  out  {_port(name, port)}" for name, port in kernel.outputs.items()]
+    if kernel.solver:
+        lines += _wrapped("Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.")
     if kernel.guards:
         lines += _wrapped(
             f"Returns 0 where {' and '.join(kernel.guards)}; elsewhere 1, and what is not defined is NaN."
@@ -104,6 +108,13 @@ def shared_files(
         for path, quantity in quantities.items()
     ]
     return {
+        "real.h": render(
+            "real.h.j2",
+            banner=banner(),
+            c_type=options.c_type,
+            largest=options.literal(Fraction(float(np.finfo(options.dtype).max))),
+            epsilon=options.literal(Fraction(float(np.finfo(options.dtype).eps))),
+        ),
         "kernels.h": render(
             "kernels.h.j2",
             banner=banner(),

@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from fractions import Fraction
 
-from awiwi_gen.ir.graph import Graph, Node, Output, Ref, canonical, node_of, operands, reachable
+from awiwi_gen.ir.graph import EVEN, ODD, Graph, Node, Output, Ref, canonical, node_of, operands, reachable
 
-ODD = frozenset({"sin", "tan", "asin", "atan"})
-EVEN = frozenset({"cos", "fabs"})
 AT_ZERO = {"sin": 0, "cos": 1, "tan": 0, "asin": 0, "atan": 0, "exp": 1, "sqrt": 0, "fabs": 0}
 
 # Longer fractions are rounded to this many bits: far beyond the 200 bits at which passes are compared.

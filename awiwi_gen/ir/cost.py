@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, astuple, dataclass
 
 from awiwi_gen.ir.graph import LEAVES, Graph
 
@@ -19,6 +19,12 @@ class Cost:
     sqrt: int = 0
     sincos: int = 0
     calls: int = 0
+
+    def __add__(self, other: Cost) -> Cost:
+        return Cost(*(a + b for a, b in zip(astuple(self), astuple(other), strict=True)))
+
+    def __mul__(self, times: int) -> Cost:
+        return Cost(*(a * times for a in astuple(self)))
 
     @property
     def operations(self) -> int:

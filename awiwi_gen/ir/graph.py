@@ -29,6 +29,9 @@ Ref = int
 
 LEAVES = frozenset({"const", "input", "param"})
 VARIADIC = frozenset({"add", "mul"})
+ODD = frozenset({"sin", "tan", "asin", "atan"})
+EVEN = frozenset({"cos", "fabs"})
+SIGNLESS = ODD | EVEN | {"mul", "inv"}  # operations whose operands are all positive references
 
 
 def node_of(ref: Ref) -> int:
@@ -117,15 +120,22 @@ def canonical(graph: Graph) -> Graph:
     def new(ref: Ref) -> Ref:
         return renamed[ref] if ref >= 0 else ~renamed[~ref]
 
-    def moved(node: Node) -> Node:
-        """The node with renamed operands, those of sums and products sorted; constants where they belong."""
+    def moved(node: Node) -> tuple[Node, bool]:
+        """The node with renamed operands, those of sums and products sorted; and whether its sign was pulled out.
+
+        An operand may have been turned since the node was made, and products keep no signs inside.
+        """
         if node[0] in LEAVES:
-            return node
+            return node, False
         refs = [new(r) for r in node[1:]]
+        negative = False
+        if node[0] in SIGNLESS:
+            negative = node[0] not in EVEN and sum(r < 0 for r in refs) % 2 == 1
+            refs = [node_of(r) for r in refs]
         if node[0] in VARIADIC:
             is_sum = node[0] == "add"
             refs.sort(key=lambda r: (is_sum == (nodes[node_of(r)][0] == "const"), node_of(r)))
-        return (node[0], *refs)
+        return (node[0], *refs), negative
 
     def key(node: Node) -> tuple[Any, ...]:
         if node[0] in LEAVES:
@@ -135,10 +145,10 @@ def canonical(graph: Graph) -> Graph:
         return (node[0], len(variables), [node_of(r) for r in variables], variables, constants)
 
     for level in sorted(levels):
-        for node, index in sorted(((moved(graph.nodes[i]), i) for i in levels[level]), key=lambda pair: key(pair[0])):
-            turned = node[0] == "add" and node[1] < 0
-            if turned:
-                node = (node[0], *(~r for r in node[1:]))
+        found = [(*moved(graph.nodes[i]), i) for i in levels[level]]
+        for node, turned, index in sorted(found, key=lambda each: key(each[0])):
+            if node[0] == "add" and node[1] < 0:
+                node, turned = (node[0], *(~r for r in node[1:])), True
             number = numbers.setdefault(node, len(nodes))
             if number == len(nodes):
                 nodes.append(node)

@@ -13,9 +13,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from awiwi_gen.hand import Finger, Hand
-from awiwi_gen.kernel import Kernel, Port, Route
-from awiwi_gen.models import chain, lagrange, recursive, tendons, tendons_ad
+from awiwi_gen.hand import Hand
+from awiwi_gen.hand_parts import Finger, Tendon
+from awiwi_gen.kernel import Kernel, Port, Route, Solver
+from awiwi_gen.models import chain, estimate, estimate_qr, lagrange, recursive, tendons, tendons_ad
 from awiwi_gen.models.derivatives import derivatives_of
 from awiwi_gen.units import J, N, Unit, kg, m, one, rad, s
 
@@ -41,16 +42,23 @@ class Template:
     source: str
     definition: Route
     witness: Route
+    solver: Callable[[Finger], Solver | None]
 
 
 TEMPLATES: list[Template] = []
 
 
-def per_finger(outputs: Outputs, source: str, witness: Route) -> Callable[[Route], Route]:
-    """Declare a kernel of every finger."""
+def straight_line(finger: Finger) -> None:
+    """No solver: the kernel is one formula for this finger."""
+
+
+def per_finger(
+    outputs: Outputs, source: str, witness: Route, solver: Callable[[Finger], Solver | None] = straight_line
+) -> Callable[[Route], Route]:
+    """Declare a kernel of every finger; for fingers that ``solver`` answers for, it iterates."""
 
     def declare(definition: Route) -> Route:
-        TEMPLATES.append(Template(definition.__name__, outputs, source, definition, witness))
+        TEMPLATES.append(Template(definition.__name__, outputs, source, definition, witness, solver))
         return definition
 
     return declare
@@ -61,28 +69,30 @@ def finger_kernels(hand: Hand, name: str, finger: Finger) -> list[Kernel]:
     size = Size(len(finger.joints), len(finger.tendons), len(finger.links))
     ports = input_ports(hand, finger, size)
     structure = json.dumps(finger.structure(), sort_keys=True)
-    return [
-        Kernel(
+    kernels = []
+    for template in TEMPLATES:
+        solver = template.solver(finger)
+        kernel = Kernel(
             name=f"{name}_{template.name}",
             doc=inspect.getdoc(template.definition) or "",
             source=template.source,
             inputs={p: ports[p] for p in list(inspect.signature(template.definition).parameters)[1:]},
             outputs=template.outputs(size),
-            routes={"sympy": template.definition, "casadi": template.witness},
+            routes={} if solver else {"sympy": template.definition, "casadi": template.witness},
             part=finger,
             path=f"fingers.{name}",
             structure=structure,
+            solver=solver,
         )
-        for template in TEMPLATES
-    ]
+        kernels.append(kernel)
+    return kernels
 
 
 def input_ports(hand: Hand, finger: Finger, size: Size) -> dict[str, Port]:
     """The ports an argument name stands for, with the ranges of this hand."""
     n, limits = (size.joints,), hand.limits
-    ranges = [link for link in finger.links if link.joint in finger.joints]
-    low = tuple(float(link.low) for link in ranges if link.low is not None)
-    high = tuple(float(link.high) for link in ranges if link.high is not None)
+    low, high = joint_limits(finger)
+    shortest, longest = zip(*(length_range(finger, tendon) for tendon in finger.tendons), strict=True)
 
     def symmetric(shape: tuple[int, ...], unit: Unit, limit: Any) -> Port:
         return Port(shape, unit, -float(limit), float(limit))
@@ -94,8 +104,32 @@ def input_ports(hand: Hand, finger: Finger, size: Size) -> dict[str, Port]:
         "tau": symmetric(n, N * m, limits.joint_torque),
         "f": Port((size.tendons,), N, 0.0, float(limits.tendon_force)),
         "k": Port((size.tendons,), N / m, float(limits.tendon_stiffness_low), float(limits.tendon_stiffness_high)),
+        "h": Port((size.tendons,), m, shortest, longest),
+        "start": Port(n, rad, low, high),
+        "noise": Port((), m, 0.0, 1e-3),
         "g": symmetric((3,), m / s**2, limits.gravity),
     }
+
+
+def joint_limits(finger: Finger) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Lower and upper limits of the independent joints [rad]."""
+    free = [link for link in finger.links if link.joint in finger.joints]
+    return tuple(float(k.low or 0) for k in free), tuple(float(k.high or 0) for k in free)
+
+
+def length_range(finger: Finger, tendon: Tendon) -> tuple[float, float]:
+    """Bounds of a tendon's path length over all poses [m]: pulleys at their limits, spans from nought to stretched."""
+    rest, reach = float(tendon.rest), 0.0
+    limits = dict(zip(finger.joints, zip(*joint_limits(finger), strict=True), strict=True))
+    for over in tendon.over:
+        joint = over[1:]
+        leader = finger.leaders.get(joint, joint)  # a coupled pulley turns as much tendon as its leader's
+        reach += float(finger.radii[leader]) * max(map(abs, limits[leader]))
+    if tendon.span is None:
+        return rest - reach, rest + reach
+    points = (tendon.span.from_, tendon.span.to, *(link.offset for link in finger.links))
+    stretched = sum(sum(float(x) ** 2 for x in point) ** 0.5 for point in points)
+    return rest - reach, rest + reach + stretched
 
 
 POSE = (one, one, one, m) * 3 + (one,) * 4
@@ -253,3 +287,47 @@ def joint_torque(finger: Any, q: Any, f: Any) -> Any:
 def joint_stiffness(finger: Any, q: Any, f: Any, k: Any) -> Any:
     """Joint stiffness -d tau/dq felt through tendons of stiffness k that pull with forces f."""
     return tendons.joint_stiffness(finger, q, f, k)
+
+
+# -- where the joints are ---------------------------------------------------------------------------------
+
+
+def nonlinear_estimate(finger: Finger, iterations: int = 24) -> Solver | None:
+    """Straight spans make the coupling depend on the pose: the estimate then iterates."""
+    if all(tendon.span is None for tendon in finger.tendons):
+        return None
+    low, high = joint_limits(finger)
+    return Solver(
+        template="joint_estimate.c.j2",
+        problem="least squares",
+        uses=("tendon_lengths", "coupling"),
+        arrays={"low": low, "high": high},
+        strings={
+            "n": str(len(low)),
+            "m": str(len(finger.tendons)),
+            "search": f"awiwi_least_squares(&problem, h, start, {iterations}, tolerance, q)",
+        },
+        iterations=iterations,
+        tolerance={"f64": 1e-12, "f32": 1e-5},
+    )
+
+
+@per_finger(
+    lambda z: {"q": Port((z.joints,), rad)},
+    "eq. 5.14, 5.15, 5.24",
+    witness=estimate_qr.joint_estimate,
+    solver=nonlinear_estimate,
+)
+def joint_estimate(finger: Any, h: Any, start: Any) -> Any:
+    """Joint angles whose tendon lengths are nearest to the measured h; start is the last estimate."""
+    return estimate.joint_estimate(finger, h, start)
+
+
+@per_finger(
+    lambda z: {"covariance": Port((z.joints, z.joints), rad**2), "worst": Port((z.joints,), rad)},
+    "eq. 5.14, linearised",
+    witness=estimate_qr.joint_estimate_error,
+)
+def joint_estimate_error(finger: Any, q: Any, noise: Any) -> Any:
+    """Error of the joint estimate: covariance for lengths of standard deviation noise, worst for errors up to noise."""
+    return estimate.joint_estimate_error(finger, q, noise)

@@ -120,7 +120,7 @@ def assemble(finger: Finger, q: SX) -> Assembly:
             base, angle = part.direction, SX(0)
         else:
             angle = angle + part.angle
-        spin = _sum_of_angles(base, angle)
+        spin = _sum_of_angles(base, (ca.cos(angle), ca.sin(angle)))
         turn = None if following is None else following.turn
         if turn is None:
             rotation, axis, body = about_z(*spin), SX([0, 0, 1]), _turned_about_z(part.body, *spin)
@@ -144,10 +144,12 @@ def _parts(finger: Finger, q: SX) -> Iterator[_Part]:
         own, turn = q[coordinate], _turn(link.turn)
         offset = ca.vertcat(*link.offset)
         if link.four_bar is not None:
-            loop = _FourBar(link.four_bar, own)
+            reference = SX(link.four_bar.reference)
+            loop, at_rest = _FourBar(link.four_bar, own + reference), _FourBar(link.four_bar, reference)
             crank = ca.vertcat(link.four_bar.crank, 0, 0)
-            yield _Part(coordinate, turn, own + link.four_bar.reference, None, SX(1), SX(0), crank, nothing(), None)
-            yield _Part(coordinate, None, None, loop.direction, loop.rate - 1, loop.bend, offset, _body(link), index)
+            yield _Part(coordinate, turn, own + reference, None, SX(1), SX(0), crank, nothing(), None)
+            turned = _sum_of_angles(loop.direction, (at_rest.direction[0], -at_rest.direction[1]))
+            yield _Part(coordinate, None, None, turned, loop.rate - 1, loop.bend, offset, _body(link), index)
         else:
             ratio = SX(1)
             if link.joint in follows:
@@ -158,42 +160,28 @@ def _parts(finger: Finger, q: SX) -> Iterator[_Part]:
 class _FourBar:
     """A four-bar as vectors in its plane: no angles, no inverse functions.
 
-    a (crank), b (coupler) and d (rocker) close the loop a + b = ground + d; the coupler is found as a side of the triangle it
-    forms with the rocker over the line from the end of the crank to the rocker's pivot.
+    Crank a, coupler b and rocker d close the loop a + b = ground + d. Coupler and rocker stand over the diagonal from the end of the
+    crank to the rocker's pivot; `area` is twice that of their triangle, positive if the coupler lies to the right.
     """
 
-    def __init__(self, bar: "Finger", q: SX) -> None:
-        at_rest = self._coupler(bar, SX(bar.reference))[1]
-        a, b, d = self._coupler(bar, q + bar.reference)
-        size = bar.coupler**2
-        self.direction = (
-            (b[0] * at_rest[0] + b[1] * at_rest[1]) / size, (b[1] * at_rest[0] - b[0] * at_rest[1]) / size)
-        """Cosine and sine of the coupler's turn since the joint was at zero."""
-        # Loop velocity: a x' + b t3' x' = d t4' x', where x' is the quarter turn; take it along d, then along b.
-        across = _cross2(b, d)
-        self.rate = -_cross2(a, d) / across
-        """Turn of the coupler per turn of the crank."""
-        rocker = -_cross2(a, b) / across
-        self.bend = (_dot2(a, d) + _dot2(b, d) * self.rate**2 - bar.rocker**2 * rocker**2) / across
-        """Change of `rate` per turn of the crank."""
-
-    @staticmethod
-    def _coupler(bar: "Finger", crank: SX) -> tuple[tuple[SX, SX], ...]:
+    def __init__(self, bar: Finger, crank: SX) -> None:
         a = (bar.crank * ca.cos(crank), bar.crank * ca.sin(crank))
-        east, north = bar.ground - a[0], -a[1]
-        distance = east**2 + north**2
-        along = (distance + bar.coupler**2 - bar.rocker**2) / (2 * distance)
-        height = bar.branch * ca.sqrt(bar.coupler**2 / distance - along**2)
-        b = (along * east + height * north, along * north - height * east)
-        return a, b, (b[0] - east, b[1] - north)
-
-
-def _cross2(a: tuple[SX, SX], b: tuple[SX, SX]) -> SX:
-    return a[0] * b[1] - a[1] * b[0]
-
-
-def _dot2(a: tuple[SX, SX], b: tuple[SX, SX]) -> SX:
-    return a[0] * b[0] + a[1] * b[1]
+        diagonal = (bar.ground - a[0], -a[1])
+        squared = bar.ground**2 + bar.crank**2 - 2 * bar.ground * a[0]
+        along = (squared + bar.coupler**2 - bar.rocker**2) / 2
+        area = bar.branch * ca.sqrt(bar.coupler**2 * squared - along**2)
+        b = ((along * diagonal[0] + area * diagonal[1]) / squared, (along * diagonal[1] - area * diagonal[0]) / squared)
+        self.direction = (b[0] / bar.coupler, b[1] / bar.coupler)
+        """Cosine and sine of the coupler's angle."""
+        # The velocity of the loop, a x' + b x' t3' = d x' t4' where x' turns by a quarter, taken along d and along b.
+        coupler_crank = a[0] * b[1] - a[1] * b[0]
+        rocker_rate = coupler_crank / area
+        self.rate = (coupler_crank + bar.ground * a[1]) / area
+        """Turn of the coupler per turn of the crank."""
+        crank_rocker = a[0] * (b[0] - diagonal[0]) + a[1] * (b[1] - diagonal[1])
+        centripetal = crank_rocker + (bar.coupler**2 - along) * self.rate**2 - (bar.rocker * rocker_rate) ** 2
+        self.bend = -centripetal / area
+        """Change of `rate` per turn of the crank."""
 
 
 def nothing() -> Moments:
@@ -234,9 +222,9 @@ def _turned_about_z(body: Moments, c: SX, s: SX) -> Moments:
     return Moments(body.mass, ca.vertcat(c * x - s * y, s * x + c * y, z), second, body.trace)
 
 
-def _sum_of_angles(base: tuple[SX, SX], angle: SX) -> tuple[SX, SX]:
-    c, s = ca.cos(angle), ca.sin(angle)
-    return base[0] * c - base[1] * s, base[1] * c + base[0] * s
+def _sum_of_angles(one: tuple[SX, SX], other: tuple[SX, SX]) -> tuple[SX, SX]:
+    """Cosine and sine of a sum, from those of its terms."""
+    return one[0] * other[0] - one[1] * other[1], one[1] * other[0] + one[0] * other[1]
 
 
 def _turn(turn: str) -> SX | None:

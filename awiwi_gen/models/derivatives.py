@@ -41,5 +41,5 @@ def derivatives_of(definition: Route, witness: Route, *wrt: str) -> tuple[Route,
 
 
 def _by_rules(vector: Any, argument: Any) -> sympy.Matrix:
-    chain = Derivation("d")
+    chain = Derivation()
     return sympy.Matrix([[chain.partial(element, x) for x in argument] for element in vector])

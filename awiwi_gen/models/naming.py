@@ -11,13 +11,14 @@ import sympy
 from sympy import Expr
 
 
-class Named(sympy.Dummy):
-    """A real symbol that stands for `definition`; whoever reads the expression looks the meaning up there."""
+class Named(sympy.Dummy):  # type: ignore[misc]
+    """A real symbol that stands for `definition`; whoever reads an expression looks the meaning up there."""
 
     __slots__ = ("definition",)
     definition: Expr
 
     def __new__(cls, name: str, definition: Expr) -> "Named":
+        """A new symbol, different from all others whatever their names."""
         named: Named = super().__new__(cls, name, real=True)
         named.definition = definition
         return named
@@ -36,7 +37,7 @@ class Derivation:
         self._known: dict[frozenset[tuple[Expr, Expr]], dict[Expr, Expr]] = {}
 
     def name(self, expr: Expr) -> Expr:
-        """A symbol standing for `expr`; atoms and signed atoms stand for themselves."""
+        """A symbol standing for `expr`; atoms and negative atoms stand for themselves."""
         if expr.is_Atom or (-expr).is_Atom:
             return expr
         if expr not in self._names:
@@ -48,16 +49,15 @@ class Derivation:
         return matrix.applyfunc(self.name)
 
     def partial(self, expr: Expr, symbol: Expr) -> Expr:
-        """d expr / d symbol, through all names."""
+        """Derivative of `expr` with respect to a symbol, through all names."""
         return self.along(expr, {symbol: sympy.S.One})
 
-    def along(self, expr: Expr, direction: Mapping[Expr, Expr]) -> Expr:
-        """Rate of `expr` while each symbol of `direction` changes at the given rate (a total derivative through all names)."""
-        known = self._known.setdefault(frozenset(direction.items()), dict(direction))
-        return self._rate(expr, known)
+    def along(self, expr: Expr, rates: Mapping[Expr, Expr]) -> Expr:
+        """Rate of `expr` while symbols change at the given rates and all others stand still, through all names."""
+        return self._rate(expr, self._known.setdefault(frozenset(rates.items()), dict(rates)))
 
     def _rate(self, expr: Expr, known: dict[Expr, Expr]) -> Expr:
-        """The chain rule, each shared subexpression once; `known` holds the rates found so far, the symbols' own to begin with."""
+        """The chain rule, once for each shared subexpression; `known` starts with the rates of the symbols."""
         if expr not in known:
             known[expr] = self._chain_rule(expr, known)
         return known[expr]
@@ -65,28 +65,31 @@ class Derivation:
     def _chain_rule(self, expr: Expr, known: dict[Expr, Expr]) -> Expr:
         if isinstance(expr, Named):
             return self.name(self._rate(expr.definition, known))
-        if expr.is_Atom:
-            return sympy.S.Zero
         rates = [self._rate(arg, known) for arg in expr.args]
-        if all(rate is sympy.S.Zero for rate in rates):
+        if not any(rates):
             return sympy.S.Zero
         if expr.is_Add:
             return sympy.Add(*rates)
         if expr.is_Mul:
-            return sympy.Add(*(sympy.Mul(rate, *(arg for k, arg in enumerate(expr.args) if k != i))
-                               for i, rate in enumerate(rates) if rate is not sympy.S.Zero))
-        return sympy.Add(*(sympy.Mul(slope, rate) for slope, rate in zip(_SLOPES[expr.func](*expr.args), rates)))
+            factors = expr.args
+            return sympy.Add(*(sympy.Mul(*factors[:i], rate, *factors[i + 1:]) for i, rate in enumerate(rates) if rate))
+        slopes = self._power_slope(expr) if expr.is_Pow else _SLOPES[expr.func](*expr.args)
+        return sympy.Add(*(sympy.Mul(slope, rate) for slope, rate in zip(slopes, rates, strict=True)))
+
+    def _power_slope(self, power: Expr) -> tuple[Expr, Expr]:
+        base, exponent = power.args
+        if not exponent.is_Number:
+            raise ValueError(f"{power} has an exponent that is not a number")
+        # Roots and reciprocals give their slopes by what was computed for themselves.
+        if exponent is sympy.S.Half:
+            return self.name(1 / self.name(power)) / 2, sympy.S.Zero
+        if exponent is sympy.S.NegativeOne:
+            return -self.name(power) ** 2, sympy.S.Zero
+        return exponent * base ** (exponent - 1), sympy.S.Zero
 
 
-def _power_slope(base: Expr, exponent: Expr) -> tuple[Expr, Expr]:
-    if not exponent.is_Number:
-        raise ValueError(f"exponent {exponent} of {base} is not a number")
-    return exponent * base ** (exponent - 1), sympy.S.Zero
-
-
-# Partial derivatives of each function with respect to each of its arguments: all the functions a finger needs.
+# Partial derivatives by each argument, of all the functions that occur in fingers.
 _SLOPES: dict[Any, Callable[..., tuple[Expr, ...]]] = {
-    sympy.Pow: _power_slope,
     sympy.sin: lambda x: (sympy.cos(x),),
     sympy.cos: lambda x: (-sympy.sin(x),),
     sympy.acos: lambda x: (-1 / sympy.sqrt(1 - x**2),),
@@ -99,7 +102,7 @@ def definitions(expressions: Iterable[Expr]) -> list[tuple[Named, Expr]]:
     found: dict[Named, Expr] = {}
 
     def visit(expr: Expr) -> None:
-        for named in sorted(expr.atoms(Named), key=lambda symbol: symbol.name):
+        for named in sorted(expr.atoms(Named), key=lambda symbol: (symbol.name, symbol.dummy_index)):
             if named not in found:
                 visit(named.definition)
                 found[named] = named.definition

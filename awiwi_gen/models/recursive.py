@@ -8,7 +8,8 @@ Wensing 2021). Vectors live in the working axes of `assembly`, where the mass of
 import casadi as ca
 from casadi import SX
 
-from awiwi_gen.models.assembly import Assembly, Moments, assemble, nothing
+from awiwi_gen.models.assembly import Assembly, Moments, assemble
+from awiwi_gen.models.composite import mass_and_coriolis
 from awiwi_gen.models.tree import Finger
 
 _Z = SX([0, 0, 1])
@@ -59,18 +60,17 @@ def seat_point(finger: Finger, q: SX, joint: str, local: SX) -> SX:
 
 def mass_matrix(finger: Finger, q: SX) -> SX:
     """M (n x n) [kg m^2] by composite bodies."""
-    return _mass_matrix(assemble(finger, q), q.numel())
+    return mass_and_coriolis(assemble(finger, q), SX.zeros(q.numel()))[0]
 
 
 def coriolis_matrix(finger: Finger, q: SX, qd: SX) -> SX:
     """C (n x n) [N m s] with Mdot - 2 C skew, the one that Christoffel's symbols give."""
-    return _coriolis_matrix(assemble(finger, q), qd)
+    return mass_and_coriolis(assemble(finger, q), qd)[1]
 
 
 def gravity(finger: Finger, q: SX, g: SX) -> SX:
     """Joint torques (n) [N m] that hold the finger still."""
-    still = SX.zeros(q.numel())
-    return _newton_euler(assemble(finger, q), still, still, g)
+    return _weight(assemble(finger, q), g, q.numel())
 
 
 def bias(finger: Finger, q: SX, qd: SX, g: SX) -> SX:
@@ -86,28 +86,26 @@ def inverse_dynamics(finger: Finger, q: SX, qd: SX, qdd: SX, g: SX) -> SX:
 def forward_dynamics(finger: Finger, q: SX, qd: SX, tau: SX, g: SX) -> SX:
     """Joint accelerations (n) [rad/s^2] that joint torques tau cause: M qdd = tau - bias."""
     assembly = assemble(finger, q)
-    return _solve(_mass_matrix(assembly, q.numel()), tau - _newton_euler(assembly, qd, SX.zeros(q.numel()), g))
+    still = SX.zeros(q.numel())
+    return _solve(mass_and_coriolis(assembly, still)[0], tau - _newton_euler(assembly, qd, still, g))
 
 
 def dynamics(finger: Finger, q: SX, qd: SX, g: SX) -> tuple[SX, SX, SX]:
     """M (n x n) [kg m^2], C (n x n) [N m s] and the gravity torques (n) [N m] of eq. 2.17."""
-    assembly, still = assemble(finger, q), SX.zeros(q.numel())
-    return _mass_matrix(assembly, q.numel()), _coriolis_matrix(assembly, qd), _newton_euler(assembly, still, still, g)
+    assembly = assemble(finger, q)
+    return *mass_and_coriolis(assembly, qd), _weight(assembly, g, q.numel())
 
 
 def energy(finger: Finger, q: SX, qd: SX, g: SX) -> tuple[SX, SX]:
     """Kinetic and potential energy [J] (eq. 5.4); the potential is zero for masses at the height of the base's origin."""
     assembly = assemble(finger, q)
-    kinetic, potential = SX(0), -ca.dot(g, assembly.ballast)
-    spin, velocity, down = SX.zeros(3), SX.zeros(3), assembly.turn @ g
+    mass = mass_and_coriolis(assembly, SX.zeros(q.numel()))[0]
+    once = ca.triu(mass) - ca.diag(ca.diag(mass)) / 2
+    potential, down = -ca.dot(g, assembly.ballast), assembly.turn @ g
     for joint in assembly.joints:
-        spin = joint.forth(spin) + joint.axis * (joint.rate * qd[joint.coordinate])
-        velocity, down = joint.forth(velocity), joint.forth(down)
-        first = joint.body.first
-        kinetic += ca.dot(velocity, ca.cross(spin, first)) + ca.dot(spin, joint.body.inertia(spin)) / 2
-        potential -= ca.dot(down, first)
-        velocity = velocity + ca.cross(spin, joint.offset)
-    return kinetic, potential
+        down = joint.forth(down)
+        potential -= ca.dot(down, joint.body.first)
+    return ca.dot(qd, once @ qd), potential
 
 
 def _pose(axes: SX, origin: SX) -> SX:
@@ -120,6 +118,20 @@ def _axes(assembly: Assembly) -> list[SX]:
     for joint in assembly.joints:
         axes.append(joint.forth(axes[-1].T).T)
     return axes[1:]
+
+
+def _weight(assembly: Assembly, g: SX, n: int) -> SX:
+    """Joint torques (n) against gravity: composite bodies without mass need no levers, only their first moments."""
+    down, downs = assembly.turn @ g, []
+    for joint in assembly.joints:
+        down = joint.forth(down)
+        downs.append(down)
+    torques, first = SX.zeros(n), SX.zeros(3)
+    for joint, down in reversed(list(zip(assembly.joints, downs))):
+        first = joint.body.first + first
+        torques[joint.coordinate] -= joint.rate * ca.dot(joint.axis, ca.cross(first, down))
+        first = joint.back(first)
+    return torques
 
 
 def _newton_euler(assembly: Assembly, qd: SX, qdd: SX, g: SX) -> SX:
@@ -175,88 +187,6 @@ def _swirl(body: Moments, spin: SX, gradient: SX) -> SX:
         a[0, 2] * s[2, 2] - a[2, 0] * s[0, 0] + (x**2 - z**2) * s[0, 2] + a[0, 1] * s[1, 2] - a[2, 1] * s[0, 1],
         # The moment of inertia about z, unlike S_xx and S_yy alone, does not change while the body turns about z.
         2 * x * y * s[0, 0] - a[0, 1] * (body.trace - s[2, 2]) + (y**2 - x**2) * s[0, 1] + a[1, 2] * s[0, 2] - a[0, 2] * s[1, 2])
-
-
-def _mass_matrix(assembly: Assembly, n: int) -> SX:
-    """Composite bodies: the force that a unit acceleration of one joint needs, felt by all joints before."""
-    joints, mass = assembly.joints, SX.zeros(n, n)
-    beyond = nothing()
-    for last in reversed(range(len(joints))):
-        joint = joints[last]
-        beyond = joint.body + beyond.moved(joint.offset)
-        force, moment = ca.cross(joint.axis, beyond.first), beyond.inertia(joint.axis)
-        _gather(mass, joint, joint, ca.dot(joint.axis, moment))
-        for i in reversed(range(last)):
-            force, moment = joints[i + 1].back(force), joints[i + 1].back(moment)
-            moment = moment + ca.cross(joints[i].offset, force)
-            _gather(mass, joints[i], joint, ca.dot(joints[i].axis, moment))
-        beyond = joint.body_back(beyond)
-    return ca.triu2symm(ca.triu(mass))
-
-
-def _gather(mass: SX, one, other, entry: SX) -> None:
-    """Add what a pair of chain joints contributes to the upper triangle of M."""
-    entry = one.rate * other.rate * entry
-    i, j = sorted((one.coordinate, other.coordinate))
-    mass[i, j] += 2 * entry if i == j and one is not other else entry
-
-
-def _coriolis_matrix(assembly: Assembly, qd: SX) -> SX:
-    """The recursion of `_mass_matrix` one derivative later.
-
-    Unit turning of a joint moves each point beyond it with velocity axis x r; the derivative of this, summed over the points' masses,
-    is the column of the joint. Velocities are relative to the working axes (`flow` and `whirl` are the integrals of r' and
-    r' r^T dm), of which only what turns within the axes has any.
-    """
-    joints, n = assembly.joints, qd.numel()
-    motions, frame_spin, swing = [], SX.zeros(3), SX(0)
-    for joint in joints:
-        swing += joint.rate * qd[joint.coordinate]
-        if joint.turn is None:
-            motions.append((frame_spin, swing, SX(0)))
-        else:
-            frame_spin = joint.forth(frame_spin + _Z * swing)
-            motions.append((frame_spin, SX(0), swing))
-            swing = SX(0)
-
-    coriolis = SX.zeros(n, n)
-    beyond, flow, whirl = nothing(), SX.zeros(3), SX.zeros(3, 3)
-    for last in reversed(range(len(joints))):
-        joint, (frame_spin, swing, turned) = joints[last], motions[last]
-        around = swing * ca.skew(joint.axis)
-        whirl = whirl + flow @ joint.offset.T + around @ joint.offset @ beyond.first.T + around @ joint.body.second
-        flow = flow + around @ joint.body.first
-        beyond = joint.body + beyond.moved(joint.offset)
-        stretch = ca.trace(whirl) * joint.axis
-        force1 = ca.cross(frame_spin, ca.cross(joint.axis, beyond.first)) + ca.cross(joint.axis, flow)
-        moment1 = ca.cross(beyond.second @ frame_spin, joint.axis) + stretch - whirl @ joint.axis
-        force2, moment2 = ca.cross(joint.axis, beyond.first), beyond.inertia(joint.axis)
-        moment3 = beyond.second @ ca.cross(frame_spin, joint.axis) + stretch - whirl.T @ joint.axis
-        bend = joint.bend * qd[joint.coordinate]
-        row, parallel = ca.dot(joint.axis, moment1), True
-        for i in reversed(range(last + 1)):
-            one, (frame_spin, swing, _) = joints[i], motions[i]
-            spin = frame_spin + one.axis * swing
-            if i < last:
-                force1, moment1, force2, moment2, moment3 = map(joints[i + 1].back, (force1, moment1, force2, moment2, moment3))
-                moment1 = moment1 + ca.cross(one.offset, force1)
-                moment2 = moment2 + ca.cross(one.offset, force2)
-                moment3 = moment3 + ca.cross(ca.cross(spin, one.offset), force2)
-                parallel = parallel and one.turn is None
-            mass = ca.dot(one.axis, moment2)
-            coriolis[one.coordinate, joint.coordinate] += one.rate * (
-                joint.rate * ca.dot(one.axis, moment1) + mass * bend)
-            if i < last:
-                if parallel:
-                    row = row - spin[2] * ca.dot(one.offset, force2)
-                else:
-                    row = ca.dot(one.axis, moment3) + ca.dot(ca.cross(spin, one.axis), moment2)
-                coriolis[joint.coordinate, one.coordinate] += joint.rate * (
-                    one.rate * row + mass * one.bend * qd[one.coordinate])
-        beyond, flow, whirl = joint.body_back(beyond), joint.back(flow), joint.back(joint.back(whirl).T).T
-        flow = flow + turned * ca.cross(_Z, beyond.first)
-        whirl = whirl + turned * ca.skew(_Z) @ beyond.second
-    return coriolis
 
 
 def _solve(mass: SX, torque: SX) -> SX:

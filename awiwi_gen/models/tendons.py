@@ -14,17 +14,17 @@ from awiwi_gen.models.tree import Finger, radius, sense
 
 def tendon_lengths(finger: Finger, q: Matrix) -> Matrix:
     """Path lengths h (m) [m]: what rolls on pulleys (eq. 5.5) plus the straight spans of tensegrity joints (eq. 5.20, 5.22)."""
-    return _lengths(finger, q, Derivation("h"))
+    return _lengths(finger, q, Derivation())
 
 
 def coupling(finger: Finger, q: Matrix) -> Matrix:
     """P = dh/dq (m x n) [m/rad] (eq. 5.6)."""
-    return _coupling(finger, q, Derivation("h"))
+    return _coupling(finger, q, Derivation())
 
 
 def coupling_derivative(finger: Finger, q: Matrix) -> list[Matrix]:
     """d2h/dq2: one symmetric matrix (n x n) [m/rad^2] per tendon."""
-    derivation = Derivation("h")
+    derivation = Derivation()
     return _second_derivatives(_coupling(finger, q, derivation), q, derivation)
 
 
@@ -35,7 +35,7 @@ def joint_torque(finger: Finger, q: Matrix, f: Matrix) -> Matrix:
 
 def joint_stiffness(finger: Finger, q: Matrix, f: Matrix, k: Matrix) -> Matrix:
     """-d tau/dq (n x n) [N m/rad] = P' diag(k) P + sum of f_i d2h_i/dq2, for tendons of stiffness k (m) [N/m] (eq. 5.12, 5.23)."""
-    derivation = Derivation("h")
+    derivation = Derivation()
     p = _coupling(finger, q, derivation)
     bends = _second_derivatives(p, q, derivation)
     return sum((force * bend for force, bend in zip(f, bends)), p.T * sympy.diag(*k) * p)

@@ -68,6 +68,36 @@ def stack(columns: list[Any], samples: int) -> Array:
     return np.stack([np.broadcast_to(np.asarray(c), (samples,)) for c in columns], axis=1)
 
 
+def judge_solver(
+    name: str,
+    reference: Reference,
+    inputs: Mapping[str, Array],
+    call: Callable[..., Any],
+    tolerance: float,
+    seed: int,
+) -> Verdict:
+    """Level 3 for a kernel that iterates: every sample converges, to the exact solution within the tolerance."""
+    raw = call(**inputs)
+    samples = len(raw.status)
+    reasons = []
+    if np.any(raw.status):
+        reasons.append(f"it does not converge at {np.count_nonzero(raw.status)} samples")
+    worst_ulp = worst_scaled = 0.0
+    for port, exact in reference.high.items():
+        values = getattr(raw, port).reshape(samples, -1)
+        error = reference.error(port, values)
+        scale = float(np.max(np.abs(exact)))
+        spacing = np.spacing(np.maximum(np.abs(exact), NEAR_ZERO * scale).astype(values.dtype))
+        worst_ulp = max(worst_ulp, float(np.max(error / spacing)))
+        worst_scaled = max(worst_scaled, float(np.max(error)) / scale)
+    if not worst_scaled <= tolerance:
+        reasons.append(f"it misses the exact solution by {worst_scaled:.1e} of the largest value")
+    return Verdict(
+        name, not reasons, False, worst_ulp, worst_scaled, worst_scaled / tolerance, 0.0, 0.0, samples, seed,
+        tuple(reasons),
+    )  # fmt: skip
+
+
 def judge(
     name: str,
     graph: Graph,

@@ -1,0 +1,52 @@
+"""C of the kernels that iterate: a solver of csrc bound to generated kernels."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from fractions import Fraction
+
+from awiwi_gen.emit.c import CFunction, signature
+from awiwi_gen.emit.files import banner, describe, render
+from awiwi_gen.emit.options import Options
+from awiwi_gen.ir.cost import Cost
+from awiwi_gen.kernel import Kernel, Solver
+
+
+STOP = {"f64": "1e-11", "f32": "1e-6"}  # a last step this short ends an iteration
+
+
+def solver_function(
+    kernel: Kernel, solver: Solver, prefix: str, options: Options, used: Mapping[str, CFunction], runtime: bool
+) -> tuple[CFunction, str]:
+    """The function and the C file of a kernel with a solver; ``used`` are the kernels it calls, by family.
+
+    The cost is that of the worst case, without the solver's own linear algebra.
+    """
+    prototype, definition = signature(
+        f"int {prefix}_{kernel.name}",
+        {name: port.shape for name, port in kernel.inputs.items()},
+        {name: port.shape for name, port in kernel.outputs.items()},
+        options,
+        runtime and prefix,
+    )
+    called = " and ".join(function.name for function in used.values())
+    comment = describe(kernel, f"Cost: at most {solver.iterations} times that of {called}.")
+    text = render(
+        solver.template,
+        banner=banner(*comment),
+        definition=definition,
+        kernels={family: f"{prefix}_{function.name}" for family, function in used.items()},
+        context=f"(const {prefix}_params *)context, " if runtime else "",
+        given="p" if runtime else "0",
+        arrays=[_array(name, values, options) for name, values in solver.arrays.items()],
+        tolerance=options.literal(Fraction(STOP[options.scalar])),
+        **solver.strings,
+    )
+    total = sum((function.cost for function in used.values()), Cost())
+    function = CFunction(kernel.name, prototype, definition, comment, (), total * solver.iterations, False)
+    return function, text
+
+
+def _array(name: str, values: tuple[float, ...], options: Options) -> str:
+    numbers = ", ".join(options.literal(Fraction(value)) for value in values)
+    return f"static const awiwi_real {name}[{len(values)}] = {{{numbers}}};"

@@ -1,0 +1,148 @@
+/* Bounded least squares: joint angles from measured tendon lengths, eq. 5.14 and 5.24. */
+#include "awiwi_solvers.h"
+
+typedef awiwi_real vector[AWIWI_MOST_UNKNOWNS];
+typedef awiwi_real matrix[AWIWI_MOST_UNKNOWNS][AWIWI_MOST_UNKNOWNS];
+
+static awiwi_real size(awiwi_real x)
+{
+    return x < 0 ? -x : x;
+}
+
+static awiwi_real clamp(awiwi_real x, awiwi_real low, awiwi_real high)
+{
+    return x < low ? low : x > high ? high : x;
+}
+
+/* Half the squared residual, its gradient, and J'J, at q; also how far rounding may move the result. */
+static awiwi_real cost(const awiwi_problem *p, const awiwi_real *measured, const awiwi_real *q, vector gradient,
+                       matrix normal, awiwi_real *blur)
+{
+    awiwi_real h[AWIWI_MOST_EQUATIONS], P[AWIWI_MOST_EQUATIONS * AWIWI_MOST_UNKNOWNS];
+    awiwi_real total = 0, terms = 0;
+    p->model(p->context, q, h, P);
+    for (int j = 0; j < p->n; j++) {
+        gradient[j] = 0;
+        for (int k = 0; k < p->n; k++)
+            normal[j][k] = 0;
+    }
+    for (int i = 0; i < p->m; i++) {
+        const awiwi_real *row = P + i * p->n;
+        const awiwi_real residual = h[i] - measured[i];
+        total += residual * residual;
+        terms += size(residual) * (size(h[i]) + size(measured[i]));
+        for (int j = 0; j < p->n; j++) {
+            gradient[j] += row[j] * residual;
+            for (int k = 0; k <= j; k++)
+                normal[j][k] += row[j] * row[k];
+        }
+    }
+    *blur = 4 * AWIWI_REAL_EPSILON * terms;
+    return total / 2;
+}
+
+/* Solve (A + damping diag A) x = -b for the unknowns not held, by Cholesky without roots; A's lower half is read. */
+static void damped_step(int n, matrix A, const vector b, const int *held, awiwi_real damping, vector x)
+{
+    matrix L;
+    vector d;
+    for (int j = 0; j < n; j++) {
+        d[j] = held[j] ? 1 : A[j][j] + damping * A[j][j];
+        x[j] = held[j] ? 0 : -b[j];
+        for (int k = 0; k < j; k++) {
+            awiwi_real sum = held[j] || held[k] ? 0 : A[j][k];
+            for (int i = 0; i < k; i++)
+                sum -= L[j][i] * d[i] * L[k][i];
+            L[j][k] = d[k] > 0 ? sum / d[k] : 0;
+            d[j] -= L[j][k] * L[j][k] * d[k];
+            x[j] -= L[j][k] * x[k];
+        }
+    }
+    for (int j = n - 1; j >= 0; j--) {
+        x[j] = d[j] > 0 ? x[j] / d[j] : 0;
+        for (int k = j + 1; k < n; k++)
+            x[j] -= L[k][j] * x[k];
+    }
+}
+
+static int all_finite(const awiwi_real *x, int n)
+{
+    for (int i = 0; i < n; i++)
+        if (!(size(x[i]) <= AWIWI_REAL_MAX))
+            return 0;
+    return 1;
+}
+
+/* Clamp the start into the box; a start that is not a number becomes the middle of the box. */
+static int begin(const awiwi_problem *p, const awiwi_real *measured, const awiwi_real *start, awiwi_real *q)
+{
+    const int finite = all_finite(measured, p->m) && all_finite(start, p->n);
+    for (int j = 0; j < p->n; j++)
+        q[j] = all_finite(start + j, 1) ? clamp(start[j], p->low[j], p->high[j]) : (p->low[j] + p->high[j]) / 2;
+    return finite;
+}
+
+int awiwi_least_squares(const awiwi_problem *p, const awiwi_real *measured, const awiwi_real *start, int iterations,
+                        awiwi_real tolerance, awiwi_real *q)
+{
+    vector gradient, trial_gradient, step, trial;
+    matrix normal, trial_normal;
+    awiwi_real damping = 0, blur;
+    if (!begin(p, measured, start, q))
+        return AWIWI_NOT_FINITE;
+    awiwi_real best = cost(p, measured, q, gradient, normal, &blur);
+    for (int i = 1; i < iterations; i++) {
+        int held[AWIWI_MOST_UNKNOWNS];
+        awiwi_real longest = 0;
+        for (int j = 0; j < p->n; j++) /* at a limit and pushed against it */
+            held[j] = (q[j] <= p->low[j] && gradient[j] >= 0) || (q[j] >= p->high[j] && gradient[j] <= 0);
+        damped_step(p->n, normal, gradient, held, damping, step);
+        for (int j = 0; j < p->n; j++) {
+            trial[j] = clamp(q[j] + step[j], p->low[j], p->high[j]);
+            longest = size(trial[j] - q[j]) > longest ? size(trial[j] - q[j]) : longest;
+        }
+        const awiwi_real found = cost(p, measured, trial, trial_gradient, trial_normal, &blur);
+        /* near the bottom rounding decides which cost is lower, and the step is still right */
+        if (found <= best + blur || longest <= tolerance) {
+            best = found;
+            damping = damping / 10;
+            for (int j = 0; j < p->n; j++) {
+                q[j] = trial[j];
+                gradient[j] = trial_gradient[j];
+                for (int k = 0; k < p->n; k++)
+                    normal[j][k] = trial_normal[j][k];
+            }
+            if (longest <= tolerance)
+                return all_finite(q, p->n) ? AWIWI_OK : AWIWI_NOT_FINITE;
+        } else {
+            damping = damping > 0 ? damping * 10 : (awiwi_real)0.001;
+        }
+    }
+    return AWIWI_NOT_CONVERGED;
+}
+
+int awiwi_gradient_search(const awiwi_problem *p, const awiwi_real *measured, const awiwi_real *start, int iterations,
+                          awiwi_real step, awiwi_real *q)
+{
+    vector gradient, trial_gradient, trial;
+    matrix unused;
+    awiwi_real blur;
+    if (!begin(p, measured, start, q))
+        return AWIWI_NOT_FINITE;
+    awiwi_real best = cost(p, measured, q, gradient, unused, &blur);
+    for (int i = 0; i < iterations; i++) {
+        for (int j = 0; j < p->n; j++) /* the gradient of the whole square is twice that of half of it */
+            trial[j] = clamp(q[j] - 2 * step * gradient[j], p->low[j], p->high[j]);
+        const awiwi_real found = cost(p, measured, trial, trial_gradient, unused, &blur);
+        if (found < best) {
+            best = found;
+            for (int j = 0; j < p->n; j++) {
+                q[j] = trial[j];
+                gradient[j] = trial_gradient[j];
+            }
+        } else {
+            step = step / 2;
+        }
+    }
+    return AWIWI_OK;
+}
