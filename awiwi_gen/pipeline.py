@@ -102,7 +102,7 @@ def generate(job: Job, directory: Path) -> bool:
     records = make_records(job)
     functions = [record.function for record in records.values()]
     files = {f"{name}.c": record.file for name, record in records.items()}
-    quantities = {path: quantity for path, quantity in job.hand.quantities().items() if path.startswith("fingers.")}
+    quantities = {path: q for path, q in job.hand.quantities().items() if not path.startswith("limits.")}
     files |= shared_files(job.hand.prefix, functions, job.hand.digest(), quantities, job.options)
     manifest = {
         "hand": job.hand.name,
@@ -148,8 +148,14 @@ def _kept_records(job: Job, stage: str, tasks: Sequence[tuple[str, Any, tuple[An
     keys = [digest for digest, _, _ in tasks]
     absent = set(job.store.missing("records", keys))
     work = [(*task, job.hand.prefix, job.options, job.store) for task in tasks if task[0] in absent]
+    work.sort(key=lambda task: -_size(task[2][1]))  # the long ones first, so that no core waits for one at the end
     job.parallel(stage, _record_task, work)
     return [job.store.get("records", digest) for digest in keys]
+
+
+def _size(given: Mapping[str, Any]) -> int:
+    """Number of nodes of the graphs a record is made from."""
+    return sum(len(getattr(graph, "nodes", ())) for graph in given.values())
 
 
 def _record_task(task: tuple[Any, ...]) -> None:

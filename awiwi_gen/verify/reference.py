@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
+from math import inf, isfinite
 from typing import Any
 
 import numpy as np
@@ -65,12 +66,12 @@ def disagreement(a: BallArrays, b: BallArrays) -> float:
     """
     worst = 0.0
     for name, elements in a.items():
-        pairs = [(x, y) for u, v in zip(elements, b[name], strict=True) for x, y in zip(u, v, strict=True)]
-        scale = max((abs(x).mid() for x, _ in pairs), default=arb(0))
-        for x, y in pairs:
-            difference = (x - y).abs_upper()
-            if not difference.is_finite() or not scale.is_finite():
-                return float("inf")
-            if difference > 0:
-                worst = max(worst, float(difference / scale) if scale > 0 else float("inf"))
+        pairs = [(u, v) for u, v in zip(elements, b[name], strict=True) if u is not v]
+        differences = [float((x - y).abs_upper()) for u, v in pairs for x, y in zip(u, v, strict=True)]
+        sizes = [abs(float(x)) for u in elements for x in u]
+        if not all(map(isfinite, differences)) or not all(map(isfinite, sizes)):
+            return inf
+        largest, scale = max(differences, default=0.0), max(sizes, default=0.0)
+        if largest > 0:
+            worst = max(worst, largest / scale if scale > 0 else inf)
     return worst
