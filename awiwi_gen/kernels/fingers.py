@@ -1,21 +1,14 @@
-"""The kernels every finger has, written once for all of them.
-
-A kernel is declared by one decorated function. Its argument names choose its input ports, its name (after
-the finger's) is the C symbol, its docstring the documentation. The function is the definition, in SymPy; the
-``witness`` is another road to the same numbers, in CasADi. Both receive the finger with symbols for numbers.
-"""
+"""The kernels every finger has, written once for all of them."""
 
 from __future__ import annotations
 
-import inspect
-import json
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 from awiwi_gen.hand import Hand
 from awiwi_gen.hand_parts import Finger, Tendon
-from awiwi_gen.kernel import Kernel, Port, Route, Solver
+from awiwi_gen.kernel import Kernel, Port, Solver
+from awiwi_gen.kernels.declare import Family
 from awiwi_gen.models import chain, estimate, estimate_qr, lagrange, recursive, tendons, tendons_ad
 from awiwi_gen.models.derivatives import derivatives_of
 from awiwi_gen.units import J, N, Unit, kg, m, one, rad, s
@@ -30,62 +23,14 @@ class Size:
     links: int
 
 
-Outputs = Callable[[Size], dict[str, Port]]
-
-
-@dataclass(frozen=True)
-class Template:
-    """A kernel before it knows its finger."""
-
-    name: str
-    outputs: Outputs
-    source: str
-    definition: Route
-    witness: Route
-    solver: Callable[[Finger], Solver | None]
-
-
-TEMPLATES: list[Template] = []
-
-
-def straight_line(finger: Finger) -> None:
-    """No solver: the kernel is one formula for this finger."""
-
-
-def per_finger(
-    outputs: Outputs, source: str, witness: Route, solver: Callable[[Finger], Solver | None] = straight_line
-) -> Callable[[Route], Route]:
-    """Declare a kernel of every finger; for fingers that ``solver`` answers for, it iterates."""
-
-    def declare(definition: Route) -> Route:
-        TEMPLATES.append(Template(definition.__name__, outputs, source, definition, witness, solver))
-        return definition
-
-    return declare
+per_finger: Family[Size] = Family()
 
 
 def finger_kernels(hand: Hand, name: str, finger: Finger) -> list[Kernel]:
     """All kernels of one finger."""
     size = Size(len(finger.joints), len(finger.tendons), len(finger.links))
     ports = input_ports(hand, finger, size)
-    structure = json.dumps(finger.structure(), sort_keys=True)
-    kernels = []
-    for template in TEMPLATES:
-        solver = template.solver(finger)
-        kernel = Kernel(
-            name=f"{name}_{template.name}",
-            doc=inspect.getdoc(template.definition) or "",
-            source=template.source,
-            inputs={p: ports[p] for p in list(inspect.signature(template.definition).parameters)[1:]},
-            outputs=template.outputs(size),
-            routes={} if solver else {"sympy": template.definition, "casadi": template.witness},
-            part=finger,
-            path=f"fingers.{name}",
-            structure=structure,
-            solver=solver,
-        )
-        kernels.append(kernel)
-    return kernels
+    return per_finger.kernels(name, finger, f"fingers.{name}", finger.structure(), ports, size)
 
 
 def input_ports(hand: Hand, finger: Finger, size: Size) -> dict[str, Port]:
