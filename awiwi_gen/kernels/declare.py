@@ -85,3 +85,19 @@ class Family(Generic[Size]):
     ) -> list[Kernel]:
         """All kernels of one part, in the order of their declaration."""
         return [template.kernel(prefix, part, path, structure, ports, size) for template in self.templates]
+
+
+class Parameterless:
+    """The part of kernels that read no number of the hand: all their parameters are inputs."""
+
+    def quantities(self) -> dict[str, Any]:
+        """None."""
+        return {}
+
+    def structure(self) -> dict[str, Any]:
+        """All such parts are alike."""
+        return {}
+
+    def symbolic(self, leaf: Callable[..., Any]) -> Parameterless:
+        """Itself: there is nothing to name."""
+        return self
