@@ -1,7 +1,8 @@
-"""CasADi expressions into a graph: the only file that looks inside CasADi."""
+"""CasADi expressions into a graph, and graphs back into CasADi: the only file that looks inside CasADi."""
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Callable, Sequence
 from fractions import Fraction
 
@@ -61,3 +62,21 @@ def _rules(builder: Builder) -> dict[int, Callable[..., Ref]]:
     for operation, name in _UNARY.items():
         rules[operation] = lambda a, name=name: builder.call(name, a)
     return rules
+
+
+class Expressions:
+    """The algebra of CasADi expressions: with it, the interpreter turns a graph into one that CasADi can differentiate."""
+
+    def const(self, value: Fraction) -> ca.SX:
+        """A constant, rounded to double."""
+        return ca.SX(value.numerator / value.denominator)
+
+    def call(self, operation: str, *args: ca.SX) -> ca.SX:
+        """A function of the graph by its CasADi name."""
+        return getattr(ca, operation)(*args)
+
+    neg = staticmethod(operator.neg)
+    add = staticmethod(operator.add)
+    sub = staticmethod(operator.sub)
+    mul = staticmethod(operator.mul)
+    div = staticmethod(operator.truediv)
