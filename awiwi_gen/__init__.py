@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Literal
 
+import awiwi_gen.build as _build  # noqa: F401 before the function of that name, which then keeps it
 from awiwi_gen.errors import AwiwiError, BuildError, DimensionError, InputError, OutputError, VerificationError
 from awiwi_gen.hand import Hand
 

@@ -40,11 +40,19 @@ class Params(StrEnum):
     runtime = "runtime"
 
 
+class Trig(StrEnum):
+    """Whose sine and cosine the C calls."""
+
+    own = "own"
+    libm = "libm"
+
+
 HandFile = Annotated[Path | None, typer.Option("--hand", help="Hand file; the Awiwi hand if left out.")]
 Output = Annotated[Path, typer.Option("--output", "-o", help="Directory of the generated C.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for programs.")]
 Only = Annotated[str, typer.Option("--only", metavar="GLOB", help="Only kernels whose name matches.")]
 ScalarOption = Annotated[Scalar, typer.Option("--scalar", help="Scalar type of the C.")]
+TrigOption = Annotated[Trig, typer.Option("--trig", help="Own sine and cosine, or the C library's.")]
 ParamsOption = Annotated[Params, typer.Option("--params", help="Numbers as constants or in a struct.")]
 GENERATED = Path("generated")
 
@@ -70,27 +78,37 @@ def command(function: Callable[..., int | None]) -> Callable[..., None]:
     return run
 
 
-def make_job(hand: Path | None, scalar: Scalar = Scalar.f64, params: Params = Params.baked, only: str = "*") -> Any:
+def make_job(
+    hand: Path | None,
+    scalar: Scalar = Scalar.f64,
+    params: Params = Params.baked,
+    only: str = "*",
+    trig: Trig = Trig.libm,
+) -> Any:
     """A job from command-line options."""
     from awiwi_gen.emit.options import Options
     from awiwi_gen.hand import Hand
     from awiwi_gen.pipeline import Job
     from awiwi_gen.report import Progress
 
-    return Job(Hand.load(hand), Options(scalar.value, params.value), only, progress=Progress())
+    return Job(Hand.load(hand), Options(scalar.value, params.value, trig.value), only, progress=Progress())
 
 
 @command
 def generate(
     hand: HandFile = None, output: Output = GENERATED, scalar: ScalarOption = Scalar.f64,
-    params: ParamsOption = Params.baked, only: Only = "*", as_json: Json = False,
+    params: ParamsOption = Params.baked, trig: TrigOption = Trig.libm, only: Only = "*", as_json: Json = False,
     verify: Annotated[bool, typer.Option("--verify", help="Verify what was generated.")] = False,
 ) -> int:  # fmt: skip
     """Derive, compare the witnesses, optimise and write the C."""
     from awiwi_gen.pipeline import generate
     from awiwi_gen.report import print_json
 
-    job = make_job(hand, scalar, params, only)
+    job = make_job(hand, scalar, params, only, trig)
+    if verify:
+        from awiwi_gen.build import compiler
+
+        compiler()  # without one nothing can be verified: better told before anything is replaced
     changed = generate(job, output)
     if verify:
         return prove(job, output, as_json)
@@ -104,13 +122,13 @@ def generate(
 @command
 def check(
     hand: HandFile = None, output: Output = GENERATED, scalar: ScalarOption = Scalar.f64,
-    params: ParamsOption = Params.baked, only: Only = "*", as_json: Json = False,
+    params: ParamsOption = Params.baked, trig: TrigOption = Trig.libm, only: Only = "*", as_json: Json = False,
 ) -> int:  # fmt: skip
     """Check the hand file, and whether the generated C is fresh and unedited."""
     from awiwi_gen.pipeline import state
     from awiwi_gen.report import print_json, state_lines
 
-    job = make_job(hand, scalar, params, only)
+    job = make_job(hand, scalar, params, only, trig)
     found = state(job, output)
     again = " ".join(["awiwi-gen generate", *([f"--hand {hand}"] if hand else []), f"-o {output}"])
     if as_json:
@@ -140,11 +158,11 @@ def build(hand: HandFile = None, output: Output = GENERATED, as_json: Json = Fal
 @command
 def verify(
     hand: HandFile = None, output: Output = GENERATED, scalar: ScalarOption = Scalar.f64,
-    params: ParamsOption = Params.baked, only: Only = "*", as_json: Json = False,
+    params: ParamsOption = Params.baked, trig: TrigOption = Trig.libm, only: Only = "*", as_json: Json = False,
 ) -> int:  # fmt: skip
     """Compile the generated C as it stands and compare every kernel with its reference."""
     require(output)
-    return prove(make_job(hand, scalar, params, only), output, as_json)
+    return prove(make_job(hand, scalar, params, only, trig), output, as_json)
 
 
 @command

@@ -21,12 +21,14 @@ from dataclasses import dataclass
 from functools import cache
 from math import prod
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from awiwi_gen.cache import Cache, key
-from awiwi_gen.errors import BuildError
-from awiwi_gen.library import Library
+from awiwi_gen.errors import BuildError, NoCompilerError
 from awiwi_gen.resources import CSRC
+
+if TYPE_CHECKING:
+    from awiwi_gen.library import Library
 
 WARNINGS = ("-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wdouble-promotion", "-Wshadow", "-Werror")
 FLAGS = ("-std=c99", "-O2", "-fPIC", "-ffp-contract=off", *WARNINGS)
@@ -50,14 +52,24 @@ class Compiler:
 
 @cache
 def compiler() -> Compiler:
-    """``$CC``, or the first of cc, gcc and clang. Raises BuildError when there is none."""
+    """``$CC``, or the first of cc, gcc and clang. Raises NoCompilerError when there is none that works."""
     named = os.environ.get("CC", "").split()
     for command in [named] if named else [["cc"], ["gcc"], ["clang"]]:
         if shutil.which(command[0]):
-            found = Compiler(tuple(command), "")
-            return Compiler(tuple(command), found.run("--version").splitlines()[0])
+            return Compiler(tuple(command), _version(command))
     wanted = f"$CC is {named[0]!r}, which is not there" if named else "there is no cc, gcc or clang on the PATH"
-    raise BuildError(f"no C compiler: {wanted}; install one (Debian: apt-get install gcc) or set CC")
+    raise NoCompilerError(f"no C compiler: {wanted}; {MEND}")
+
+
+MEND = "install one (Debian: apt-get install gcc) or set CC"
+
+
+def _version(command: list[str]) -> str:
+    try:
+        done = subprocess.run([*command, "--version"], capture_output=True, text=True, check=True)
+    except (OSError, ValueError, subprocess.SubprocessError) as error:
+        raise NoCompilerError(f"no C compiler: {' '.join(command)} does not work ({error}); {MEND}") from None
+    return (done.stdout.splitlines() or ["of unknown version"])[0]
 
 
 def headers(directory: Path) -> str:
@@ -92,6 +104,8 @@ def declarations(directory: Path) -> str:
 
 def load(directory: Path, store: Cache | None = None) -> Library:
     """Compile a generated directory and load it as a Library. Raises BuildError."""
+    from awiwi_gen.library import Library
+
     store = store or Cache()
     manifest = json.loads((directory / "manifest.json").read_text(encoding="utf-8"))
     objects = compile_objects(directory, store)

@@ -4,7 +4,8 @@
     ├── InputError            what was handed in is wrong: a hand file, an argument; exit code 2; lists all its faults
     │   └── OutputError       the place to write to is missing, locked or somebody else's
     ├── DimensionError        an expression adds metres to newtons: the physics, not the file, is wrong
-    ├── BuildError            there is no C compiler, or it refused the generated code
+    ├── BuildError            the C compiler refused the generated code
+    │   └── NoCompilerError   there is none that works; exit code 2
     └── VerificationError     two independent routes to one number disagree
 
 Anything else that escapes is a bug of ours.
@@ -16,7 +17,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import ClassVar
 
-__all__ = ["AwiwiError", "BuildError", "DimensionError", "Fault", "InputError", "OutputError", "VerificationError"]
+__all__ = [
+    "AwiwiError", "BuildError", "DimensionError", "Fault", "InputError", "NoCompilerError", "OutputError",
+    "VerificationError",
+]  # fmt: skip
 
 _MOST_SHOWN = 100  # a terminal is not scrolled back farther than that; `faults` has them all
 
@@ -74,7 +78,13 @@ class DimensionError(AwiwiError):
 
 
 class BuildError(AwiwiError):
-    """The C compiler is missing, or failed."""
+    """The C compiler failed."""
+
+
+class NoCompilerError(BuildError):
+    """There is no C compiler, or none that works: the machine is to be mended, not the code."""
+
+    exit_code = 2
 
 
 class VerificationError(AwiwiError):

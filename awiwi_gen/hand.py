@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import Field
 
@@ -41,6 +41,26 @@ class Hand(Part):
     spring: Spring | None = None
     tendon: Fibre | None = None
 
+    @property
+    def tendons(self) -> int:
+        """How many tendons the fingers have together."""
+        return sum(len(finger.tendons) for finger in self.fingers.values())
+
+    @property
+    def blocks(self) -> dict[str, tuple[slice, slice]]:
+        """Finger -> its tendons and its joints in arrays over all tendons and joints of the hand."""
+        found, row, column = {}, 0, 0
+        for name, finger in self.fingers.items():
+            tendons, joints = len(finger.tendons), len(finger.joints)
+            found[name] = slice(row, row + tendons), slice(column, column + joints)
+            row, column = row + tendons, column + joints
+        return found
+
+    def structure(self) -> dict[str, Any]:
+        """What the kernels of the whole hand depend on besides numbers, ready for JSON."""
+        fingers = {name: finger.structure() for name, finger in self.fingers.items()}
+        return {"fingers": [*fingers.items()], "wrist": self.wrist and self.wrist.structure()}
+
     @classmethod
     def load(cls, path: str | os.PathLike[str] | None = None) -> Hand:
         """Read a hand file; without a path, the Awiwi hand of this package.
@@ -58,7 +78,7 @@ class Hand(Part):
     def _checked(cls, file: HandFile) -> Hand:
         hand = file.validated(cls)
         found = list(complaints(hand.limits, hand.fingers, hand.wrist))
-        found += actuator_complaints(hand.motor, hand.spring, hand.tendon, hand.fingers)
+        found += actuator_complaints(hand.motor, hand.spring, hand.tendon, hand.tendons)
         if found:
             raise file.error(found)
         return hand

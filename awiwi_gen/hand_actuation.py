@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from awiwi_gen.hand_parts import Angle, FingerName, Length, Measure, Moment, Part, Size, Source
+from awiwi_gen.hand_parts import Angle, Length, Measure, Moment, Part, Size, Source
 from awiwi_gen.units import Quantity
 
 __all__ = ["CalibratedUnit", "Fibre", "Friction", "Motor", "Ripple", "Roller", "Sensor", "Spring", "Wheel"]
@@ -87,14 +87,21 @@ class Sensor(Part):
 
 
 class CalibratedUnit(Part):
-    """One tendon's own mechanism: the numbers that were measured on it, in place of those of the design."""
+    """One tendon's own mechanism: the numbers that were measured on it, in place of those of the design.
 
-    finger: FingerName
-    tendon: Annotated[int, Field(ge=0, le=63, examples=["3"])]
+    `tendon` counts all tendons of the hand from zero, finger by finger, as they lie in the forearm.
+    """
+
+    tendon: Annotated[int, Field(ge=0, examples=["11"])]
     rate: Annotated[Quantity, Measure("7 N/mm", "0", "1000 kN/m")] | None = None
     free_length: Size | None = None
     sensor: Sensor | None = None
     source: Source
+
+    def measured(self) -> dict[str, Any]:
+        """The design's keys that this unit replaces, with its values."""
+        own = {"rate": self.rate, "free_length": self.free_length, "sensor": self.sensor}
+        return {key: value for key, value in own.items() if value is not None}
 
 
 class Spring(Part):
@@ -121,14 +128,16 @@ class Spring(Part):
     units: Annotated[tuple[CalibratedUnit, ...], Field(strict=False, max_length=64, examples=["[[spring.units]]"])] = ()
     source: Source
 
+    @property
+    def calibrated(self) -> dict[int, Spring]:
+        """The mechanisms of the tendons that have their own: the design, with what was measured in its place."""
+        return {unit.tendon: self.model_copy(update=unit.measured()) for unit in self.units}
+
     def structure(self) -> dict[str, Any]:
         """All that is not a number, ready for JSON."""
         return {
             "windings": [wheel.winding for wheel in (self.motor, self.roller, self.fixed)],
-            "units": [
-                [unit.finger, unit.tendon, unit.rate is None, unit.free_length is None, unit.sensor is None]
-                for unit in self.units
-            ],
+            "units": [[unit.tendon, sorted(unit.measured())] for unit in self.units],
         }
 
 

@@ -16,7 +16,12 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from awiwi_gen.hand_actuation import Spring
 
-__all__ = ["Lever", "Pose", "chebyshev"]
+__all__ = ["BEYOND", "CURVE_NODES", "POWERS", "READING_NODES", "Lever", "Pose", "chebyshev"]
+
+CURVE_NODES = 17  # samples for curves over elongation or force; each two more make the error ten times smaller
+READING_NODES = 9  # samples for curves over sensor readings, which are so much smoother
+POWERS = 7  # coefficients of a calibration polynomial from the bench: degree 6 is finer than its data
+BEYOND = Fraction(65, 64)  # square of how far curves may be followed, in halves of the travel: an 0.8 % margin
 
 Vector = tuple[complex, complex]
 

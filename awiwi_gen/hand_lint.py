@@ -65,7 +65,7 @@ def _upside_down(part: Part, low: str, high: str) -> Iterator[Complaint]:
 def _wrist(wrist: Wrist, tendons: int) -> Iterator[Complaint]:
     yield from sources(wrist)
     if len(wrist.tendons) != tendons:
-        yield ("tendons",), f"has {len(wrist.tendons)} entries, but the fingers have {tendons} tendons; each passes here"
+        yield ("tendons",), f"has {len(wrist.tendons)} entries, but {tendons} tendons of the fingers pass here"
     swings = {"q71": wrist.q71, "q73": wrist.q73}.items()
     backwards = [fault for key, swing in swings for fault in below((key,), _upside_down(swing, "low", "high"))]
     yield from backwards or closure(wrist)

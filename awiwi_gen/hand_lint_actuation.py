@@ -2,27 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 
 from awiwi_gen.hand_actuation import CalibratedUnit, Fibre, Motor, Sensor, Spring
 from awiwi_gen.hand_lever import Lever, Pose
 from awiwi_gen.hand_lint import Complaint, below, sources
-from awiwi_gen.hand_parts import Finger
 
 __all__ = ["actuator_complaints"]
 
 _STEPS = 200
+_FARTHEST_ANGLE = 1000.0  # rad; sines of larger arguments have lost too many digits, and the generated ones refuse them
 _LEAST_LEVERAGE = 0.02  # of the lever's arm: nearer to a dead point, force and stiffness have no bound worth its name
 
 
 def actuator_complaints(
-    motor: Motor | None, spring: Spring | None, tendon: Fibre | None, fingers: Mapping[str, Finger]
+    motor: Motor | None, spring: Spring | None, tendon: Fibre | None, tendons: int
 ) -> Iterator[Complaint]:
-    """All that is wrong with actuators whose single values are all right."""
+    """All that is wrong with actuators whose single values are all right, for a hand with so many tendons."""
     if motor:
         yield from below(("motor",), _motor(motor))
     if spring:
-        yield from below(("spring",), _spring(spring, fingers))
+        yield from below(("spring",), _spring(spring, tendons))
     if tendon:
         yield from below(("tendon",), sources(tendon))
     if motor and spring and motor.pulley != spring.motor.radius:
@@ -32,6 +32,11 @@ def actuator_complaints(
 
 def _motor(motor: Motor) -> Iterator[Complaint]:
     yield from sources(motor)
+    turned = float(motor.travel) * float(motor.gear_ratio)
+    harmonic = max((ripple.harmonic for ripple in motor.ripple if ripple.shaft == "input"), default=0)
+    if turned * harmonic > _FARTHEST_ANGLE:
+        limit = f"harmonic {harmonic} of its ripple is computed to {_FARTHEST_ANGLE:.0f}/{harmonic} rad"
+        yield ("travel",), f'= "{motor.travel}" turns the rotor by {turned:.6g} rad; {limit}'
     lines = [(ripple.shaft, ripple.harmonic) for ripple in motor.ripple]
     for index, line in enumerate(lines):
         if line in lines[:index]:
@@ -39,7 +44,7 @@ def _motor(motor: Motor) -> Iterator[Complaint]:
             yield ("ripple", index), f"is harmonic {line[1]} of the {line[0]} shaft, which ripple[{first}] is already"
 
 
-def _spring(spring: Spring, fingers: Mapping[str, Finger]) -> Iterator[Complaint]:
+def _spring(spring: Spring, tendons: int) -> Iterator[Complaint]:
     yield from sources(spring)
     yield from below(("sensor",), _sensor(spring.sensor))
     if spring.slack == spring.taut:
@@ -49,9 +54,8 @@ def _spring(spring: Spring, fingers: Mapping[str, Finger]) -> Iterator[Complaint
     if fault:
         yield (), fault
     for index, unit in enumerate(spring.units):
-        yield from below(("units", index), _unit(spring.units, index, fingers))
-        own = {"rate": unit.rate or spring.rate, "free_length": unit.free_length or spring.free_length}
-        if not fault and (own_fault := _obstacle(spring.model_copy(update=own))):
+        yield from below(("units", index), _unit(spring.units, index, tendons))
+        if not fault and (own_fault := _obstacle(spring.model_copy(update=unit.measured()))):
             yield ("units", index), own_fault
 
 
@@ -60,20 +64,17 @@ def _sensor(sensor: Sensor) -> Iterator[Complaint]:
         yield ("taut",), f'= "{sensor.taut}" is what it reads when slack: it would measure nothing'
 
 
-def _unit(units: Sequence[CalibratedUnit], index: int, fingers: Mapping[str, Finger]) -> Iterator[Complaint]:
+def _unit(units: Sequence[CalibratedUnit], index: int, tendons: int) -> Iterator[Complaint]:
     """A unit is that of an existing tendon, and the only one."""
     unit = units[index]
     yield from sources(unit)
     if unit.sensor:
         yield from below(("sensor",), _sensor(unit.sensor))
-    if unit.finger not in fingers:
-        yield ("finger",), f'= "{unit.finger}" names no finger; known here: {", ".join(fingers)}'
-    elif unit.tendon >= len(fingers[unit.finger].tendons):
-        last = len(fingers[unit.finger].tendons) - 1
-        yield ("tendon",), f"= {unit.tendon} names no tendon of {unit.finger}; they are 0 to {last}"
-    owners = [(other.finger, other.tendon) for other in units]
-    if (first := owners.index(owners[index])) < index:
-        yield ("tendon",), f"= {unit.tendon} of {unit.finger} is units[{first}] already"
+    if unit.tendon >= tendons:
+        yield ("tendon",), f"= {unit.tendon} is none of this hand's tendons; they count from 0 to {tendons - 1}"
+    first = next(i for i, other in enumerate(units) if other.tendon == unit.tendon)
+    if first < index:
+        yield ("tendon",), f"= {unit.tendon} is units[{first}] already"
 
 
 def _obstacle(spring: Spring) -> str:

@@ -22,7 +22,7 @@ from pydantic import Field
 
 from awiwi_gen.hand_parts import Angle, Keys, Part, Point, Source
 
-__all__ = ["Swing", "Wrist", "WristTendon", "closure"]
+__all__ = ["Linkage", "Swing", "Wrist", "WristTendon", "closure"]
 
 _STEPS = 40  # per axis, of the grid of poses on which the bars must close
 _MARGIN = 1e-6  # how far, relatively, from the end of its reach a bar must stay
@@ -81,7 +81,7 @@ def closure(wrist: Wrist) -> Iterator[tuple[Keys, str]]:
     if drawn := list(_misdrawn(wrist)):
         yield from drawn
         return
-    linkage, (low, high) = _Linkage.of(wrist), wrist.range
+    linkage, (low, high) = Linkage.of(wrist), wrist.range
     for i in range(_STEPS + 1):
         for k in range(_STEPS + 1):
             pose = low[0] + (high[0] - low[0]) * i / _STEPS, low[1] + (high[1] - low[1]) * k / _STEPS
@@ -94,23 +94,26 @@ def closure(wrist: Wrist) -> Iterator[tuple[Keys, str]]:
 
 def _misdrawn(wrist: Wrist) -> Iterator[tuple[Keys, str]]:
     """What the points of the neutral pose must fulfil, without rounding."""
-    (_, _, z0), (x, y, z) = (tuple(value.value for value in point) for point in (wrist.a0, wrist.a))
-    bx, by, bz = (value.value for value in wrist.b)
+    x0, _, z0 = (coordinate.value for coordinate in wrist.a0)
+    x, y, z = (coordinate.value for coordinate in wrist.a)
+    bx, by, bz = (coordinate.value for coordinate in wrist.b)
     if by <= 0 or not (bx or bz):
         yield ("b",), "does not cross the width of the wrist: expected y = B0C0 above zero, and x or z other than zero"
     for axis, found, wanted in (("x", x, bx), ("y", y, by / 2)):
         if found != wanted:
             opposite = f"expected {float(wanted) * 1e3:.6g} mm, straight across the palm from the middle of BC"
             yield ("a",), f"has {axis} = {float(found) * 1e3:.6g} mm; {opposite}"
+    if x0 >= bx:
+        yield ("a0", 0), f'= "{wrist.a0[0]}" lies no nearer to the elbow than the palm, with b at x = "{wrist.b[0]}"'
+    off_plane = z0 * bx - x0 * bz  # of A0 from the plane of the side bars, times their length in it
     if z == bz:
         yield ("a",), "lies on BC: the palm's three points must form a triangle"
-    off_plane = z0 * bx - wrist.a0[0].value * bz  # of A0 from the plane of the side bars, times their length in it
-    if z != bz and off_plane * (bz - z) <= 0:
-        yield ("a",), "lies on the wrong side: bar AA0 must cross the plane of the side bars, from one side to the other"
+    elif off_plane * (bz - z) <= 0:
+        yield ("a",), "lies on the same side of the side bars as A0; expected on the other, so that the bars cross"
 
 
 @dataclass(frozen=True)
-class _Linkage:
+class Linkage:
     """The lengths that decide whether the bars close [m]."""
 
     a0: tuple[float, float, float]
@@ -120,7 +123,7 @@ class _Linkage:
     middle: float
 
     @classmethod
-    def of(cls, wrist: Wrist) -> _Linkage:
+    def of(cls, wrist: Wrist) -> Linkage:
         x, y, z = (float(value) for value in wrist.a0)
         points = [tuple(float(value) for value in point) for point in (wrist.a, wrist.b)]
         a, b = points

@@ -52,15 +52,18 @@ class Port:
 class Solver:
     """What makes a kernel that must iterate: a template that binds a solver of csrc to generated kernels.
 
-    ``uses`` are the families of the kernels of the same part that it calls, ``arrays`` become C constants,
-    ``strings`` go to the template as they are. ``problem`` names what is solved, so that verification knows
-    well-posed inputs and their exact solution; a compiled result may differ from that by ``tolerance`` of
-    the largest, per scalar type.
+    ``uses`` are the families of the kernels of the same part that it calls; ``equations`` and ``unknowns`` tell
+    which of their tendons and joints take part. ``arrays`` become C constants, ``strings`` go to the template as
+    they are. ``problem`` names what is solved, so that verification knows well-posed inputs and their exact
+    solution; a compiled result may differ from that by ``tolerance`` of the largest, per scalar type.
+    ``iterations`` counts the calls of the used kernels in the worst case.
     """
 
     template: str
     problem: str
     uses: tuple[str, ...]
+    equations: tuple[int, ...]
+    unknowns: tuple[int, ...]
     arrays: Mapping[str, tuple[float, ...]]
     strings: Mapping[str, str]
     iterations: int
@@ -107,4 +110,4 @@ class Kernel:
     @property
     def family(self) -> str:
         """The kernel's name without its part: what the five fingers' versions have in common."""
-        return self.name.removeprefix(self.path.rpartition(".")[2] + "_")
+        return self.name.removeprefix(self.path.partition(".")[2] + "_")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import namedtuple
 from collections.abc import Iterator, Mapping
+from functools import cache
 from math import prod
 from typing import Any
 
@@ -12,6 +13,21 @@ import numpy as np
 from awiwi_gen.errors import InputError
 
 Array = np.ndarray[Any, Any]
+
+
+@cache
+def result_type(name: str, fields: tuple[str, ...]) -> Any:
+    """The named tuple of a kernel with several outputs; it survives pickling although no module has it."""
+
+    def reduce(self: tuple[Array, ...]) -> tuple[Any, ...]:
+        return restore, (name, fields, tuple(self))
+
+    return type(name, (namedtuple(name, fields),), {"__slots__": (), "__reduce__": reduce})
+
+
+def restore(name: str, fields: tuple[str, ...], values: tuple[Array, ...]) -> Any:
+    """The result that was pickled."""
+    return result_type(name, fields)(*values)
 
 
 class KernelFunction:
@@ -35,7 +51,7 @@ class KernelFunction:
         self._pointer = "double[]" if self.dtype == np.float64 else "float[]"
         fields = [o["name"] for o in self.outputs] + (["status"] if entry["status"] else [])
         self._has_status: bool = entry["status"]
-        self._result = namedtuple(self.name, fields)  # type: ignore[misc]
+        self._result = result_type(self.name, tuple(fields))
 
     @property
     def signature(self) -> str:
@@ -50,6 +66,7 @@ class KernelFunction:
         return f"<kernel {self.name}: {self.signature}>"
 
     def __call__(self, *args: Any, **named: Any) -> Any:
+        """Evaluate the kernel at one or many points."""
         arrays = [self._checked(port, value) for port, value in zip(self.inputs, self._bound(args, named), strict=True)]
         leads = [a.shape[: a.ndim - len(p["shape"])] for a, p in zip(arrays, self.inputs, strict=True)]
         try:
@@ -57,9 +74,6 @@ class KernelFunction:
         except ValueError:
             shapes = ", ".join(f"{p['name']} {a.shape}" for p, a in zip(self.inputs, arrays, strict=True))
             raise InputError(f"{self.name}: leading dimensions do not broadcast: {shapes}") from None
-        count = 1
-        for n in lead:
-            count *= n
         arguments: list[Any] = [prod(lead)] if self._params is None else [prod(lead), self._params]
         for array, own, port in zip(arrays, leads, self.inputs, strict=True):
             if own != lead and any(n != 1 for n in own):
@@ -88,7 +102,7 @@ class KernelFunction:
     def _checked(self, port: dict[str, Any], value: Any) -> Array:
         shape = tuple(port["shape"])
         try:
-            array: Array = np.ascontiguousarray(value, dtype=self.dtype)
+            array: Array = np.asarray(value, dtype=self.dtype, order="C")
         except (TypeError, ValueError):
             raise InputError(f"{self.name}: {port['name']} = {value!r} is not an array of numbers") from None
         if array.shape[max(array.ndim - len(shape), 0) :] != shape:
@@ -98,12 +112,17 @@ class KernelFunction:
 
 
 class Library(Mapping[str, KernelFunction]):
-    """All kernels of a compiled hand, by name as attributes or items."""
+    """All kernels of a compiled hand, by name as attributes or items.
+
+    ``c`` and ``ffi`` are what cffi made of the firmware's header: every function of it, kernels and solvers, called as
+    in C, as in ``library.c.awiwi_index_mass_matrix(q, M)`` with arrays from ``library.ffi.new("double[4]")``.
+    """
 
     def __init__(self, manifest: Mapping[str, Any], lib: Any, ffi: Any) -> None:
         dtype = np.float64 if manifest["c_type"] == "double" else np.float32
         prefix = manifest["prefix"]
         self.manifest = manifest
+        self.c, self.ffi = lib, ffi
         self.digest: str = ffi.string(getattr(lib, f"{prefix}_model_digest")).decode()
         self._kernels = {}
         for entry in manifest["kernels"]:

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 from awiwi_gen.cache import Cache, code_digest, key, libraries
 from awiwi_gen.emit.options import Options
-from awiwi_gen.emit.tree import MANIFEST, State, inspect, install, sha256
+from awiwi_gen.emit.tree import MANIFEST, State, inspect, install, require_place, sha256, sweep
 from awiwi_gen.errors import InputError
 from awiwi_gen.hand import Hand
 
@@ -94,8 +94,10 @@ def generate(job: Job, directory: Path) -> bool:
     Raises InputError for a bad hand, DimensionError and VerificationError for bad physics, OutputError when
     the directory cannot be replaced; whatever is raised, the directory is as it was.
     """
+    sweep(directory)
     if state(job, directory).fresh:
         return False
+    require_place(directory)
     from awiwi_gen.emit.files import shared_files
     from awiwi_gen.records import manifest_entry
 
@@ -128,18 +130,18 @@ def make_records(job: Job) -> dict[str, Record]:
     made: dict[str, Record] = {}
     closed = [kernel for kernel in job.kernels if kernel.solver is None]
     graphs = [load_graphs(kernel, job.store) for kernel in closed]
-    tasks = [
+    tasks: list[tuple[str, Any, tuple[Any, ...]]] = [
         (record_key(kernel, own, job.hand.prefix, job.options), make_record, (kernel, own))
         for kernel, own in zip(closed, graphs, strict=True)
     ]
     made |= zip((kernel.name for kernel in closed), _kept_records(job, "emit", tasks), strict=True)
     iterating = [kernel for kernel in job.kernels if kernel.solver is not None]
     used = [{family: made[name] for family, name in kernel.needs.items()} for kernel in iterating]
-    tasks = [
+    solving: list[tuple[str, Any, tuple[Any, ...]]] = [
         (solver_key(kernel, own, job.hand.prefix, job.options), make_solver_record, (kernel, own))
         for kernel, own in zip(iterating, used, strict=True)
     ]
-    made |= zip((kernel.name for kernel in iterating), _kept_records(job, "solve", tasks), strict=True)
+    made |= zip((kernel.name for kernel in iterating), _kept_records(job, "solve", solving), strict=True)
     return {kernel.name: made[kernel.name] for kernel in job.kernels}
 
 

@@ -23,14 +23,23 @@ from awiwi_gen.ir.graph import Graph
 from awiwi_gen.ir.passes import optimise
 from awiwi_gen.ir.passes.bind import bind
 from awiwi_gen.kernel import Kernel, Port, Solver
-from awiwi_gen.verify.problems import PROBLEMS
 from awiwi_gen.verify.physics import Law, obey
+from awiwi_gen.verify.problems import PROBLEMS, LeastSquares
 from awiwi_gen.verify.reference import BallArrays, Reference, ball_values, disagreement, reference
 from awiwi_gen.verify.samples import SEED, draw
 from awiwi_gen.verify.verdict import Verdict, judge, judge_solver
 
 ROUTES_AGREE = 1e-40  # level 4
 PASSES_AGREE = 1e-50  # level 2
+DERIVATION_CODE = tuple(
+    f"awiwi_gen/{place}"
+    for place in ("models", "control", "kernels", "derive.py", "kernel.py", "units.py", "ir/graph.py", "ir/builder.py",
+                  "ir/from_sympy.py", "ir/from_casadi.py")
+)  # fmt: skip
+RECORD_CODE = (
+    *(f"awiwi_gen/{place}" for place in ("ir", "emit", "verify", "records.py", "kernel.py", "units.py")),
+    "templates",
+)
 HOPELESS = 2  # passes seldom halve a cost
 
 
@@ -50,8 +59,7 @@ class Record:
 
 def derivation_key(kernel: Kernel, route: str) -> str:
     """What a derivation depends on: the structure of the part and the code of the physics, no number."""
-    code = code_digest("awiwi_gen/models", "awiwi_gen/kernels", "awiwi_gen/derive.py", "awiwi_gen/ir/graph.py",
-                       "awiwi_gen/ir/from_sympy.py", "awiwi_gen/ir/from_casadi.py", "awiwi_gen/units.py")  # fmt: skip
+    code = code_digest(*DERIVATION_CODE)
     return key(kernel.structure, kernel.family, route, code, libraries())
 
 
@@ -59,8 +67,7 @@ def record_key(kernel: Kernel, graphs: Mapping[str, Graph], prefix: str, options
     """What a record depends on: the derivations, the numbers in them, the ports, the compiler's own code."""
     values = kernel.part.quantities()
     used = {path: str(values[path].value) for graph in graphs.values() for path in graph.params}
-    code = code_digest("awiwi_gen/ir", "awiwi_gen/emit", "awiwi_gen/records.py", "awiwi_gen/kernel.py", "templates",
-                       "awiwi_gen/verify/reference.py", "awiwi_gen/verify/samples.py", "awiwi_gen/verify/problems.py")  # fmt: skip
+    code = code_digest(*RECORD_CODE)
     digests = {route: graph.digest for route, graph in graphs.items()}
     ports = (dict(kernel.inputs), dict(kernel.outputs), kernel.doc, kernel.source, kernel.solver)
     return key(kernel.name, digests, json.dumps(used, sort_keys=True), ports, prefix, options, code, libraries())
@@ -145,26 +152,22 @@ def make_solver_record(
     runtime = any(record.graph is not None and record.graph.params for record in used.values())
     functions = {family: record.function for family, record in used.items()}
     function, text = solver_function(kernel, solver, prefix, options, functions, runtime)
-    inputs = solver_inputs(kernel, used, options)
-    exact = PROBLEMS[solver.problem].solve(inputs, _graphs(used), _values(kernel))
+    problem = _problem(kernel, used)
+    exact = problem.solve(problem.sample(draw(kernel.inputs, kernel.path, options.dtype)))
     return Record(digest, None, function, text, "solver", 0.0, 0.0, exact)
 
 
-def solver_inputs(kernel: Kernel, used: Mapping[str, Record], options: Options) -> dict[str, Any]:
-    """Well-posed sample inputs of a kernel with a solver."""
+def _problem(kernel: Kernel, used: Mapping[str, Record]) -> LeastSquares:
+    """What a kernel with a solver solves."""
     solver = _solver(kernel)
-    drawn = draw(kernel.inputs, kernel.path, options.dtype)
-    return PROBLEMS[solver.problem].sample(drawn, _graphs(used), _values(kernel))
+    graphs = {family: record.graph for family, record in used.items() if record.graph is not None}
+    return PROBLEMS[solver.problem](solver, graphs, _values(kernel))
 
 
 def _solver(kernel: Kernel) -> Solver:
     if kernel.solver is None:
         raise ValueError(f"{kernel.name} has no solver")
     return kernel.solver
-
-
-def _graphs(used: Mapping[str, Record]) -> dict[str, Graph]:
-    return {family: record.graph for family, record in used.items() if record.graph is not None}
 
 
 def _values(kernel: Kernel) -> dict[str, Fraction]:
@@ -176,8 +179,10 @@ def judge_record(
 ) -> Verdict:
     """Levels 1 and 3 for one compiled kernel, joined with levels 2 and 4 of its record."""
     if record.graph is None:
-        inputs, tolerance = solver_inputs(kernel, used, options), _solver(kernel).tolerance[options.scalar]
-        return judge_solver(kernel.name, record.reference, inputs, function, tolerance, SEED)
+        problem, tolerance = _problem(kernel, used), _solver(kernel).tolerance[options.scalar]
+        inputs = problem.sample(draw(kernel.inputs, kernel.path, options.dtype))
+        mirror = problem.mirror(inputs)
+        return judge_solver(kernel.name, record.reference, mirror, inputs, function, tolerance, SEED)
     return judge(
         kernel.name,
         record.graph,
@@ -190,6 +195,7 @@ def judge_record(
         record.passes,
         SEED,
         options.dtype,
+        options.trig == "own",
     )
 
 
@@ -197,7 +203,7 @@ def physics(members: Sequence[tuple[Kernel, Record]], ports: Mapping[str, Port],
     """Level 5 for the kernels of one part."""
     first = members[0][0]
     graphs = {kernel.family: record.graph for kernel, record in members if record.graph is not None}
-    return obey(first.path, graphs, draw(ports, first.path, options.dtype), _values(first))
+    return obey(first.path or "hand", graphs, draw(ports, first.path, options.dtype), _values(first))
 
 
 def manifest_entry(kernel: Kernel, record: Record) -> dict[str, Any]:

@@ -96,7 +96,7 @@ def state_lines(state: State, directory: str, mend: str) -> list[str]:
     lines += [f"{directory}/{name}: missing" for name in state.lost]
     lines += [f"{directory}/{name}: not generated; it does not belong here" for name in state.foreign]
     lines += [f"{directory}: stale, another {REASONS.get(key, key)} than it was made from" for key in state.stale]
-    return [*lines, f"to mend it: {mend}"]
+    return [*lines, f"to mend it: {'move that away, then ' if state.foreign else ''}{mend}"]
 
 
 REASONS = {"hand": "hand file", "generator": "version of awiwi_gen", "libraries": "set of libraries"}
@@ -109,6 +109,7 @@ class Progress:
         self._terminal = sys.stderr.isatty()
 
     def __call__(self, stage: str, done: int, total: int) -> None:
+        """Tell how far a stage has come."""
         if self._terminal:
             end = "\n" if done == total else ""
             print(f"\r{stage} {done}/{total}", end=end, file=sys.stderr, flush=True)

@@ -36,8 +36,10 @@ typedef struct awiwi_problem {
 int awiwi_least_squares(const awiwi_problem *problem, const awiwi_real *measured, const awiwi_real *start,
                         int iterations, awiwi_real tolerance, awiwi_real *q);
 
-/* The gradient search of algorithm 1, mended: exactly `iterations` trials of step length `step`, halved when a
-   trial does not improve. Writes q[n]; returns an awiwi_status, AWIWI_OK unless something is not finite. */
+/* The gradient search of algorithm 1, mended: exactly `iterations` trials, the first of length `step` times the
+   gradient of the squared residual; a trial that does not improve is not taken, and halves the step. Step 0 stands
+   for 2 over the sum of the curvatures at the start: it cannot diverge, and no other fixed step brings the worse of
+   two unknowns nearer. Writes q[n]; returns an awiwi_status, AWIWI_OK unless something is not finite. */
 int awiwi_gradient_search(const awiwi_problem *problem, const awiwi_real *measured, const awiwi_real *start,
                           int iterations, awiwi_real step, awiwi_real *q);
 

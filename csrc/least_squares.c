@@ -125,15 +125,19 @@ int awiwi_gradient_search(const awiwi_problem *p, const awiwi_real *measured, co
                           awiwi_real step, awiwi_real *q)
 {
     vector gradient, trial_gradient, trial;
-    matrix unused;
-    awiwi_real blur;
+    matrix normal;
+    awiwi_real blur, curvature = 0;
     if (!begin(p, measured, start, q))
         return AWIWI_NOT_FINITE;
-    awiwi_real best = cost(p, measured, q, gradient, unused, &blur);
+    awiwi_real best = cost(p, measured, q, gradient, normal, &blur);
+    for (int j = 0; j < p->n; j++)
+        curvature += normal[j][j];
+    if (!(step > 0))
+        step = curvature > 0 ? 1 / curvature : 0;
     for (int i = 0; i < iterations; i++) {
         for (int j = 0; j < p->n; j++) /* the gradient of the whole square is twice that of half of it */
             trial[j] = clamp(q[j] - 2 * step * gradient[j], p->low[j], p->high[j]);
-        const awiwi_real found = cost(p, measured, trial, trial_gradient, unused, &blur);
+        const awiwi_real found = cost(p, measured, trial, trial_gradient, normal, &blur);
         if (found < best) {
             best = found;
             for (int j = 0; j < p->n; j++) {

@@ -7,11 +7,10 @@
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  kinetic[1] in J
  *   out  potential[1] in J
- * Cost: 145 add, 183 mul, 2 div, 2 neg, 1 sqrt, 5 sincos.
+ * Cost: 140 add, 176 mul, 2 div, 1 neg, 1 sqrt, 5 sincos.
  * Inputs: sha256 82c94b8f69f95d4e333edef1e77b9be9e828f140a78270df43f42bcfcd69897c.
  */
 #include <math.h>
-
 #include "kernels.h"
 
 void awiwi_fifth_energy(const double q[restrict 4], const double qd[restrict 4], const double g[restrict 3], double kinetic[restrict 1], double potential[restrict 1])
@@ -39,62 +38,61 @@ void awiwi_fifth_energy(const double q[restrict 4], const double qd[restrict 4],
     const double t18 = t13 + 0.7692307692307693*t5;
     const double t19 = t16 + 0.7692307692307693*t7;
     const double t20 = t11*t18 + t14*t19 + t10 + t9;
-    const double t21 = 7.2e-10*t3 + 3e-09*t4;
-    const double t22 = 2.22e-09*t1 + 2.4608e-07*t6 + t21 + 0.003*t7;
+    const double t21 = 2.52e-09*t3 + 7.5e-08*t4;
+    const double t22 = 2.22e-09*t1 + 2.4608e-07*t6 + t21;
     const double t23 = 4.28e-09*cos_q2 + 4.517e-07*sin_q2 + t22;
-    const double t24 = 0.0003465*cos_q2 - 1.4e-06*sin_q2;
-    const double t25 = t24 + t13;
-    const double t26 = 0.012*t25;
-    const double t27 = -t26 - t17 - 6.4814e-07;
-    const double t28 = 1.011997e-05*cos_q2 - 2.62e-08*sin_q2;
-    const double t29 = 2.0599e-06*t1 - 1.228e-08*t6;
-    const double t30 = 2.6088e-07*t3 - 7.2e-09*t4;
-    const double t31 = cos_q2*t28 + t1*t29 + t3*t30;
-    const double t32 = qd[2]*t23 + qd[3]*(0.7692307692307693*t21 + 0.002307692307692308*t7 + t22) - 0.5*qd[1]*(0.044*t6*t7 + 0.066*sin_q2*t16 + t27 + 1.251731e-05 - t31);
+    const double t24 = 1.4e-06*cos_q2 + 0.0003465*sin_q2;
+    const double t25 = t24 + t16;
+    const double t26 = 0.0003465*cos_q2 - 1.4e-06*sin_q2;
+    const double t27 = t26 + t13;
+    const double t28 = t25 - t27;
+    const double t29 = 0.012*t28 - t17 - 6.4814e-07;
+    const double t30 = 1.011997e-05*cos_q2 - 2.62e-08*sin_q2;
+    const double t31 = 2.0599e-06*t1 - 1.228e-08*t6;
+    const double t32 = 2.6088e-07*t3 - 7.2e-09*t4;
+    const double t33 = cos_q2*t30 + t1*t31 + t3*t32;
+    const double t34 = qd[2]*t23 + qd[3]*(t22 + 0.7692307692307693*t21) - 0.5*qd[1]*(0.044*t6*t7 + 0.066*sin_q2*t16 + t29 + 1.251731e-05 - t33 - 0.012*t25);
     const double cos_q1 = cos(q[1]);
     const double sin_q1 = sin(q[1]);
-    const double t33 = t25 + 8.79e-05;
-    const double t34 = 1.46e-05*cos_q1 + sin_q1*t33;
-    const double t35 = q[0] + 1.0471975511965979;
-    const double t36 = cos(t35);
-    const double t37 = 0.01*t36;
-    const double t38 = 0.00024*t36 - 0.000244;
-    const double t39 = 1.0/t38;
-    const double t40 = sin(t35);
-    const double t41 = t38 + 6.475e-05;
-    const double t42 = t37 - 0.012;
-    const double t43 = sqrt(-(5.625e-05*t38) - 0.25*t41*t41);
-    const double t44 = t39*(0.005*t40*t41 + t42*t43);
-    const double t45 = 0.01*t40;
-    const double t46 = t39*(0.5*t42*t41 - t45*t43);
-    const double t47 = 67.22093858258893*t44 - 115.1482661348124*t46;
-    const double t48 = 115.1482661348124*t44 + 67.22093858258893*t46;
-    const double t49 = 1.4e-06*cos_q2 + 0.0003465*sin_q2;
-    const double t50 = t49 + t16;
-    const double t51 = 0.006*t50;
-    const double t52 = cos_q1*(t23 - 2e-10) + sin_q1*(sin_q2*t28 + t6*t29 + t4*t30 + t11*t16 + t14*t13 + t51 + 0.022*(t1*t7 + t6*t5) + 2.304e-08) - 0.006*t34;
-    const double t53 = (0.00012*t40 + t45*t46 - t37*t44)/t43 - 1.0;
-    const double t54 = t53 + 1.0;
-    const double t55 = 0.044*t1*t5 + t31 + 0.066*cos_q2*t13 + t26 + 6.0786e-07;
-    const double t56 = 3e-09*t3 - 7.2e-10*t4;
-    const double t57 = 2.4608e-07*t1 + t56 + 0.003*t5 - 2.22e-09*t6;
+    const double t35 = t27 + 8.79e-05;
+    const double t36 = q[0] + 1.0471975511965979;
+    const double t37 = cos(t36);
+    const double t38 = 0.01*t37;
+    const double t39 = 0.00024*t37 - 0.000244;
+    const double t40 = 1.0/t39;
+    const double t41 = sin(t36);
+    const double t42 = t39 + 6.475e-05;
+    const double t43 = t38 - 0.012;
+    const double t44 = sqrt(-(5.625e-05*t39) - 0.25*t42*t42);
+    const double t45 = t40*(0.005*t41*t42 + t43*t44);
+    const double t46 = 0.01*t41;
+    const double t47 = t40*(0.5*t43*t42 - t46*t44);
+    const double t48 = 67.22093858258893*t45 - 115.1482661348124*t47;
+    const double t49 = 115.1482661348124*t45 + 67.22093858258893*t47;
+    const double t50 = 0.006*t28;
+    const double t51 = cos_q1*(t23 - 8.78e-08) + sin_q1*(sin_q2*t30 + t6*t31 + t4*t32 + t11*t16 + t14*t13 + 0.022*(t1*t7 + t6*t5) + t50 - 5.0436e-07);
+    const double t52 = (0.00012*t41 + t46*t47 - t38*t45)/t44 - 1.0;
+    const double t53 = t52 + 1.0;
+    const double t54 = 1.46e-05*sin_q1 - cos_q1*t35;
+    const double t55 = 0.044*t1*t5 + t33 + 0.066*cos_q2*t13 + 0.012*t27 + 6.0786e-07;
+    const double t56 = 7.5e-08*t3 - 2.52e-09*t4;
+    const double t57 = 2.4608e-07*t1 + t56 - 2.22e-09*t6;
     const double t58 = 4.517e-07*cos_q2 + t57 - 4.28e-09*sin_q2;
-    const double t59 = 1.46e-05*sin_q1 - cos_q1*t33;
-    const double t60 = t55 + cos_q1*(2.0*sin_q1*(t58 + 8.73e-08) - cos_q1*(t55 - 1.1684e-07)) + (t27 + 2.0*(t51 + 0.004*t59) - 1.0652e-06);
-    const double t61 = t53*t60;
-    const double t62 = t50 - 0.0001068;
-    const double t63 = t59 - 7.12e-05;
-    const double t64 = t62*t47 + t63*t48;
-    const double t65 = t62*t48 - t63*t47;
-    const double t66 = 0.5*qd[0]*(t60 + t53*t61 + 2.0*(t37*t64 - t45*t65 + (t61 + t37*(t53*t64) - t45*(t53*t65))) - 2.03e-06);
-    const double t67 = cos_q1*t50;
-    const double t68 = t37*(t25*t48 - t67*t47) + t45*(t25*t47 + t67*t48) + (0.004*t25 + cos_q1*(0.006*t25 + t17) - 0.006*t67 - sin_q1*t58)*t54;
-    const double t69 = cos_q1*t19;
-    const double t70 = 0.004*t18 + cos_q1*(0.006*t18 + t20) - 0.006*t69 - sin_q1*(0.7692307692307693*t56 + 0.002307692307692308*t5 + t57);
-    const double t71 = qd[1]*(t34*(t37*t47 - t45*t48) - t52*t54) + t66 - qd[2]*t68 - qd[3]*(t37*(t18*t48 - t69*t47) + t45*(t18*t47 + t69*t48) + t70*t54);
-    const double t72 = 0.5*qd[3]*qd[3]*(t9 + 2.0*t10 + 1.6871005917159763e-07) + qd[2]*(0.5*qd[2]*t17 + qd[3]*t20) + qd[1]*t32 - qd[0]*t71;
-    const double t73 = g[0]*t48 + g[2]*t47;
-    const double t74 = 2.5e-06*g[1] + (t49 + t15 + t7 - 0.0001068)*(g[0]*t47 - g[2]*t48) - 0.000203*(g[0]*t36 + g[2]*t40) - 7.12e-05*t73 - 1.46e-05*(g[1]*cos_q1 - sin_q1*t73) - (t24 + t12 + t5 + 8.79e-05)*(g[1]*sin_q1 + cos_q1*t73);
-    kinetic[0] = t72;
-    potential[0] = t74;
+    const double t59 = t29 + 0.008*t54 - 1.0652e-06 + (t55 + cos_q1*(2.0*sin_q1*(t58 + 8.73e-08) - cos_q1*(t55 - 1.1684e-07)));
+    const double t60 = t52*t59;
+    const double t61 = t25 - 0.0001068;
+    const double t62 = t54 - 7.12e-05;
+    const double t63 = t61*t48 + t62*t49;
+    const double t64 = t61*t49 - t62*t48;
+    const double t65 = 0.5*qd[0]*(t59 + t52*t60 + 2.0*(t38*t63 - t46*t64 + (t60 + t38*(t52*t63) - t46*(t52*t64))) - 2.03e-06);
+    const double t66 = cos_q1*t25;
+    const double t67 = t38*(t27*t49 - t66*t48) + t46*(t27*t48 + t66*t49) + (0.004*t27 - sin_q1*t58 - cos_q1*(t50 - t17))*t53;
+    const double t68 = cos_q1*t19;
+    const double t69 = t38*(t18*t49 - t68*t48) + t46*(t18*t48 + t68*t49) + (0.004*t18 - sin_q1*(t57 + 0.7692307692307693*t56) - cos_q1*(0.006*(t19 - t18) - t20))*t53;
+    const double t70 = qd[0]*(qd[1]*((1.46e-05*cos_q1 + sin_q1*t35)*(t38*t48 - t46*t49) - t51*t53) + t65 - qd[2]*t67 - qd[3]*t69);
+    const double t71 = 0.5*qd[3]*qd[3]*(t9 + 2.0*t10 + 1.6871005917159763e-07) + qd[2]*(0.5*qd[2]*t17 + qd[3]*t20) + qd[1]*t34 - t70;
+    const double t72 = g[0]*t49 + g[2]*t48;
+    const double t73 = 2.5e-06*g[1] + (t24 + t15 + t7 - 0.0001068)*(g[0]*t48 - g[2]*t49) - 0.000203*(g[0]*t37 + g[2]*t41) - 7.12e-05*t72 - 1.46e-05*(g[1]*cos_q1 - sin_q1*t72) - (t26 + t12 + t5 + 8.79e-05)*(g[1]*sin_q1 + cos_q1*t72);
+    kinetic[0] = t71;
+    potential[0] = t73;
 }

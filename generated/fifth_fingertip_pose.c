@@ -8,7 +8,6 @@
  * Inputs: sha256 28edf41a51f84ef24222facbdc6e1021f809ccdd8b122d41df2ba55b8d1b95d9.
  */
 #include <math.h>
-
 #include "kernels.h"
 
 void awiwi_fifth_fingertip_pose(const double q[restrict 4], double T[restrict 16])

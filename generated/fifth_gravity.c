@@ -9,7 +9,6 @@
  * Inputs: sha256 510cc29c516f948798433eb3b40aa4ff4fd7af8989efae96a8696b05c3c6c657.
  */
 #include <math.h>
-
 #include "kernels.h"
 
 void awiwi_fifth_gravity(const double q[restrict 4], const double g[restrict 3], double gravity[restrict 4])

@@ -8,7 +8,6 @@
  * Inputs: sha256 41e0b066350c1515c23653124cb3764011a2af2cb74c560413362bf44f18b5d9.
  */
 #include <math.h>
-
 #include "kernels.h"
 
 void awiwi_fifth_jacobian(const double q[restrict 4], double J[restrict 24])

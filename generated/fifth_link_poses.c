@@ -8,7 +8,6 @@
  * Inputs: sha256 32b023dd4bb7a4597b7c1aa31cf4af44bf374e70b19ab512ecc615d4be915382.
  */
 #include <math.h>
-
 #include "kernels.h"
 
 void awiwi_fifth_link_poses(const double q[restrict 4], double T[restrict 80])
@@ -31,18 +30,18 @@ void awiwi_fifth_link_poses(const double q[restrict 4], double T[restrict 80])
     const double t14 = cos_q1*t12;
     const double sin_q1 = sin(q[1]);
     const double t15 = sin_q1*t12;
-    const double t16 = t6 + 0.006*t13 + 0.004*t12;
+    const double t16 = 0.006*t13 + (t6 + 0.004*t12);
     const double t17 = cos_q1*t13;
     const double t18 = sin_q1*t13;
     const double t19 = t10 + 0.004*t13 - 0.006*t12;
     const double sin_q2 = sin(q[2]);
     const double cos_q2 = cos(q[2]);
     const double t20 = sin_q2*t13 - cos_q2*t14;
-    const double t21 = t16 + 0.006*t14;
+    const double t21 = 0.006*t14 + t16;
     const double t22 = cos_q2*sin_q1;
     const double t23 = 0.006*sin_q1;
     const double t24 = sin_q2*t12 + cos_q2*t17;
-    const double t25 = t19 + 0.006*t17;
+    const double t25 = 0.006*t17 + t19;
     const double t26 = q[2] + q[3];
     const double t27 = sin(t26);
     const double t28 = cos(t26);

@@ -6,11 +6,10 @@
  *   in   qd[4] in rad/s, -20 to 20
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  bias[4] in N m
- * Cost: 62 add, 86 mul, 1 neg, 4 sincos.
+ * Cost: 60 add, 84 mul, 4 sincos.
  * Inputs: sha256 e81c8580817eac8f68e2015b14a5b569106ad1f3f949b7d278d0a2f0f5760292.
  */
 #include <math.h>
-
 #include "kernels.h"
 
 void awiwi_index_bias(const double q[restrict 4], const double qd[restrict 4], const double g[restrict 3], double bias[restrict 4])
@@ -26,45 +25,45 @@ void awiwi_index_bias(const double q[restrict 4], const double qd[restrict 4], c
     const double t4 = 2.0*qd[0];
     const double t5 = qd[1]*t4;
     const double t6 = sin_q1*(2.1654944e-05*cos_q1 - 7.72e-08*sin_q1) + 3.86e-08;
-    const double t7 = qd[0]*qd[0];
-    const double t8 = qd[1] + qd[2];
-    const double t9 = qd[3] + t8;
-    const double t10 = t9*t9;
-    const double t11 = q[1] + q[2];
-    const double t12 = q[3] + t11;
-    const double t13 = cos(t12);
-    const double t14 = sin(t12);
-    const double t15 = 3.2e-05*t13 - 8e-07*t14;
-    const double t16 = (t7 + t10)*t15;
-    const double t17 = cos(t11);
-    const double t18 = 0.0298*t17;
-    const double t19 = t4*t9;
-    const double t20 = 8e-07*t13 + 3.2e-05*t14;
-    const double t21 = t19*t20;
-    const double t22 = 0.04038*sin_q1;
-    const double t23 = t1 - t22*t5;
-    const double t24 = sin(t11);
-    const double t25 = 0.0002062*t17 - 1.2e-06*t24;
-    const double t26 = t8*t8;
-    const double t27 = t8*t4;
-    const double t28 = t24*(5.22042e-06*t17 - 2.28e-08*t24) + 1.14e-08;
-    const double t29 = 0.0298*t24;
-    const double t30 = t14*(3.7034e-07*t13 - 8.8e-09*t14) + 4.4e-09;
-    const double t31 = t23*t25 + (t26*(7.5326e-07*t17 - 5.8e-09*t24) - t27*t28) + (t15*(t23 + (-(0.005*t7) - t27*t29)) + (t10*(6.6e-09*t13 - 1.24e-09*t14) - t19*t30));
-    const double t32 = 0.04038*cos_q1;
-    const double t33 = 1.2e-06*t17 + 0.0002062*t24;
-    const double t34 = t27*t33 + t21;
-    const double t35 = 3.22e-05*t0 + 0.0001245*t1 + (t2*t1 + (t3*(1.244876e-06*cos_q1 - 9.6e-09*sin_q1) - t5*t6) + (0.005*t16 - t18*t21 + t31) - t32*t34);
-    const double t36 = 3e-06*cos_q1 + 0.0006058*sin_q1;
-    const double t37 = t7 + t26;
-    const double t38 = t10*t20;
-    const double t39 = 0.006*t7 + t0;
-    const double t40 = (t7 + t3)*t32 + t39;
-    const double t41 = g[2] + t3*t22;
-    const double t42 = t20*(t37*t18 + t40) - (t41 + t26*t29)*t15 + t7*t30;
-    const double t43 = t29*t16 - t18*t38 + (t33*t40 - t41*t25 + t7*t28 + t42);
-    bias[0] = t35 - 0.006*(t5*t36 + t34);
-    bias[1] = t22*(t37*t25 + t16) - t32*(t26*t33 + t38) + (t36*t39 - g[2]*t2 + t7*t6 + t43);
+    const double t7 = 0.04038*sin_q1;
+    const double t8 = t1 - t7*t5;
+    const double t9 = q[1] + q[2];
+    const double t10 = cos(t9);
+    const double t11 = sin(t9);
+    const double t12 = 0.0002062*t10 - 1.2e-06*t11;
+    const double t13 = qd[1] + qd[2];
+    const double t14 = t13*t13;
+    const double t15 = t13*t4;
+    const double t16 = t11*(5.22042e-06*t10 - 2.28e-08*t11) + 1.14e-08;
+    const double t17 = 0.0298*t11;
+    const double t18 = q[3] + t9;
+    const double t19 = cos(t18);
+    const double t20 = sin(t18);
+    const double t21 = 3.2e-05*t19 - 8e-07*t20;
+    const double t22 = qd[3] + t13;
+    const double t23 = t22*t22;
+    const double t24 = t4*t22;
+    const double t25 = t20*(3.7034e-07*t19 - 8.8e-09*t20) + 4.4e-09;
+    const double t26 = t8*t12 + (t14*(7.5326e-07*t10 - 5.8e-09*t11) - t15*t16) + ((t8 - t15*t17)*t21 + (t23*(1.666e-07*t19 - 5.24e-09*t20) - t24*t25));
+    const double t27 = 0.0298*t10;
+    const double t28 = 8e-07*t19 + 3.2e-05*t20;
+    const double t29 = t24*t28;
+    const double t30 = 0.04038*cos_q1;
+    const double t31 = 1.2e-06*t10 + 0.0002062*t11;
+    const double t32 = t15*t31 + t29;
+    const double t33 = 3.22e-05*t0 + 0.0001245*t1 + (t2*t1 + (t3*(1.244876e-06*cos_q1 - 9.6e-09*sin_q1) - t5*t6) + (t26 - t27*t29) - t30*t32);
+    const double t34 = 3e-06*cos_q1 + 0.0006058*sin_q1;
+    const double t35 = qd[0]*qd[0];
+    const double t36 = t35 + t14;
+    const double t37 = (t35 + t23)*t21;
+    const double t38 = t23*t28;
+    const double t39 = 0.006*t35 + t0;
+    const double t40 = (t35 + t3)*t30 + t39;
+    const double t41 = g[2] + t3*t7;
+    const double t42 = t28*(t36*t27 + t40) - (t41 + t14*t17)*t21 + t35*t25;
+    const double t43 = t17*t37 - t27*t38 + (t31*t40 - t41*t12 + t35*t16 + t42);
+    bias[0] = t33 - 0.006*(t5*t34 + t32);
+    bias[1] = t7*(t36*t12 + t37) - t30*(t14*t31 + t38) + (t34*t39 - g[2]*t2 + t35*t6 + t43);
     bias[2] = t43;
     bias[3] = t42;
 }

@@ -7,11 +7,10 @@
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  kinetic[1] in J
  *   out  potential[1] in J
- * Cost: 52 add, 68 mul, 4 sincos.
+ * Cost: 51 add, 67 mul, 4 sincos.
  * Inputs: sha256 c0e346d673217a3c0fa9e70826de7816197e0e1f7eac085721ef7fbf00222255.
  */
 #include <math.h>
-
 #include "kernels.h"
 
 void awiwi_index_energy(const double q[restrict 4], const double qd[restrict 4], const double g[restrict 3], double kinetic[restrict 1], double potential[restrict 1])
@@ -33,7 +32,7 @@ void awiwi_index_energy(const double q[restrict 4], const double qd[restrict 4],
     const double t12 = 1.2e-06*t1 + 0.0002062*t6 + t7;
     const double t13 = cos_q1*t11 + sin_q1*t12;
     const double t14 = t9 + 0.08076*t13 + 2.1836744e-05;
-    const double t15 = 1.24e-09*t3 + 6.6e-09*t4 + 0.005*t7;
+    const double t15 = 5.24e-09*t3 + 1.666e-07*t4;
     const double t16 = 5.8e-09*t1 + 7.5326e-07*t6 + t15;
     const double t17 = 0.0006058*cos_q1 - 3e-06*sin_q1;
     const double t18 = cos_q1*(2.1654944e-05*cos_q1 - 7.72e-08*sin_q1) + t1*(5.22042e-06*t1 - 2.28e-08*t6) + t3*(3.7034e-07*t3 - 8.8e-09*t4) + 0.012*(t17 + t11) + t14 - 0.0596*t6*t7 - 0.08076*sin_q1*t12 - 2.6359844e-05;

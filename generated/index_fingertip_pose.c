@@ -8,7 +8,6 @@
  * Inputs: sha256 74fba3f0be68f5fb3d765efd077c013f6464ac472d1e0a918550978e139a5fa9.
  */
 #include <math.h>
-
 #include "kernels.h"
 
 void awiwi_index_fingertip_pose(const double q[restrict 4], double T[restrict 16])

@@ -9,7 +9,6 @@
  * Inputs: sha256 3a88ddfd19000c9698bd5bc8df95fb76af1c699ee8ce4306835172f592b612fc.
  */
 #include <math.h>
-
 #include "kernels.h"
 
 void awiwi_index_gravity(const double q[restrict 4], const double g[restrict 3], double gravity[restrict 4])

@@ -8,7 +8,6 @@
  * Inputs: sha256 cc479d3eaff2d23a1439c4046dc08cbbd6a22d642904ede3e49fae304d176b25.
  */
 #include <math.h>
-
 #include "kernels.h"
 
 void awiwi_index_jacobian(const double q[restrict 4], double J[restrict 24])

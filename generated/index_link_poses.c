@@ -8,7 +8,6 @@
  * Inputs: sha256 75f7b76c20b7e4a22746233c0cfa27e0d9ba474f4ef19196a0ce34d6f902e7f7.
  */
 #include <math.h>
-
 #include "kernels.h"
 
 void awiwi_index_link_poses(const double q[restrict 4], double T[restrict 64])

@@ -4,11 +4,10 @@
  * Source: eq. 2.17, 5.4.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   out  M[4][4] in kg m^2
- * Cost: 35 add, 42 mul, 3 sincos.
+ * Cost: 34 add, 41 mul, 3 sincos.
  * Inputs: sha256 c0ef972f5545cb49fd7275e781cf58d35b661d7f7939853e31e0d6d89da3ade1.
  */
 #include <math.h>
-
 #include "kernels.h"
 
 void awiwi_index_mass_matrix(const double q[restrict 4], double M[restrict 16])
@@ -32,7 +31,7 @@ void awiwi_index_mass_matrix(const double q[restrict 4], double M[restrict 16])
     const double t14 = t11*t7 + t12*t13;
     const double t15 = t10 + 2.0*t14 + 2.1836744e-05;
     const double t16 = cos_q1*(2.1654944e-05*cos_q1 - 7.72e-08*sin_q1) + t1*(5.22042e-06*t1 - 2.28e-08*t2) + t4*(3.7034e-07*t4 - 8.8e-09*t5) + 0.012*(0.0006058*cos_q1 + t7 - 3e-06*sin_q1) + t15 - 0.0596*t2*t8 - 0.08076*sin_q1*t13 - 2.6359844e-05;
-    const double t17 = 1.24e-09*t4 + 6.6e-09*t5 + 0.005*t8;
+    const double t17 = 5.24e-09*t4 + 1.666e-07*t5;
     const double t18 = 5.8e-09*t1 + 7.5326e-07*t2 + t17;
     const double t19 = 9.6e-09*cos_q1 + 1.244876e-06*sin_q1 + t18;
     const double t20 = t14 + t10;

@@ -52,7 +52,7 @@ void awiwi_thumb_mass_matrix(const double q[4], double M[16]);
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   in   qd[4] in rad/s, -20 to 20
  *   out  C[4][4] in N m s/rad
- * Cost: 134 add, 147 mul, 4 neg, 3 sincos.
+ * Cost: 134 add, 148 mul, 5 neg, 3 sincos.
  */
 void awiwi_thumb_coriolis_matrix(const double q[4], const double qd[4], double C[16]);
 
@@ -123,7 +123,7 @@ void awiwi_thumb_forward_dynamics(const double q[4], const double qd[4], const d
  *   out  M[4][4] in kg m^2
  *   out  C[4][4] in N m s/rad
  *   out  gravity[4] in N m
- * Cost: 157 add, 175 mul, 8 neg, 4 sincos.
+ * Cost: 157 add, 176 mul, 9 neg, 4 sincos.
  */
 void awiwi_thumb_dynamics(const double q[4], const double qd[4], const double g[3], double M[16], double C[16], double gravity[4]);
 
@@ -211,6 +211,17 @@ int awiwi_thumb_joint_estimate(const double h[8], const double start[4], double 
 void awiwi_thumb_joint_estimate_error(const double q[4], const double noise[1], double covariance[16], double worst[4]);
 
 /*
+ * Base joint angles whose span lengths are nearest to the measured h, by gradient search from start.
+ * Source: eq. 5.20, 5.24, algorithm 1, mended.
+ *   in   h[4] in m, 0 to 0.15149
+ *   in   start[2] in rad, -0.610865 to 0.610865
+ *   out  q[2] in rad
+ * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
+ * Cost: at most 51 times that of thumb_tendon_lengths and thumb_coupling.
+ */
+int awiwi_thumb_base_estimate_by_gradient(const double h[4], const double start[2], double q[2]);
+
+/*
  * Pose of the fingertip: maps fingertip coordinates into the finger's base frame.
  * Source: eq. 5.2, 5.3, table 5.1.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
@@ -242,7 +253,7 @@ void awiwi_index_jacobian(const double q[4], double J[24]);
  * Source: eq. 2.17, 5.4.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   out  M[4][4] in kg m^2
- * Cost: 35 add, 42 mul, 3 sincos.
+ * Cost: 34 add, 41 mul, 3 sincos.
  */
 void awiwi_index_mass_matrix(const double q[4], double M[16]);
 
@@ -252,7 +263,7 @@ void awiwi_index_mass_matrix(const double q[4], double M[16]);
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   qd[4] in rad/s, -20 to 20
  *   out  C[4][4] in N m s/rad
- * Cost: 66 add, 70 mul, 1 neg, 3 sincos.
+ * Cost: 64 add, 69 mul, 1 neg, 3 sincos.
  */
 void awiwi_index_coriolis_matrix(const double q[4], const double qd[4], double C[16]);
 
@@ -273,7 +284,7 @@ void awiwi_index_gravity(const double q[4], const double g[3], double gravity[4]
  *   in   qd[4] in rad/s, -20 to 20
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  bias[4] in N m
- * Cost: 62 add, 86 mul, 1 neg, 4 sincos.
+ * Cost: 60 add, 84 mul, 4 sincos.
  */
 void awiwi_index_bias(const double q[4], const double qd[4], const double g[3], double bias[4]);
 
@@ -285,7 +296,7 @@ void awiwi_index_bias(const double q[4], const double qd[4], const double g[3], 
  *   in   qdd[4] in rad/s^2, -2000 to 2000
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  tau[4] in N m
- * Cost: 98 add, 124 mul, 4 sincos.
+ * Cost: 95 add, 120 mul, 4 sincos.
  */
 void awiwi_index_inverse_dynamics(const double q[4], const double qd[4], const double qdd[4], const double g[3], double tau[4]);
 
@@ -298,7 +309,7 @@ void awiwi_index_inverse_dynamics(const double q[4], const double qd[4], const d
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  dtau_dq[4][4] in N m/rad
  *   out  dtau_dqd[4][4] in N m s/rad
- * Cost: 199 add, 235 mul, 3 neg, 4 sincos.
+ * Cost: 193 add, 229 mul, 4 neg, 4 sincos.
  */
 void awiwi_index_inverse_dynamics_derivatives(const double q[4], const double qd[4], const double qdd[4], const double g[3], double dtau_dq[16], double dtau_dqd[16]);
 
@@ -310,7 +321,7 @@ void awiwi_index_inverse_dynamics_derivatives(const double q[4], const double qd
  *   in   tau[4] in N m, -1 to 1
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  qdd[4] in rad/s^2
- * Cost: 113 add, 144 mul, 3 div, 4 sincos.
+ * Cost: 110 add, 141 mul, 3 div, 4 sincos.
  */
 void awiwi_index_forward_dynamics(const double q[4], const double qd[4], const double tau[4], const double g[3], double qdd[4]);
 
@@ -323,7 +334,7 @@ void awiwi_index_forward_dynamics(const double q[4], const double qd[4], const d
  *   out  M[4][4] in kg m^2
  *   out  C[4][4] in N m s/rad
  *   out  gravity[4] in N m
- * Cost: 97 add, 107 mul, 1 neg, 4 sincos.
+ * Cost: 94 add, 105 mul, 1 neg, 4 sincos.
  */
 void awiwi_index_dynamics(const double q[4], const double qd[4], const double g[3], double M[16], double C[16], double gravity[4]);
 
@@ -335,7 +346,7 @@ void awiwi_index_dynamics(const double q[4], const double qd[4], const double g[
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  kinetic[1] in J
  *   out  potential[1] in J
- * Cost: 52 add, 68 mul, 4 sincos.
+ * Cost: 51 add, 67 mul, 4 sincos.
  */
 void awiwi_index_energy(const double q[4], const double qd[4], const double g[3], double kinetic[1], double potential[1]);
 
@@ -441,7 +452,7 @@ void awiwi_middle_jacobian(const double q[4], double J[24]);
  * Source: eq. 2.17, 5.4.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   out  M[4][4] in kg m^2
- * Cost: 35 add, 42 mul, 3 sincos.
+ * Cost: 34 add, 41 mul, 3 sincos.
  */
 void awiwi_middle_mass_matrix(const double q[4], double M[16]);
 
@@ -451,7 +462,7 @@ void awiwi_middle_mass_matrix(const double q[4], double M[16]);
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   qd[4] in rad/s, -20 to 20
  *   out  C[4][4] in N m s/rad
- * Cost: 66 add, 70 mul, 1 neg, 3 sincos.
+ * Cost: 64 add, 69 mul, 1 neg, 3 sincos.
  */
 void awiwi_middle_coriolis_matrix(const double q[4], const double qd[4], double C[16]);
 
@@ -472,7 +483,7 @@ void awiwi_middle_gravity(const double q[4], const double g[3], double gravity[4
  *   in   qd[4] in rad/s, -20 to 20
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  bias[4] in N m
- * Cost: 62 add, 86 mul, 1 neg, 4 sincos.
+ * Cost: 60 add, 84 mul, 4 sincos.
  */
 void awiwi_middle_bias(const double q[4], const double qd[4], const double g[3], double bias[4]);
 
@@ -484,7 +495,7 @@ void awiwi_middle_bias(const double q[4], const double qd[4], const double g[3],
  *   in   qdd[4] in rad/s^2, -2000 to 2000
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  tau[4] in N m
- * Cost: 98 add, 124 mul, 4 sincos.
+ * Cost: 95 add, 120 mul, 4 sincos.
  */
 void awiwi_middle_inverse_dynamics(const double q[4], const double qd[4], const double qdd[4], const double g[3], double tau[4]);
 
@@ -497,7 +508,7 @@ void awiwi_middle_inverse_dynamics(const double q[4], const double qd[4], const 
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  dtau_dq[4][4] in N m/rad
  *   out  dtau_dqd[4][4] in N m s/rad
- * Cost: 199 add, 235 mul, 3 neg, 4 sincos.
+ * Cost: 193 add, 229 mul, 4 neg, 4 sincos.
  */
 void awiwi_middle_inverse_dynamics_derivatives(const double q[4], const double qd[4], const double qdd[4], const double g[3], double dtau_dq[16], double dtau_dqd[16]);
 
@@ -509,7 +520,7 @@ void awiwi_middle_inverse_dynamics_derivatives(const double q[4], const double q
  *   in   tau[4] in N m, -1 to 1
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  qdd[4] in rad/s^2
- * Cost: 113 add, 144 mul, 3 div, 4 sincos.
+ * Cost: 110 add, 141 mul, 3 div, 4 sincos.
  */
 void awiwi_middle_forward_dynamics(const double q[4], const double qd[4], const double tau[4], const double g[3], double qdd[4]);
 
@@ -522,7 +533,7 @@ void awiwi_middle_forward_dynamics(const double q[4], const double qd[4], const 
  *   out  M[4][4] in kg m^2
  *   out  C[4][4] in N m s/rad
  *   out  gravity[4] in N m
- * Cost: 97 add, 107 mul, 1 neg, 4 sincos.
+ * Cost: 94 add, 105 mul, 1 neg, 4 sincos.
  */
 void awiwi_middle_dynamics(const double q[4], const double qd[4], const double g[3], double M[16], double C[16], double gravity[4]);
 
@@ -534,7 +545,7 @@ void awiwi_middle_dynamics(const double q[4], const double qd[4], const double g
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  kinetic[1] in J
  *   out  potential[1] in J
- * Cost: 52 add, 68 mul, 4 sincos.
+ * Cost: 51 add, 67 mul, 4 sincos.
  */
 void awiwi_middle_energy(const double q[4], const double qd[4], const double g[3], double kinetic[1], double potential[1]);
 
@@ -640,7 +651,7 @@ void awiwi_ring_jacobian(const double q[3], double J[18]);
  * Source: eq. 2.17, 5.4.
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   out  M[3][3] in kg m^2
- * Cost: 41 add, 47 mul, 3 sincos.
+ * Cost: 39 add, 45 mul, 3 sincos.
  */
 void awiwi_ring_mass_matrix(const double q[3], double M[9]);
 
@@ -650,7 +661,7 @@ void awiwi_ring_mass_matrix(const double q[3], double M[9]);
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   in   qd[3] in rad/s, -20 to 20
  *   out  C[3][3] in N m s/rad
- * Cost: 72 add, 83 mul, 1 neg, 3 sincos.
+ * Cost: 69 add, 79 mul, 1 neg, 3 sincos.
  */
 void awiwi_ring_coriolis_matrix(const double q[3], const double qd[3], double C[9]);
 
@@ -671,7 +682,7 @@ void awiwi_ring_gravity(const double q[3], const double g[3], double gravity[3])
  *   in   qd[3] in rad/s, -20 to 20
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  bias[3] in N m
- * Cost: 63 add, 89 mul, 1 neg, 4 sincos.
+ * Cost: 61 add, 87 mul, 4 sincos.
  */
 void awiwi_ring_bias(const double q[3], const double qd[3], const double g[3], double bias[3]);
 
@@ -683,7 +694,7 @@ void awiwi_ring_bias(const double q[3], const double qd[3], const double g[3], d
  *   in   qdd[3] in rad/s^2, -2000 to 2000
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  tau[3] in N m
- * Cost: 99 add, 128 mul, 4 sincos.
+ * Cost: 96 add, 124 mul, 4 sincos.
  */
 void awiwi_ring_inverse_dynamics(const double q[3], const double qd[3], const double qdd[3], const double g[3], double tau[3]);
 
@@ -696,7 +707,7 @@ void awiwi_ring_inverse_dynamics(const double q[3], const double qd[3], const do
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  dtau_dq[3][3] in N m/rad
  *   out  dtau_dqd[3][3] in N m s/rad
- * Cost: 231 add, 283 mul, 5 neg, 4 sincos.
+ * Cost: 223 add, 275 mul, 4 neg, 4 sincos.
  */
 void awiwi_ring_inverse_dynamics_derivatives(const double q[3], const double qd[3], const double qdd[3], const double g[3], double dtau_dq[9], double dtau_dqd[9]);
 
@@ -708,7 +719,7 @@ void awiwi_ring_inverse_dynamics_derivatives(const double q[3], const double qd[
  *   in   tau[3] in N m, -1 to 1
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  qdd[3] in rad/s^2
- * Cost: 115 add, 129 mul, 3 div, 2 neg, 4 sincos.
+ * Cost: 111 add, 125 mul, 3 div, 1 neg, 4 sincos.
  */
 void awiwi_ring_forward_dynamics(const double q[3], const double qd[3], const double tau[3], const double g[3], double qdd[3]);
 
@@ -721,7 +732,7 @@ void awiwi_ring_forward_dynamics(const double q[3], const double qd[3], const do
  *   out  M[3][3] in kg m^2
  *   out  C[3][3] in N m s/rad
  *   out  gravity[3] in N m
- * Cost: 109 add, 128 mul, 1 neg, 4 sincos.
+ * Cost: 101 add, 123 mul, 1 neg, 4 sincos.
  */
 void awiwi_ring_dynamics(const double q[3], const double qd[3], const double g[3], double M[9], double C[9], double gravity[3]);
 
@@ -733,7 +744,7 @@ void awiwi_ring_dynamics(const double q[3], const double qd[3], const double g[3
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  kinetic[1] in J
  *   out  potential[1] in J
- * Cost: 54 add, 68 mul, 4 sincos.
+ * Cost: 52 add, 66 mul, 4 sincos.
  */
 void awiwi_ring_energy(const double q[3], const double qd[3], const double g[3], double kinetic[1], double potential[1]);
 
@@ -839,7 +850,7 @@ void awiwi_fifth_jacobian(const double q[4], double J[24]);
  * Source: eq. 2.17, 5.4.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   out  M[4][4] in kg m^2
- * Cost: 120 add, 149 mul, 2 div, 1 neg, 1 sqrt, 5 sincos.
+ * Cost: 115 add, 142 mul, 2 div, 1 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_mass_matrix(const double q[4], double M[16]);
 
@@ -849,7 +860,7 @@ void awiwi_fifth_mass_matrix(const double q[4], double M[16]);
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   in   qd[4] in rad/s, -20 to 20
  *   out  C[4][4] in N m s/rad
- * Cost: 333 add, 408 mul, 2 div, 7 neg, 1 sqrt, 5 sincos.
+ * Cost: 325 add, 381 mul, 2 div, 9 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_coriolis_matrix(const double q[4], const double qd[4], double C[16]);
 
@@ -870,7 +881,7 @@ void awiwi_fifth_gravity(const double q[4], const double g[3], double gravity[4]
  *   in   qd[4] in rad/s, -20 to 20
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  bias[4] in N m
- * Cost: 227 add, 258 mul, 2 div, 3 neg, 1 sqrt, 5 sincos.
+ * Cost: 224 add, 251 mul, 2 div, 3 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_bias(const double q[4], const double qd[4], const double g[3], double bias[4]);
 
@@ -882,7 +893,7 @@ void awiwi_fifth_bias(const double q[4], const double qd[4], const double g[3], 
  *   in   qdd[4] in rad/s^2, -2000 to 2000
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  tau[4] in N m
- * Cost: 242 add, 268 mul, 2 div, 3 neg, 1 sqrt, 5 sincos.
+ * Cost: 239 add, 263 mul, 2 div, 3 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_inverse_dynamics(const double q[4], const double qd[4], const double qdd[4], const double g[3], double tau[4]);
 
@@ -895,7 +906,7 @@ void awiwi_fifth_inverse_dynamics(const double q[4], const double qd[4], const d
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  dtau_dq[4][4] in N m/rad
  *   out  dtau_dqd[4][4] in N m s/rad
- * Cost: 990 add, 1108 mul, 2 div, 9 neg, 1 sqrt, 5 sincos.
+ * Cost: 970 add, 1076 mul, 2 div, 13 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_inverse_dynamics_derivatives(const double q[4], const double qd[4], const double qdd[4], const double g[3], double dtau_dq[16], double dtau_dqd[16]);
 
@@ -907,7 +918,7 @@ void awiwi_fifth_inverse_dynamics_derivatives(const double q[4], const double qd
  *   in   tau[4] in N m, -1 to 1
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  qdd[4] in rad/s^2
- * Cost: 345 add, 378 mul, 6 div, 2 neg, 1 sqrt, 5 sincos.
+ * Cost: 337 add, 364 mul, 6 div, 2 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_forward_dynamics(const double q[4], const double qd[4], const double tau[4], const double g[3], double qdd[4]);
 
@@ -920,7 +931,7 @@ void awiwi_fifth_forward_dynamics(const double q[4], const double qd[4], const d
  *   out  M[4][4] in kg m^2
  *   out  C[4][4] in N m s/rad
  *   out  gravity[4] in N m
- * Cost: 366 add, 452 mul, 2 div, 8 neg, 1 sqrt, 5 sincos.
+ * Cost: 358 add, 425 mul, 2 div, 8 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_dynamics(const double q[4], const double qd[4], const double g[3], double M[16], double C[16], double gravity[4]);
 
@@ -932,7 +943,7 @@ void awiwi_fifth_dynamics(const double q[4], const double qd[4], const double g[
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  kinetic[1] in J
  *   out  potential[1] in J
- * Cost: 145 add, 183 mul, 2 div, 2 neg, 1 sqrt, 5 sincos.
+ * Cost: 140 add, 176 mul, 2 div, 1 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_energy(const double q[4], const double qd[4], const double g[3], double kinetic[1], double potential[1]);
 
@@ -1005,6 +1016,696 @@ void awiwi_fifth_joint_estimate(const double h[8], const double start[4], double
  * Cost: 8 mul.
  */
 void awiwi_fifth_joint_estimate_error(const double q[4], const double noise[1], double covariance[16], double worst[4]);
+
+/*
+ * Angles of coupler and rocker at a joint angle, and their turns per turn of the joint. The
+ * transmission is the sine of the angle between coupler and rocker: where it is zero the linkage
+ * locks.
+ * Source: section 5.5.
+ *   in   q[1] in rad, -0.523599 to 0.698132
+ *   out  coupler[1] in rad
+ *   out  rocker[1] in rad
+ *   out  coupler_ratio[1] in 1
+ *   out  rocker_ratio[1] in 1
+ *   out  transmission[1] in 1
+ * Returns 0 where the loop closes; elsewhere 1, and what is not defined is NaN.
+ * Cost: 14 add, 28 mul, 2 div, 2 neg, 1 sqrt, 1 sincos, 2 calls.
+ */
+int awiwi_fifth_hmc_four_bar(const double q[1], double coupler[1], double rocker[1], double coupler_ratio[1], double rocker_ratio[1], double transmission[1]);
+
+/*
+ * The palm's points A, B and C in frame {0} of the forearm.
+ * Source: eq. 6.1 to 6.8.
+ *   in   q71[1] in rad, 0.100424 to 1.14762
+ *   in   q73[1] in rad, 0.6234 to 1.32153
+ *   out  A[3] in m
+ *   out  B[3] in m
+ *   out  C[3] in m
+ * Returns 0 where the side bars are short of the line B0C0 (q73 between 0 and pi) and their plane is
+ * short of A0 and bar AA0 reaches; elsewhere 1, and what is not defined is NaN.
+ * Cost: 20 add, 39 mul, 2 div, 3 neg, 1 sqrt, 2 sincos.
+ */
+int awiwi_wrist_points(const double q71[1], const double q73[1], double A[3], double B[3], double C[3]);
+
+/*
+ * Pose of the palm: maps palm coordinates into frame {0} of the forearm.
+ * Source: fig. 6.8, eq. 6.9.
+ *   in   q71[1] in rad, 0.100424 to 1.14762
+ *   in   q73[1] in rad, 0.6234 to 1.32153
+ *   out  T[4][4] in 1, m
+ * Returns 0 where the side bars are short of the line B0C0 (q73 between 0 and pi) and their plane is
+ * short of A0 and bar AA0 reaches; elsewhere 1, and what is not defined is NaN.
+ * Cost: 24 add, 48 mul, 2 div, 2 neg, 1 sqrt, 2 sincos.
+ */
+int awiwi_wrist_palm_pose(const double q71[1], const double q73[1], double T[16]);
+
+/*
+ * Length of every tendon's straight run through the wrist.
+ * Source: eq. 6.9.
+ *   in   q71[1] in rad, 0.100424 to 1.14762
+ *   in   q73[1] in rad, 0.6234 to 1.32153
+ *   out  h[38] in m
+ * Returns 0 where the side bars are short of the line B0C0 (q73 between 0 and pi) and their plane is
+ * short of A0 and bar AA0 reaches; elsewhere 1, and what is not defined is NaN.
+ * Cost: 180 add, 144 mul, 2 div, 1 neg, 39 sqrt, 2 sincos.
+ */
+int awiwi_wrist_tendon_lengths(const double q71[1], const double q73[1], double h[38]);
+
+/*
+ * Derivatives of the tendons' lengths in the wrist with respect to q71 and q73.
+ * Source: eq. 6.9, differentiated.
+ *   in   q71[1] in rad, 0.100424 to 1.14762
+ *   in   q73[1] in rad, 0.6234 to 1.32153
+ *   out  dh[38][2] in m/rad
+ * Returns 0 where the side bars are short of the line B0C0 (q73 between 0 and pi) and their plane is
+ * short of A0 and bar AA0 reaches; elsewhere 1, and what is not defined is NaN.
+ * Cost: 438 add, 490 mul, 41 div, 2 neg, 39 sqrt, 2 sincos.
+ */
+int awiwi_wrist_coupling(const double q71[1], const double q73[1], double dh[76]);
+
+/*
+ * Length of every tendon's path in its finger and in the wrist, whose internal angles are wrist =
+ * (q71, q73).
+ * Source: eq. 5.1, 5.5, 6.9.
+ *   in   q[19] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727, -0.3491, -0.1745, -0.08727, -0.08727, -0.3491, -0.1745, -0.08727, -0.08727, -0.3491, -0.1745, -0.08727, -0.5236, -0.3491, -0.1745, -0.08727] to [0.6109, 0.6109, 1.396, 1.396, 0.3491, 1.484, 1.571, 1.396, 0.3491, 1.484, 1.571, 1.396, 0.3491, 1.484, 1.571, 0.6981, 0.3491, 1.484, 1.571]
+ *   in   wrist[2] in rad, from [0.1004, 0.6234] to [1.148, 1.322]
+ *   out  h[38] in m
+ * Returns 0 where the side bars are short of the line B0C0 (q73 between 0 and pi) and their plane is
+ * short of A0 and bar AA0 reaches; elsewhere 1, and what is not defined is NaN.
+ * Cost: 254 add, 181 mul, 2 div, 1 neg, 43 sqrt, 4 sincos.
+ */
+int awiwi_hand_tendon_lengths(const double q[19], const double wrist[2], double h[38]);
+
+/*
+ * Coupling matrix P = dh/dq of all tendons and joints; zero outside the blocks of the fingers.
+ * Source: eq. 5.6, 5.9, 5.21.
+ *   in   q[19] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727, -0.3491, -0.1745, -0.08727, -0.08727, -0.3491, -0.1745, -0.08727, -0.08727, -0.3491, -0.1745, -0.08727, -0.5236, -0.3491, -0.1745, -0.08727] to [0.6109, 0.6109, 1.396, 1.396, 0.3491, 1.484, 1.571, 1.396, 0.3491, 1.484, 1.571, 1.396, 0.3491, 1.484, 1.571, 0.6981, 0.3491, 1.484, 1.571]
+ *   out  P[38][19] in m/rad
+ * Cost: 44 add, 58 mul, 4 div, 4 sqrt, 2 sincos.
+ */
+void awiwi_hand_coupling(const double q[19], double P[722]);
+
+/*
+ * Joint torques -P' f of the tendon forces f.
+ * Source: eq. 5.8.
+ *   in   q[19] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727, -0.3491, -0.1745, -0.08727, -0.08727, -0.3491, -0.1745, -0.08727, -0.08727, -0.3491, -0.1745, -0.08727, -0.5236, -0.3491, -0.1745, -0.08727] to [0.6109, 0.6109, 1.396, 1.396, 0.3491, 1.484, 1.571, 1.396, 0.3491, 1.484, 1.571, 1.396, 0.3491, 1.484, 1.571, 0.6981, 0.3491, 1.484, 1.571]
+ *   in   f[38] in N, 0 to 100
+ *   out  tau[19] in N m
+ * Cost: 87 add, 76 mul, 4 div, 4 sqrt, 2 sincos.
+ */
+void awiwi_hand_joint_torque(const double q[19], const double f[38], double tau[19]);
+
+/*
+ * Joint stiffness -d tau/dq through tendons of stiffness k that pull with forces f; zero outside the
+ * blocks.
+ * Source: eq. 5.12, 5.23.
+ *   in   q[19] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727, -0.3491, -0.1745, -0.08727, -0.08727, -0.3491, -0.1745, -0.08727, -0.08727, -0.3491, -0.1745, -0.08727, -0.5236, -0.3491, -0.1745, -0.08727] to [0.6109, 0.6109, 1.396, 1.396, 0.3491, 1.484, 1.571, 1.396, 0.3491, 1.484, 1.571, 1.396, 0.3491, 1.484, 1.571, 0.6981, 0.3491, 1.484, 1.571]
+ *   in   f[38] in N, 0 to 100
+ *   in   k[38] in N/m, 1000 to 50000
+ *   out  K[19][19] in N m/rad
+ * Cost: 150 add, 194 mul, 4 div, 4 sqrt, 2 sincos.
+ */
+void awiwi_hand_joint_stiffness(const double q[19], const double f[38], const double k[38], double K[361]);
+
+/*
+ * Tendon lengths in the finger, of motor angles theta, elongations x and changes w of the lengths in
+ * the wrist. All three count from where the straight finger's tendons begin to stretch. The motor
+ * reels in for positive theta.
+ * Source: eq. 5.1.
+ *   in   theta[8] in rad, -5 to 5
+ *   in   x[8] in m, 0 to 0.1
+ *   in   w[8] in m, -0.0745654 to 0.0745654
+ *   out  h[8] in m
+ * Cost: 20 add, 8 mul.
+ */
+void awiwi_thumb_measured_lengths(const double theta[8], const double x[8], const double w[8], double h[8]);
+
+/*
+ * Tendon lengths in the finger, of motor angles theta, elongations x and changes w of the lengths in
+ * the wrist. All three count from where the straight finger's tendons begin to stretch. The motor
+ * reels in for positive theta.
+ * Source: eq. 5.1.
+ *   in   theta[8] in rad, -5 to 5
+ *   in   x[8] in m, 0 to 0.1
+ *   in   w[8] in m, -0.0745654 to 0.0745654
+ *   out  h[8] in m
+ * Cost: 16 add, 8 mul.
+ */
+void awiwi_index_measured_lengths(const double theta[8], const double x[8], const double w[8], double h[8]);
+
+/*
+ * Tendon lengths in the finger, of motor angles theta, elongations x and changes w of the lengths in
+ * the wrist. All three count from where the straight finger's tendons begin to stretch. The motor
+ * reels in for positive theta.
+ * Source: eq. 5.1.
+ *   in   theta[8] in rad, -5 to 5
+ *   in   x[8] in m, 0 to 0.1
+ *   in   w[8] in m, -0.0745654 to 0.0745654
+ *   out  h[8] in m
+ * Cost: 16 add, 8 mul.
+ */
+void awiwi_middle_measured_lengths(const double theta[8], const double x[8], const double w[8], double h[8]);
+
+/*
+ * Tendon lengths in the finger, of motor angles theta, elongations x and changes w of the lengths in
+ * the wrist. All three count from where the straight finger's tendons begin to stretch. The motor
+ * reels in for positive theta.
+ * Source: eq. 5.1.
+ *   in   theta[6] in rad, -5 to 5
+ *   in   x[6] in m, 0 to 0.1
+ *   in   w[6] in m, -0.0745654 to 0.0745654
+ *   out  h[6] in m
+ * Cost: 12 add, 6 mul.
+ */
+void awiwi_ring_measured_lengths(const double theta[6], const double x[6], const double w[6], double h[6]);
+
+/*
+ * Tendon lengths in the finger, of motor angles theta, elongations x and changes w of the lengths in
+ * the wrist. All three count from where the straight finger's tendons begin to stretch. The motor
+ * reels in for positive theta.
+ * Source: eq. 5.1.
+ *   in   theta[8] in rad, -5 to 5
+ *   in   x[8] in m, 0 to 0.1
+ *   in   w[8] in m, -0.0745654 to 0.0745654
+ *   out  h[8] in m
+ * Cost: 16 add, 8 mul.
+ */
+void awiwi_fifth_measured_lengths(const double theta[8], const double x[8], const double w[8], double h[8]);
+
+/*
+ * Kinetic energy of rotor and gear: half of B thd^2, with the inertia B that the output shaft feels.
+ * Source: eq. 3.1.
+ *   in   thd[1] in rad/s, -20 to 20
+ *   out  energy[1] in J
+ * Cost: 2 mul.
+ */
+void awiwi_motor_energy(const double thd[1], double energy[1]);
+
+/*
+ * Friction torque of motor and gear at the speed thd: what the motor must overcome, positive for
+ * positive thd.
+ * Source: eq. 3.8.
+ *   in   thd[1] in rad/s, -20 to 20
+ *   out  tau[1] in N m
+ * Cost: 1 add, 3 mul, 1 calls.
+ */
+void awiwi_motor_friction(const double thd[1], double tau[1]);
+
+/*
+ * Slope of the friction torque; an explicit step of a simulation must stay below 2 B / damping.
+ * Source: eq. 3.8, differentiated.
+ *   in   thd[1] in rad/s, -20 to 20
+ *   out  damping[1] in N m s/rad
+ * Cost: 2 add, 2 mul, 1 div.
+ */
+void awiwi_motor_damping(const double thd[1], double damping[1]);
+
+/*
+ * Periodic disturbance torque of both shafts at the angle theta: what the motor must overcome.
+ * Source: eq. 3.4, 3.5.
+ *   in   theta[1] in rad, -5 to 5
+ *   out  tau[1] in N m
+ * Cost: 11 add, 17 mul, 2 sincos.
+ */
+void awiwi_motor_ripple(const double theta[1], double tau[1]);
+
+/*
+ * Motor torque to feed forward against friction and ripple: the share of both that is safe to
+ * compensate.
+ * Source: section 3.2.
+ *   in   theta[1] in rad, -5 to 5
+ *   in   thd[1] in rad/s, -20 to 20
+ *   out  tau[1] in N m
+ * Cost: 13 add, 21 mul, 2 sincos, 1 calls.
+ */
+void awiwi_motor_compensation(const double theta[1], const double thd[1], double tau[1]);
+
+/*
+ * Acceleration under the motor torque tau and the tendon force f: (tau - friction - ripple - r f) / B.
+ * Source: eq. 3.2, 3.5.
+ *   in   theta[1] in rad, -5 to 5
+ *   in   thd[1] in rad/s, -20 to 20
+ *   in   tau[1] in N m, -3 to 3
+ *   in   f[1] in N, 0 to 100
+ *   out  thdd[1] in rad/s^2
+ * Cost: 15 add, 22 mul, 2 sincos, 1 calls.
+ */
+void awiwi_motor_acceleration(const double theta[1], const double thd[1], const double tau[1], const double f[1], double thdd[1]);
+
+/*
+ * Motor torque of a motion under the tendon force f: B thdd + friction + ripple + r f.
+ * Source: eq. 3.2, 3.5, solved for the torque.
+ *   in   theta[1] in rad, -5 to 5
+ *   in   thd[1] in rad/s, -20 to 20
+ *   in   thdd[1] in rad/s^2, -1000 to 1000
+ *   in   f[1] in N, 0 to 100
+ *   out  tau[1] in N m
+ * Cost: 15 add, 22 mul, 2 sincos, 1 calls.
+ */
+void awiwi_motor_torque(const double theta[1], const double thd[1], const double thdd[1], const double f[1], double tau[1]);
+
+/*
+ * Length dL of tendon in the mechanism, force and stiffness of the tendon at the lever angle theta.
+ * Source: table 4.1, figure 4.6.
+ *   in   theta[1] in rad, 3.25 to 3.62
+ *   out  dL[1] in m
+ *   out  force[1] in N
+ *   out  stiffness[1] in N/m
+ * Returns 0 where the roller is clear of the motor's pulley and the roller is clear of the fixed
+ * pulley and the tendon turns the lever towards its taut end and the spring is stretched; elsewhere 1,
+ * and what is not defined is NaN.
+ * Cost: 40 add, 54 mul, 7 div, 1 neg, 3 sqrt, 1 sincos, 2 calls.
+ */
+int awiwi_spring_lever(const double theta[1], double dL[1], double force[1], double stiffness[1]);
+
+/*
+ * Tendon force at the elongation x, counted from the slack end of the lever's travel.
+ * Source: figure 4.7.
+ *   in   x[1] in m, 0 to 0.0100745
+ *   out  f[1] in N
+ * Returns 0 where the argument is within the lever's travel, give or take a hundredth; elsewhere 1,
+ * and what is not defined is NaN.
+ * Cost: 18 add, 19 mul.
+ */
+int awiwi_spring_force(const double x[1], double f[1]);
+
+/*
+ * Tendon stiffness at the elongation x, counted from the slack end of the lever's travel.
+ * Source: figure 4.7.
+ *   in   x[1] in m, 0 to 0.0100745
+ *   out  k[1] in N/m
+ * Returns 0 where the argument is within the lever's travel, give or take a hundredth; elsewhere 1,
+ * and what is not defined is NaN.
+ * Cost: 18 add, 19 mul.
+ */
+int awiwi_spring_stiffness(const double x[1], double k[1]);
+
+/*
+ * Elongation at which the tendon's force is f: the inverse of the force.
+ * Source: figure 4.7.
+ *   in   f[1] in N, 3.87595 to 100.149
+ *   out  x[1] in m
+ * Returns 0 where the argument is within the lever's travel, give or take a hundredth; elsewhere 1,
+ * and what is not defined is NaN.
+ * Cost: 18 add, 19 mul.
+ */
+int awiwi_spring_elongation(const double f[1], double x[1]);
+
+/*
+ * dL, force and stiffness of every tendon from its sensor: the design's, or its own where it was
+ * calibrated.
+ * Source: section 4.1.
+ *   in   readings[38] in 1, 410 to 3685
+ *   out  dL[38] in m
+ *   out  force[38] in N
+ *   out  stiffness[38] in N/m
+ * Returns 0 where the argument is within the lever's travel, give or take a hundredth; elsewhere 1,
+ * and what is not defined is NaN.
+ * Cost: 1062 add, 1138 mul, 37 calls.
+ */
+int awiwi_calibration_readings(const double readings[38], double dL[38], double force[38], double stiffness[38]);
+
+/*
+ * dL, force and stiffness of one sensor's counts by polynomials from the bench, coefficients from the
+ * constant up. Their argument is (2 counts - ends[0] - ends[1]) / (ends[1] - ends[0]): -1 at the slack
+ * end, 1 at the taut one.
+ * Source: section 4.1.
+ *   in   counts[1] in 1, 614.688 to 3480.31
+ *   in   ends[2] in 1, from [205.3, 3480] to [614.7, 3890]
+ *   in   length_powers[7] in m, -0.0262062 to 0.0262062
+ *   in   force_powers[7] in N, -100.149 to 100.149
+ *   in   stiffness_powers[7] in N/m, -23579.9 to 23579.9
+ *   out  dL[1] in m
+ *   out  force[1] in N
+ *   out  stiffness[1] in N/m
+ * Returns 0 where the argument is within the lever's travel, give or take a hundredth; elsewhere 1,
+ * and what is not defined is NaN.
+ * Cost: 23 add, 19 mul, 1 div.
+ */
+int awiwi_calibration_polynomials(const double counts[1], const double ends[2], const double length_powers[7], const double force_powers[7], const double stiffness_powers[7], double dL[1], double force[1], double stiffness[1]);
+
+/*
+ * Elongation of the fibre under the force f.
+ * Source: section 5.1.
+ *   in   f[1] in N, 0 to 100
+ *   out  x[1] in m
+ * Cost: 1 mul.
+ */
+void awiwi_tendon_stretch(const double f[1], double x[1]);
+
+/*
+ * Stiffness of a whole tendon: of the fibre, in series with its mechanism of stiffness k.
+ * Source: section 4.3.
+ *   in   k[1] in N/m, 1000 to 50000
+ *   out  stiffness[1] in N/m
+ * Cost: 1 add, 2 div.
+ */
+void awiwi_tendon_stiffness(const double k[1], double stiffness[1]);
+
+/*
+ * Force lost in the guidings by a tendon that is pulled with the force f and bent by the angle bend in
+ * all.
+ * Source: eq. 4.1.
+ *   in   f[1] in N, 0 to 100
+ *   in   bend[1] in rad, 0 to 6
+ *   out  loss[1] in N
+ * Cost: 1 add, 2 mul, 1 calls.
+ */
+void awiwi_guiding_friction(const double f[1], const double bend[1], double loss[1]);
+
+/*
+ * Motor torque that brings the tendon force f to f_des: kp and kd on its error, estimates cancel the
+ * rest. f_hat is the force whose torque is fed forward: the measured one cancels it, the desired one
+ * adds no feedback.
+ * Source: eq. 10.2, with the signs mended.
+ *   in   f[1] in N, 0 to 120
+ *   in   fd[1] in N/s, -5000 to 5000
+ *   in   f_des[1] in N, 0 to 120
+ *   in   fd_des[1] in N/s, -5000 to 5000
+ *   in   f_hat[1] in N, 0 to 120
+ *   in   friction[1] in N m, -2 to 2
+ *   in   r[1] in m, 0.002 to 0.02
+ *   in   kp[1] in m, 0.0001 to 1
+ *   in   kd[1] in m s, 1e-06 to 0.1
+ *   out  tau[1] in N m
+ * Returns 0 where the pulley's radius is positive and the proportional gain is positive and the
+ * derivative gain is positive; elsewhere 1, and what is not defined is NaN.
+ * Cost: 5 add, 3 mul.
+ */
+int awiwi_tendon_force_pd(const double f[1], const double fd[1], const double f_des[1], const double fd_des[1], const double f_hat[1], const double friction[1], const double r[1], const double kp[1], const double kd[1], double tau[1]);
+
+/*
+ * Motor torque that brings the tendon force to f_des as a motor of inertia B does on a spring of
+ * omega0 and xi0. The gains (kp, kd) follow from the tendon's stiffness at the desired force and from
+ * its rate, which is zero where the desired force rests.
+ * Source: eq. 10.8 to 10.12, mended.
+ *   in   f[1] in N, 0 to 120
+ *   in   fd[1] in N/s, -5000 to 5000
+ *   in   f_des[1] in N, 0 to 120
+ *   in   fd_des[1] in N/s, -5000 to 5000
+ *   in   f_hat[1] in N, 0 to 120
+ *   in   friction[1] in N m, -2 to 2
+ *   in   r[1] in m, 0.002 to 0.02
+ *   in   B[1] in kg m^2, 0.0001 to 0.01
+ *   in   stiffness[1] in N/m, 1000 to 50000
+ *   in   stiffness_rate[1] in N/(m s), -10000 to 10000
+ *   in   omega0[1] in rad/s, 50 to 500
+ *   in   xi0[1] in 1, 0.2 to 2
+ *   out  tau[1] in N m
+ *   out  gains[2] in m, m s
+ * Returns 0 where the pulley's radius is positive and the motor's inertia is positive and the tendon's
+ * stiffness is positive and the target's frequency is positive and the target's damping ratio is
+ * positive and the proportional gain is positive; elsewhere 1, and what is not defined is NaN.
+ * Cost: 6 add, 17 mul, 1 div.
+ */
+int awiwi_tendon_force_scheduled(const double f[1], const double fd[1], const double f_des[1], const double fd_des[1], const double f_hat[1], const double friction[1], const double r[1], const double B[1], const double stiffness[1], const double stiffness_rate[1], const double omega0[1], const double xi0[1], double tau[1], double gains[2]);
+
+/*
+ * Gains of a motor that pulls against a grounded spring k: poles of frequency omega0 and damping ratio
+ * xi0.
+ * Source: eq. 12.7.
+ *   in   b[1] in kg m^2, 0.0001 to 0.01
+ *   in   dtheta[1] in N m s/rad, 0 to 0.1
+ *   in   k[1] in N m/rad, 0.05 to 20
+ *   in   omega0[1] in rad/s, 50 to 500
+ *   in   xi0[1] in 1, 0.2 to 2
+ *   out  K[2] in N m/rad, N m s/rad
+ * Returns 0 where the motor's inertia is positive and the target's frequency is positive and the
+ * target's damping ratio is positive; elsewhere 1, and what is not defined is NaN.
+ * Cost: 2 add, 4 mul.
+ */
+int awiwi_pole_placement_motor(const double b[1], const double dtheta[1], const double k[1], const double omega0[1], const double xi0[1], double K[2]);
+
+/*
+ * Gains on (q, dq/dt, theta, dtheta/dt) that make a joint with a spring k two oscillators omega and
+ * xi.
+ * Source: eq. 12.13 to 12.16, mended.
+ *   in   m[1] in kg m^2, 1e-07 to 0.0001
+ *   in   b[1] in kg m^2, 0.0001 to 0.01
+ *   in   k[1] in N m/rad, 0.05 to 20
+ *   in   dq[1] in N m s/rad, 0 to 0.005
+ *   in   dtheta[1] in N m s/rad, 0 to 0.1
+ *   in   omega[2] in rad/s, 5 to 500
+ *   in   xi[2] in 1, 0.2 to 2
+ *   out  K[4] in N m/rad, N m s/rad
+ * Returns 0 where the link's inertia is positive and the motor's inertia is positive and the stiffness
+ * is positive and the first frequency is positive and the second frequency is positive and the first
+ * damping ratio is positive and the second damping ratio is positive; elsewhere 1, and what is not
+ * defined is NaN.
+ * Cost: 14 add, 26 mul, 2 div, 1 neg.
+ */
+int awiwi_pole_placement(const double m[1], const double b[1], const double k[1], const double dq[1], const double dtheta[1], const double omega[2], const double xi[2], double K[4]);
+
+/*
+ * Motor torque u_des - K (x - x_des), where u_des holds the desired state; for optimal gains just as
+ * well.
+ * Source: eq. 12.2, 13.3, 14.12.
+ *   in   K[4] in N m/rad, N m s/rad, from [-1e+04, -100, -1e+04, -100] to [1e+04, 100, 1e+04, 100]
+ *   in   x[4] in rad, rad/s, from [-3, -50, -3, -50] to [3, 50, 3, 50]
+ *   in   x_des[4] in rad, rad/s, from [-3, -50, -3, -50] to [3, 50, 3, 50]
+ *   in   u_des[1] in N m, -3 to 3
+ *   out  u[1] in N m
+ * Cost: 8 add, 4 mul.
+ */
+void awiwi_pole_placement_law(const double K[4], const double x[4], const double x_des[4], const double u_des[1], double u[1]);
+
+/*
+ * Control of the example x1' = -x1^3 + x1^2 + x2, x2' = u.
+ * Source: eq. 15.1 to 15.10, mended.
+ *   in   x[2] in 1, from [-3, -10] to [3, 10]
+ *   in   k[2] in 1, 0.01 to 10
+ *   out  u[1] in 1
+ * Returns 0 where k1 is positive and k2 is positive; elsewhere 1, and what is not defined is NaN.
+ * Cost: 6 add, 7 mul, 1 neg.
+ */
+int awiwi_backstepping_academic(const double x[2], const double k[2], double u[1]);
+
+/*
+ * Energy of the example, its rate under the law, and the virtual control of x2.
+ * Source: eq. 15.2, 15.6, 15.9, mended.
+ *   in   x[2] in 1, from [-3, -10] to [3, 10]
+ *   in   k[2] in 1, 0.01 to 10
+ *   out  V[1] in 1
+ *   out  Vdot[1] in 1
+ *   out  virtual[1] in 1
+ * Cost: 5 add, 6 mul, 2 neg.
+ */
+void awiwi_backstepping_academic_lyapunov(const double x[2], const double k[2], double V[1], double Vdot[1], double virtual[1]);
+
+/*
+ * Motor torque that takes the link (q and three derivatives) to desired (q_d and four); scales of 1 as
+ * printed.
+ * Source: eq. 15.17 to 15.50.
+ *   in   motion[4] in rad, rad/s, rad/s^2, rad/s^3, from [-2, -20, -2000, -2e+05] to [2, 20, 2000, 2e+05]
+ *   in   desired[5] in rad, rad/s, rad/s^2, rad/s^3, rad/s^4, from [-2, -20, -2000, -2e+05, -2e+07] to [2, 20, 2000, 2e+05, 2e+07]
+ *   in   plant[3] in kg m^2, N m/rad, from [5e-07, 0.0001, 0.05] to [0.001, 0.01, 50]
+ *   in   rates[4] in 1/s, 0.1 to 2000
+ *   in   scales[3] in s^2, s^4, s^6, from [0.0001, 1e-08, 1e-12] to [10, 10, 10]
+ *   out  tau_m[1] in N m
+ * Returns 0 where the link's inertia is positive and the motor's inertia is positive and the stiffness
+ * is positive and k1 is positive and k2 is positive and k3 is positive and k4 is positive and c2 is
+ * positive and c3 is positive and c4 is positive; elsewhere 1, and what is not defined is NaN.
+ * Cost: 22 add, 16 mul, 4 div.
+ */
+int awiwi_backstepping_position(const double motion[4], const double desired[5], const double plant[3], const double rates[4], const double scales[3], double tau_m[1]);
+
+/*
+ * Energy of the position law's errors, its rate under the law, and the virtual controls of q', q'' and
+ * q'''.
+ * Source: eq. 15.27 to 15.46.
+ *   in   motion[4] in rad, rad/s, rad/s^2, rad/s^3, from [-2, -20, -2000, -2e+05] to [2, 20, 2000, 2e+05]
+ *   in   desired[5] in rad, rad/s, rad/s^2, rad/s^3, rad/s^4, from [-2, -20, -2000, -2e+05, -2e+07] to [2, 20, 2000, 2e+05, 2e+07]
+ *   in   plant[3] in kg m^2, N m/rad, from [5e-07, 0.0001, 0.05] to [0.001, 0.01, 50]
+ *   in   rates[4] in 1/s, 0.1 to 2000
+ *   in   scales[3] in s^2, s^4, s^6, from [0.0001, 1e-08, 1e-12] to [10, 10, 10]
+ *   out  V[1] in rad^2
+ *   out  Vdot[1] in rad^2/s
+ *   out  virtual[3] in rad/s, rad/s^2, rad/s^3
+ * Cost: 22 add, 20 mul, 2 div, 1 neg.
+ */
+void awiwi_backstepping_position_lyapunov(const double motion[4], const double desired[5], const double plant[3], const double rates[4], const double scales[3], double V[1], double Vdot[1], double virtual[3]);
+
+/*
+ * Motor torque that gives the link the stiffness K_p and the damping K_d about desired (q_d and four
+ * derivatives). state is (q, q', tau, tau') with the spring's torque tau, external the torque on the
+ * link and its rate: left out, the static stiffness is wrong. plant is (link, motor, spring); gains
+ * are (K_p, K_d, K_3, K_4); weights (C_t, C_s) are 1 as printed.
+ * Source: eq. 15.51 to 15.70, mended.
+ *   in   state[4] in rad, rad/s, N m, N m/s, from [-2, -20, -2, -200] to [2, 20, 2, 200]
+ *   in   desired[5] in rad, rad/s, rad/s^2, rad/s^3, rad/s^4, from [-2, -20, -2000, -2e+05, -2e+07] to [2, 20, 2000, 2e+05, 2e+07]
+ *   in   external[2] in N m, N m/s, from [-1, -100] to [1, 100]
+ *   in   plant[3] in kg m^2, N m/rad, from [5e-07, 0.0001, 0.05] to [0.001, 0.01, 50]
+ *   in   gains[4] in N m/rad, N m s/rad, 1/s, from [0.01, 0.0001, 0.1, 0.1] to [50, 1, 2000, 2000]
+ *   in   weights[2] in rad/(N m), rad s^2/(N m), from [0.01, 1e-06] to [100, 100]
+ *   out  tau_m[1] in N m
+ * Returns 0 where the link's inertia is positive and the motor's inertia is positive and the stiffness
+ * is positive and K_p is positive and K_d is positive and K_3 is positive and K_4 is positive and C_t
+ * is positive and C_s is positive; elsewhere 1, and what is not defined is NaN.
+ * Cost: 22 add, 16 mul, 4 div.
+ */
+int awiwi_backstepping_impedance(const double state[4], const double desired[5], const double external[2], const double plant[3], const double gains[4], const double weights[2], double tau_m[1]);
+
+/*
+ * Energy of the impedance law, its rate under the law, and the virtual controls of tau and tau'.
+ * Serves the law for nonlinear springs too: neither depends on the spring.
+ * Source: eq. 15.54, 15.57, 15.64, 15.66, mended.
+ *   in   state[4] in rad, rad/s, N m, N m/s, from [-2, -20, -2, -200] to [2, 20, 2, 200]
+ *   in   desired[5] in rad, rad/s, rad/s^2, rad/s^3, rad/s^4, from [-2, -20, -2000, -2e+05, -2e+07] to [2, 20, 2000, 2e+05, 2e+07]
+ *   in   external[2] in N m, N m/s, from [-1, -100] to [1, 100]
+ *   in   plant[3] in kg m^2, N m/rad, from [5e-07, 0.0001, 0.05] to [0.001, 0.01, 50]
+ *   in   gains[4] in N m/rad, N m s/rad, 1/s, from [0.01, 0.0001, 0.1, 0.1] to [50, 1, 2000, 2000]
+ *   in   weights[2] in rad/(N m), rad s^2/(N m), from [0.01, 1e-06] to [100, 100]
+ *   out  V[1] in J
+ *   out  Vdot[1] in W
+ *   out  virtual[2] in N m, N m/s
+ * Cost: 18 add, 18 mul, 2 div, 1 neg.
+ */
+void awiwi_backstepping_impedance_lyapunov(const double state[4], const double desired[5], const double external[2], const double plant[3], const double gains[4], const double weights[2], double V[1], double Vdot[1], double virtual[2]);
+
+/*
+ * The impedance law behind a nonlinear spring phi: tau = phi, and spring is (phi', phi'') at its
+ * elongation. bodies are the inertias of link and motor.
+ * Source: eq. 15.71 to 15.81, mended.
+ *   in   state[4] in rad, rad/s, N m, N m/s, from [-2, -20, -2, -200] to [2, 20, 2, 200]
+ *   in   desired[5] in rad, rad/s, rad/s^2, rad/s^3, rad/s^4, from [-2, -20, -2000, -2e+05, -2e+07] to [2, 20, 2000, 2e+05, 2e+07]
+ *   in   external[2] in N m, N m/s, from [-1, -100] to [1, 100]
+ *   in   bodies[2] in kg m^2, from [5e-07, 0.0001] to [0.001, 0.01]
+ *   in   spring[2] in N m/rad, N m/rad^2, from [0.05, -100] to [50, 100]
+ *   in   gains[4] in N m/rad, N m s/rad, 1/s, from [0.01, 0.0001, 0.1, 0.1] to [50, 1, 2000, 2000]
+ *   in   weights[2] in rad/(N m), rad s^2/(N m), from [0.01, 1e-06] to [100, 100]
+ *   out  tau_m[1] in N m
+ * Returns 0 where the link's inertia is positive and the motor's inertia is positive and the spring's
+ * slope is positive and K_p is positive and K_d is positive and K_3 is positive and K_4 is positive
+ * and C_t is positive and C_s is positive; elsewhere 1, and what is not defined is NaN.
+ * Cost: 23 add, 21 mul, 4 div.
+ */
+int awiwi_backstepping_nonlinear(const double state[4], const double desired[5], const double external[2], const double bodies[2], const double spring[2], const double gains[4], const double weights[2], double tau_m[1]);
+
+/*
+ * Torques of both motors: impedance of the link and common torque of the springs, exact for all six
+ * states. By motor: torques (tau, tau') of its spring, springs (phi', phi'') at its elongation,
+ * tunings (K_3, K_4, C_t, C_s). inertias are (link, motor 1, motor 2), impedance is (K_p, K_d),
+ * pretension the common torque with two derivatives.
+ * Source: eq. 15.82 to 15.106, mended.
+ *   in   joint[2] in rad, rad/s, from [-2, -20] to [2, 20]
+ *   in   torques[2][2] in N m, N m/s, from [0, -200, 0, -200] to [2, 200, 2, 200]
+ *   in   desired[5] in rad, rad/s, rad/s^2, rad/s^3, rad/s^4, from [-2, -20, -2000, -2e+05, -2e+07] to [2, 20, 2000, 2e+05, 2e+07]
+ *   in   pretension[3] in N m, N m/s, N m/s^2, from [0, -10, -1000] to [1, 10, 1000]
+ *   in   external[2] in N m, N m/s, from [-1, -100] to [1, 100]
+ *   in   inertias[3] in kg m^2, from [5e-07, 0.0001, 0.0001] to [0.001, 0.01, 0.01]
+ *   in   springs[2][2] in N m/rad, N m/rad^2, from [0.05, -100, 0.05, -100] to [50, 100, 50, 100]
+ *   in   impedance[2] in N m/rad, N m s/rad, from [0.01, 0.0001] to [50, 1]
+ *   in   tunings[2][4] in 1/s, rad/(N m), rad s^2/(N m), from [0.1, 0.1, 0.01, 1e-06, 0.1, 0.1, 0.01, 1e-06] to [2000, 2000, 100, 100, 2000, 2000, 100, 100]
+ *   out  tau_m[2] in N m
+ * Returns 0 where the link's inertia is positive and motor 1's inertia is positive and motor 2's
+ * inertia is positive and slope 1 is positive and slope 2 is positive and K_p is positive and K_d is
+ * positive and K_3 of motor 1 is positive and K_4 of motor 1 is positive and C_t of motor 1 is
+ * positive and C_s of motor 1 is positive and K_3 of motor 2 is positive and K_4 of motor 2 is
+ * positive and C_t of motor 2 is positive and C_s of motor 2 is positive; elsewhere 1, and what is not
+ * defined is NaN.
+ * Cost: 42 add, 34 mul, 7 div.
+ */
+int awiwi_backstepping_antagonistic(const double joint[2], const double torques[4], const double desired[5], const double pretension[3], const double external[2], const double inertias[3], const double springs[4], const double impedance[2], const double tunings[8], double tau_m[2]);
+
+/*
+ * Energy of the six states, its rate under the law, and the virtual controls of each motor's torque
+ * and rate.
+ * Source: eq. 15.88, 15.95, 15.97, 15.105, mended.
+ *   in   joint[2] in rad, rad/s, from [-2, -20] to [2, 20]
+ *   in   torques[2][2] in N m, N m/s, from [0, -200, 0, -200] to [2, 200, 2, 200]
+ *   in   desired[5] in rad, rad/s, rad/s^2, rad/s^3, rad/s^4, from [-2, -20, -2000, -2e+05, -2e+07] to [2, 20, 2000, 2e+05, 2e+07]
+ *   in   pretension[3] in N m, N m/s, N m/s^2, from [0, -10, -1000] to [1, 10, 1000]
+ *   in   external[2] in N m, N m/s, from [-1, -100] to [1, 100]
+ *   in   inertias[3] in kg m^2, from [5e-07, 0.0001, 0.0001] to [0.001, 0.01, 0.01]
+ *   in   springs[2][2] in N m/rad, N m/rad^2, from [0.05, -100, 0.05, -100] to [50, 100, 50, 100]
+ *   in   impedance[2] in N m/rad, N m s/rad, from [0.01, 0.0001] to [50, 1]
+ *   in   tunings[2][4] in 1/s, rad/(N m), rad s^2/(N m), from [0.1, 0.1, 0.01, 1e-06, 0.1, 0.1, 0.01, 1e-06] to [2000, 2000, 100, 100, 2000, 2000, 100, 100]
+ *   out  V[1] in J
+ *   out  Vdot[1] in W
+ *   out  virtual[2][2] in N m, N m/s
+ * Cost: 31 add, 29 mul, 3 div, 1 neg.
+ */
+void awiwi_backstepping_antagonistic_lyapunov(const double joint[2], const double torques[4], const double desired[5], const double pretension[3], const double external[2], const double inertias[3], const double springs[4], const double impedance[2], const double tunings[8], double V[1], double Vdot[1], double virtual[4]);
+
+/*
+ * The printed decoupling of the motors, for comparison only: it takes the pretension for motion and
+ * releases it.
+ * Source: eq. 15.84 to 15.88, as printed.
+ *   in   joint[2] in rad, rad/s, from [-2, -20] to [2, 20]
+ *   in   torques[2][2] in N m, N m/s, from [0, -200, 0, -200] to [2, 200, 2, 200]
+ *   in   desired[5] in rad, rad/s, rad/s^2, rad/s^3, rad/s^4, from [-2, -20, -2000, -2e+05, -2e+07] to [2, 20, 2000, 2e+05, 2e+07]
+ *   in   pretension[3] in N m, N m/s, N m/s^2, from [0, -10, -1000] to [1, 10, 1000]
+ *   in   external[2] in N m, N m/s, from [-1, -100] to [1, 100]
+ *   in   inertias[3] in kg m^2, from [5e-07, 0.0001, 0.0001] to [0.001, 0.01, 0.01]
+ *   in   springs[2][2] in N m/rad, N m/rad^2, from [0.05, -100, 0.05, -100] to [50, 100, 50, 100]
+ *   in   impedance[2] in N m/rad, N m s/rad, from [0.01, 0.0001] to [50, 1]
+ *   in   tunings[2][4] in 1/s, rad/(N m), rad s^2/(N m), from [0.1, 0.1, 0.01, 1e-06, 0.1, 0.1, 0.01, 1e-06] to [2000, 2000, 100, 100, 2000, 2000, 100, 100]
+ *   out  tau_m[2] in N m
+ * Returns 0 where the link's inertia is positive and motor 1's inertia is positive and motor 2's
+ * inertia is positive and slope 1 is positive and slope 2 is positive and K_p is positive and K_d is
+ * positive and K_3 of motor 1 is positive and K_4 of motor 1 is positive and C_t of motor 1 is
+ * positive and C_s of motor 1 is positive and K_3 of motor 2 is positive and K_4 of motor 2 is
+ * positive and C_t of motor 2 is positive and C_s of motor 2 is positive; elsewhere 1, and what is not
+ * defined is NaN.
+ * Cost: 48 add, 42 mul, 7 div.
+ */
+int awiwi_backstepping_antagonistic_decoupled(const double joint[2], const double torques[4], const double desired[5], const double pretension[3], const double external[2], const double inertias[3], const double springs[4], const double impedance[2], const double tunings[8], double tau_m[2]);
+
+/*
+ * The impedance law as tau_m = -K (q, q', tau, tau') + h (tau_ext, tau_ext'), linear spring, q_d = 0.
+ * K_cancelled are the gains for a plant whose spring's torque is cancelled: tau_m = (m + b) / m tau -
+ * K_cancelled x.
+ * Source: eq. 15.70, 16.1 to 16.3, mended.
+ *   in   plant[3] in kg m^2, N m/rad, from [5e-07, 0.0001, 0.05] to [0.001, 0.01, 50]
+ *   in   gains[4] in N m/rad, N m s/rad, 1/s, from [0.01, 0.0001, 0.1, 0.1] to [50, 1, 2000, 2000]
+ *   in   weights[2] in rad/(N m), rad s^2/(N m), from [0.01, 1e-06] to [100, 100]
+ *   out  K[4] in N m/rad, N m s/rad, 1, s
+ *   out  K_cancelled[4] in N m/rad, N m s/rad, 1, s
+ *   out  h[2] in 1, s
+ * Cost: 11 add, 16 mul, 4 div, 1 neg.
+ */
+void awiwi_backstepping_state_gains(const double plant[3], const double gains[4], const double weights[2], double K[4], double K_cancelled[4], double h[2]);
+
+/*
+ * Slopes of K_cancelled by the gains K_p, K_d, K_3, K_4.
+ * Source: eq. 16.3, mended and differentiated.
+ *   in   plant[3] in kg m^2, N m/rad, from [5e-07, 0.0001, 0.05] to [0.001, 0.01, 50]
+ *   in   gains[4] in N m/rad, N m s/rad, 1/s, from [0.01, 0.0001, 0.1, 0.1] to [50, 1, 2000, 2000]
+ *   in   weights[2] in rad/(N m), rad s^2/(N m), from [0.01, 1e-06] to [100, 100]
+ *   out  dK[4][4] in 1, 1/s, N m s/rad, s, N m s^2/rad, rad/(N m), rad/(N m s), s rad/(N m), s^2
+ * Cost: 7 add, 14 mul, 4 div.
+ */
+void awiwi_backstepping_state_gains_derivatives(const double plant[3], const double gains[4], const double weights[2], double dK[16]);
+
+/*
+ * K_3 and K_4 that give tau and tau' the feedback gains K_opt, with (K_p, K_d) and the weights given.
+ * Source: eq. 16.3, 16.4, solved.
+ *   in   K_opt[4] in N m/rad, N m s/rad, 1, s, from [33.03, 0.693, 342, 3.33] to [40.37, 0.847, 418, 4.07]
+ *   in   plant[3] in kg m^2, N m/rad, from [9.8e-05, 0.00196, 0.588] to [0.000102, 0.00204, 0.612]
+ *   in   impedance[2] in N m/rad, N m s/rad, from [0.07, 0.0007] to [0.13, 0.0013]
+ *   in   weights[2] in rad/(N m), rad s^2/(N m), from [7, 0.007] to [13, 0.013]
+ *   out  rates[2] in 1/s
+ * Returns 0 where K_3 and K_4 are real and differ and their sum is positive and their product is
+ * positive; elsewhere 1, and what is not defined is NaN.
+ * Cost: 7 add, 8 mul, 5 div, 3 neg, 1 sqrt.
+ */
+int awiwi_optimal_backstepping_rates(const double K_opt[4], const double plant[3], const double impedance[2], const double weights[2], double rates[2]);
+
+/*
+ * (K_3, K_4) and the weights (C_t, C_s) that give all four feedback gains K_opt exactly, with (K_p,
+ * K_d) given. Some K_p and K_d do whenever the closed loop is stable and has two different pairs of
+ * poles: near those of one pair.
+ * Source: eq. 15.89, 15.97, 16.3, 16.4, solved.
+ *   in   K_opt[4] in N m/rad, N m s/rad, 1, s, from [18.9, 0.819, 477, 0.279] to [23.1, 1.001, 583, 0.341]
+ *   in   plant[3] in kg m^2, N m/rad, from [9.8e-05, 0.00196, 0.588] to [0.000102, 0.00204, 0.612]
+ *   in   impedance[2] in N m/rad, N m s/rad, from [0.9, 0.000828] to [1.1, 0.001012]
+ *   out  rates[2] in 1/s
+ *   out  weights[2] in rad/(N m), rad s^2/(N m)
+ * Returns 0 where C_t is positive and K_3 is positive and K_4 is positive and C_s is positive;
+ * elsewhere 1, and what is not defined is NaN.
+ * Cost: 8 add, 10 mul, 5 div, 7 neg.
+ */
+int awiwi_optimal_backstepping_weights(const double K_opt[4], const double plant[3], const double impedance[2], double rates[2], double weights[2]);
 
 #ifdef __cplusplus
 }

@@ -8,11 +8,10 @@
  *   out  M[4][4] in kg m^2
  *   out  C[4][4] in N m s/rad
  *   out  gravity[4] in N m
- * Cost: 97 add, 107 mul, 1 neg, 4 sincos.
+ * Cost: 94 add, 105 mul, 1 neg, 4 sincos.
  * Inputs: sha256 e62e10a0c5f174abe387898095f5e44e9b4bd4c4d0e8ad5e213f8ec3d580acd9.
  */
 #include <math.h>
-
 #include "kernels.h"
 
 void awiwi_middle_dynamics(const double q[restrict 4], const double qd[restrict 4], const double g[restrict 3], double M[restrict 16], double C[restrict 16], double gravity[restrict 4])
@@ -43,48 +42,50 @@ void awiwi_middle_dynamics(const double q[restrict 4], const double qd[restrict 
     const double t21 = t20 + t15;
     const double t22 = t18*t11 + t19*t21;
     const double t23 = t17 + 2.0*t22 + 2.791019e-05;
-    const double t24 = 1.252e-09*t6 + 8.34e-09*t7 + 0.004*t15;
+    const double t24 = 4.612e-09*t6 + 1.5954e-07*t7;
     const double t25 = 6.56e-09*t2 + 7.1078e-07*t3 + t24;
     const double t26 = 1.166e-08*cos_q1 + 1.16724e-06*sin_q1 + t25;
     const double t27 = t22 + t17;
     const double t28 = t16 + 5.16368e-07;
     const double t29 = t18*t10 + t19*t15 + t28;
     const double t30 = qd[1] + qd[2];
-    const double t31 = t14*t10;
-    const double t32 = qd[3] + t30;
-    const double t33 = t13*t15;
-    const double t34 = t32*t33;
-    const double t35 = t3*t4 + 1.28e-08;
+    const double t31 = qd[3] + t30;
+    const double t32 = t31*t15;
+    const double t33 = t13*t32;
+    const double t34 = t3*t4 + 1.28e-08;
+    const double t35 = t14*t10;
     const double t36 = t7*t8 + 5.06e-09;
-    const double t37 = t30*t35 + t32*t36;
-    const double t38 = -(t30*t31) - t34 - t37;
-    const double t39 = sin_q1*t0 + 4.46e-08;
-    const double t40 = qd[1]*t39;
-    const double t41 = t19*t11;
-    const double t42 = t30*t20 + t32*t15;
-    const double t43 = t18*t42;
-    const double t44 = t38 - t40 - qd[1]*t41 - t43;
-    const double t45 = 3.3e-06*cos_q1 + 0.0007128*sin_q1;
-    const double t46 = t32*t10;
-    const double t47 = t32*(8.34e-09*t6 - 1.252e-09*t7) + 0.004*t46;
-    const double t48 = t30*(7.1078e-07*t2 - 6.56e-09*t3) + t47;
-    const double t49 = 0.006*qd[0];
-    const double t50 = t45 + t21;
-    const double t51 = t18*t21;
-    const double t52 = t35 + t33 + t31 + t36;
-    const double t53 = t49*t50 + qd[0]*(t39 + t51 + t41 + t52);
-    const double t54 = t49*t21 + qd[0]*t51 + qd[0]*t52;
-    const double t55 = t18*t15;
-    const double t56 = t49*t15 + qd[0]*t55 + qd[0]*(t33 + t36);
-    const double t57 = t19*(t30*t9 + t46);
-    const double t58 = t14*t46;
-    const double t59 = t30*t33 + t58 + t37;
-    const double t60 = t59 + t38;
-    const double t61 = t58 - t34;
-    const double t62 = t30*(t33 - t31);
+    const double t37 = t31*t36;
+    const double t38 = -t33 - t30*(t34 + t35) - t37;
+    const double t39 = t30*t20 + t32;
+    const double t40 = t18*t39;
+    const double t41 = sin_q1*t0 + 4.46e-08;
+    const double t42 = t19*t11;
+    const double t43 = t38 - t40 - qd[1]*(t41 + t42);
+    const double t44 = 3.3e-06*cos_q1 + 0.0007128*sin_q1;
+    const double t45 = t31*(1.5954e-07*t6 - 4.612e-09*t7);
+    const double t46 = t30*(7.1078e-07*t2 - 6.56e-09*t3) + t45;
+    const double t47 = 0.006*qd[0];
+    const double t48 = t44 + t21;
+    const double t49 = t18*t21;
+    const double t50 = t41 + t49;
+    const double t51 = t13*t15;
+    const double t52 = t34 + t51;
+    const double t53 = t35 + t36 + t52;
+    const double t54 = t47*t48 + qd[0]*(t42 + t50 + t53);
+    const double t55 = t47*t21 + qd[0]*t49 + qd[0]*t53;
+    const double t56 = qd[0]*t15;
+    const double t57 = t47*t15 + t18*t56 + (t13*t56 + qd[0]*t36);
+    const double t58 = t31*t10;
+    const double t59 = t19*(t30*t9 + t58);
+    const double t60 = t14*t58;
+    const double t61 = t60 + t30*t52 + t37;
+    const double t62 = t38 + t61;
+    const double t63 = t60 - t33;
+    const double t64 = t30*(t51 - t35);
     const double cos_q0 = cos(q[0]);
     const double sin_q0 = sin(q[0]);
-    const double t63 = g[0]*cos_q0 + g[1]*sin_q0;
+    const double t65 = g[0]*cos_q0 + g[1]*sin_q0;
     M[0] = cos_q1*t0 + t2*t4 + t6*t8 + 0.012*t12 + t23 - 0.066*t3*t15 - 0.088*sin_q1*t21 - 3.4061942e-05;
     M[1] = t26;
     M[2] = t25;
@@ -101,24 +102,24 @@ void awiwi_middle_dynamics(const double q[restrict 4], const double qd[restrict 
     M[13] = t29;
     M[14] = t28;
     M[15] = 5.16368e-07;
-    C[0] = t44 - 0.006*(qd[1]*t45 + t42);
-    C[1] = qd[1]*(1.16724e-06*cos_q1 - 1.166e-08*sin_q1) + t48 - t53;
-    C[2] = t48 - t54;
-    C[3] = t47 - t56;
-    C[4] = t53;
-    C[5] = t40 + qd[1]*t51 + t57 + t59 + t44;
-    C[6] = t57 + t60 - t43;
-    C[7] = t19*t46 + t61 - t32*t55;
-    C[8] = t54;
-    C[9] = qd[1]*(t51 - t41) + t60;
-    C[10] = t60;
-    C[11] = t61;
-    C[12] = t56;
-    C[13] = qd[1]*(t55 - t19*t10) + t62;
-    C[14] = t62;
+    C[0] = t43 - 0.006*(qd[1]*t44 + t39);
+    C[1] = qd[1]*(1.16724e-06*cos_q1 - 1.166e-08*sin_q1) + t46 - t54;
+    C[2] = t46 - t55;
+    C[3] = t45 - t57;
+    C[4] = t54;
+    C[5] = t43 + (t59 + t61 + qd[1]*t50);
+    C[6] = t59 + t62 - t40;
+    C[7] = t19*t58 + t63 - t18*t32;
+    C[8] = t55;
+    C[9] = qd[1]*(t49 - t42) + t62;
+    C[10] = t62;
+    C[11] = t63;
+    C[12] = t57;
+    C[13] = qd[1]*(t18*t15 - t19*t10) + t64;
+    C[14] = t64;
     C[15] = 0.0;
-    gravity[0] = 2.806e-05*t63 + (g[0]*sin_q0 - g[1]*cos_q0)*(t12 + 0.0001347);
-    gravity[1] = t63*t50 - g[2]*t12;
-    gravity[2] = t63*t21 - g[2]*t11;
-    gravity[3] = t63*t15 - g[2]*t10;
+    gravity[0] = 2.806e-05*t65 + (g[0]*sin_q0 - g[1]*cos_q0)*(t12 + 0.0001347);
+    gravity[1] = t65*t48 - g[2]*t12;
+    gravity[2] = t65*t21 - g[2]*t11;
+    gravity[3] = t65*t15 - g[2]*t10;
 }

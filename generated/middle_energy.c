@@ -7,11 +7,10 @@
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  kinetic[1] in J
  *   out  potential[1] in J
- * Cost: 52 add, 68 mul, 4 sincos.
+ * Cost: 51 add, 67 mul, 4 sincos.
  * Inputs: sha256 6dc3171fbd7a3bb4e8ba1b2ad4c5197dcf6b595756784e4b6b74a397a420a135.
  */
 #include <math.h>
-
 #include "kernels.h"
 
 void awiwi_middle_energy(const double q[restrict 4], const double qd[restrict 4], const double g[restrict 3], double kinetic[restrict 1], double potential[restrict 1])
@@ -33,7 +32,7 @@ void awiwi_middle_energy(const double q[restrict 4], const double qd[restrict 4]
     const double t12 = 1.3e-06*t1 + 0.0002426*t6 + t7;
     const double t13 = cos_q1*t11 + sin_q1*t12;
     const double t14 = t9 + 0.088*t13 + 2.791019e-05;
-    const double t15 = 1.252e-09*t3 + 8.34e-09*t4 + 0.004*t7;
+    const double t15 = 4.612e-09*t3 + 1.5954e-07*t4;
     const double t16 = 6.56e-09*t1 + 7.1078e-07*t6 + t15;
     const double t17 = 0.0007128*cos_q1 - 3.3e-06*sin_q1;
     const double t18 = cos_q1*(2.771021e-05*cos_q1 - 8.92e-08*sin_q1) + t1*(6.78634e-06*t1 - 2.56e-08*t6) + t3*(4.73532e-07*t3 - 1.012e-08*t4) + 0.012*(t17 + t11) + t14 - 0.066*t6*t7 - 0.088*sin_q1*t12 - 3.4061942e-05;

@@ -8,7 +8,6 @@
  * Inputs: sha256 15462d6160e9e4cd18a43275ab61dc404bca2d4b163c1071b4541fb6ea4f279d.
  */
 #include <math.h>
-
 #include "kernels.h"
 
 void awiwi_middle_fingertip_pose(const double q[restrict 4], double T[restrict 16])

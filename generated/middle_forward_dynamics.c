@@ -7,11 +7,10 @@
  *   in   tau[4] in N m, -1 to 1
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  qdd[4] in rad/s^2
- * Cost: 113 add, 144 mul, 3 div, 4 sincos.
+ * Cost: 110 add, 141 mul, 3 div, 4 sincos.
  * Inputs: sha256 e62e10a0c5f174abe387898095f5e44e9b4bd4c4d0e8ad5e213f8ec3d580acd9.
  */
 #include <math.h>
-
 #include "kernels.h"
 
 void awiwi_middle_forward_dynamics(const double q[restrict 4], const double qd[restrict 4], const double tau[restrict 4], const double g[restrict 3], double qdd[restrict 4])
@@ -22,81 +21,81 @@ void awiwi_middle_forward_dynamics(const double q[restrict 4], const double qd[r
     const double cos_q1 = cos(q[1]);
     const double t2 = 2.771021e-05*cos_q1 - 8.92e-08*sin_q1;
     const double t3 = sin_q1*t2 + 4.46e-08;
-    const double t4 = q[1] + q[2];
-    const double t5 = q[3] + t4;
-    const double t6 = cos(t5);
-    const double t7 = sin(t5);
-    const double t8 = 3.78e-05*t6 - 8.4e-07*t7;
-    const double t9 = qd[0]*qd[0];
-    const double t10 = qd[1] + qd[2];
-    const double t11 = 0.066*qd[0];
-    const double t12 = sin(t4);
+    const double t4 = qd[1] + qd[2];
+    const double t5 = 0.066*qd[0];
+    const double t6 = q[1] + q[2];
+    const double t7 = sin(t6);
     const double sin_q0 = sin(q[0]);
     const double cos_q0 = cos(q[0]);
-    const double t13 = g[0]*sin_q0 - g[1]*cos_q0;
-    const double t14 = 0.088*sin_q1;
-    const double t15 = t13 - qd[0]*qd[1]*t14;
-    const double t16 = t10*t0;
-    const double t17 = cos(t4);
-    const double t18 = 6.78634e-06*t17 - 2.56e-08*t12;
-    const double t19 = t12*t18 + 1.28e-08;
-    const double t20 = qd[3] + t10;
-    const double t21 = 8.4e-07*t6 + 3.78e-05*t7;
-    const double t22 = t20*t21;
-    const double t23 = 4.73532e-07*t6 - 1.012e-08*t7;
-    const double t24 = t7*t23 + 5.06e-09;
-    const double t25 = 0.044*cos_q1;
-    const double t26 = 1.3e-06*t17 + 0.0002426*t12;
-    const double t27 = t16*t26 + t0*t22;
-    const double t28 = 3.3e-06*cos_q1 + 0.0007128*sin_q1;
-    const double t29 = g[0]*cos_q0 + g[1]*sin_q0;
-    const double t30 = qd[1]*qd[1];
-    const double t31 = t10*t10;
-    const double t32 = 0.0007128*cos_q1 - 3.3e-06*sin_q1;
-    const double t33 = 0.0002426*t17 - 1.3e-06*t12;
-    const double t34 = t20*t20;
-    const double t35 = (t9 + t34)*t8;
-    const double t36 = 1.252e-09*t6 + 8.34e-09*t7 + 0.004*t21;
-    const double t37 = 1936603.352647724*t36;
-    const double t38 = 0.044*sin_q1;
-    const double t39 = g[2] + t30*t38;
-    const double t40 = 0.033*t12;
-    const double t41 = t9 + t31;
-    const double t42 = 0.033*t17;
-    const double t43 = 0.006*t9 + t29;
-    const double t44 = (t9 + t30)*t25 + t43;
-    const double t45 = (t39 + t31*t40)*t8 - t21*(t41*t42 + t44) - t9*t24;
-    const double t46 = tau[3] + t45;
-    const double t47 = t34*t21;
-    const double t48 = t39*t33 + t42*t47 + t45 - t26*t44 - t9*t19 - t40*t35;
-    const double t49 = t42*t8 + t40*t21;
+    const double t8 = g[0]*sin_q0 - g[1]*cos_q0;
+    const double t9 = 0.088*sin_q1;
+    const double t10 = t8 - qd[0]*qd[1]*t9;
+    const double t11 = q[3] + t6;
+    const double t12 = cos(t11);
+    const double t13 = sin(t11);
+    const double t14 = 3.78e-05*t12 - 8.4e-07*t13;
+    const double t15 = t4*t0;
+    const double t16 = cos(t6);
+    const double t17 = 6.78634e-06*t16 - 2.56e-08*t7;
+    const double t18 = t7*t17 + 1.28e-08;
+    const double t19 = qd[3] + t4;
+    const double t20 = 8.4e-07*t12 + 3.78e-05*t13;
+    const double t21 = t19*t20;
+    const double t22 = 4.73532e-07*t12 - 1.012e-08*t13;
+    const double t23 = t13*t22 + 5.06e-09;
+    const double t24 = 0.044*cos_q1;
+    const double t25 = 1.3e-06*t16 + 0.0002426*t7;
+    const double t26 = t15*t25 + t0*t21;
+    const double t27 = 3.3e-06*cos_q1 + 0.0007128*sin_q1;
+    const double t28 = g[0]*cos_q0 + g[1]*sin_q0;
+    const double t29 = qd[1]*qd[1];
+    const double t30 = t4*t4;
+    const double t31 = 0.0007128*cos_q1 - 3.3e-06*sin_q1;
+    const double t32 = 0.0002426*t16 - 1.3e-06*t7;
+    const double t33 = t19*t19;
+    const double t34 = 4.612e-09*t12 + 1.5954e-07*t13;
+    const double t35 = 1936603.352647724*t34;
+    const double t36 = 0.044*sin_q1;
+    const double t37 = g[2] + t29*t36;
+    const double t38 = 0.033*t7;
+    const double t39 = qd[0]*qd[0];
+    const double t40 = t39 + t30;
+    const double t41 = 0.033*t16;
+    const double t42 = 0.006*t39 + t28;
+    const double t43 = (t39 + t29)*t24 + t42;
+    const double t44 = (t37 + t30*t38)*t14 - t20*(t40*t41 + t43) - t39*t23;
+    const double t45 = tau[3] + t44;
+    const double t46 = t33*t20;
+    const double t47 = (t39 + t33)*t14;
+    const double t48 = t37*t32 + t41*t46 + t44 - t25*t43 - t39*t18 - t38*t47;
+    const double t49 = t41*t14 + t38*t20;
     const double t50 = t49 + 5.16368e-07;
     const double t51 = 1936603.352647724*t50;
-    const double t52 = tau[2] + t48 - t51*t46;
-    const double t53 = 6.56e-09*t17 + 7.1078e-07*t12 + t36;
-    const double t54 = t53 - t50*t37;
+    const double t52 = tau[2] + t48 - t51*t45;
+    const double t53 = 6.56e-09*t16 + 7.1078e-07*t7 + t34;
+    const double t54 = t53 - t35*t50;
     const double t55 = 2.0*t49 + 7.384428e-06;
     const double t56 = 1.0/(t55 - t50*t51);
     const double t57 = t54*t56;
-    const double t58 = t25*t8 + t38*t21 + t50;
+    const double t58 = t24*t14 + t36*t20 + t50;
     const double t59 = 1936603.352647724*t58;
-    const double t60 = t33 + t8;
-    const double t61 = t26 + t21;
-    const double t62 = t25*t60 + t38*t61;
+    const double t60 = t32 + t14;
+    const double t61 = t25 + t20;
+    const double t62 = t24*t60 + t36*t61;
     const double t63 = t62 + t55 - t58*t51;
     const double t64 = t63*t56;
-    const double t65 = tau[1] + g[2]*t32 + t25*(t31*t26 + t47) + t48 - t28*t43 - t9*t3 - t38*(t41*t33 + t35) - t46*t59 - t52*t64;
-    const double t66 = 1.166e-08*cos_q1 + 1.16724e-06*sin_q1 + t53 - t37*t58 - t63*t57;
+    const double t65 = tau[1] + g[2]*t31 + t24*(t30*t25 + t46) + t48 - t27*t42 - t39*t3 - t36*(t40*t32 + t47) - t45*t59 - t52*t64;
+    const double t66 = 1.166e-08*cos_q1 + 1.16724e-06*sin_q1 + t53 - t35*t58 - t63*t57;
     const double t67 = t55 + 2.0*t62 + 2.791019e-05;
     const double t68 = 1.0/(t67 - t58*t59 - t63*t64);
     const double t69 = t66*t68;
-    const double t70 = tau[0] + t1*t3 + t8*(0.004*t9 + t10*t11*t12 - t15) + t16*t19 + t11*t17*t22 + t0*t20*t24 + t25*t27 + 0.006*(t1*t28 + t27) - 2.806e-05*t29 - t30*(1.16724e-06*cos_q1 - 1.166e-08*sin_q1) - t31*(7.1078e-07*t17 - 6.56e-09*t12) - t13*(t32 + 0.0001347) - t15*t33 - t34*(8.34e-09*t6 - 1.252e-09*t7) - 0.004*t35 - t37*t46 - t52*t57 - t65*t69;
-    const double t71 = cos_q1*t2 + t17*t18 + t6*t23 + 0.012*(t32 + t60) + t67 - 0.066*t12*t21 - t14*t61 - t36*t37 - t54*t57 - t66*t69 - 3.4061942e-05;
+    const double t70 = tau[0] + t1*t3 + (t4*t5*t7 - t10)*t14 + t15*t18 + t5*t16*t21 + t0*t19*t23 + t24*t26 + 0.006*(t1*t27 + t26) - 2.806e-05*t28 - t29*(1.16724e-06*cos_q1 - 1.166e-08*sin_q1) - t30*(7.1078e-07*t16 - 6.56e-09*t7) - t8*(t31 + 0.0001347) - t10*t32 - t33*(1.5954e-07*t12 - 4.612e-09*t13) - t35*t45 - t52*t57 - t65*t69;
+    const double t71 = cos_q1*t2 + t16*t17 + t12*t22 + 0.012*(t31 + t60) + t67 - 0.066*t7*t20 - t9*t61 - t34*t35 - t54*t57 - t66*t69 - 3.4061942e-05;
     const double t72 = t70/t71;
     const double t73 = t65*t68 - t69*t72;
     const double t74 = t52*t56 - t57*t72 - t64*t73;
     qdd[0] = t72;
     qdd[1] = t73;
     qdd[2] = t74;
-    qdd[3] = 1936603.352647724*t46 - t37*t72 - t59*t73 - t51*t74;
+    qdd[3] = 1936603.352647724*t45 - t35*t72 - t59*t73 - t51*t74;
 }

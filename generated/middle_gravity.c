@@ -9,7 +9,6 @@
  * Inputs: sha256 8a291a953e0d00c5244930cc5ad24fa3e70d4d07cf2b958617060f4b88419888.
  */
 #include <math.h>
-
 #include "kernels.h"
 
 void awiwi_middle_gravity(const double q[restrict 4], const double g[restrict 3], double gravity[restrict 4])

@@ -8,7 +8,6 @@
  * Inputs: sha256 f97fd1ddc88da616075a1c9877058146fe0ad1e2c493dc00244366f615b4428f.
  */
 #include <math.h>
-
 #include "kernels.h"
 
 void awiwi_middle_jacobian(const double q[restrict 4], double J[restrict 24])

@@ -8,7 +8,6 @@
  * Inputs: sha256 006a35ca0873973d7efd6d4fea4cb0917509e7fec8703892fb015437d1b3a27a.
  */
 #include <math.h>
-
 #include "kernels.h"
 
 void awiwi_middle_link_poses(const double q[restrict 4], double T[restrict 64])

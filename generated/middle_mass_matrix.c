@@ -4,11 +4,10 @@
  * Source: eq. 2.17, 5.4.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   out  M[4][4] in kg m^2
- * Cost: 35 add, 42 mul, 3 sincos.
+ * Cost: 34 add, 41 mul, 3 sincos.
  * Inputs: sha256 e62e10a0c5f174abe387898095f5e44e9b4bd4c4d0e8ad5e213f8ec3d580acd9.
  */
 #include <math.h>
-
 #include "kernels.h"
 
 void awiwi_middle_mass_matrix(const double q[restrict 4], double M[restrict 16])
@@ -32,7 +31,7 @@ void awiwi_middle_mass_matrix(const double q[restrict 4], double M[restrict 16])
     const double t14 = t11*t7 + t12*t13;
     const double t15 = t10 + 2.0*t14 + 2.791019e-05;
     const double t16 = cos_q1*(2.771021e-05*cos_q1 - 8.92e-08*sin_q1) + t1*(6.78634e-06*t1 - 2.56e-08*t2) + t4*(4.73532e-07*t4 - 1.012e-08*t5) + 0.012*(0.0007128*cos_q1 + t7 - 3.3e-06*sin_q1) + t15 - 0.066*t2*t8 - 0.088*sin_q1*t13 - 3.4061942e-05;
-    const double t17 = 1.252e-09*t4 + 8.34e-09*t5 + 0.004*t8;
+    const double t17 = 4.612e-09*t4 + 1.5954e-07*t5;
     const double t18 = 6.56e-09*t1 + 7.1078e-07*t2 + t17;
     const double t19 = 1.166e-08*cos_q1 + 1.16724e-06*sin_q1 + t18;
     const double t20 = t14 + t10;

@@ -2,4 +2,4 @@
  */
 #include "kernels.h"
 
-const char awiwi_model_digest[65] = "3ff8426a5de01f48e852cdaaf46ef55dd612856c5c19df12fa89858bf694af34";
+const char awiwi_model_digest[65] = "8ec1a32256a12626e6a534d07d9716d731729c7ea21934b48f6b42e3cf6a6788";

@@ -5,11 +5,10 @@
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   in   qd[3] in rad/s, -20 to 20
  *   out  C[3][3] in N m s/rad
- * Cost: 72 add, 83 mul, 1 neg, 3 sincos.
+ * Cost: 69 add, 79 mul, 1 neg, 3 sincos.
  * Inputs: sha256 bd8b39edf0c326c692ad61b5af6c0fc4e8d7a58d1260e50a706973fc5a47c5f8.
  */
 #include <math.h>
-
 #include "kernels.h"
 
 void awiwi_ring_coriolis_matrix(const double q[restrict 3], const double qd[restrict 3], double C[restrict 9])
@@ -17,61 +16,60 @@ void awiwi_ring_coriolis_matrix(const double q[restrict 3], const double qd[rest
     const double t0 = qd[1] + qd[2];
     const double t1 = q[1] + q[2];
     const double t2 = sin(t1);
-    const double t3 = 0.0305*t2;
-    const double t4 = t1 + 0.7857142857142857*q[2];
-    const double t5 = cos(t4);
-    const double t6 = sin(t4);
-    const double t7 = 3.6e-05*t5 - 8e-07*t6;
-    const double t8 = t3*t7;
-    const double t9 = t0 + 0.7857142857142857*qd[2];
-    const double t10 = cos(t1);
-    const double t11 = 8e-07*t5 + 3.6e-05*t6;
-    const double t12 = t10*t11;
-    const double t13 = 0.0305*t12;
-    const double t14 = t2*(5.463e-06*t10 - 2.352e-08*t2) + 1.176e-08;
-    const double t15 = t6*(4.4334e-07*t5 - 1.04e-08*t6) + 5.2e-09;
-    const double t16 = t0*t14 + t9*t15;
-    const double t17 = -(t0*t8) - t9*t13 - t16;
-    const double sin_q1 = sin(q[1]);
+    const double t3 = cos(t1);
+    const double t4 = t2*(5.463e-06*t3 - 2.352e-08*t2) + 1.176e-08;
+    const double t5 = 0.0305*t2;
+    const double t6 = t1 + 0.7857142857142857*q[2];
+    const double t7 = cos(t6);
+    const double t8 = sin(t6);
+    const double t9 = 3.6e-05*t7 - 8e-07*t8;
+    const double t10 = t4 + t5*t9;
+    const double t11 = t0 + 0.7857142857142857*qd[2];
+    const double t12 = t8*(4.4334e-07*t7 - 1.04e-08*t8) + 5.2e-09;
+    const double t13 = t11*t12;
+    const double t14 = 8e-07*t7 + 3.6e-05*t8;
+    const double t15 = t3*t14;
+    const double t16 = 0.0305*t15;
+    const double t17 = -(t0*t10) - t13 - t11*t16;
     const double cos_q1 = cos(q[1]);
-    const double t18 = sin_q1*(2.23216e-05*cos_q1 - 7.9e-08*sin_q1) + 3.95e-08;
-    const double t19 = qd[1]*t18;
-    const double t20 = 0.041*sin_q1;
-    const double t21 = 0.0002108*t10 - 1.2e-06*t2;
-    const double t22 = t21 + t7;
-    const double t23 = t20*t22;
-    const double t24 = 0.041*cos_q1;
-    const double t25 = 1.2e-06*t10 + 0.0002108*t2;
-    const double t26 = t0*t25 + t9*t11;
-    const double t27 = t17 - t19 - qd[1]*t23 - t24*t26;
-    const double t28 = 3e-06*cos_q1 + 0.000615*sin_q1;
-    const double t29 = t9*(7.8e-09*t5 - 1.24e-09*t6);
-    const double t30 = t9*t7;
-    const double t31 = t0*(6.2216e-07*t10 - 5.44e-09*t2) + t29 + 0.004*t30;
-    const double t32 = 0.006*qd[0];
-    const double t33 = t25 + t11;
-    const double t34 = t24*t33;
-    const double t35 = t14 + t8 + t15 + t13;
-    const double t36 = t32*(t28 + t33) + qd[0]*(t18 + t34 + t23 + t35);
-    const double t37 = qd[0]*t15;
-    const double t38 = 0.7857142857142857*t11;
-    const double t39 = t33 + t38;
-    const double t40 = 0.023964285714285716*t12;
-    const double t41 = qd[0]*(t40 + t35);
-    const double t42 = t0*t21 + t30;
-    const double t43 = t3*t30 + t0*t13 + t16;
-    const double t44 = 0.023964285714285716*t2;
-    const double t45 = t17 + t43;
-    const double t46 = t44*t30 - t9*t40 + t45;
-    const double t47 = t24*t39;
-    const double t48 = t0*(t44*t7 - t40);
-    C[0] = t27 - 0.006*(qd[1]*t28 + t26);
-    C[1] = qd[1]*(1.0264e-06*cos_q1 - 9.6e-09*sin_q1) + t31 - t36;
-    C[2] = 0.003142857142857143*t30 + t31 + 0.7857142857142857*(t29 - t37) - (t24 + 0.006)*(qd[0]*t39) - t41;
-    C[3] = t36;
-    C[4] = t19 + qd[1]*t34 + t20*t42 + t43 + t27;
-    C[5] = t20*(t42 + 0.7857142857142857*t30) + t46 - t24*(t26 + t9*t38);
-    C[6] = t32*t39 + 0.7857142857142857*t37 + qd[0]*t47 + t41;
-    C[7] = qd[1]*(t47 - t20*(t22 + 0.7857142857142857*t7)) + t45 - t48;
-    C[8] = t46 - t48;
+    const double t18 = 0.041*cos_q1;
+    const double t19 = 1.2e-06*t3 + 0.0002108*t2;
+    const double t20 = t0*t19 + t11*t14;
+    const double sin_q1 = sin(q[1]);
+    const double t21 = sin_q1*(2.23216e-05*cos_q1 - 7.9e-08*sin_q1) + 3.95e-08;
+    const double t22 = 0.041*sin_q1;
+    const double t23 = 0.0002108*t3 - 1.2e-06*t2;
+    const double t24 = t23 + t9;
+    const double t25 = t22*t24;
+    const double t26 = t17 - t18*t20 - qd[1]*(t21 + t25);
+    const double t27 = 3e-06*cos_q1 + 0.000615*sin_q1;
+    const double t28 = t11*(1.518e-07*t7 - 4.44e-09*t8);
+    const double t29 = t0*(6.2216e-07*t3 - 5.44e-09*t2) + t28;
+    const double t30 = 0.006*qd[0];
+    const double t31 = t19 + t14;
+    const double t32 = t21 + t18*t31;
+    const double t33 = t12 + t10 + t16;
+    const double t34 = t30*(t27 + t31) + qd[0]*(t25 + t32 + t33);
+    const double t35 = qd[0]*t12;
+    const double t36 = 0.7857142857142857*t14;
+    const double t37 = t31 + t36;
+    const double t38 = 0.023964285714285716*t15;
+    const double t39 = qd[0]*(t38 + t33);
+    const double t40 = t11*t9;
+    const double t41 = t0*t23 + t40;
+    const double t42 = t5*t40 + t13 + t0*(t4 + t16);
+    const double t43 = 0.023964285714285716*t2;
+    const double t44 = t17 + t42;
+    const double t45 = t43*t40 - t11*t38 + t44;
+    const double t46 = t18*t37;
+    const double t47 = t0*(t43*t9 - t38);
+    C[0] = t26 - 0.006*(qd[1]*t27 + t20);
+    C[1] = qd[1]*(1.0264e-06*cos_q1 - 9.6e-09*sin_q1) + t29 - t34;
+    C[2] = t29 + 0.7857142857142857*(t28 - t35) - (t18 + 0.006)*(qd[0]*t37) - t39;
+    C[3] = t34;
+    C[4] = t26 + (t22*t41 + qd[1]*t32 + t42);
+    C[5] = t22*(t41 + 0.7857142857142857*t40) + t45 - t18*(t20 + t11*t36);
+    C[6] = t30*t37 + 0.7857142857142857*t35 + qd[0]*t46 + t39;
+    C[7] = qd[1]*(t46 - t22*(t24 + 0.7857142857142857*t9)) + t44 - t47;
+    C[8] = t45 - t47;
 }

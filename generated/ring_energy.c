@@ -7,11 +7,10 @@
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  kinetic[1] in J
  *   out  potential[1] in J
- * Cost: 54 add, 68 mul, 4 sincos.
+ * Cost: 52 add, 66 mul, 4 sincos.
  * Inputs: sha256 002a38e3700c4633fdb4a7f5f3af58489ec3ef1c8d6654b8a99f77e3122edefa.
  */
 #include <math.h>
-
 #include "kernels.h"
 
 void awiwi_ring_energy(const double q[restrict 3], const double qd[restrict 3], const double g[restrict 3], double kinetic[restrict 1], double potential[restrict 1])
@@ -29,14 +28,14 @@ void awiwi_ring_energy(const double q[restrict 3], const double qd[restrict 3], 
     const double t10 = 0.023964285714285716*t8 + 3.804114285714286e-07;
     const double cos_q1 = cos(q[1]);
     const double sin_q1 = sin(q[1]);
-    const double t11 = 1.24e-09*t3 + 7.8e-09*t4;
-    const double t12 = 5.44e-09*t1 + 6.2216e-07*t6 + t11 + 0.004*t7;
+    const double t11 = 4.44e-09*t3 + 1.518e-07*t4;
+    const double t12 = 5.44e-09*t1 + 6.2216e-07*t6 + t11;
     const double t13 = 0.000615*cos_q1 - 3e-06*sin_q1;
     const double t14 = 0.0002108*t1 - 1.2e-06*t6 + t5;
     const double t15 = 1.2e-06*t1 + 0.0002108*t6 + t7;
     const double t16 = t9 + 0.082*(cos_q1*t14 + sin_q1*t15) + 2.25034e-05;
     const double t17 = cos_q1*(2.23216e-05*cos_q1 - 7.9e-08*sin_q1) + t1*(5.463e-06*t1 - 2.352e-08*t6) + t3*(4.4334e-07*t3 - 1.04e-08*t4) + 0.012*(t13 + t14) + t16 - 0.061*t6*t7 - 0.082*sin_q1*t15 - 2.738534e-05;
-    const double t18 = qd[1]*(9.6e-09*cos_q1 + 1.0264e-06*sin_q1 + t12) + qd[2]*(0.7857142857142857*t11 + 0.003142857142857143*t7 + t12) + 0.5*qd[0]*t17;
+    const double t18 = qd[1]*(9.6e-09*cos_q1 + 1.0264e-06*sin_q1 + t12) + qd[2]*(t12 + 0.7857142857142857*t11) + 0.5*qd[0]*t17;
     const double t19 = qd[2]*(t10 + t9 + 0.041*(cos_q1*(t14 + 0.7857142857142857*t5) + sin_q1*(t15 + 0.7857142857142857*t7)));
     const double sin_q0 = sin(q[0]);
     const double cos_q0 = cos(q[0]);

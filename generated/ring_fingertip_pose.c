@@ -8,7 +8,6 @@
  * Inputs: sha256 8b1e4049e08ada68fc0fffe59ae1b436246736a5f349d22efb157c0e2c972c0c.
  */
 #include <math.h>
-
 #include "kernels.h"
 
 void awiwi_ring_fingertip_pose(const double q[restrict 3], double T[restrict 16])

@@ -7,11 +7,10 @@
  *   in   tau[3] in N m, -1 to 1
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  qdd[3] in rad/s^2
- * Cost: 115 add, 129 mul, 3 div, 2 neg, 4 sincos.
+ * Cost: 111 add, 125 mul, 3 div, 1 neg, 4 sincos.
  * Inputs: sha256 d58f38e02f25804f1cbc849cf9a3a2f485a8ffffebf33c0f77b384b71638e328.
  */
 #include <math.h>
-
 #include "kernels.h"
 
 void awiwi_ring_forward_dynamics(const double q[restrict 3], const double qd[restrict 3], const double tau[restrict 3], const double g[restrict 3], double qdd[restrict 3])
@@ -54,9 +53,9 @@ void awiwi_ring_forward_dynamics(const double q[restrict 3], const double qd[res
     const double t31 = t6*t30 + 1.176e-08;
     const double t32 = t16*t26 - t7*t27 + (t2*t28 - t29*t20 - t13*t31 + t23);
     const double t33 = tau[2] + (0.7857142857142857*t23 + t32);
-    const double t34 = 1.24e-09*t9 + 7.8e-09*t10;
-    const double t35 = 5.44e-09*t15 + 6.2216e-07*t6 + (t34 + 0.004*t12);
-    const double t36 = 0.7857142857142857*t34 + 0.003142857142857143*t12 + t35;
+    const double t34 = 4.44e-09*t9 + 1.518e-07*t10;
+    const double t35 = 5.44e-09*t15 + 6.2216e-07*t6 + t34;
+    const double t36 = t35 + 0.7857142857142857*t34;
     const double t37 = t7*t12;
     const double t38 = 2.0*(t16*t11 + t37) + 4.8416e-07 + 5.53848e-06;
     const double t39 = 0.7857142857142857*t11;
@@ -70,13 +69,13 @@ void awiwi_ring_forward_dynamics(const double q[restrict 3], const double qd[res
     const double t47 = qd[1]*t46;
     const double t48 = 2.23216e-05*cos_q1 - 7.9e-08*sin_q1;
     const double t49 = sin_q1*t48 + 3.95e-08;
-    const double t50 = t46*t24;
-    const double t51 = t50*t12;
-    const double t52 = t44 - t1*t47;
-    const double t53 = t3*t46;
-    const double t54 = t52*t28 + (t4*(6.2216e-07*t15 - 5.44e-09*t6) - t53*t31) + (t11*(t52 + (-(0.004*t13) - t53*t7)) + (t25*(7.8e-09*t9 - 1.24e-09*t10) - t50*t22));
-    const double t55 = t53*t29 + t51;
-    const double t56 = t45*t44 + (t0*(1.0264e-06*cos_q1 - 9.6e-09*sin_q1) - t47*t49) + (0.004*t27 - t16*t51 + t54) - t17*t55;
+    const double t50 = t44 - t1*t47;
+    const double t51 = t3*t46;
+    const double t52 = t46*t24;
+    const double t53 = t50*t28 + (t4*(6.2216e-07*t15 - 5.44e-09*t6) - t51*t31) + ((t50 - t51*t7)*t11 + (t25*(1.518e-07*t9 - 4.44e-09*t10) - t52*t22));
+    const double t54 = t52*t12;
+    const double t55 = t51*t29 + t54;
+    const double t56 = 2.64e-05*t18 + 0.0001245*t44 + (t45*t44 + (t0*(1.0264e-06*cos_q1 - 9.6e-09*sin_q1) - t47*t49) + (t53 - t16*t54) - t17*t55);
     const double t57 = 3e-06*cos_q1 + 0.000615*sin_q1;
     const double t58 = t28 + t11;
     const double t59 = t29 + t12;
@@ -89,7 +88,7 @@ void awiwi_ring_forward_dynamics(const double q[restrict 3], const double qd[res
     const double t66 = 1.0/(t65 - t60*t61);
     const double t67 = t63*t66;
     const double t68 = cos_q1*t48 - 2.24125e-05 + (t15*t30 - 5.50074e-06 + (t9*t21 - 4.6375e-07 - t37 - t37) - t64 - t64) + (0.012*(t45 + t58) + t65 + 9.9165e-07);
-    const double t69 = (t33*t43 + (2.64e-05*t18 + 0.0001245*t44 + t56 - 0.006*(t47*t57 + t55) - tau[0]) + t62*t67)/(t68 - t36*t43 - t63*t67);
+    const double t69 = (t33*t43 + (t56 - 0.006*(t47*t57 + t55) - tau[0]) + t62*t67)/(t68 - t36*t43 - t63*t67);
     const double t70 = t62*t66 + t67*t69;
     qdd[0] = -t69;
     qdd[1] = t70;

@@ -9,7 +9,6 @@
  * Inputs: sha256 bdbf3d4216ddd0986e54534ddc122a2523b4a4b40b48d386707d2a96cc08c710.
  */
 #include <math.h>
-
 #include "kernels.h"
 
 void awiwi_ring_gravity(const double q[restrict 3], const double g[restrict 3], double gravity[restrict 3])

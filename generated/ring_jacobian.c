@@ -8,7 +8,6 @@
  * Inputs: sha256 090304d03fe3bc2a4f7fd1fcdca40644c253e343cce00255c91570f1ebc31845.
  */
 #include <math.h>
-
 #include "kernels.h"
 
 void awiwi_ring_jacobian(const double q[restrict 3], double J[restrict 18])

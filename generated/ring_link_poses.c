@@ -8,7 +8,6 @@
  * Inputs: sha256 00846c2aa6e04d6ee60e3b090dc5413ee81528e8e112883d6c7063ec3fc706d8.
  */
 #include <math.h>
-
 #include "kernels.h"
 
 void awiwi_ring_link_poses(const double q[restrict 3], double T[restrict 64])

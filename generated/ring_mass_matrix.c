@@ -4,11 +4,10 @@
  * Source: eq. 2.17, 5.4.
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   out  M[3][3] in kg m^2
- * Cost: 41 add, 47 mul, 3 sincos.
+ * Cost: 39 add, 45 mul, 3 sincos.
  * Inputs: sha256 d58f38e02f25804f1cbc849cf9a3a2f485a8ffffebf33c0f77b384b71638e328.
  */
 #include <math.h>
-
 #include "kernels.h"
 
 void awiwi_ring_mass_matrix(const double q[restrict 3], double M[restrict 9])
@@ -29,10 +28,10 @@ void awiwi_ring_mass_matrix(const double q[restrict 3], double M[restrict 9])
     const double t11 = 1.2e-06*t1 + 0.0002108*t2 + t8;
     const double t12 = t10 + 0.082*(cos_q1*t7 + sin_q1*t11) + 2.25034e-05;
     const double t13 = cos_q1*(2.23216e-05*cos_q1 - 7.9e-08*sin_q1) + t1*(5.463e-06*t1 - 2.352e-08*t2) + t4*(4.4334e-07*t4 - 1.04e-08*t5) + 0.012*(0.000615*cos_q1 + t7 - 3e-06*sin_q1) + t12 - 0.061*t2*t8 - 0.082*sin_q1*t11 - 2.738534e-05;
-    const double t14 = 1.24e-09*t4 + 7.8e-09*t5;
-    const double t15 = 5.44e-09*t1 + 6.2216e-07*t2 + t14 + 0.004*t8;
+    const double t14 = 4.44e-09*t4 + 1.518e-07*t5;
+    const double t15 = 5.44e-09*t1 + 6.2216e-07*t2 + t14;
     const double t16 = 9.6e-09*cos_q1 + 1.0264e-06*sin_q1 + t15;
-    const double t17 = 0.7857142857142857*t14 + 0.003142857142857143*t8 + t15;
+    const double t17 = t15 + 0.7857142857142857*t14;
     const double t18 = 0.023964285714285716*t9 + 3.804114285714286e-07;
     const double t19 = t18 + t10 + 0.041*(cos_q1*(t7 + 0.7857142857142857*t6) + sin_q1*(t11 + 0.7857142857142857*t8));
     M[0] = t13;

@@ -8,7 +8,6 @@
  * Inputs: sha256 4c7ea1578dc942e36d6e563cd97831da5179a3ff0e24a017614ea16cdc764ec6.
  */
 #include <math.h>
-
 #include "kernels.h"
 
 void awiwi_thumb_coupling_derivative(const double q[restrict 4], double dP[restrict 128])

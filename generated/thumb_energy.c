@@ -11,7 +11,6 @@
  * Inputs: sha256 46e4c11520cb35f8c8b39b4a5f744de13eafc538dda122a909bd753de6881cc0.
  */
 #include <math.h>
-
 #include "kernels.h"
 
 void awiwi_thumb_energy(const double q[restrict 4], const double qd[restrict 4], const double g[restrict 3], double kinetic[restrict 1], double potential[restrict 1])

@@ -8,7 +8,6 @@
  * Inputs: sha256 e56e526ea40970104fe9bee780b2560b3c841e631e95f0e1cea4522e61111cae.
  */
 #include <math.h>
-
 #include "kernels.h"
 
 void awiwi_thumb_fingertip_pose(const double q[restrict 4], double T[restrict 16])

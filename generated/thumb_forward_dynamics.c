@@ -11,7 +11,6 @@
  * Inputs: sha256 eb684d40ad53461219ce6205f05b311d2262086fa4be9e6eb81e8ea245c94e57.
  */
 #include <math.h>
-
 #include "kernels.h"
 
 void awiwi_thumb_forward_dynamics(const double q[restrict 4], const double qd[restrict 4], const double tau[restrict 4], const double g[restrict 3], double qdd[restrict 4])

@@ -9,7 +9,6 @@
  * Inputs: sha256 8fd21702b73cf8d9819e1c8e44a914a3c6a94a7985cff85e13ce63e1e2992754.
  */
 #include <math.h>
-
 #include "kernels.h"
 
 void awiwi_thumb_gravity(const double q[restrict 4], const double g[restrict 3], double gravity[restrict 4])

@@ -11,7 +11,6 @@
  * Inputs: sha256 b7fe551f96056cda15630ccc8e1048458a04fd2c391240ea725523ad5d20e299.
  */
 #include <math.h>
-
 #include "kernels.h"
 
 void awiwi_thumb_inverse_dynamics(const double q[restrict 4], const double qd[restrict 4], const double qdd[restrict 4], const double g[restrict 3], double tau[restrict 4])

@@ -12,7 +12,6 @@
  * Inputs: sha256 4ff828818334cb83d928abc5829a5aed9e61790582438708448f0ec37e3ff7ea.
  */
 #include <math.h>
-
 #include "kernels.h"
 
 void awiwi_thumb_inverse_dynamics_derivatives(const double q[restrict 4], const double qd[restrict 4], const double qdd[restrict 4], const double g[restrict 3], double dtau_dq[restrict 16], double dtau_dqd[restrict 16])

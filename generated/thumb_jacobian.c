@@ -8,7 +8,6 @@
  * Inputs: sha256 a7bb8ff1f782a8790c9bbc77b4aba27af39200e96fd5ea71f5378ce3f4c99cdf.
  */
 #include <math.h>
-
 #include "kernels.h"
 
 void awiwi_thumb_jacobian(const double q[restrict 4], double J[restrict 24])

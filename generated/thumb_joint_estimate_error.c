@@ -11,7 +11,6 @@
  * Inputs: sha256 587a65bca3163563dc3b07fe3ba2c07934dd21d567d7f82f1bc6b0fb691a7376.
  */
 #include <math.h>
-
 #include "kernels.h"
 
 void awiwi_thumb_joint_estimate_error(const double q[restrict 4], const double noise[restrict 1], double covariance[restrict 16], double worst[restrict 4])

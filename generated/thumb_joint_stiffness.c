@@ -10,7 +10,6 @@
  * Inputs: sha256 587a65bca3163563dc3b07fe3ba2c07934dd21d567d7f82f1bc6b0fb691a7376.
  */
 #include <math.h>
-
 #include "kernels.h"
 
 void awiwi_thumb_joint_stiffness(const double q[restrict 4], const double f[restrict 8], const double k[restrict 8], double K[restrict 16])

@@ -8,7 +8,6 @@
  * Inputs: sha256 cd912ab3289456ec069beac4761440cf1d21f475ca4f2bc6f55b373b40f43897.
  */
 #include <math.h>
-
 #include "kernels.h"
 
 void awiwi_thumb_link_poses(const double q[restrict 4], double T[restrict 64])

@@ -8,7 +8,6 @@
  * Inputs: sha256 5e272fcaf53c5cd633ef6975d3c6c087a59d1d03e13b9a940e6fbe1831dd74a7.
  */
 #include <math.h>
-
 #include "kernels.h"
 
 void awiwi_thumb_tendon_lengths(const double q[restrict 4], double h[restrict 8])

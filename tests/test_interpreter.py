@@ -59,7 +59,11 @@ def test_dimensions_are_checked_in_sums_and_in_arguments():
     force = builder.graph([Output("f", (), (builder.add((x, y)),))])
 
     assert evaluate(force, Dimensions(), lambda node: units[node[2]])["f"] == [N]
-    for wrong in (builder.add((x, builder.const(1))), builder.call("sin", x), builder.call("atan2", x, builder.mul((x, y)))):
+    for wrong in (
+        builder.add((x, builder.const(1))),
+        builder.call("sin", x),
+        builder.call("atan2", x, builder.mul((x, y))),
+    ):
         with pytest.raises(DimensionError):
             evaluate(builder.graph([Output("f", (), (wrong,))]), Dimensions(), lambda node: units[node[2]])
 

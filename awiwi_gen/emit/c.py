@@ -34,7 +34,7 @@ class CFunction:
     comment: tuple[str, ...]
     statements: tuple[str, ...]
     cost: Cost
-    includes_math: bool
+    includes: tuple[str, ...]
 
 
 def identifier(path: str) -> str:
@@ -52,11 +52,13 @@ def c_function(
     part: str = "",
 ) -> CFunction:
     """Print a graph. ``inputs`` maps port names to shapes; ``part`` is where its parameters live."""
-    printer = Printer(graph, options, f"p->{identifier(part)}_" if part else "p->")
+    printer = Printer(graph, options, prefix, f"p->{identifier(part)}_" if part else "p->")
     outputs = {o.name: o.shape for o in graph.outputs if o.name != GUARDS}
     result = "int" if len(outputs) < len(graph.outputs) else "void"
     prototype, definition = signature(f"{result} {prefix}_{name}", inputs, outputs, options, graph.params and prefix)
     read = {node[1] for node in graph.nodes if node[0] == "input"}
+    functions = {node[0] for node in graph.nodes} - LEAVES - {"add", "mul", "div", "inv"}
+    turns = functions & {"sin", "cos"} if options.trig == "own" else set()
     unused = tuple(f"(void){port};" for port in inputs if port not in read)
     return CFunction(
         name=name,
@@ -65,7 +67,7 @@ def c_function(
         comment=comment,
         statements=unused + tuple(printer.statements()),
         cost=cost(graph),
-        includes_math=any(node[0] not in LEAVES | {"add", "mul", "div", "inv"} for node in graph.nodes),
+        includes=("<math.h>",) * bool(functions - turns) + ('"trig.h"',) * bool(turns),
     )
 
 
@@ -87,8 +89,9 @@ def signature(
 class Printer:
     """Turns the nodes of one graph into C text."""
 
-    def __init__(self, graph: Graph, options: Options, params: str) -> None:
-        self.graph, self.options, self.params = graph, options, params
+    def __init__(self, graph: Graph, options: Options, prefix: str, params: str) -> None:
+        self.graph, self.options, self.prefix, self.params = graph, options, prefix, params
+        self.turns: dict[Ref, str] = {}
         self.texts: list[Text] = []
         self.lines: list[str] = []
         self.count = 0
@@ -98,6 +101,9 @@ class Printer:
         uses = self.graph.uses
         argument = {node_of(r) for node in self.graph.nodes if node[0] in ("sin", "cos") for r in node[1:]}
         for index, node in enumerate(self.graph.nodes):
+            if node[0] in ("sin", "cos") and self.options.trig == "own":
+                self.texts.append((f"{self.turn(node[1])}.{node[0]}", ATOM))
+                continue
             text = self.expression(node)
             named = node[0] not in LEAVES and (
                 uses[index] > 1 or len(text[0]) > LINE or index in argument or node[0] in ("sin", "cos")
@@ -113,6 +119,16 @@ class Printer:
             for position, ref in enumerate(output.elements):
                 self.lines.append(f"{output.name}[{position}] = {self.operand(ref, SUM)};")
         return self.lines
+
+    def turn(self, angle: Ref) -> str:
+        """The name of an angle's sine and cosine, declared when first asked for."""
+        if angle not in self.turns:
+            leaf = self.graph.nodes[node_of(angle)]
+            name = f"{leaf[1]}{leaf[2]}" if leaf[0] == "input" and angle >= 0 else f"a{len(self.turns)}"
+            self.turns[angle] = name
+            call = f"{self.prefix}_sincos({self.operand(angle, SUM)})"
+            self.lines.append(f"const {self.prefix}_turn {name} = {call};")
+        return self.turns[angle]
 
     def declare(self, node: Node, text: str) -> Text:
         """Give a value a name."""

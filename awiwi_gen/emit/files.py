@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import jinja2
@@ -13,6 +12,7 @@ import numpy as np
 
 from awiwi_gen.emit.c import CFunction, identifier
 from awiwi_gen.emit.options import Options
+from awiwi_gen.ir.trig import constants
 from awiwi_gen.kernel import Kernel, Port
 from awiwi_gen.resources import TEMPLATES
 from awiwi_gen.units import Quantity
@@ -107,7 +107,8 @@ def shared_files(
         f".{identifier(path)} = {options.literal(quantity.value)}, /* {quantity.text} */"
         for path, quantity in quantities.items()
     ]
-    return {
+    trig = {"trig.h": trig_header(prefix, options)} if options.trig == "own" else {}
+    return trig | {
         "real.h": render(
             "real.h.j2",
             banner=banner(),
@@ -129,7 +130,23 @@ def shared_files(
     }
 
 
-def write(directory: Path, files: Mapping[str, str]) -> None:
-    """Put files into a directory that exists."""
-    for name, text in files.items():
-        (directory / name).write_text(text, encoding="utf-8", newline="\n")
+NUMERALS = {"zero": 0.0, "quarter": 0.25, "below": 0.375, "half": 0.5, "one": 1.0, "middle": 1.5, "four": 4.0}
+
+
+def trig_header(prefix: str, options: Options) -> str:
+    """Sine and cosine in the scalar type of this build."""
+    trig = constants(options.dtype)
+
+    def literal(value: float) -> str:
+        return options.literal(Fraction(value))
+
+    def polynomial(coefficients: tuple[float, ...]) -> str:
+        first, *others = coefficients
+        return f"{literal(first)} + z * ({polynomial(tuple(others))})" if others else literal(first)
+
+    k: dict[str, object] = {name: literal(value) for name, value in vars(trig).items() if isinstance(value, float)}
+    k |= {name: literal(value) for name, value in NUMERALS.items()}
+    k["half_pi"] = [literal(part) for part in trig.half_pi]
+    k |= {"sine": polynomial(trig.sine), "cosine": polynomial(trig.cosine)}
+    guard = f"{prefix.upper()}_TRIG_H"
+    return render("trig.h.j2", banner=banner(), guard=guard, prefix=prefix, c_type=options.c_type, k=k)

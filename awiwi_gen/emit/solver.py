@@ -11,7 +11,6 @@ from awiwi_gen.emit.options import Options
 from awiwi_gen.ir.cost import Cost
 from awiwi_gen.kernel import Kernel, Solver
 
-
 STOP = {"f64": "1e-11", "f32": "1e-6"}  # a last step this short ends an iteration
 
 
@@ -38,12 +37,16 @@ def solver_function(
         kernels={family: f"{prefix}_{function.name}" for family, function in used.items()},
         context=f"(const {prefix}_params *)context, " if runtime else "",
         given="p" if runtime else "0",
+        n=len(solver.unknowns),
+        m=len(solver.equations),
+        equations=", ".join(map(str, solver.equations)),
+        unknowns=", ".join(map(str, solver.unknowns)),
         arrays=[_array(name, values, options) for name, values in solver.arrays.items()],
         tolerance=options.literal(Fraction(STOP[options.scalar])),
         **solver.strings,
     )
     total = sum((function.cost for function in used.values()), Cost())
-    function = CFunction(kernel.name, prototype, definition, comment, (), total * solver.iterations, False)
+    function = CFunction(kernel.name, prototype, definition, comment, (), total * solver.iterations, ())
     return function, text
 
 

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import ctypes
-import ctypes.util
 import errno
+import fcntl
 import hashlib
 import json
 import os
+import re
 import shutil
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,6 +20,7 @@ from typing import Any
 from awiwi_gen.errors import Fault, OutputError
 
 MANIFEST = "manifest.json"
+UNFINISHED = "-unfinished-"  # what a killed run leaves beside `generated` is called .generated-unfinished-...
 
 
 def sha256(text: str | bytes) -> str:
@@ -52,7 +55,7 @@ class State:
 
 def inspect(directory: Path, inputs: Mapping[str, Any]) -> State:
     """Compare a directory with its manifest, and the manifest's inputs with the present ones."""
-    if not directory.exists():
+    if not directory.is_dir():
         return State(missing=True)
     manifest = read_manifest(directory)
     present = {path.name for path in directory.iterdir()} - {MANIFEST}
@@ -75,41 +78,88 @@ def install(directory: Path, files: Mapping[str, str]) -> None:
     Killed at any moment, the directory is the old one or the new one. Raises OutputError when it cannot be
     written, or when it holds files that are not ours.
     """
-    directory = directory.absolute()
-    foreign = _foreign(directory)
-    if foreign:
-        names = ", ".join(foreign[:5])
-        raise OutputError(
-            Fault(file=str(directory), message=f"holds files that were not generated ({names}); choose another place")
-        )
-    try:
-        directory.parent.mkdir(parents=True, exist_ok=True)
-        staging = Path(tempfile.mkdtemp(prefix=f".{directory.name}-", dir=directory.parent))
-    except OSError as error:
-        raise OutputError(
-            Fault(file=str(directory), message=f"cannot be written: {error.strerror}; choose another place with -o")
-        ) from error
-    try:
+    directory = directory.resolve()
+    _require_ours(directory)
+    sweep(directory)
+    with _staging(directory) as staging:
         for name, text in files.items():
             (staging / name).write_text(text, encoding="utf-8", newline="\n")
         staging.chmod(0o755)
-        if directory.exists():
-            exchange(staging, directory)
-        else:
+        try:
             staging.rename(directory)
-    except OSError as error:
-        raise OutputError(Fault(file=str(directory), message=f"cannot be written: {error.strerror}")) from error
-    finally:
-        shutil.rmtree(staging, ignore_errors=True)
+        except OSError:  # there is one already
+            exchange(staging, directory)
 
 
-def _foreign(directory: Path) -> list[str]:
-    if not directory.exists():
-        return []
-    if not directory.is_dir():
+def require_place(directory: Path) -> None:
+    """Raise OutputError where `install` would: before the work, not after it."""
+    _require_ours(directory.resolve())
+    with _staging(directory.resolve()):
+        pass
+
+
+def _require_ours(directory: Path) -> None:
+    if directory.exists() and not directory.is_dir():
         raise OutputError(Fault(file=str(directory), message="is a file; expected a directory"))
     ours = (read_manifest(directory) or {"files": {}})["files"].keys() | {MANIFEST}
-    return sorted(path.name for path in directory.iterdir() if path.name not in ours)
+    foreign = [path.name for path in directory.iterdir() if path.name not in ours] if directory.exists() else []
+    if foreign:
+        names = ", ".join(sorted(foreign)[:5])
+        mend = "move them away, or choose another place with -o"
+        raise OutputError(Fault(file=str(directory), message=f"holds files that were not generated ({names}); {mend}"))
+
+
+@contextmanager
+def _staging(directory: Path) -> Iterator[Path]:
+    """A new directory beside the given one, locked as long as this process lives, and removed in the end."""
+    handle: int | None = None
+    try:
+        directory.parent.mkdir(parents=True, exist_ok=True)
+        while handle is None:  # until it is locked before another run sweeps it
+            staging = Path(tempfile.mkdtemp(prefix=f".{directory.name}{UNFINISHED}", dir=directory.parent))
+            handle = _locked(staging, or_unlockable=True)
+        try:
+            yield staging
+        finally:
+            shutil.rmtree(staging, ignore_errors=True)
+            os.close(handle)
+    except OSError as error:
+        message = f"cannot be written: {(error.strerror or str(error)).lower()}; choose another place with -o"
+        raise OutputError(Fault(file=str(directory), message=message)) from error
+
+
+def sweep(directory: Path) -> None:
+    """Remove what killed runs left beside a directory; what a living run works on is locked, and stays."""
+    directory = directory.resolve()
+    ours = re.compile(re.escape(f".{directory.name}{UNFINISHED}") + r"\w{8}(-old)?")
+    with suppress(OSError):
+        for path in [path for path in directory.parent.iterdir() if ours.fullmatch(path.name)]:
+            handle = _locked(path)
+            if handle is not None:
+                shutil.rmtree(path, ignore_errors=True)
+                os.close(handle)
+
+
+def _locked(path: Path, or_unlockable: bool = False) -> int | None:
+    """An open handle that holds the lock of a directory and loses it with its process; None if it is not to be had.
+
+    Where the file system has no locks nothing is ever swept, and ``or_unlockable`` gives a handle without one.
+    """
+    try:
+        handle = os.open(path, os.O_RDONLY | os.O_DIRECTORY)
+    except OSError:
+        return None
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        if path.exists():
+            return handle
+    except BlockingIOError:
+        pass
+    except OSError:
+        if or_unlockable:
+            return handle
+    os.close(handle)
+    return None
 
 
 def exchange(a: Path, b: Path) -> None:

@@ -17,6 +17,7 @@ import numpy as np
 from flint import arb, ctx, fmpq
 
 from awiwi_gen.errors import DimensionError
+from awiwi_gen.ir.trig import sincos
 from awiwi_gen.units import Unit, one
 
 PRECISION_BITS = 256  # working precision of balls: the checks ask for 200
@@ -27,11 +28,11 @@ Array = np.ndarray[Any, Any]
 class Floats:
     """IEEE arithmetic in double or single precision on NumPy arrays, bit for bit what C computes.
 
-    NumPy's own sine is another one than the C library's, so functions are taken from the C library.
+    Sine and cosine are our own or the C library's; other functions are the C library's, for NumPy has others.
     """
 
-    def __init__(self, dtype: type = np.float64) -> None:
-        self.dtype = dtype
+    def __init__(self, dtype: type = np.float64, own_trig: bool = False) -> None:
+        self.dtype, self.own_trig = dtype, own_trig
 
     def const(self, value: Fraction) -> Any:
         return self.dtype(value.numerator / value.denominator)  # the division of integers rounds once
@@ -45,7 +46,9 @@ class Floats:
     def call(self, operation: str, *args: Any) -> Any:
         if operation == "sqrt":
             return np.sqrt(args[0])
-        return libm(operation, self.dtype)(*args).astype(self.dtype)
+        if self.own_trig and operation in ("sin", "cos"):
+            return sincos(args[0], self.dtype)[operation == "cos"]
+        return np.asarray(libm(operation, self.dtype)(*args), self.dtype)[()]  # a function of numbers alone gives one
 
 
 @cache

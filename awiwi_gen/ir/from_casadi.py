@@ -65,7 +65,7 @@ def _rules(builder: Builder) -> dict[int, Callable[..., Ref]]:
 
 
 class Expressions:
-    """The algebra of CasADi expressions: with it, the interpreter turns a graph into one that CasADi can differentiate."""
+    """The algebra of CasADi expressions: the interpreter turns a graph into one that CasADi can differentiate."""
 
     def const(self, value: Fraction) -> ca.SX:
         """A constant, rounded to double."""
@@ -73,7 +73,8 @@ class Expressions:
 
     def call(self, operation: str, *args: ca.SX) -> ca.SX:
         """A function of the graph by its CasADi name."""
-        return getattr(ca, operation)(*args)
+        result: ca.SX = getattr(ca, operation)(*args)
+        return result
 
     neg = staticmethod(operator.neg)
     add = staticmethod(operator.add)

@@ -4,11 +4,36 @@ from __future__ import annotations
 
 from awiwi_gen.hand import Hand
 from awiwi_gen.kernel import Kernel
-from awiwi_gen.kernels.actuation import actuation_kernels
+from awiwi_gen.kernels.base_estimate import base_kernels
+from awiwi_gen.kernels.control_backstepping import backstepping_laws
+from awiwi_gen.kernels.control_linear import linear_laws
+from awiwi_gen.kernels.control_optimal import optimal_laws
+from awiwi_gen.kernels.fibres import fibre_kernels
 from awiwi_gen.kernels.fingers import finger_kernels
+from awiwi_gen.kernels.four_bars import four_bar_kernels
+from awiwi_gen.kernels.measured import measured_kernels
+from awiwi_gen.kernels.motors import motor_kernels
+from awiwi_gen.kernels.springs import spring_kernels
+from awiwi_gen.kernels.whole_hand import hand_kernels
+from awiwi_gen.kernels.wrist import wrist_kernels
 
 
 def catalog(hand: Hand) -> list[Kernel]:
     """All kernels of a hand, in the order of its parts."""
-    fingers = [kernel for name, finger in hand.fingers.items() for kernel in finger_kernels(hand, name, finger)]
-    return fingers + actuation_kernels(hand)
+    fingers = [
+        kernel
+        for name, finger in hand.fingers.items()
+        for kernel in [
+            *finger_kernels(hand, name, finger),
+            *base_kernels(hand, name, finger),
+            *four_bar_kernels(name, finger),
+        ]
+    ]
+    wrist = wrist_kernels(hand.wrist) if hand.wrist else []
+    actuators = [
+        *(motor_kernels(hand, hand.motor) if hand.motor else []),
+        *(spring_kernels(hand, hand.spring) if hand.spring else []),
+        *(fibre_kernels(hand, hand.tendon) if hand.tendon else []),
+    ]
+    laws = [*linear_laws(), *backstepping_laws(), *optimal_laws()]
+    return fingers + wrist + hand_kernels(hand) + measured_kernels(hand) + actuators + laws

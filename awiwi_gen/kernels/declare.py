@@ -26,7 +26,7 @@ class Template(Generic[Size]):
     outputs: Callable[[Size], dict[str, Port]]
     source: str
     definition: Route
-    witness: Route
+    witness: Route | None
     guards: tuple[str, ...]
     solver: Callable[[Any], Solver | None]
 
@@ -42,7 +42,7 @@ class Template(Generic[Size]):
             source=self.source,
             inputs={name: ports[name] for name in arguments if name in ports},
             outputs=self.outputs(size),
-            routes={} if solver else {"sympy": self.definition, "casadi": self.witness},
+            routes={} if solver or not self.witness else {"sympy": self.definition, "casadi": self.witness},
             part=part,
             path=path,
             structure=json.dumps(structure, sort_keys=True),
@@ -65,13 +65,13 @@ class Family(Generic[Size]):
         self,
         outputs: Callable[[Size], dict[str, Port]],
         source: str,
-        witness: Route,
+        witness: Route | None = None,
         guards: tuple[str, ...] = (),
         solver: Callable[[Any], Solver | None] = straight_line,
     ) -> Callable[[Route], Route]:
         """Declare a kernel: its outputs for a part of some size, where it comes from, and the other road to it.
 
-        For parts that ``solver`` answers for, it iterates instead.
+        For parts that ``solver`` answers for, it iterates instead; what always iterates needs no witness.
         """
 
         def declare(definition: Route) -> Route:

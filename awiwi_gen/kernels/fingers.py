@@ -246,12 +246,10 @@ def nonlinear_estimate(finger: Finger, iterations: int = 24) -> Solver | None:
         template="joint_estimate.c.j2",
         problem="least squares",
         uses=("tendon_lengths", "coupling"),
+        equations=tuple(range(len(finger.tendons))),
+        unknowns=tuple(range(len(low))),
         arrays={"low": low, "high": high},
-        strings={
-            "n": str(len(low)),
-            "m": str(len(finger.tendons)),
-            "search": f"awiwi_least_squares(&problem, h, start, {iterations}, tolerance, q)",
-        },
+        strings={"search": f"awiwi_least_squares(&problem, h, start, {iterations}, tolerance, q)"},
         iterations=iterations,
         tolerance={"f64": 1e-12, "f32": 1e-5},
     )

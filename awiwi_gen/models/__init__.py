@@ -1,0 +1,1 @@
+"""One file per physical system: SymPy by definition, CasADi by another road."""

@@ -1,9 +1,9 @@
 """Kinematics of a finger by its definition: transformations multiplied along the chain (eq. 5.2, 5.3, table 5.1).
 
-The frame of link i is `T_i = T_(i-1) Trans(offset_(i-1)) R(turn_i) Rz(c_i)`, the fingertip is `T_last Trans(offset_last)`.
-The chain angles c are functions of the n independent joint angles q: a coupled joint turns in proportion to its leader
-(eq. 5.16), and a four-bar counts twice, as its massless crank (angle q + reference, offset along the crank) and as its
-coupler, which is parallel to the turned frame at q = 0.
+The frame of link i is T_i = T_(i-1) Trans(offset_(i-1)) R(turn_i) Rz(c_i), that of the fingertip lies one offset
+beyond the last. The chain angles c are functions of the n independent joint angles q: a coupled joint turns in
+proportion to its leader (eq. 5.16), and a four-bar counts twice, as its massless crank (angle q + reference, offset
+along the crank) and as its coupler, which is parallel to the turned frame at q = 0.
 
 Velocities are derivatives of positions, nothing else. Entries of results may be `Named` symbols.
 """

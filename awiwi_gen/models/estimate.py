@@ -7,10 +7,23 @@ from typing import Any
 import sympy
 from sympy import Matrix
 
-from awiwi_gen.models.lagrange import _cofactors
+from awiwi_gen.models.lagrange import cofactor_matrix
 from awiwi_gen.models.naming import Derivation
 from awiwi_gen.models.tendons import coupling, tendon_lengths
 from awiwi_gen.models.tree import Finger
+
+Hand = Any
+
+
+def measured_lengths(hand: Hand, theta: Matrix, x: Matrix, w: Matrix | None = None) -> Matrix:
+    """Lengths h (m) [m] in the fingers, with what the pulleys reel in and the wrist takes away: h(0) + x - r theta - w.
+
+    Motor angles theta (m) [rad], elongations x (m) [m] and wrist sections w (m) [m] count from the straight fingers.
+    """
+    fingers = hand.fingers.values()
+    straight = Matrix.vstack(*(tendon_lengths(finger, sympy.zeros(len(finger.joints), 1)) for finger in fingers))
+    lengths = straight + x - hand.motor.pulley * theta
+    return lengths if w is None else lengths - w
 
 
 def joint_estimate(finger: Finger, h: Matrix, start: Matrix) -> Matrix:
@@ -35,7 +48,7 @@ def _left_inverse(P: Matrix) -> tuple[Matrix, Matrix]:
     derivation = Derivation()
     P = derivation.name_all(P)
     normal = derivation.name_all(P.T * P)
-    cofactors = derivation.name_all(_cofactors(normal, derivation))
+    cofactors = derivation.name_all(cofactor_matrix(normal, derivation))
     determinant = derivation.name((normal.row(0) * cofactors.row(0).T)[0])
     inverse = derivation.name_all(cofactors.T / determinant)
     return inverse * P.T, inverse

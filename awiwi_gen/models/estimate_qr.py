@@ -2,11 +2,26 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import casadi as ca
 from casadi import SX
 
 from awiwi_gen.models.tendons_ad import coupling, tendon_lengths
 from awiwi_gen.models.tree import Finger
+
+Hand = Any
+
+
+def measured_lengths(hand: Hand, theta: SX, x: SX, w: SX | None = None) -> SX:
+    """Lengths h (m) [m] at which the tendons' elongation h + w + r theta - l0 is x (eq. 5.1): one step of Newton's
+    method from zero, which is exact."""
+    fingers = hand.fingers.values()
+    slack = ca.vertcat(*(tendon_lengths(finger, SX.zeros(len(finger.joints))) for finger in fingers))
+    h = SX.sym("h", slack.numel())
+    reeled = hand.motor.pulley * theta
+    excess = h + reeled - slack - x + (0 if w is None else w)
+    return -ca.solve(ca.jacobian(excess, h), ca.substitute(excess, h, SX.zeros(h.numel())))
 
 
 def joint_estimate(finger: Finger, h: SX, start: SX) -> SX:

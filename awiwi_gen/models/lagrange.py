@@ -1,7 +1,8 @@
 """Dynamics of a finger by its definition: Lagrange's equation, from the two energies (eq. 2.16, 2.17, 5.4).
 
-The kinetic energy is that of the links' centres of mass plus that of their rotation (inertia tensors about the centres of
-mass), the potential energy is that of gravity; g (3) is the acceleration of free fall [m/s^2] in the finger's base axes.
+The kinetic energy is that of the links' centres of mass plus that of their rotation (inertia tensors about the
+centres of mass), the potential energy is that of gravity; g (3) is the acceleration of free fall [m/s^2] in the
+finger's base axes.
 """
 
 from dataclasses import dataclass
@@ -61,12 +62,12 @@ def bias(finger: Finger, q: Matrix, qd: Matrix, g: Matrix) -> Matrix:
 
 
 def forward_dynamics(finger: Finger, q: Matrix, qd: Matrix, tau: Matrix, g: Matrix) -> Matrix:
-    """Joint accelerations (n) [rad/s^2] that joint torques tau cause: M qdd = tau - bias (eq. 2.1), by Cramer's rule."""
+    """Joint accelerations (n) [rad/s^2] that torques tau cause: M qdd = tau - bias (eq. 2.1), by Cramer's rule."""
     lagrangian = _lagrangian(finger, q, qd, g)
     derive = lagrangian.derive
     mass = lagrangian.mass_matrix()
     free = derive.name_all(tau - lagrangian.torques(sympy.zeros(len(q), 1)))
-    cofactors = derive.name_all(_cofactors(mass, derive))
+    cofactors = derive.name_all(cofactor_matrix(mass, derive))
     return cofactors * free * derive.name(1 / mass.row(0).dot(cofactors.row(0)))
 
 
@@ -130,7 +131,7 @@ def _tensor(inertia: Any) -> Matrix:
     ])
 
 
-def _cofactors(matrix: Matrix, derive: Derivation) -> Matrix:
+def cofactor_matrix(matrix: Matrix, derive: Derivation) -> Matrix:
     """The cofactors (n x n) of a symmetric matrix; each minor is expanded along its first row, once."""
     known: dict[tuple[tuple[int, ...], tuple[int, ...]], Expr] = {((), ()): sympy.S.One}
 

@@ -1,4 +1,4 @@
-"""The planar four-bar behind the fifth finger's metacarpal (section 5.5), as vectors: no angles, no inverse functions."""
+"""The planar four-bar of the fifth metacarpal, as vectors: no angles, no inverse functions (section 5.5)."""
 
 from typing import Any
 
@@ -11,9 +11,9 @@ Vector = tuple[SX, SX]
 class FourBar:
     """A four-bar whose crank, at the origin, stands at angle `crank` [rad] from the line to the rocker's pivot.
 
-    Crank a, coupler b and rocker d close the loop a + b = ground + d. Coupler and rocker stand over the diagonal from the
-    end of the crank to the rocker's pivot; `area`, twice that of their triangle, is positive on branch +1, where the
-    rocker's end lies to the right of the diagonal.
+    Crank a, coupler b and rocker d close the loop a + b = ground + d. Coupler and rocker stand over the diagonal
+    from the end of the crank to the rocker's pivot; `area`, twice that of their triangle, is positive on branch +1,
+    where the rocker's end lies to the right of the diagonal.
 
     `coupler` and `rocker` are the unit vectors along b and d; `rate` and `rocker_rate` are their turns per turn of the
     crank, and `bend` is the derivative of `rate` by the crank's angle.

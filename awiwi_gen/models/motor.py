@@ -12,8 +12,6 @@ from typing import Any
 import sympy
 from sympy import Expr, Matrix
 
-from awiwi_gen.models.naming import Derivation
-
 
 def reflected_inertia(motor: Any) -> Expr:
     """B [kg m^2]: gear and rotor, which turns `gear_ratio` times as fast (eq. 3.1)."""
@@ -32,7 +30,7 @@ def friction(motor: Any, thd: Matrix) -> Expr:
 
 def damping(motor: Any, thd: Matrix) -> Expr:
     """Slope of the friction torque [N m s/rad]: what decides how short the steps of a simulation must be."""
-    return Derivation().partial(friction(motor, thd), thd[0])
+    return sympy.diff(friction(motor, thd), thd[0])
 
 
 def ripple(motor: Any, theta: Matrix) -> Expr:

@@ -1,7 +1,8 @@
 """Names for subexpressions, and derivatives that see through them.
 
-SymPy writes expressions as trees: a rotation used nine times is written nine times, and its derivative many times more. A
-`Named` symbol stands for such an expression and remembers it, so a derivation stays as small as the graph it describes.
+SymPy writes expressions as trees: a rotation used nine times is written nine times, and its derivative many times
+more. A `Named` symbol stands for such an expression and remembers it, so a derivation stays as small as the graph
+it describes.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -27,8 +28,8 @@ class Named(sympy.Dummy):  # type: ignore[misc]
 class Derivation:
     """The names and the derivatives of one derivation.
 
-    Names are numbered from zero and SymPy sorts symbols by name, so the same derivation always spells the same expressions,
-    whatever was derived before it.
+    Names are numbered from zero and SymPy sorts symbols by name, so the same derivation always spells the same
+    expressions, whatever was derived before it.
     """
 
     def __init__(self, prefix: str = "t") -> None:
@@ -73,8 +74,13 @@ class Derivation:
         if expr.is_Mul:
             factors = expr.args
             return sympy.Add(*(sympy.Mul(*factors[:i], rate, *factors[i + 1:]) for i, rate in enumerate(rates) if rate))
-        slopes = self._power_slope(expr) if expr.is_Pow else _SLOPES[expr.func](*expr.args)
+        slopes = self._power_slope(expr) if expr.is_Pow else self._function_slopes(expr)
         return sympy.Add(*(sympy.Mul(slope, rate) for slope, rate in zip(slopes, rates, strict=True)))
+
+    def _function_slopes(self, call: Expr) -> tuple[Expr, ...]:
+        if call.func not in _SLOPES:
+            raise ValueError(f"{call} has no derivative here")
+        return _SLOPES[call.func](*call.args)
 
     def _power_slope(self, power: Expr) -> tuple[Expr, Expr]:
         base, exponent = power.args
@@ -88,12 +94,17 @@ class Derivation:
         return exponent * base ** (exponent - 1), sympy.S.Zero
 
 
-# Partial derivatives by each argument, of all the functions that occur in fingers.
+# Partial derivatives of functions by each of their arguments.
 _SLOPES: dict[Any, Callable[..., tuple[Expr, ...]]] = {
     sympy.sin: lambda x: (sympy.cos(x),),
     sympy.cos: lambda x: (-sympy.sin(x),),
+    sympy.tan: lambda x: (1 + sympy.tan(x) ** 2,),
+    sympy.asin: lambda x: (1 / sympy.sqrt(1 - x**2),),
     sympy.acos: lambda x: (-1 / sympy.sqrt(1 - x**2),),
+    sympy.atan: lambda x: (1 / (1 + x**2),),
     sympy.atan2: lambda y, x: (x / (x**2 + y**2), -y / (x**2 + y**2)),
+    sympy.exp: lambda x: (sympy.exp(x),),
+    sympy.log: lambda x: (1 / x,),
 }
 
 

@@ -1,7 +1,7 @@
 """Tendon lengths of a finger and what follows from them by differentiation (eq. 5.5 to 5.13, 5.20 to 5.23).
 
-h is the length of the tendons' paths in the finger, P = dh/dq. Tendons pull, so forces f make the torques -P' f, and the stiffness
--d tau/dq is positive when the tendons' own stiffnesses k are.
+h is the length of the tendons' paths in the finger, P = dh/dq. Tendons pull, so their forces f make the torques
+tau = -P' f, and the joints' stiffness is -d tau/dq.
 """
 
 import sympy
@@ -13,7 +13,7 @@ from awiwi_gen.models.tree import Finger, radius, sense
 
 
 def tendon_lengths(finger: Finger, q: Matrix) -> Matrix:
-    """Path lengths h (m) [m]: what rolls on pulleys (eq. 5.5) plus the straight spans of tensegrity joints (eq. 5.20, 5.22)."""
+    """Path lengths h (m) [m]: what rolls on pulleys (eq. 5.5) plus the spans of tensegrity joints (eq. 5.20, 5.22)."""
     return _lengths(finger, q, Derivation())
 
 
@@ -29,16 +29,16 @@ def coupling_derivative(finger: Finger, q: Matrix) -> list[Matrix]:
 
 
 def joint_torque(finger: Finger, q: Matrix, f: Matrix) -> Matrix:
-    """Joint torques -P' f (n) [N m] of tendon forces f (m) [N] (eq. 5.8; tendons shorten where they do work)."""
+    """Joint torques -P' f (n) [N m] of tendon forces f (m) [N] (eq. 5.8): tendons do work as they shorten."""
     return -coupling(finger, q).T * f
 
 
 def joint_stiffness(finger: Finger, q: Matrix, f: Matrix, k: Matrix) -> Matrix:
-    """-d tau/dq (n x n) [N m/rad] = P' diag(k) P + sum of f_i d2h_i/dq2, for tendons of stiffness k (m) [N/m] (eq. 5.12, 5.23)."""
+    """-d tau/dq (n x n) [N m/rad]: P' diag(k) P + sum of f_i d2h_i/dq2, with k (m) [N/m] (eq. 5.12, 5.23)."""
     derivation = Derivation()
     p = _coupling(finger, q, derivation)
     bends = _second_derivatives(p, q, derivation)
-    return sum((force * bend for force, bend in zip(f, bends)), p.T * sympy.diag(*k) * p)
+    return sum((force * bend for force, bend in zip(f, bends, strict=True)), p.T * sympy.diag(*k) * p)
 
 
 def _lengths(finger: Finger, q: Matrix, derivation: Derivation) -> Matrix:
@@ -62,5 +62,7 @@ def _coupling(finger: Finger, q: Matrix, derivation: Derivation) -> Matrix:
 
 
 def _second_derivatives(p: Matrix, q: Matrix, derivation: Derivation) -> list[Matrix]:
-    n = len(q)
-    return [Matrix(n, n, lambda j, k: derivation.partial(p[i, min(j, k)], q[max(j, k)])) for i in range(p.rows)]
+    def bend(row: Matrix) -> Matrix:
+        return Matrix(len(q), len(q), lambda j, k: derivation.partial(row[min(j, k)], q[max(j, k)]))
+
+    return [bend(p.row(i)) for i in range(p.rows)]

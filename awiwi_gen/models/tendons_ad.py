@@ -1,6 +1,7 @@
 """Tendons of a finger by automatic differentiation: torques and stiffnesses as derivatives of an energy.
 
-Only the lengths are written down; the points between which tendons run straight come from the recursion along the chain.
+Only the lengths are written down; the points between which tendons run straight come from the recursion along the
+chain.
 """
 
 import casadi as ca
@@ -43,7 +44,7 @@ def joint_torque(finger: Finger, q: SX, f: SX) -> SX:
 
 
 def joint_stiffness(finger: Finger, q: SX, f: SX, k: SX) -> SX:
-    """-d tau/dq (n x n) [N m/rad] (eq. 5.12, 5.23): Hessian of the energy in tendons of stiffness k (m) [N/m] stretched from here."""
+    """-d tau/dq (n x n) [N m/rad] (eq. 5.12, 5.23): Hessian of the energy in tendons of stiffnesses k (m) [N/m]."""
     h = tendon_lengths(finger, q)
     here = SX.sym("here", h.numel())
     stretch = h - here

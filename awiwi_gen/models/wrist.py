@@ -1,7 +1,7 @@
 """The wrist by its definition: three bars, solved one after the other by angles (chapter 6, eq. 6.1 to 6.9).
 
-A wrist is anything with the attributes a0[3], a[3], b[3], palm[3] and tendons[i].forearm[3], .palm[3] (`hand_wrist` tells
-where they lie); q71 and q73 are the internal angles [rad]. Frame {0} has its origin at B0, x distal, y from B0 to C0.
+A wrist is anything with the attributes a0[3], a[3], b[3], palm[3] and tendons[i].forearm[3], .palm[3]; `hand_wrist`
+tells where they lie. q71 and q73 are the internal angles [rad]. Frame {0}: origin B0, x distal, y from B0 to C0.
 
 The plane of the side bars contains B0C0 and is turned about it by q71; in it, B and C run on circles about B0 and C0.
 Eq. 6.1 prints one centre for both, 6.2 loses it too; with C0 = (0, D) all of 6.3 and 6.4 follows.
@@ -72,8 +72,8 @@ def _palm(wrist: Wrist, q71: Expr, q73: Expr, derivation: Derivation) -> Palm:
     b = derivation.name_all(side * (sympy.cos(t_b) * along + sympy.sin(t_b) * across))
     c = derivation.name_all(side * sympy.cos(t_c) * along + (width + side * sympy.sin(t_c)) * across)
 
-    # Frame {BCM}: x towards C, z along the normal. A lies on a circle about M in its y-z plane (eq. 6.5), with the radius
-    # R_AM (6.5 and 6.7 print R_AA0), which is negative where the palm's A lies on the other side of BC.
+    # Frame {BCM}: x towards C, z along the normal. A lies on a circle about M in its y-z plane (eq. 6.5). Its radius is
+    # R_AM, where 6.5 and 6.7 print R_AA0; it is negative if the palm is drawn with A above BC.
     height = wrist.b[2] - wrist.a[2]
     axes = Matrix.hstack((c - b) / width, normal.cross((c - b) / width), normal)
     x, y, z = derivation.name_all(axes.T * (forearm - (b + c) / 2))  # of A0 (eq. 6.6)
@@ -88,7 +88,7 @@ def _palm(wrist: Wrist, q71: Expr, q73: Expr, derivation: Derivation) -> Palm:
 
 
 def _pose(wrist: Wrist, palm: Palm, derivation: Derivation) -> Matrix:
-    """y along CB, z along AM, and the origin where the file puts it in the neutral pose, in which the axes are those of {0}."""
+    """y along CB, z along AM: parallel to {0} in the neutral pose, in which the hand file tells the origin."""
     y = (palm.b - palm.c) / wrist.b[1]
     z = (palm.m - palm.a) / (wrist.b[2] - wrist.a[2])
     axes = derivation.name_all(Matrix.hstack(y.cross(z), y, z))

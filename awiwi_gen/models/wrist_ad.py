@@ -1,7 +1,7 @@
 """The wrist by algebra alone: no angle is solved for, one square root decides; couplings by automatic differentiation.
 
-Everything happens in axes that turn with q71 about B0C0: e1 in the plane of the side bars, e2 along B0C0, e3 normal to them.
-There C is a rational function of B, and A stands over the foot of A0 in the plane that halves BC.
+Everything happens in axes that turn with q71: e1 in the plane of the side bars, e2 along B0C0, e3 normal to both. There
+C is a rational function of B, and A is found from the foot of A0 in the plane that halves BC.
 """
 
 from dataclasses import dataclass
@@ -61,31 +61,31 @@ def coupling(wrist: Wrist, q71: SX, q73: SX) -> tuple[Any, ...]:
 
 def _palm(wrist: Wrist, q71: SX, q73: SX) -> Palm:
     width, height = wrist.b[1], wrist.b[2] - wrist.a[2]
-    squared = wrist.b[0] ** 2 + wrist.b[1] ** 2 + wrist.b[2] ** 2
-    side = ca.sqrt(squared)
+    side_squared = wrist.b[0] ** 2 + wrist.b[1] ** 2 + wrist.b[2] ** 2
+    side = ca.sqrt(side_squared)
     c71, s71 = ca.cos(q71), ca.sin(q71)
     axes = ca.vertcat(ca.horzcat(c71, 0, -s71), ca.horzcat(0, 1, 0), ca.horzcat(s71, 0, c71))
 
     # In a crossed parallelogram the diagonals B0C and C0B are parallel, and their product is R^2 - D^2 (eq. 6.4).
     b = (side * ca.sin(q73), side * ca.cos(q73))
-    product = squared - width**2
-    stretch = 1 / ((squared + width**2) / product - 2 * width * side / product * ca.cos(q73))
+    product = side_squared - width**2
+    stretch = 1 / ((side_squared + width**2) / product - 2 * width * side / product * ca.cos(q73))
     c = (stretch * b[0], stretch * (b[1] - width))
     y = ((b[0] - c[0]) / width, (b[1] - c[1]) / width)
 
-    # All doubled, as 2 M is B + C: from M, the foot of A0 in the plane that halves BC lies at `off` along (y[1], -y[0], 0) and
-    # `away` along e3; `reach` is how far A gets along that line, `swing` how far off it (eq. 6.7).
+    # Eq. 6.7, doubled as 2 M is B + C. From M, the foot of A0 in the plane that halves BC lies at `off` along
+    # (y[1], -y[0], 0) and `away` along e3. A lies at `reach` towards it and at `swing` across.
     away = c71 * (2 * wrist.a0[2]) - s71 * (2 * wrist.a0[0])
     run = (c71 * (2 * wrist.a0[0]) + s71 * (2 * wrist.a0[2]) - (b[0] + c[0]), 2 * wrist.a0[1] - (b[1] + c[1]))
     off = run[0] * y[1] - run[1] * y[0]
     middle = sum((p - q) ** 2 for p, q in zip(wrist.a, wrist.a0, strict=True))
     reach = (run[0] ** 2 + run[1] ** 2 + away**2 + 4 * (height**2 - middle)) / (4 * height)
-    distance = off**2 + away**2
-    room = distance - reach**2
-    swing = ca.sqrt(room)
+    distance_squared = off**2 + away**2
+    swing_squared = distance_squared - reach**2
+    swing = ca.sqrt(swing_squared)
     # z, from A to M, makes the same angle with the way back from the foot.
-    tilt = (swing * away - reach * off) / distance
-    rise = -(swing * off + reach * away) / distance
+    tilt = (swing * away - reach * off) / distance_squared
+    rise = -(swing * off + reach * away) / distance_squared
     return Palm(
         b=ca.vertcat(*b, 0),
         c=ca.vertcat(*c, 0),
@@ -93,14 +93,15 @@ def _palm(wrist: Wrist, q71: SX, q73: SX) -> Palm:
         y=ca.vertcat(*y, 0),
         z=ca.vertcat(tilt * y[1], -tilt * y[0], rise),
         axes=axes,
-        guards=[ca.sin(q73), height * away, room],
+        guards=[ca.sin(q73), height * away, swing_squared],
     )
 
 
 def _origin(wrist: Wrist, palm: Palm) -> SX:
     """The palm frame's origin in the turning axes; the palm frame is parallel to {0} in the neutral pose."""
     drawn = (wrist.palm[0] - wrist.b[0], wrist.palm[1] - wrist.b[1] / 2, wrist.palm[2] - wrist.b[2])
-    return palm.m + drawn[0] * palm.x + drawn[1] * palm.y + drawn[2] * palm.z
+    origin: SX = palm.m + drawn[0] * palm.x + drawn[1] * palm.y + drawn[2] * palm.z
+    return origin
 
 
 def _lengths(wrist: Wrist, q71: SX, q73: SX) -> tuple[SX, list[SX]]:
@@ -116,7 +117,7 @@ def _lengths(wrist: Wrist, q71: SX, q73: SX) -> tuple[SX, list[SX]]:
         (x, place, z), (palm_x, palm_place, palm_z) = tendon.forearm, tendon.palm
         feet = origin + palm_x * palm.x + palm_z * palm.z - back @ ca.vertcat(x, 0, z)
         common = ca.dot(feet, feet)
-        lengths.append(ca.sqrt(
-            common + (place**2 + palm_place**2) - place * (2 * feet[1]) + palm_place * (2 * ca.dot(feet, palm.y))
-            - (place * palm_place) * (2 * palm.y[1])))  # fmt: skip
+        across = palm_place * (2 * ca.dot(feet, palm.y)) - place * (2 * feet[1])
+        along = place * palm_place * (2 * palm.y[1])
+        lengths.append(ca.sqrt(common + (place**2 + palm_place**2) + across - along))
     return ca.vertcat(*lengths), palm.guards

@@ -162,7 +162,8 @@ def the_jacobian_gives_the_angular_velocity_of_the_tip(x: Motion, jacobian: Any,
     return np.stack([spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0]], axis=1) - omega, omega
 
 
-def the_derivatives_are_the_rates_of_the_inverse_dynamics(x: Motion, inverse_dynamics_derivatives: Any, inverse_dynamics: Any
+def the_derivatives_are_the_rates_of_the_inverse_dynamics(
+    x: Motion, inverse_dynamics_derivatives: Any, inverse_dynamics: Any
 ) -> Residual:
     d, qd, qdd = inverse_dynamics_derivatives, x.inputs["qd"], x.inputs["qdd"]
     rate = x.rate("inverse_dynamics", "tau", q=qd, qd=qdd)
@@ -197,6 +198,50 @@ def the_joint_stiffness_is_the_falling_torque(
     return rate + _times(joint_stiffness["K"], qd), rate
 
 
+def the_bars_of_the_wrist_keep_their_lengths(x: Motion, wrist_points: Any) -> Residual:
+    a0, a, b = (np.array([ball(x.values[f"{point}[{i}]"]) for i in range(3)]) for point in ("a0", "a", "b"))
+    b0, c0, c = b - b, b * [0, 1, 0], b * [1, 0, 1]
+    moved = [wrist_points[point] for point in "ABC"]
+    bars = [(a0, 0), (b0, 1), (c0, 2), (moved[0], 1), (moved[0], 2), (moved[1], 2)]
+    drawn = [(a0, a), (b0, b), (c0, c), (a, b), (a, c), (b, c)]
+    length = np.array([_dot(p - q, p - q) for p, q in drawn])
+    return np.stack([_dot(moved[i] - p, moved[i] - p) for p, i in bars], axis=1) - length, length
+
+
+def the_wrist_turns_the_palm(x: Motion, wrist_palm_pose: Any) -> Residual:
+    R = wrist_palm_pose["T"][..., :3, :3]
+    right_handed = np.cross(R[..., 0], R[..., 1]) - R[..., 2]
+    return np.concatenate([R @ _turned(R) - np.eye(3, dtype=int), right_handed[..., None]], axis=2), np.array([arb(1)])
+
+
+def the_wrist_coupling_is_the_derivative_of_the_lengths(
+    x: Motion, wrist_coupling: Any, wrist_tendon_lengths: Any
+) -> Residual:
+    unit = np.full((x.samples, 1), arb(1), dtype=object)
+    rates = [x.rate("wrist_tendon_lengths", "h", **{angle: unit}) for angle in ("q71", "q73")]
+    return np.stack(rates, axis=2) - wrist_coupling["dh"], wrist_coupling["dh"]
+
+
+def the_whole_coupling_is_the_derivative_of_the_lengths(
+    x: Motion, hand_coupling: Any, hand_tendon_lengths: Any
+) -> Residual:
+    rate = x.rate("hand_tendon_lengths", "h", q=x.inputs["q"])
+    return rate - _times(hand_coupling["P"], x.inputs["q"]), rate
+
+
+def the_whole_hand_takes_its_power_from_the_tendons(x: Motion, hand_joint_torque: Any, hand_coupling: Any) -> Residual:
+    power = _dot(hand_joint_torque["tau"], x.inputs["q"])
+    return power + _dot(x.inputs["f"], _times(hand_coupling["P"], x.inputs["q"])), power
+
+
+def the_whole_stiffness_is_the_falling_torque(
+    x: Motion, hand_joint_stiffness: Any, hand_coupling: Any, hand_joint_torque: Any
+) -> Residual:
+    stretching = x.inputs["k"] * _times(hand_coupling["P"], x.inputs["q"])
+    rate = x.rate("hand_joint_torque", "tau", q=x.inputs["q"], f=stretching)
+    return rate + _times(hand_joint_stiffness["K"], x.inputs["q"]), rate
+
+
 LAWS: tuple[Callable[..., Residual], ...] = (
     the_mass_matrix_is_symmetric,
     half_qd_M_qd_is_the_kinetic_energy,
@@ -216,6 +261,12 @@ LAWS: tuple[Callable[..., Residual], ...] = (
     the_power_of_the_joints_is_taken_from_the_tendons,
     the_joint_stiffness_is_symmetric,
     the_joint_stiffness_is_the_falling_torque,
+    the_bars_of_the_wrist_keep_their_lengths,
+    the_wrist_turns_the_palm,
+    the_wrist_coupling_is_the_derivative_of_the_lengths,
+    the_whole_coupling_is_the_derivative_of_the_lengths,
+    the_whole_hand_takes_its_power_from_the_tendons,
+    the_whole_stiffness_is_the_falling_torque,
 )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
@@ -12,16 +13,16 @@ from flint import arb, arb_mat
 from awiwi_gen.ir.algebras import Balls, Floats, ball
 from awiwi_gen.ir.graph import Graph, Node
 from awiwi_gen.ir.interpret import evaluate
+from awiwi_gen.kernel import Solver
 from awiwi_gen.verify.reference import Reference, reference
 
 Array = np.ndarray[Any, Any]
-Graphs = Mapping[str, Graph]
-Values = Mapping[str, Fraction]
 
 NOISE = 2.5e-4  # error of a measured length [m]; keeps the estimate inside the limits it starts in
 ROUNDS = 30  # of Gauss-Newton at 256 bits: the residual is small, each round gains a digit at least
 
 
+@dataclass(frozen=True)
 class LeastSquares:
     """Joint angles whose tendon lengths are nearest to the measured ones (eq. 5.14, 5.24).
 
@@ -29,37 +30,48 @@ class LeastSquares:
     on poses away from the limits, for there the exact solution is a stationary point.
     """
 
-    def sample(self, drawn: dict[str, Array], graphs: Graphs, values: Values) -> dict[str, Array]:
+    solver: Solver
+    graphs: Mapping[str, Graph]
+    values: Mapping[str, Fraction]
+
+    def sample(self, drawn: dict[str, Array]) -> dict[str, Array]:
         """Measured lengths ``h`` of poses, and starts up to 0.2 rad away from them."""
         start = drawn["start"]
         low, high = start.min(axis=0), start.max(axis=0)
         middle, noisy = (low + high) / 2, np.arange(len(start)) % 2 == 1
         random = np.random.default_rng(len(start))
         pose = np.where(noisy[:, None], middle + 0.7 * (start - middle), start)
-        lengths = self._lengths(graphs["tendon_lengths"], pose, values)
+        lengths, _ = self.model(pose.astype(np.float64))
         lengths = lengths + np.where(noisy[:, None], random.uniform(-NOISE, NOISE, lengths.shape), 0)
         begun = np.clip(pose + random.uniform(-0.2, 0.2, pose.shape), low, high)
         return {"h": lengths.astype(start.dtype), "start": begun.astype(start.dtype)}
 
-    def _lengths(self, graph: Graph, q: Array, values: Values) -> Array:
+    def model(self, q: Array) -> tuple[Array, Array]:
+        """Lengths (samples, m) and coupling (samples, m, n) at q (samples, n): in its arithmetic, bit for bit as C."""
+        floats = Floats(q.dtype.type)
+        other = np.zeros(len(q), q.dtype)
+
         def leaf(node: Node) -> Any:
-            return Floats().const(values[node[1]]) if node[0] == "param" else q[:, node[2]].astype(np.float64)
+            return floats.const(self.values[node[1]]) if node[0] == "param" else self._angle(node, q.T, other)
 
-        columns = evaluate(graph, Floats(), leaf)["h"]
-        return np.stack([np.broadcast_to(c, (len(q),)) for c in columns], axis=1)
+        h, P = (
+            np.stack([np.broadcast_to(c, len(q)) for c in columns], axis=1).astype(q.dtype)
+            for columns in self._evaluate(floats, leaf)
+        )
+        return h, P.reshape(len(q), h.shape[1], q.shape[1])
 
-    def solve(self, inputs: Mapping[str, Array], graphs: Graphs, values: Values) -> Reference:
+    def solve(self, inputs: Mapping[str, Array]) -> Reference:
         """The stationary points near the starts, by undamped Gauss-Newton at 256 bits."""
         samples, n = inputs["start"].shape
         q = [[arb(x) for x in column] for column in inputs["start"].T.astype(np.float64).tolist()]
         measured = [[arb(x) for x in column] for column in inputs["h"].T.astype(np.float64).tolist()]
+        other = [arb(0)] * samples
         for _ in range(ROUNDS):
 
             def leaf(node: Node, q: Any = q) -> list[arb]:
-                return [ball(values[node[1]])] * samples if node[0] == "param" else q[node[2]]
+                return [ball(self.values[node[1]])] * samples if node[0] == "param" else self._angle(node, q, other)
 
-            h = evaluate(graphs["tendon_lengths"], Balls(samples), leaf)["h"]
-            P = evaluate(graphs["coupling"], Balls(samples), leaf)["P"]
+            h, P = self._evaluate(Balls(samples), leaf)
             for s in range(samples):
                 jacobian = arb_mat(len(h), n, [column[s] for column in P])
                 residual = arb_mat(len(h), 1, [(a[s] - b[s]).mid() for a, b in zip(measured, h, strict=True)])
@@ -69,5 +81,58 @@ class LeastSquares:
                     q[j][s] = (q[j][s] + step[j, 0]).mid()
         return reference({"q": q})
 
+    def mirror(self, inputs: Mapping[str, Array]) -> Mapping[str, Array]:
+        """What the solver computes in floats, by output, where that is known to the last bit."""
+        return {}
 
-PROBLEMS = {"least squares": LeastSquares()}
+    def _angle(self, node: Node, q: Any, other: Any) -> Any:
+        """A joint angle of the kernels used: one of the unknowns q (n, samples), or that of a joint at rest."""
+        unknowns = self.solver.unknowns
+        return q[unknowns.index(node[2])] if node[2] in unknowns else other
+
+    def _evaluate(self, algebra: Any, leaf: Any) -> tuple[list[Any], list[Any]]:
+        """The problem's rows of the lengths, and its rows and columns of the coupling, row by row."""
+        h = evaluate(self.graphs["tendon_lengths"], algebra, leaf)["h"]
+        P = evaluate(self.graphs["coupling"], algebra, leaf)["P"]
+        rows, columns, width = self.solver.equations, self.solver.unknowns, len(P) // len(h)
+        return [h[i] for i in rows], [P[i * width + j] for i in rows for j in columns]
+
+
+class GradientSearch(LeastSquares):
+    """The same by algorithm 1, mended: what it computes is repeated here operation by operation."""
+
+    def mirror(self, inputs: Mapping[str, Array]) -> Mapping[str, Array]:
+        """All trials, with the arithmetic and the order of csrc."""
+        start, measured = inputs["start"], inputs["h"]
+        low, high = (np.array(self.solver.arrays[end], start.dtype) for end in ("low", "high"))
+        q = _clamped(start, low, high)
+        best, gradient, curvature = self._cost(q, measured)
+        step = 1 / curvature
+        for _ in range(1, self.solver.iterations):
+            trial = _clamped(q - 2 * step[:, None] * gradient, low, high)
+            found, trial_gradient, _ = self._cost(trial, measured)
+            better = found < best
+            q, gradient = (np.where(better[:, None], a, b) for a, b in ((trial, q), (trial_gradient, gradient)))
+            best, step = np.where(better, found, best), np.where(better, step, step / 2)
+        return {"q": q}
+
+    def _cost(self, q: Array, measured: Array) -> tuple[Array, Array, Array]:
+        """Half the squared residual, its gradient, and the trace of P'P: sums over the tendons from the first on."""
+        h, P = self.model(q)
+        residual = h - measured
+        total, trace = np.zeros_like(q[:, 0]), np.zeros_like(q[:, 0])
+        gradient, squares = np.zeros_like(q), np.zeros_like(q)
+        for i in range(h.shape[1]):
+            total = total + residual[:, i] * residual[:, i]
+            gradient = gradient + P[:, i] * residual[:, i, None]
+            squares = squares + P[:, i] * P[:, i]
+        for j in range(q.shape[1]):
+            trace = trace + squares[:, j]
+        return total / 2, gradient, trace
+
+
+def _clamped(x: Array, low: Array, high: Array) -> Array:
+    return np.where(x < low, low, np.where(x > high, high, x))
+
+
+PROBLEMS: Mapping[str, type[LeastSquares]] = {"least squares": LeastSquares, "gradient search": GradientSearch}

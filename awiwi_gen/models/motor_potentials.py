@@ -12,8 +12,8 @@ from casadi import SX
 
 def energy(motor: Any, thd: SX) -> SX:
     """Kinetic energy [J] of the rotor and of the gear, each at its own speed."""
-    rotor = thd * motor.gear_ratio
-    return (motor.rotor_inertia * rotor**2 + motor.gear_inertia * thd**2) / 2
+    rotor = thd * SX(motor.gear_ratio)
+    return (rotor**2 * SX(motor.rotor_inertia) + thd**2 * SX(motor.gear_inertia)) / 2
 
 
 def friction(motor: Any, thd: SX) -> SX:
@@ -32,13 +32,14 @@ def ripple(motor: Any, theta: SX) -> SX:
     total = SX(0)
     for wave in motor.ripple:
         c, s = _power(waves[wave.shaft], wave.harmonic)
-        total += wave.amplitude * (s * ca.cos(wave.phase) + c * ca.sin(wave.phase))
+        total += s * (wave.amplitude * ca.cos(wave.phase)) + c * (wave.amplitude * ca.sin(wave.phase))
     return total
 
 
 def compensation(motor: Any, theta: SX, thd: SX) -> SX:
     """Motor torque [N m] that takes away a share of friction and ripple."""
-    return motor.compensation * friction(motor, thd) + motor.compensation * ripple(motor, theta)
+    share = SX(motor.compensation)
+    return share * friction(motor, thd) + share * ripple(motor, theta)
 
 
 def torque(motor: Any, theta: SX, thd: SX, thdd: SX, f: SX) -> SX:
@@ -54,12 +55,13 @@ def acceleration(motor: Any, theta: SX, thd: SX, tau: SX, f: SX) -> SX:
 
 
 def _resistance(motor: Any, theta: SX, thd: SX, f: SX) -> SX:
-    return friction(motor, thd) + ripple(motor, theta) + f * motor.pulley
+    return friction(motor, thd) + ripple(motor, theta) + f * SX(motor.pulley)
 
 
 def _dissipation(motor: Any, thd: SX) -> SX:
     """Rayleigh's function [W]: its gradient is the friction torque."""
-    steepness, level, viscosity = motor.friction.steepness, motor.friction.level, motor.friction.viscosity
+    numbers = motor.friction
+    steepness, level, viscosity = SX(numbers.steepness), SX(numbers.level), SX(numbers.viscosity)
     dry = thd * ca.atan(steepness * thd) - ca.log(1 + (steepness * thd) ** 2) / (2 * steepness)
     return level * dry + viscosity * thd**2 / 2
 
@@ -69,9 +71,9 @@ def _circle(angle: SX) -> tuple[SX, SX]:
 
 
 def _power(base: tuple[SX, SX], exponent: int) -> tuple[SX, SX]:
-    """A power of a complex number, by squaring."""
+    """A power of a complex number of modulus 1, by squaring."""
     if exponent == 1:
         return base
     c, s = _power(base, exponent // 2)
-    c, s = c**2 - s**2, 2 * c * s
+    c, s = 1 - 2 * s**2, 2 * c * s
     return (c * base[0] - s * base[1], c * base[1] + s * base[0]) if exponent % 2 else (c, s)

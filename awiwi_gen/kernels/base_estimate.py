@@ -1,0 +1,84 @@
+"""The mended algorithm 1 of section 5.4: base joints by a gradient search, for fingers with straight spans.
+
+Straight spans depend on the joints between their two ends only, so their lengths alone tell where these are. The
+kernel `joint_estimate` finds all joints at once, in fewer rounds; this is the search of the source, for comparison.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from awiwi_gen.hand import Finger, Hand
+from awiwi_gen.kernel import Kernel, Port, Solver
+from awiwi_gen.kernels.declare import Family
+from awiwi_gen.kernels.fingers import Size, input_ports, joint_limits
+from awiwi_gen.units import rad
+
+TRIALS = 50  # as in algorithm 1; figure 5.17 shows that 15 are enough for noisy lengths
+
+
+@dataclass(frozen=True)
+class Base:
+    """Which tendons of a finger are straight spans, and which joint angles these depend on."""
+
+    spans: tuple[int, ...]
+    joints: tuple[int, ...]
+
+
+of_base: Family[Base] = Family()
+
+
+def base_kernels(hand: Hand, name: str, finger: Finger) -> list[Kernel]:
+    """The kernels of a finger's tensegrity base, if it has one."""
+    base = base_of(finger)
+    if not base.spans:
+        return []
+    whole = input_ports(hand, finger, Size(len(finger.joints), len(finger.tendons), len(finger.links)))
+    ports = {"h": chosen(whole["h"], base.spans), "start": chosen(whole["start"], base.joints)}
+    return of_base.kernels(name, finger, f"fingers.{name}", finger.structure(), ports, base)
+
+
+def base_of(finger: Finger) -> Base:
+    """The spans, and the joints between them and the palm; no spans where these tendons also see joints beyond."""
+    order = [link.joint for link in finger.links]
+    spans = tuple(i for i, tendon in enumerate(finger.tendons) if tendon.span)
+    ends = [order.index(tendon.span.joint) for tendon in finger.tendons if tendon.span]
+    leaders = [finger.leaders.get(joint, joint) for joint in order[: max(ends, default=0)]]
+    joints = tuple(i for i, joint in enumerate(finger.joints) if joint in leaders)
+    rolled = {finger.leaders.get(over[1:], over[1:]) for i in spans for over in finger.tendons[i].over}
+    return Base(spans, joints) if rolled <= set(leaders) and len(joints) <= len(spans) else Base((), ())
+
+
+def chosen(port: Port, elements: tuple[int, ...]) -> Port:
+    """Some elements of a port, with their ranges."""
+    bounds = port.bounds()
+    low, high = zip(*(bounds[i] for i in elements), strict=True)
+    return Port((len(elements),), tuple(port.units[i] for i in elements), low, high)
+
+
+def gradient_search(finger: Finger) -> Solver:
+    """Algorithm 1, its step from the curvature at the start."""
+    base, (low, high) = base_of(finger), joint_limits(finger)
+    return Solver(
+        template="base_estimate.c.j2",
+        problem="gradient search",
+        uses=("tendon_lengths", "coupling"),
+        equations=base.spans,
+        unknowns=base.joints,
+        arrays={"low": tuple(low[j] for j in base.joints), "high": tuple(high[j] for j in base.joints)},
+        strings={
+            "joints": str(len(finger.joints)),
+            "tendons": str(len(finger.tendons)),
+            "search": f"awiwi_gradient_search(&problem, h, start, {TRIALS}, 0, q)",
+        },
+        iterations=TRIALS + 1,
+        tolerance={"f64": 1e-6, "f32": 1e-4},
+    )
+
+
+@of_base(
+    lambda base: {"q": Port((len(base.joints),), rad)}, "eq. 5.20, 5.24, algorithm 1, mended", solver=gradient_search
+)
+def base_estimate_by_gradient(finger: Any, h: Any, start: Any) -> Any:
+    """Base joint angles whose span lengths are nearest to the measured h, by gradient search from start."""

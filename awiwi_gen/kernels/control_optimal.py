@@ -1,0 +1,106 @@
+"""The kernels of chapter 16: the impedance law as a state feedback, and its gains from feedback gains.
+
+Feedback gains belong to the plant of table 16.1, whose spring's torque is cancelled: any linear method gives such
+gains, and what it asks for can be had in three ways. With the weights free, K_p and K_d are chosen and the rest follows
+in closed form. With the weights given, K_p and K_d leave two of the four gains to be matched, in closed form too; all
+four take an iteration, and need not exist.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from awiwi_gen.control import backstepping_gains as gain
+from awiwi_gen.control import backstepping_gains_ad as gain_ad
+from awiwi_gen.kernel import Kernel, Port
+from awiwi_gen.kernels.control_backstepping import DAMPING, INERTIA, PORTS, RATES, STIFFNESS, WEIGHTS, box
+from awiwi_gen.kernels.declare import Family, Parameterless
+from awiwi_gen.models.derivatives import derivatives_of
+from awiwi_gen.units import Unit, one, s
+
+FEEDBACK = (STIFFNESS, DAMPING, one, s)
+EXTERNAL = (one, s)
+
+feedback: Family[None] = Family()
+by_rates: Family[None] = Family()
+by_weights: Family[None] = Family()
+
+
+def optimal_laws() -> list[Kernel]:
+    """All kernels of chapter 16; they need no hand."""
+    families = ((feedback, PORTS), (by_rates, ROUND_RATES), (by_weights, ROUND_WEIGHTS))
+    return [
+        kernel
+        for family, ports in families
+        for kernel in family.kernels("", Parameterless(), "control", {}, ports, None)
+    ]
+
+
+def around(units: tuple[Unit, ...], values: tuple[float, ...], share: float) -> Port:
+    """A port about known values, up to a share of them."""
+    return box(units, tuple(v * (1 - share) for v in values), tuple(v * (1 + share) for v in values))
+
+
+# Where gains exist is no box. These lie inside, about K_3 = 1000 and K_4 = 100, and about C_t = 0.07 and C_s = 1.3e-5.
+ROUND_RATES = {
+    "K_opt": around(FEEDBACK, (36.7, 0.77, 380.0, 3.7), 0.1),
+    "plant": around((INERTIA, INERTIA, STIFFNESS), (1e-4, 2e-3, 0.6), 0.02),
+    "impedance": around((STIFFNESS, DAMPING), (0.1, 1e-3), 0.3),
+    "weights": around(WEIGHTS, (10.0, 0.01), 0.3),
+}
+ROUND_WEIGHTS = {
+    "K_opt": around(FEEDBACK, (21.0, 0.91, 530.0, 0.31), 0.1),
+    "plant": around((INERTIA, INERTIA, STIFFNESS), (1e-4, 2e-3, 0.6), 0.02),
+    "impedance": around((STIFFNESS, DAMPING), (1.0, 9.2e-4), 0.1),
+}
+
+
+@feedback(
+    lambda _: {"K": Port((4,), FEEDBACK), "K_cancelled": Port((4,), FEEDBACK), "h": Port((2,), EXTERNAL)},
+    "eq. 15.70, 16.1 to 16.3, mended",
+    witness=gain_ad.state_gains,
+)
+def backstepping_state_gains(_: Any, plant: Any, gains: Any, weights: Any) -> Any:
+    """The impedance law as tau_m = -K (q, q', tau, tau') + h (tau_ext, tau_ext'), linear spring, q_d = 0.
+
+    K_cancelled are the gains for a plant whose spring's torque is cancelled: tau_m = (m + b) / m tau - K_cancelled x.
+    """
+    return gain.state_gains(plant, gains, weights)
+
+
+slopes, slopes_ad = derivatives_of(gain.linearised_gains, gain_ad.linearised_gains, "gains")
+
+
+@feedback(
+    lambda _: {"dK": Port((4, 4), tuple(k / g for k in FEEDBACK for g in (STIFFNESS, DAMPING, *RATES)))},
+    "eq. 16.3, mended and differentiated",
+    witness=slopes_ad,
+)
+def backstepping_state_gains_derivatives(_: Any, plant: Any, gains: Any, weights: Any) -> Any:
+    """Slopes of K_cancelled by the gains K_p, K_d, K_3, K_4."""
+    return slopes(_, plant, gains, weights)
+
+
+@by_rates(
+    lambda _: {"rates": Port((2,), RATES)},
+    "eq. 16.3, 16.4, solved",
+    witness=gain_ad.matched_rates,
+    guards=("K_3 and K_4 are real and differ", "their sum is positive", "their product is positive"),
+)
+def optimal_backstepping_rates(_: Any, K_opt: Any, plant: Any, impedance: Any, weights: Any) -> Any:
+    """K_3 and K_4 that give tau and tau' the feedback gains K_opt, with (K_p, K_d) and the weights given."""
+    return gain.matched_rates(K_opt, plant, impedance, weights)
+
+
+@by_weights(
+    lambda _: {"rates": Port((2,), RATES), "weights": Port((2,), WEIGHTS)},
+    "eq. 15.89, 15.97, 16.3, 16.4, solved",
+    witness=gain_ad.matched_weights,
+    guards=("C_t is positive", "K_3 is positive", "K_4 is positive", "C_s is positive"),
+)
+def optimal_backstepping_weights(_: Any, K_opt: Any, plant: Any, impedance: Any) -> Any:
+    """(K_3, K_4) and the weights (C_t, C_s) that give all four feedback gains K_opt exactly, with (K_p, K_d) given.
+
+    Some K_p and K_d do whenever the closed loop is stable and has two different pairs of poles: near those of one pair.
+    """
+    return gain.matched_weights(K_opt, plant, impedance)

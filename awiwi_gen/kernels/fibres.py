@@ -1,0 +1,52 @@
+"""The kernels of a tendon's fibre and of the guidings it rubs in."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from awiwi_gen.hand import Fibre, Hand
+from awiwi_gen.kernel import Kernel, Port
+from awiwi_gen.kernels.declare import Family
+from awiwi_gen.models import fibre as fibres
+from awiwi_gen.models import fibre_energy
+from awiwi_gen.units import N, m, rad
+
+of_fibre: Family[None] = Family()
+of_guidings: Family[None] = Family()
+
+
+def fibre_kernels(hand: Hand, fibre: Fibre) -> list[Kernel]:
+    """All kernels of the fibre and its guidings."""
+    ports = fibre_ports(hand, fibre)
+    return [
+        *of_fibre.kernels("tendon", fibre, "tendon", {"fibre": "whole"}, ports, None),
+        *of_guidings.kernels("guiding", fibre, "tendon", {"fibre": "guidings"}, ports, None),
+    ]
+
+
+def fibre_ports(hand: Hand, fibre: Fibre) -> dict[str, Port]:
+    """The ports an argument name stands for, with the ranges of this hand."""
+    limits = hand.limits
+    return {
+        "f": Port((), N, 0.0, float(limits.tendon_force)),
+        "k": Port((), N / m, float(limits.tendon_stiffness_low), float(limits.tendon_stiffness_high)),
+        "bend": Port((), rad, 0.0, float(fibre.bend)),
+    }
+
+
+@of_fibre(lambda _: {"x": Port((), m)}, "section 5.1", witness=fibre_energy.stretch)
+def stretch(fibre: Any, f: Any) -> Any:
+    """Elongation of the fibre under the force f."""
+    return fibres.stretch(fibre, f)
+
+
+@of_fibre(lambda _: {"stiffness": Port((), N / m)}, "section 4.3", witness=fibre_energy.stiffness)
+def stiffness(fibre: Any, k: Any) -> Any:
+    """Stiffness of a whole tendon: of the fibre, in series with its mechanism of stiffness k."""
+    return fibres.stiffness(fibre, k)
+
+
+@of_guidings(lambda _: {"loss": Port((), N)}, "eq. 4.1", witness=fibre_energy.guiding_friction)
+def friction(fibre: Any, f: Any, bend: Any) -> Any:
+    """Force lost in the guidings by a tendon that is pulled with the force f and bent by the angle bend in all."""
+    return fibres.guiding_friction(fibre, f, bend)

@@ -1,0 +1,50 @@
+"""What the motors and springs of a finger's tendons, and the wrist, tell about its tendon lengths (eq. 5.1).
+
+The finger, the wrist and the motor's pulley take of a tendon's length l0; more than that stretches it, by
+h + w + r theta - l0. Here this is solved for h, which `joint_estimate` turns into joint angles.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from awiwi_gen.hand import Hand
+from awiwi_gen.kernel import Kernel, Port
+from awiwi_gen.kernels.declare import Family
+from awiwi_gen.models import estimate, estimate_qr
+from awiwi_gen.units import m, rad
+
+of_driven: Family[int] = Family()  # sized by the number of tendons
+
+
+def measured_kernels(hand: Hand) -> list[Kernel]:
+    """The kernels of every finger together with the motors behind it: of a hand with this finger only."""
+    alone = {name: hand.model_copy(update={"fingers": {name: hand.fingers[name]}}) for name in hand.fingers}
+    return [
+        kernel
+        for name, single in alone.items()
+        if hand.motor
+        for kernel in of_driven.kernels(name, single, "", single.structure(), measured_ports(single), single.tendons)
+    ]
+
+
+def measured_ports(hand: Hand) -> dict[str, Port]:
+    """Motor angles, elongations, and what the wrist takes of the tendons, with the ranges of this hand."""
+    shape, limits = (hand.tendons,), hand.limits
+    longest = float(limits.tendon_force) / float(limits.tendon_stiffness_low)
+    ports = {"x": Port(shape, m, 0.0, longest)}
+    if hand.motor:
+        ports["theta"] = Port(shape, rad, -float(hand.motor.travel), float(hand.motor.travel))
+    if hand.wrist:
+        length = sum(float(x) ** 2 for x in hand.wrist.b) ** 0.5
+        ports["w"] = Port(shape, m, -length, length)
+    return ports
+
+
+@of_driven(lambda tendons: {"h": Port((tendons,), m)}, "eq. 5.1", witness=estimate_qr.measured_lengths)
+def measured_lengths(hand: Any, theta: Any, x: Any, w: Any = None) -> Any:
+    """Tendon lengths in the finger, of motor angles theta, elongations x and changes w of the lengths in the wrist.
+
+    All three count from where the straight finger's tendons begin to stretch. The motor reels in for positive theta.
+    """
+    return estimate.measured_lengths(hand, theta, x, w)

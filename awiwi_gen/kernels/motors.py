@@ -1,0 +1,79 @@
+"""The kernels of a motor with its gear; angles, speeds and torques are those of the output shaft."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from awiwi_gen.hand import Hand, Motor
+from awiwi_gen.kernel import Kernel, Port
+from awiwi_gen.kernels.declare import Family
+from awiwi_gen.models import motor as motors
+from awiwi_gen.models import motor_potentials as potentials
+from awiwi_gen.units import J, N, Unit, m, rad, s
+
+of_motor: Family[None] = Family()
+
+
+def motor_kernels(hand: Hand, motor: Motor) -> list[Kernel]:
+    """All kernels of the motor."""
+    return of_motor.kernels("motor", motor, "motor", {"motor": motor.structure()}, motor_ports(hand, motor), None)
+
+
+def motor_ports(hand: Hand, motor: Motor) -> dict[str, Port]:
+    """The ports an argument name stands for, with the ranges of this motor."""
+
+    def symmetric(unit: Unit, limit: Any) -> Port:
+        return Port((), unit, -float(limit), float(limit))
+
+    return {
+        "theta": symmetric(rad, motor.travel),
+        "thd": symmetric(rad / s, motor.velocity),
+        "thdd": symmetric(rad / s**2, motor.acceleration),
+        "tau": symmetric(N * m, motor.torque),
+        "f": Port((), N, 0.0, float(hand.limits.tendon_force)),
+    }
+
+
+TORQUE = {"tau": Port((), N * m)}
+
+
+@of_motor(lambda _: {"energy": Port((), J)}, "eq. 3.1", witness=potentials.energy)
+def energy(motor: Any, thd: Any) -> Any:
+    """Kinetic energy of rotor and gear: half of B thd^2, with the inertia B that the output shaft feels."""
+    return motors.energy(motor, thd)
+
+
+@of_motor(lambda _: TORQUE, "eq. 3.8", witness=potentials.friction)
+def friction(motor: Any, thd: Any) -> Any:
+    """Friction torque of motor and gear at the speed thd: what the motor must overcome, positive for positive thd."""
+    return motors.friction(motor, thd)
+
+
+@of_motor(lambda _: {"damping": Port((), N * m * s / rad)}, "eq. 3.8, differentiated", witness=potentials.damping)
+def damping(motor: Any, thd: Any) -> Any:
+    """Slope of the friction torque; an explicit step of a simulation must stay below 2 B / damping."""
+    return motors.damping(motor, thd)
+
+
+@of_motor(lambda _: TORQUE, "eq. 3.4, 3.5", witness=potentials.ripple)
+def ripple(motor: Any, theta: Any) -> Any:
+    """Periodic disturbance torque of both shafts at the angle theta: what the motor must overcome."""
+    return motors.ripple(motor, theta)
+
+
+@of_motor(lambda _: TORQUE, "section 3.2", witness=potentials.compensation)
+def compensation(motor: Any, theta: Any, thd: Any) -> Any:
+    """Motor torque to feed forward against friction and ripple: the share of both that is safe to compensate."""
+    return motors.compensation(motor, theta, thd)
+
+
+@of_motor(lambda _: {"thdd": Port((), rad / s**2)}, "eq. 3.2, 3.5", witness=potentials.acceleration)
+def acceleration(motor: Any, theta: Any, thd: Any, tau: Any, f: Any) -> Any:
+    """Acceleration under the motor torque tau and the tendon force f: (tau - friction - ripple - r f) / B."""
+    return motors.acceleration(motor, theta, thd, tau, f)
+
+
+@of_motor(lambda _: TORQUE, "eq. 3.2, 3.5, solved for the torque", witness=potentials.torque)
+def torque(motor: Any, theta: Any, thd: Any, thdd: Any, f: Any) -> Any:
+    """Motor torque of a motion under the tendon force f: B thdd + friction + ripple + r f."""
+    return motors.torque(motor, theta, thd, thdd, f)

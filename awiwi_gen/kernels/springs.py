@@ -1,0 +1,119 @@
+"""The kernels of the lever springs and of the sensors on their levers."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from awiwi_gen.hand import Hand, Spring
+from awiwi_gen.hand_lever import POWERS, Lever
+from awiwi_gen.kernel import Kernel, Port
+from awiwi_gen.kernels.declare import Family, Parameterless
+from awiwi_gen.models import calibration, calibration_horner, spring_curve, spring_statics
+from awiwi_gen.models import spring as springs
+from awiwi_gen.models import spring_curve_neville as neville
+from awiwi_gen.units import N, m, one, rad
+
+of_spring: Family[None] = Family()
+of_sensors: Family[int] = Family()  # sized by the number of tendons
+of_bench: Family[None] = Family()
+
+WITHIN = ("the argument is within the lever's travel, give or take a hundredth",)
+
+
+def spring_kernels(hand: Hand, spring: Spring) -> list[Kernel]:
+    """All kernels of the spring, which is the same for all tendons, and of its sensors, which may differ."""
+    structure = {"spring": spring.structure(), "tendons": hand.tendons}
+    ports, bench = spring_ports(spring), bench_ports(spring)
+    sensors = {"readings": reading_port(spring, hand.tendons)}
+    return [
+        *of_spring.kernels("spring", spring, "spring", structure, ports, None),
+        *of_sensors.kernels("calibration", spring, "spring", structure, sensors, hand.tendons),
+        *of_bench.kernels("calibration", Parameterless(), "calibration", {"powers": POWERS}, bench, None),
+    ]
+
+
+def spring_ports(spring: Spring) -> dict[str, Port]:
+    """Lever angle, elongation and force: each has the range that the lever's travel gives it."""
+    lever = Lever(spring)
+    return {
+        "theta": Port((), rad, *sorted((lever.slack, lever.taut))),
+        "x": Port((), m, 0.0, lever.travel),
+        "f": Port((), N, lever.at(lever.slack).force, lever.at(lever.taut).force),
+    }
+
+
+def reading_port(spring: Spring, tendons: int) -> Port:
+    """The readings of all sensors [counts]."""
+    sensors = [spring.calibrated.get(tendon, spring).sensor for tendon in range(tendons)]
+    ends = [sorted((float(sensor.slack), float(sensor.taut))) for sensor in sensors]
+    return Port((tendons,), one, tuple(low for low, _ in ends), tuple(high for _, high in ends))
+
+
+def bench_ports(spring: Spring) -> dict[str, Port]:
+    """One reading, the sensor's ends, which may lie a sixteenth of the travel from those designed, and coefficients."""
+    lever = Lever(spring)
+    slack, taut = float(spring.sensor.slack), float(spring.sensor.taut)
+    play, (low, high) = abs(taut - slack) / 16, sorted((slack, taut))
+    pose = lever.at(lever.taut)
+    path = lever.at(lever.slack).path
+    return {
+        "counts": Port((), one, low + play, high - play),
+        "ends": Port((2,), one, (slack - play, taut - play), (slack + play, taut + play)),
+        "force_powers": Port((POWERS,), N, -pose.force, pose.force),
+        "stiffness_powers": Port((POWERS,), N / m, -pose.stiffness, pose.stiffness),
+        "length_powers": Port((POWERS,), m, -path, path),
+    }
+
+
+def tendon_state(shape: tuple[int, ...]) -> dict[str, Port]:
+    """What a lever tells of its tendon."""
+    return {"dL": Port(shape, m), "force": Port(shape, N), "stiffness": Port(shape, N / m)}
+
+
+@of_spring(
+    lambda _: tendon_state(()),
+    "table 4.1, figure 4.6",
+    witness=spring_statics.lever,
+    guards=(
+        "the roller is clear of the motor's pulley",
+        "the roller is clear of the fixed pulley",
+        "the tendon turns the lever towards its taut end",
+        "the spring is stretched",
+    ),
+)
+def lever(spring: Any, theta: Any) -> Any:
+    """Length dL of tendon in the mechanism, force and stiffness of the tendon at the lever angle theta."""
+    return springs.lever(spring, theta)
+
+
+@of_spring(lambda _: {"f": Port((), N)}, "figure 4.7", witness=neville.force, guards=WITHIN)
+def force(spring: Any, x: Any) -> Any:
+    """Tendon force at the elongation x, counted from the slack end of the lever's travel."""
+    return spring_curve.force(spring, x)
+
+
+@of_spring(lambda _: {"k": Port((), N / m)}, "figure 4.7", witness=neville.stiffness, guards=WITHIN)
+def stiffness(spring: Any, x: Any) -> Any:
+    """Tendon stiffness at the elongation x, counted from the slack end of the lever's travel."""
+    return spring_curve.stiffness(spring, x)
+
+
+@of_spring(lambda _: {"x": Port((), m)}, "figure 4.7", witness=neville.elongation, guards=WITHIN)
+def elongation(spring: Any, f: Any) -> Any:
+    """Elongation at which the tendon's force is f: the inverse of the force."""
+    return spring_curve.elongation(spring, f)
+
+
+@of_sensors(lambda tendons: tendon_state((tendons,)), "section 4.1", witness=neville.readings, guards=WITHIN)
+def readings(spring: Any, readings: Any) -> Any:
+    """dL, force and stiffness of every tendon from its sensor: the design's, or its own where it was calibrated."""
+    return spring_curve.readings(spring, readings)
+
+
+@of_bench(lambda _: tendon_state(()), "section 4.1", witness=calibration_horner.polynomials, guards=WITHIN)
+def polynomials(_: Any, counts: Any, ends: Any, length_powers: Any, force_powers: Any, stiffness_powers: Any) -> Any:
+    """dL, force and stiffness of one sensor's counts by polynomials from the bench, coefficients from the constant up.
+
+    Their argument is (2 counts - ends[0] - ends[1]) / (ends[1] - ends[0]): -1 at the slack end, 1 at the taut one.
+    """
+    return calibration.polynomials(counts, ends, length_powers, force_powers, stiffness_powers)

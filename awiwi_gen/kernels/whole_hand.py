@@ -1,0 +1,72 @@
+"""The tendons of the whole hand: 38 of them and 19 joints in the Awiwi hand, in the order of its fingers.
+
+Arrays over all joints and all tendons keep the structure of the hand: `Hand.blocks` tells the rows and columns of each
+finger. Outside these blocks the coupling and the stiffness are zero: written, but never computed. The fingers' tendons
+do not feel each other's joints, and the wrist moves tendons only: its two columns are those of `wrist_coupling`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from awiwi_gen.hand import Hand
+from awiwi_gen.kernel import Kernel, Port
+from awiwi_gen.kernels.declare import Family
+from awiwi_gen.kernels.fingers import Size, input_ports
+from awiwi_gen.kernels.wrist import BARS_CLOSE, wrist_ports
+from awiwi_gen.models import hand_tendons, hand_tendons_ad
+from awiwi_gen.units import N, m, rad
+
+of_hand: Family[Size] = Family()
+
+
+def hand_kernels(hand: Hand) -> list[Kernel]:
+    """The kernels of all tendons together."""
+    sizes = {name: Size(len(f.joints), len(f.tendons), len(f.links)) for name, f in hand.fingers.items()}
+    fingers = [input_ports(hand, finger, sizes[name]) for name, finger in hand.fingers.items()]
+    ports = {name: joined([of_finger[name] for of_finger in fingers]) for name in ("q", "f", "k")}
+    if hand.wrist:
+        ports["wrist"] = joined([*wrist_ports(hand.wrist).values()])
+    whole = Size(ports["q"].size, ports["f"].size, sum(size.links for size in sizes.values()))
+    kernels = of_hand.kernels("hand", hand, "", hand.structure(), ports, whole)
+    return kernels if hand.wrist else [replace(kernel, guards=()) for kernel in kernels]
+
+
+def joined(ports: list[Port]) -> Port:
+    """One port after the other, as one vector."""
+    low, high = zip(*(bound for port in ports for bound in port.bounds()), strict=True)
+    return Port((len(low),), tuple(unit for port in ports for unit in port.units), low, high)
+
+
+@of_hand(
+    lambda z: {"h": Port((z.tendons,), m)},
+    "eq. 5.1, 5.5, 6.9",
+    witness=hand_tendons_ad.tendon_lengths,
+    guards=BARS_CLOSE,
+)
+def tendon_lengths(hand: Any, q: Any, wrist: Any = None) -> Any:
+    """Length of every tendon's path in its finger and in the wrist, whose internal angles are wrist = (q71, q73)."""
+    return hand_tendons.tendon_lengths(hand, q, wrist)
+
+
+@of_hand(lambda z: {"P": Port((z.tendons, z.joints), m / rad)}, "eq. 5.6, 5.9, 5.21", witness=hand_tendons_ad.coupling)
+def coupling(hand: Any, q: Any) -> Any:
+    """Coupling matrix P = dh/dq of all tendons and joints; zero outside the blocks of the fingers."""
+    return hand_tendons.coupling(hand, q)
+
+
+@of_hand(lambda z: {"tau": Port((z.joints,), N * m)}, "eq. 5.8", witness=hand_tendons_ad.joint_torque)
+def joint_torque(hand: Any, q: Any, f: Any) -> Any:
+    """Joint torques -P' f of the tendon forces f."""
+    return hand_tendons.joint_torque(hand, q, f)
+
+
+@of_hand(
+    lambda z: {"K": Port((z.joints, z.joints), N * m / rad)},
+    "eq. 5.12, 5.23",
+    witness=hand_tendons_ad.joint_stiffness,
+)
+def joint_stiffness(hand: Any, q: Any, f: Any, k: Any) -> Any:
+    """Joint stiffness -d tau/dq through tendons of stiffness k that pull with forces f; zero outside the blocks."""
+    return hand_tendons.joint_stiffness(hand, q, f, k)
