@@ -6,6 +6,7 @@ Exit codes: 0 done, 1 verification failed or out of date, 2 bad input.
 from __future__ import annotations
 
 import json
+import shlex
 import sys
 from collections.abc import Callable
 from enum import StrEnum
@@ -15,7 +16,7 @@ from typing import Annotated, Any
 
 import typer
 
-from awiwi_gen.errors import AwiwiError, InputError
+from awiwi_gen.errors import AwiwiError, InputError, unknown
 
 app = typer.Typer(
     help="From the CAD numbers of a tendon-driven hand to verified real-time C.",
@@ -111,7 +112,7 @@ def generate(
         compiler()  # without one nothing can be verified: better told before anything is replaced
     changed = generate(job, output)
     if verify:
-        return prove(job, output, as_json)
+        return prove(job, hand, output, as_json)
     if as_json:
         print_json({"directory": str(output), "changed": changed, "digest": job.hand.digest()})
     else:
@@ -130,12 +131,11 @@ def check(
 
     job = make_job(hand, scalar, params, only, trig)
     found = state(job, output)
-    again = " ".join(["awiwi-gen generate", *([f"--hand {hand}"] if hand else []), f"-o {output}"])
     if as_json:
         print_json({"hand": job.hand.name, "fresh": found.fresh, **vars(found)})
     else:
         print(f"{hand or 'hand.toml'}: {len(job.hand.fingers)} fingers, no faults")
-        print("\n".join(state_lines(found, str(output), again)))
+        print("\n".join(state_lines(found, str(output), mend(job, hand, output))))
     return 0 if found.fresh else 1
 
 
@@ -162,7 +162,7 @@ def verify(
 ) -> int:  # fmt: skip
     """Compile the generated C as it stands and compare every kernel with its reference."""
     require(output)
-    return prove(make_job(hand, scalar, params, only, trig), output, as_json)
+    return prove(make_job(hand, scalar, params, only, trig), hand, output, as_json)
 
 
 @command
@@ -208,7 +208,7 @@ def call(
 
     library = awiwi_gen.build(Hand.load(hand))
     function = find(library, kernel)
-    given = parse_inputs(inputs or []) if inputs or not as_json else read_json_inputs()
+    given = parse_inputs(inputs or [], function) if inputs or not as_json else read_json_inputs()
     result = function(**given)
     values = result._asdict() if len(function.outputs) > 1 else {function.outputs[0]["name"]: result}
     if as_json:
@@ -237,7 +237,15 @@ def explain(
     return 0
 
 
-def prove(job: Any, output: Path, as_json: bool) -> int:
+def mend(job: Any, hand: Path | None, output: Path) -> str:
+    """The command that brings a generated directory up to date."""
+    usual, chosen = vars(type(job.options)()), vars(job.options) | {"only": job.only}
+    words = ["awiwi-gen", "generate", *(["--hand", str(hand)] if hand else []), "-o", str(output)]
+    words += [word for key, value in chosen.items() if value != usual.get(key, "*") for word in (f"--{key}", value)]
+    return shlex.join(words)
+
+
+def prove(job: Any, hand: Path | None, output: Path, as_json: bool) -> int:
     """Verify a directory, print the proof sheet, return the exit code."""
     from awiwi_gen.pipeline import state
     from awiwi_gen.pipeline import verify as examine
@@ -245,7 +253,7 @@ def prove(job: Any, output: Path, as_json: bool) -> int:
 
     found = state(job, output)
     if found.stale or found.lost:
-        print("\n".join(state_lines(found, str(output), f"awiwi-gen generate -o {output}")), file=sys.stderr)
+        print("\n".join(state_lines(found, str(output), mend(job, hand, output))), file=sys.stderr)
         return 1
     proof = examine(job, output)
     if as_json:
@@ -268,24 +276,26 @@ def require(output: Path) -> dict[str, Any]:
 def find(library: Any, kernel: str) -> Any:
     """A kernel of a library by name. Raises InputError with near names."""
     if kernel not in library:
-        import difflib
-
-        near = difflib.get_close_matches(kernel, library, 3)
-        raise InputError(f"no kernel {kernel!r}; {'did you mean ' + ', '.join(near) if near else 'see awiwi-gen list'}")
+        raise unknown("kernel", kernel, library)
     return library[kernel]
 
 
-def parse_inputs(texts: list[str]) -> dict[str, list[float]]:
-    """``q=0.1,0.2`` as named lists of numbers."""
-    parsed = {}
+def parse_inputs(texts: list[str], function: Any) -> dict[str, Any]:
+    """``q=0.1,0.2`` as named arrays; as many numbers as an input has elements take its shape."""
+    import numpy as np
+
+    shapes = {port["name"]: port["shape"] for port in function.inputs}
+    parsed: dict[str, Any] = {}
     for text in texts:
         name, equals, numbers = text.partition("=")
         try:
-            parsed[name] = [float(number) for number in numbers.split(",")]
+            given = np.array([float(number) for number in numbers.split(",")])
         except ValueError:
             equals = ""
         if not equals:
             raise InputError(f"{text!r} is not an input; expected name=number,number,... such as q=0.1,0.2,0.3,0.4")
+        shape = shapes.get(name, given.shape)
+        parsed[name] = given.reshape(shape) if given.size == np.prod(shape) else given
     return parsed
 
 

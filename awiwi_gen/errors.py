@@ -13,13 +13,14 @@ Anything else that escapes is a bug of ours.
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import ClassVar
 
 __all__ = [
     "AwiwiError", "BuildError", "DimensionError", "Fault", "InputError", "NoCompilerError", "OutputError",
-    "VerificationError",
+    "VerificationError", "unknown",
 ]  # fmt: skip
 
 _MOST_SHOWN = 100  # a terminal is not scrolled back farther than that; `faults` has them all
@@ -67,6 +68,12 @@ class InputError(AwiwiError, ValueError):
         lines = [str(fault) for fault in self.faults[:_MOST_SHOWN]]
         more = len(self.faults) - len(lines)
         return "\n".join(lines + [f"... and {more} more"] * (more > 0))
+
+
+def unknown(kind: str, name: str, known: Iterable[str]) -> InputError:
+    """The exception for a name that is not known, with those that look like it."""
+    near = difflib.get_close_matches(name, list(known), 3)
+    return InputError(f"no {kind} {name!r}; {'did you mean ' + ', '.join(near) if near else 'see awiwi-gen list'}")
 
 
 class OutputError(InputError):

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import difflib
 from typing import Any
 
 from awiwi_gen.emit.c import Printer
 from awiwi_gen.emit.options import Options
-from awiwi_gen.errors import InputError
+from awiwi_gen.errors import unknown
 from awiwi_gen.ir.graph import Graph
 from awiwi_gen.ir.passes import optimise
 from awiwi_gen.kernel import Port
@@ -21,8 +20,7 @@ def explanation(job: Job, name: str) -> dict[str, Any]:
     """Everything worth telling about a kernel. Raises InputError for an unknown name, with near ones."""
     known = {kernel.name: kernel for kernel in job.kernels}
     if name not in known:
-        near = ", ".join(difflib.get_close_matches(name, known, 3)) or "see awiwi-gen list"
-        raise InputError(f"no kernel {name!r}; did you mean {near}?")
+        raise unknown("kernel", name, known)
     kernel = known[name]
     alone = Job(job.hand, job.options, name, job.store, job.progress)
     derive_missing(alone)

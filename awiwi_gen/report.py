@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -17,9 +18,17 @@ COLUMNS = ("kernel", "operations", "sincos", "worst ulp", "scaled error", "witne
 
 
 def print_json(value: Any) -> None:
-    """One JSON document on standard output."""
-    json.dump(value, sys.stdout, indent=1, ensure_ascii=False)
+    """One JSON document on standard output; what is not a number is null, for JSON has no word for it."""
+    json.dump(_finite(value), sys.stdout, indent=1, ensure_ascii=False, allow_nan=False)
     sys.stdout.write("\n")
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _finite(inner) for key, inner in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(inner) for inner in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def proof_rows(verdicts: Iterable[Verdict], manifest: Mapping[str, Any]) -> list[tuple[str, ...]]:

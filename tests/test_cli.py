@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import json
 import re
+import shlex
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -70,9 +70,9 @@ def test_every_command_has_help_and_json(command):
     assert "--json" in told(command, "--help")
 
 
-@pytest.mark.parametrize("arguments", [["generat"], ["generate", "--hnd", "x"], ["generate", "--scalar", "f16"], ["call"]])
+@pytest.mark.parametrize("arguments", ["generat", "generate --hnd x", "generate --scalar f16", "call"])
 def test_a_command_line_that_makes_no_sense_is_refused(arguments):
-    assert run(*arguments).exit_code == 2
+    assert run(*arguments.split()).exit_code == 2
 
 
 @pytest.mark.parametrize("command", ["generate", "check", "verify", "list --assumed", "call x", "explain x"])
@@ -80,7 +80,7 @@ def test_a_bad_hand_file_is_told_with_its_line_and_changes_nothing(command, smal
     bad = tmp_path / "bad.toml"
     bad.write_text(Path(ONE_FINGER).read_text().replace('radius = "9 mm"', 'radius = "9 N"'))
     before = snapshot(small)
-    place = () if command[0] in "lc" and command != "check" or command[0] == "e" else ("-o", small)
+    place = ("-o", small) if command in ("generate", "check", "verify") else ()
     message = f'{bad}:16 fingers.jaw.pulleys[0].radius = "9 N" is a force; expected a length such as "6.2 mm"'
 
     assert complaint(*command.split(), "--hand", bad, *place) == message
@@ -108,9 +108,8 @@ def test_what_was_generated_is_told_in_json(tmp_path):
     only = ("--hand", ONE_FINGER, "-o", place, "--only", "jaw_tendon_lengths")
 
     assert answer("generate", *only) == {"directory": str(place), "changed": True, "digest": hand.digest()}
-    assert sorted(path.name for path in place.iterdir()) == [
-        "jaw_tendon_lengths.c", "kernels.h", "manifest.json", "model.c", "real.h"
-    ]  # fmt: skip
+    assert [path.name for path in place.glob("*_*.c")] == ["jaw_tendon_lengths.c"]
+    assert {"kernels.h", "manifest.json", "model.c", "real.h"} <= {path.name for path in place.iterdir()}
 
 
 def test_a_pattern_that_matches_nothing_is_refused(tmp_path):
@@ -150,16 +149,18 @@ def test_other_options_make_the_directory_stale(small):
     assert answer("check", *SMALL, "--scalar", "f32", "-o", small, code=1)["stale"] == ["options"]
 
 
-def test_the_mend_that_is_told_mends(small, tmp_path, monkeypatch):
+def test_the_mend_that_is_told_mends(tmp_path):
     place = tmp_path / "out"
     options = ("--hand", ONE_FINGER, "--only", "jaw_t*", "--scalar", "f32", "-o", place)
     told("generate", *options)
     (place / "jaw_tendon_lengths.c").write_text("/* better */")
     lines = told("check", *options, code=1).splitlines()
     mend = lines[-1].removeprefix("to mend it: awiwi-gen ")
+    refusal = run("verify", "--hand", ONE_FINGER, "-o", place).stderr
 
     assert f"{place}/jaw_tendon_lengths.c: edited by hand; changes belong in the hand file" in lines
-    told(*mend.split())
+    assert refusal.splitlines()[-1] == f"to mend it: awiwi-gen generate --hand {ONE_FINGER} -o {place}"
+    told(*shlex.split(mend))
     assert told("check", *options).endswith(": fresh\n")
 
 
@@ -209,7 +210,8 @@ def test_a_stale_directory_is_not_verified_but_told(small):
 @pytest.mark.parametrize("scalar", ["f64", "f32"])
 @pytest.mark.parametrize("params", ["baked", "runtime"])
 def test_every_kind_of_c_is_verified(scalar, params, tmp_path):
-    options = ("--hand", ONE_FINGER, "-o", tmp_path / "out", "--only", "jaw_[me]*", "--scalar", scalar, "--params", params)
+    kind = ("--scalar", scalar, "--params", params)
+    options = ("--hand", ONE_FINGER, "-o", tmp_path / "out", "--only", "jaw_[me]*", *kind)
     told("generate", *options)
     header = (tmp_path / "out" / "kernels.h").read_text()
 
@@ -294,6 +296,7 @@ def test_a_misspelt_kernel_is_told_its_likely_name():
         (["q"], "'q' is not an input; expected name=number,number,... such as q=0.1,0.2,0.3,0.4"),
         (["q=a,b"], "'q=a,b' is not an input; expected"),
         (["x=1"], "index_mass_matrix takes q; missing ['q'], unknown ['x']"),
+        (["q=nan,0,0"], "index_mass_matrix: q has shape (3,), expected (..., 4)"),
         ([], "index_mass_matrix takes q; missing ['q'], unknown []"),
     ],
 )
@@ -308,7 +311,6 @@ def test_inputs_that_do_not_fit_are_told(arguments, message):
         ("{q: 1}", "standard input is not JSON"),
         ("[1, 2]", "standard input must be one JSON object"),
         ('{"q": "x"}', "is not an array of numbers"),
-        ('{"q": [1, 2, 3, null]}', "q has"),
         ('{"Q": [1, 2, 3, 4]}', "unknown ['Q']"),
     ],
 )
@@ -320,10 +322,10 @@ def test_json_that_does_not_fit_is_told(stdin, message):
 
 
 def test_what_is_not_a_number_is_null_in_json():
-    found = told("call", "wrist_points", "q71=0.62", "q73=-0.5", "--json")
+    found = answer("call", "wrist_points", "q71=0.62", "q73=-0.5")
 
-    assert np.isnan(float("nan"))
-    assert "NaN" not in found
+    assert None in found["A"] + found["B"] + found["C"]
+    assert answer("call", "index_tendon_lengths", stdin='{"q": [null, 0, 0, 0]}')["h"][0] is None
 
 
 # ------------------------------------------------------------------------------------------------- explain
@@ -334,7 +336,7 @@ def test_a_kernel_is_explained_down_to_the_numbers():
 
     assert lines[0] == "jaw_tendon_lengths"
     assert any(line.split() == ["source", "eq.", "5.5,", "5.18,", "5.22"] for line in lines)
-    assert any(line.strip().startswith("h[0] = ") and "pulleys[0].radius" in line for line in lines)
+    assert "    t0 = q[0]*pulleys[0].radius" in lines
     assert "    pulleys[0].radius = 9 mm" in lines
 
 

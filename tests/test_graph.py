@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from awiwi_gen.ir.builder import Builder
-from awiwi_gen.ir.graph import Graph, Node, Output, canonical, node_of, operands
+from awiwi_gen.ir.graph import SIGNLESS, Graph, Node, Output, canonical, node_of, operands
 from awiwi_gen.ir.passes import PIPELINES, stages
 from awiwi_gen.ir.passes.bind import bind
 from awiwi_gen.ir.passes.factor import factor
@@ -90,6 +90,21 @@ def test_equal_sums_and_products_are_one_node_whatever_their_order_and_sign():
     assert builder.mul((x, ~y)) == ~builder.mul((y, x))
     assert builder.add((x, x, ~x)) == x
     assert builder.mul((x, builder.inv(x))) == builder.const(1)
+
+
+def test_a_sum_that_renumbering_turns_leaves_no_sign_inside_products_and_functions():
+    builder = Builder()
+    late, early, z = (builder.input("x", i) for i in (1, 0, 2))
+    difference = builder.sub(late, early)
+    users = [
+        builder.mul((z, difference)),
+        builder.inv(difference),
+        *(builder.call(f, difference) for f in ("sin", "cos")),
+    ]
+    graph = builder.graph([Output("y", (4,), tuple(users))])
+
+    assert all(ref >= 0 for node in graph.nodes if node[0] in SIGNLESS for ref in operands(node))
+    assert [ref >= 0 for ref in graph.roots] == [False, False, False, True]
 
 
 @settings(deadline=None, max_examples=60)

@@ -1,0 +1,25 @@
+"""Symmetric matrices by their minors (CasADi): another road to what Cholesky says of them."""
+
+from __future__ import annotations
+
+from functools import reduce
+
+import casadi as ca
+from casadi import SX
+
+
+def symmetric(entries: SX, n: int) -> SX:
+    """A symmetric matrix (n x n) from the entries of a square one, row by row; only the lower triangle is read."""
+    lower = ca.tril(ca.reshape(entries, n, n).T)
+    return lower + ca.tril(lower, False).T
+
+
+def pivots(matrix: SX) -> list[SX]:
+    """Quotients of successive leading minors: all positive where the matrix is positive definite, and only there."""
+    minors = [ca.det(matrix[:k, :k]) for k in range(1, matrix.shape[0] + 1)]
+    return [minors[0], *(high / low for low, high in zip(minors, minors[1:], strict=False))]
+
+
+def least(values: list[SX]) -> SX:
+    """The least of several values: half of what their sum exceeds their difference by."""
+    return reduce(lambda a, b: (a + b) / 2 - ca.fabs(a - b) / 2, values)

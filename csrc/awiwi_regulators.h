@@ -1,0 +1,30 @@
+/* Optimal gains in bounded time: fixed worst-case work, no heap, no recursion; reentrant. */
+#ifndef AWIWI_REGULATORS_H
+#define AWIWI_REGULATORS_H
+
+#include "awiwi_solvers.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+enum { AWIWI_MOST_STATES = 4 };
+
+/* Gains K[n] of u = -K x that minimise the integral of x'Q x + R u^2 for dx/dt = A x + b u, and S[n][n] with
+   x'S x = the least cost from x: the stabilising solution of S A + A'S - S b b'S/R + Q = 0. Arrays are row by row, n is
+   at most AWIWI_MOST_STATES, of Q the symmetric part counts. Doubles at most `iterations` times.
+   `residual` is the largest entry of the left side, relative to the largest sum of its terms' magnitudes, both in
+   coordinates that the solver balances. Returns
+   AWIWI_OK             the loop A - b K is stable and the equation holds to half of the digits or better;
+   AWIWI_OUT_OF_DOMAIN  R is not positive, b cannot stabilise A, or a mode at zero costs nothing;
+   AWIWI_NOT_CONVERGED  no stable loop was found: K, S and their residual are the best there are, perhaps zero;
+   AWIWI_NOT_FINITE     an input is not a number.
+   Where it is neither of the first nor of the third, K and S are zero, and the residual of that is 1. */
+int awiwi_riccati(int n, const awiwi_real *A, const awiwi_real *b, const awiwi_real *Q, awiwi_real R, int iterations,
+                  awiwi_real *K, awiwi_real *S, awiwi_real *residual);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif
