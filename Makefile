@@ -1,6 +1,7 @@
 # make        set up .venv, then derive, emit, compile and verify the default hand
 # make test   all tests              make lint   ruff, mypy, layers
 # make check  is generated/ fresh?   make bench  timings and counts
+# make report the figures of the source, computed again, with all proofs: build/report/index.html
 # make clean  remove what make made (generated/ stays: it is checked in)
 
 PYTHON ?= python3
@@ -29,6 +30,9 @@ lint: .venv/installed
 check: .venv/installed
 	@$(BIN)/awiwi-gen check
 
+report: .venv/installed
+	@$(BIN)/awiwi-gen report
+
 bench: .venv/installed
 	@$(BIN)/python bench/generation.py
 
@@ -36,4 +40,4 @@ clean:
 	rm -rf .venv .cache build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
-.PHONY: all test lint check bench clean
+.PHONY: all test lint check report bench clean

@@ -56,6 +56,7 @@ ScalarOption = Annotated[Scalar, typer.Option("--scalar", help="Scalar type of t
 TrigOption = Annotated[Trig, typer.Option("--trig", help="Own sine and cosine, or the C library's.")]
 ParamsOption = Annotated[Params, typer.Option("--params", help="Numbers as constants or in a struct.")]
 GENERATED = Path("generated")
+PAGE = Path("build/report/index.html")
 
 
 def command(function: Callable[..., int | None]) -> Callable[..., None]:
@@ -235,6 +236,25 @@ def explain(
     else:
         print("\n".join(explanation_lines(told)))
     return 0
+
+
+@command
+def report(
+    hand: HandFile = None, as_json: Json = False,
+    page: Annotated[Path, typer.Option("--page", "-o", help="HTML file to write.")] = PAGE,
+) -> int:  # fmt: skip
+    """Compute the source's figures again, and write them on one page with the proof of every kernel."""
+    from awiwi_gen.report import print_json
+    from awiwi_gen.studies.page import publish, verdict
+
+    figures, proof = publish(make_job(hand), page)
+    if as_json:
+        print_json([{key: getattr(f, key) for key in ("number", "title", "claim", "holds")} for f in figures])
+    else:
+        print("\n".join(f"figure {figure.number}: the claim {verdict(figure)}" for figure in figures))
+        proved = f"{sum(v.passed for v in proof.verdicts)} of {len(proof.verdicts)} kernels proved"
+        print(f"{page}: {len(figures)} figures, {proved}")
+    return 0 if proof.passed else 1
 
 
 def mend(job: Any, hand: Path | None, output: Path) -> str:

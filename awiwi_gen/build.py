@@ -125,7 +125,7 @@ def load(directory: Path, store: Cache | None = None) -> Library:
 
 
 def _glue_source(manifest: dict[str, Any], declared: str) -> str:
-    """JSON of what the wrapper is made from: declarations, and loops over batches."""
+    """JSON of what the wrapper is made from: declarations, loops over batches, and the kernels in a uniform shape."""
     loops, prototypes = [], []
     scalar, prefix = manifest["c_type"], manifest["prefix"]
     if any(entry["params"] for entry in manifest["kernels"]):
@@ -148,7 +148,24 @@ def _glue_source(manifest: dict[str, Any], declared: str) -> str:
         keep = "status[i] = " if entry["status"] else ""
         body = f"for (ptrdiff_t i = 0; i < n; i++) {keep}{prefix}_{entry['name']}({', '.join(call)});"
         loops.append(f"static {head} {{ {body} }}")
+        loops.append(_flat_source(entry, prefix, scalar))
+    table = ", ".join(f"flat_{entry['name']}" for entry in manifest["kernels"])
+    prototypes.append("extern awiwi_flat flat_kernels[];")
+    loops.append(f"static awiwi_flat flat_kernels[] = {{ {table} }};")
     return json.dumps({"declared": declared, "prototypes": prototypes, "loops": loops})
+
+
+def _flat_source(entry: dict[str, Any], prefix: str, scalar: str) -> str:
+    """A kernel with all inputs in one array and all outputs in another: what a loop can call without knowing it."""
+    arguments = [f"&{prefix}_default_params"] if entry["params"] else []
+    for side, array in (("inputs", "in"), ("outputs", "out")):
+        place = 0
+        for port in entry[side]:
+            arguments.append(f"{array} + {place}")
+            place += prod(port["shape"])
+    call = f"{prefix}_{entry['name']}({', '.join(arguments)});"
+    head = f"static int flat_{entry['name']}(const {scalar} *in, {scalar} *out)"
+    return f"{head} {{ return {call} }}" if entry["status"] else f"{head} {{ {call} return 0; }}"
 
 
 def _glue_object(name: str, glue: str, directory: Path, store: Cache) -> Path:

@@ -17,6 +17,7 @@ from pydantic import Field
 
 from awiwi_gen.hand_actuation import Fibre, Motor, Spring
 from awiwi_gen.hand_file import HandFile
+from awiwi_gen.hand_gains import Gains, gains_complaints, with_gains
 from awiwi_gen.hand_lint import complaints
 from awiwi_gen.hand_lint_actuation import actuator_complaints
 from awiwi_gen.hand_parts import Finger, FingerName, Limits, Link, Part, Prefix, Title
@@ -40,6 +41,7 @@ class Hand(Part):
     motor: Motor | None = None
     spring: Spring | None = None
     tendon: Fibre | None = None
+    gains: Gains = ()
 
     @property
     def tendons(self) -> int:
@@ -76,9 +78,10 @@ class Hand(Part):
 
     @classmethod
     def _checked(cls, file: HandFile) -> Hand:
-        hand = file.validated(cls)
+        hand = with_gains(file).validated(cls)
         found = list(complaints(hand.limits, hand.fingers, hand.wrist))
         found += actuator_complaints(hand.motor, hand.spring, hand.tendon, hand.tendons)
+        found += gains_complaints(hand.gains, hand.tendons)
         if found:
             raise file.error(found)
         return hand

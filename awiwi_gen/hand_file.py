@@ -156,6 +156,12 @@ def _predicate(error: ErrorDetails, expected: str) -> str:
             return f"is not text; expected {expected}"
         case "tuple_type":
             return f"is not an array; expected {expected}"
+        case "int_type":
+            return f"is not a whole number; expected {expected}"
+        case "greater_than_equal":
+            return f"is below the least, {context['ge']}"
+        case "less_than_equal":
+            return f"is above the most, {context['le']}"
         case "model_type" | "dict_type":
             return f"is not a table; expected {expected}"
     return error["msg"]

@@ -71,6 +71,24 @@ class Lever:
         """Equal steps of the angle from slack to taut, both included [rad]."""
         return [self.slack + (self.taut - self.slack) * i / steps for i in range(steps + 1)]
 
+    def curve_error(self) -> float:
+        """How far the polynomial through `CURVE_NODES` samples misses the force of an elongation, over the largest force."""
+        slack = self._path(self.slack)
+        samples = [self.at(self.slack + float(share) * (self.taut - self.slack)) for share in chebyshev(CURVE_NODES)]
+        nodes = [(slack - pose.path) / self.travel for pose in samples]
+        differences = [pose.force for pose in samples]  # Newton's, each as soon as those before are known
+        for order in range(1, CURVE_NODES):
+            for i in range(CURVE_NODES - 1, order - 1, -1):
+                differences[i] = (differences[i] - differences[i - 1]) / (nodes[i] - nodes[i - order])
+
+        def missed(pose: Pose) -> float:
+            place, force = (slack - pose.path) / self.travel, 0.0
+            for node, difference in zip(reversed(nodes), reversed(differences), strict=True):
+                force = force * (place - node) + difference
+            return abs(force - pose.force)
+
+        return max(map(missed, map(self.at, self.angles(4 * CURVE_NODES)))) / max(pose.force for pose in samples)
+
     def at(self, angle: float) -> Pose:
         """The lever at one angle."""
         leverage, stretch, force = self._balance(complex(angle))

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from awiwi_gen.hand_actuation import CalibratedUnit, Fibre, Motor, Sensor, Spring
-from awiwi_gen.hand_lever import Lever, Pose
+from awiwi_gen.hand_lever import CURVE_NODES, Lever, Pose
 from awiwi_gen.hand_lint import Complaint, below, sources
 
 __all__ = ["actuator_complaints"]
 
 _STEPS = 200
 _FARTHEST_ANGLE = 1000.0  # rad; sines of larger arguments have lost too many digits, and the generated ones refuse them
+_LARGEST_CURVE_ERROR = 1e-6  # of the largest force: far below what a sensor of 12 bits resolves
 _LEAST_LEVERAGE = 0.02  # of the lever's arm: nearer to a dead point, force and stiffness have no bound worth its name
 
 
@@ -53,6 +54,9 @@ def _spring(spring: Spring, tendons: int) -> Iterator[Complaint]:
     fault = _obstacle(spring)
     if fault:
         yield (), fault
+    elif (error := Lever(spring).curve_error()) > _LARGEST_CURVE_ERROR:
+        misses = f"a polynomial through {CURVE_NODES} samples would miss its force by {error:.1g} of the largest"
+        yield ("taut",), f'= "{spring.taut}" is too near a dead point: {misses}; end the travel earlier'
     for index, unit in enumerate(spring.units):
         yield from below(("units", index), _unit(spring.units, index, tendons))
         if not fault and (own_fault := _obstacle(spring.model_copy(update=unit.measured()))):

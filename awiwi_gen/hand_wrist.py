@@ -124,6 +124,7 @@ class Linkage:
 
     @classmethod
     def of(cls, wrist: Wrist) -> Linkage:
+        """The linkage as it is drawn."""
         x, y, z = (float(value) for value in wrist.a0)
         points = [tuple(float(value) for value in point) for point in (wrist.a, wrist.b)]
         a, b = points

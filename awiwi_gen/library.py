@@ -36,9 +36,11 @@ class KernelFunction:
     An input of shape (4,) takes arrays (..., 4); leading dimensions broadcast against each other. One output
     comes as an array, several as a named tuple. Kernels that can fail add a field ``status``, an integer array
     over the leading dimensions with 0 for success. Raises InputError (a ValueError) for shapes that do not fit.
+
+    ``flat`` is the kernel as a C function of one array with all inputs and one with all outputs.
     """
 
-    def __init__(self, entry: Mapping[str, Any], dtype: type, ffi: Any, batch: Any, params: Any) -> None:
+    def __init__(self, entry: Mapping[str, Any], dtype: type, ffi: Any, batch: Any, flat: Any, params: Any) -> None:
         self.name: str = entry["name"]
         self.doc: str = entry["doc"]
         self.source: str = entry["source"]
@@ -47,6 +49,7 @@ class KernelFunction:
         self.outputs: list[dict[str, Any]] = entry["outputs"]
         self.__doc__ = f"{self.doc}\n\n{self.signature}\nSource: {self.source}."
         self.dtype = np.dtype(dtype)
+        self.flat = flat
         self._ffi, self._batch, self._params = ffi, batch, params
         self._pointer = "double[]" if self.dtype == np.float64 else "float[]"
         fields = [o["name"] for o in self.outputs] + (["status"] if entry["status"] else [])
@@ -125,10 +128,10 @@ class Library(Mapping[str, KernelFunction]):
         self.c, self.ffi = lib, ffi
         self.digest: str = ffi.string(getattr(lib, f"{prefix}_model_digest")).decode()
         self._kernels = {}
-        for entry in manifest["kernels"]:
+        for place, entry in enumerate(manifest["kernels"]):
             params = lib.default_params() if entry["params"] else None
             batch = getattr(lib, f"batch_{entry['name']}")
-            self._kernels[entry["name"]] = KernelFunction(entry, dtype, ffi, batch, params)
+            self._kernels[entry["name"]] = KernelFunction(entry, dtype, ffi, batch, lib.flat_kernels[place], params)
 
     def __getattr__(self, name: str) -> KernelFunction:
         try:

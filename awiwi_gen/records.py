@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
@@ -24,7 +24,7 @@ from awiwi_gen.ir.passes import optimise
 from awiwi_gen.ir.passes.bind import bind
 from awiwi_gen.kernel import Kernel, Port, Solver
 from awiwi_gen.verify.physics import Law, obey
-from awiwi_gen.verify.problems import PROBLEMS, LeastSquares
+from awiwi_gen.verify.problems import PROBLEMS, Problem
 from awiwi_gen.verify.reference import BallArrays, Reference, ball_values, disagreement, reference
 from awiwi_gen.verify.samples import SEED, draw
 from awiwi_gen.verify.verdict import Verdict, judge, judge_solver
@@ -45,7 +45,10 @@ HOPELESS = 2  # passes seldom halve a cost
 
 @dataclass(frozen=True)
 class Record:
-    """What is known of a kernel before it is compiled; ``digest`` names what it was made from."""
+    """What is known of a kernel before it is compiled; ``digest`` names what it was made from.
+
+    ``values`` are the numbers of the hand that its graph reads when it runs.
+    """
 
     digest: str
     graph: Graph | None
@@ -55,6 +58,7 @@ class Record:
     agreement: float
     passes: float
     reference: Reference
+    values: Mapping[str, Fraction] = field(default_factory=dict)
 
 
 def derivation_key(kernel: Kernel, route: str) -> str:
@@ -128,7 +132,8 @@ def make_record(kernel: Kernel, graphs: Mapping[str, Graph], prefix: str, option
     )
     used = {f"{kernel.path}.{path}": str(values[path]) for graph in graphs.values() for path in graph.params}
     text = kernel_file(function, key(json.dumps(used, sort_keys=True)))
-    return Record(digest, final, function, text, route, agreement, passes, reference(definition))
+    left = {path: values[path] for path in final.params}
+    return Record(digest, final, function, text, route, agreement, passes, reference(definition), left)
 
 
 def culprit(
@@ -157,10 +162,10 @@ def make_solver_record(
     return Record(digest, None, function, text, "solver", 0.0, 0.0, exact)
 
 
-def _problem(kernel: Kernel, used: Mapping[str, Record]) -> LeastSquares:
-    """What a kernel with a solver solves."""
+def _problem(kernel: Kernel, used: Mapping[str, Record]) -> Problem:
+    """What a kernel with a solver solves; the kernels it calls may belong to other parts, so their numbers are bound."""
     solver = _solver(kernel)
-    graphs = {family: record.graph for family, record in used.items() if record.graph is not None}
+    graphs = {family: bind(record.graph, record.values) for family, record in used.items() if record.graph is not None}
     return PROBLEMS[solver.problem](solver, graphs, _values(kernel))
 
 

@@ -2,6 +2,8 @@
 #ifndef AWIWI_H
 #define AWIWI_H
 
+#include "awiwi_distribution.h"
+#include "awiwi_simulate.h"
 #include "awiwi_solvers.h"
 #include "kernels.h"
 

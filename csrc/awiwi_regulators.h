@@ -23,6 +23,18 @@ enum { AWIWI_MOST_STATES = 4 };
 int awiwi_riccati(int n, const awiwi_real *A, const awiwi_real *b, const awiwi_real *Q, awiwi_real R, int iterations,
                   awiwi_real *K, awiwi_real *S, awiwi_real *residual);
 
+/* A motor b that drives a link m through a spring k; dq and dtheta are their frictions. */
+typedef struct awiwi_joint {
+    awiwi_real m, b, k, dq, dtheta;
+} awiwi_joint;
+
+/* The same for that joint and Q = diag(q[4]), state (q, dq/dt, theta, dtheta/dt), at a fortieth of the work. `last` are
+   gains to start near, any will do: at most `iterations` steps come down to the solution without fail. Where it returns
+   anything but AWIWI_OK, K is `last`, or zero if that is not a number. AWIWI_OUT_OF_DOMAIN says that a parameter has
+   the wrong sign, AWIWI_NOT_CONVERGED that the digits do not suffice. */
+int awiwi_joint_gains(const awiwi_joint *joint, const awiwi_real *q, awiwi_real R, const awiwi_real *last,
+                      int iterations, awiwi_real *K);
+
 #ifdef __cplusplus
 }
 #endif

@@ -13,7 +13,8 @@ enum awiwi_status {
     AWIWI_OK = 0,
     AWIWI_OUT_OF_DOMAIN = 1, /* no result exists there */
     AWIWI_NOT_CONVERGED = 2, /* the best found within the allowed work is returned */
-    AWIWI_NOT_FINITE = 3     /* an input was not a number; outputs are the clamped start */
+    AWIWI_NOT_FINITE = 3,    /* an input was not a number; outputs are the clamped start */
+    AWIWI_INFEASIBLE = 4     /* limits forbid what was asked for; the nearest that they allow is returned */
 };
 
 enum { AWIWI_MOST_UNKNOWNS = 8, AWIWI_MOST_EQUATIONS = 16 };

@@ -1,230 +1,67 @@
-/* The algebraic Riccati equation S A + A'S - S b b'S / R + Q = 0 of one input (eq. 13.5), by structure-preserving
-   doubling: a Cayley transform turns it into a discrete one whose closed loop is then squared until it vanishes. */
+/* The algebraic Riccati equation S A + A'S - S b b'S/R + Q = 0 of one input (eq. 13.5), by structure-preserving
+   doubling: a Cayley transform makes it a discrete one, whose closed loop is squared until it vanishes. */
 #include <tgmath.h>
 
 #include "awiwi_regulators.h"
+#include "dense.h"
 
-enum { N = AWIWI_MOST_STATES, SYMMETRIC = N * (N + 1) / 2, DOUBLE = 2 * N, SWEEPS = 4, REFINEMENTS = 2 };
+enum {
+    N = AWIWI_MOST_STATES,
+    UNKNOWNS = N * (N + 1) / 2,
+    SWEEPS = 4,     /* of balancing */
+    REFINEMENTS = 4 /* steps of Newton at the end, at most */
+};
 
-typedef awiwi_real matrix[N * N]; /* n x n, row by row */
-
-/* A plant and its costs in coordinates z with x = diag(d) z, chosen so that their entries are of like size. */
-typedef struct balanced {
+/* A plant and its costs in coordinates z with x = diag(d) z, whose entries are of like size. */
+typedef struct plant {
     int n;
-    awiwi_real d[N], b[N];
-    matrix A, Q;
-    awiwi_real R;
-} balanced;
+    awiwi_real d[N], A[N * N], b[N], Q[N * N], R;
+} plant;
 
-static awiwi_real size(awiwi_real x)
-{
-    return x < 0 ? -x : x;
-}
+/* A candidate: gains, closed loop A - b K, the equation's left side E, and how large that is against its terms. */
+typedef struct solution {
+    awiwi_real S[N * N], K[N], loop[N * N], E[N * N], residual;
+} solution;
 
-static awiwi_real largest(const awiwi_real *x, int n)
-{
-    awiwi_real found = 0;
-    for (int i = 0; i < n; i++)
-        found = size(x[i]) <= found ? found : size(x[i]); /* a NaN stays */
-    return found;
-}
-
-static int all_finite(const awiwi_real *x, int n)
-{
-    for (int i = 0; i < n; i++)
-        if (!(size(x[i]) <= AWIWI_REAL_MAX))
-            return 0;
-    return 1;
-}
-
-static void product(int n, const awiwi_real *A, const awiwi_real *B, awiwi_real *C)
-{
-    for (int i = 0; i < n; i++)
-        for (int j = 0; j < n; j++) {
-            awiwi_real sum = 0;
-            for (int k = 0; k < n; k++)
-                sum += A[i * n + k] * B[k * n + j];
-            C[i * n + j] = sum;
-        }
-}
-
-static void transposed(int n, const awiwi_real *A, awiwi_real *B)
-{
-    for (int i = 0; i < n; i++)
-        for (int j = 0; j < n; j++)
-            B[j * n + i] = A[i * n + j];
-}
-
-/* X += (Y + Y')/2. */
-static void add_symmetric(int n, const awiwi_real *Y, awiwi_real *X)
-{
-    for (int i = 0; i < n; i++)
-        for (int j = 0; j < n; j++)
-            X[i * n + j] += (Y[i * n + j] + Y[j * n + i]) / 2;
-}
-
-/* Solve A X = B for the n x m matrix X, in place of B, by elimination with row exchanges; 0 if A is singular. */
-static int solve(int n, int m, awiwi_real *A, awiwi_real *B)
-{
-    for (int k = 0; k < n; k++) {
-        int p = k;
-        for (int i = k + 1; i < n; i++)
-            if (size(A[i * n + k]) > size(A[p * n + k]))
-                p = i;
-        if (!(size(A[p * n + k]) > 0))
-            return 0;
-        for (int j = 0; j < n; j++) {
-            const awiwi_real a = A[k * n + j];
-            A[k * n + j] = A[p * n + j];
-            A[p * n + j] = a;
-        }
-        for (int j = 0; j < m; j++) {
-            const awiwi_real a = B[k * m + j];
-            B[k * m + j] = B[p * m + j];
-            B[p * m + j] = a;
-        }
-        for (int i = k + 1; i < n; i++) {
-            const awiwi_real f = A[i * n + k] / A[k * n + k];
-            for (int j = k + 1; j < n; j++)
-                A[i * n + j] -= f * A[k * n + j];
-            for (int j = 0; j < m; j++)
-                B[i * m + j] -= f * B[k * m + j];
-        }
-    }
-    for (int i = n - 1; i >= 0; i--)
-        for (int j = 0; j < m; j++) {
-            awiwi_real sum = B[i * m + j];
-            for (int k = i + 1; k < n; k++)
-                sum -= A[i * n + k] * B[k * m + j];
-            B[i * m + j] = sum / A[i * n + i];
-        }
-    return 1;
-}
-
-/* Scale every coordinate by a power of two, so that rows and columns of the Hamiltonian matrix weigh alike. */
-static void balance(balanced *p)
+/* Scale every coordinate by a power of two, so that its row and its column of the Hamiltonian matrix weigh alike. */
+static void balance(plant *p)
 {
     const int n = p->n;
     for (int i = 0; i < n; i++)
         p->d[i] = 1;
-    for (int sweep = 0; sweep < SWEEPS; sweep++)
-        for (int i = 0; i < n; i++) {
-            awiwi_real row = 0, column = 0, ratio;
-            int exponent;
-            for (int j = 0; j < n; j++) {
-                row += size(p->b[i] * p->b[j] / p->R);
-                column += size(p->Q[j * n + i]);
-                if (j != i) {
-                    row += size(p->A[i * n + j]);
-                    column += size(p->A[j * n + i]);
-                }
-            }
-            ratio = row / column;
-            if (!(ratio > 0) || !(ratio <= AWIWI_REAL_MAX))
-                continue;
-            (void)frexp(ratio, &exponent);
-            const awiwi_real f = ldexp((awiwi_real)1, exponent / 2);
-            p->d[i] *= f;
-            p->b[i] /= f;
-            for (int j = 0; j < n; j++) {
-                p->A[i * n + j] /= f;
-                p->A[j * n + i] *= f;
-                p->Q[i * n + j] *= f;
-                p->Q[j * n + i] *= f;
-            }
-        }
-}
-
-/* Coefficients c[0..n-1] of det(s - A) = s^n + c[n-1] s^(n-1) + ... + c[0], after Faddeev and LeVerrier. */
-static void characteristic(int n, const awiwi_real *A, awiwi_real *c)
-{
-    matrix M = {0}, AM;
-    for (int k = 1; k <= n; k++) {
-        awiwi_real trace = 0;
-        for (int i = 0; i < n; i++)
-            M[i * n + i] += k == 1 ? 1 : c[n - k + 1];
-        product(n, A, M, AM);
-        for (int i = 0; i < n; i++)
-            trace += AM[i * n + i];
-        c[n - k] = -trace / (awiwi_real)k;
-        for (int i = 0; i < n * n; i++)
-            M[i] = AM[i];
-    }
-}
-
-/* Whether all eigenvalues of A have negative real parts, by the criterion of Hurwitz. */
-static int stable(int n, const awiwi_real *A)
-{
-    awiwi_real c[N];
-    if (n == 0)
-        return 1;
-    characteristic(n, A, c);
-    for (int i = 0; i < n; i++)
-        if (!(c[i] > 0))
-            return 0;
-    if (n == 3)
-        return c[2] * c[1] > c[0];
-    return n < 3 || c[3] * c[2] * c[1] > c[1] * c[1] + c[0] * c[3] * c[3];
-}
-
-/* Whether what the input cannot move is stable. Elimination brings (b, A) to Hessenberg form with the input on top; a
-   pivot that vanishes but for rounding ends what it moves. */
-static int stabilisable(const balanced *p)
-{
-    const int n = p->n;
-    const awiwi_real nothing = 64 * AWIWI_REAL_EPSILON * largest(p->A, n * n);
-    matrix A, rest;
-    awiwi_real column[N];
-    int reached = 0;
-    for (int i = 0; i < n * n; i++)
-        A[i] = p->A[i];
-    for (int i = 0; i < n; i++)
-        column[i] = p->b[i];
-    for (; reached < n; reached++) {
-        const int k = reached;
-        int pivot = k;
-        for (int i = k + 1; i < n; i++)
-            if (size(column[i]) > size(column[pivot]))
-                pivot = i;
-        if (!(size(column[pivot]) > (k ? nothing : 0)))
-            break;
+    for (int turn = 0; turn < SWEEPS * n; turn++) {
+        const int i = turn % n;
+        awiwi_real row = 0, column = 0;
+        int exponent;
         for (int j = 0; j < n; j++) {
-            const awiwi_real a = A[k * n + j];
-            A[k * n + j] = A[pivot * n + j];
-            A[pivot * n + j] = a;
+            row += awiwi_size(p->b[i] * p->b[j]) / p->R + (j == i ? 0 : awiwi_size(p->A[i * n + j]));
+            column += awiwi_size(p->Q[j * n + i]) + (j == i ? 0 : awiwi_size(p->A[j * n + i]));
         }
-        for (int i = 0; i < n; i++) {
-            const awiwi_real a = A[i * n + k];
-            A[i * n + k] = A[i * n + pivot];
-            A[i * n + pivot] = a;
+        const awiwi_real ratio = row / column;
+        if (!(ratio > 0 && ratio <= AWIWI_REAL_MAX))
+            continue;
+        (void)frexp(ratio, &exponent);
+        const awiwi_real f = ldexp((awiwi_real)1, exponent / 2);
+        p->d[i] *= f;
+        p->b[i] /= f;
+        for (int j = 0; j < n; j++) {
+            p->A[i * n + j] /= f;
+            p->A[j * n + i] *= f;
+            p->Q[i * n + j] *= f;
+            p->Q[j * n + i] *= f;
         }
-        const awiwi_real top = column[pivot];
-        column[pivot] = column[k];
-        for (int i = k + 1; i < n; i++) {
-            const awiwi_real f = column[i] / top;
-            for (int j = 0; j < n; j++)
-                A[i * n + j] -= f * A[k * n + j];
-            for (int j = 0; j < n; j++)
-                A[j * n + k] += f * A[j * n + i];
-        }
-        for (int i = 0; i < n; i++)
-            column[i] = A[i * n + k];
     }
-    const int left = n - reached;
-    for (int i = 0; i < left; i++)
-        for (int j = 0; j < left; j++)
-            rest[i * left + j] = A[(reached + i) * n + reached + j];
-    return stable(left, rest);
 }
 
-/* The geometric mean of the closed loop's poles, to a power of two: their product squared is det(A)^2 + v'Q v / R with
-   v = adj(A) b. Zero if one of them is zero. */
-static awiwi_real mean_pole(const balanced *p)
+/* The geometric mean of the optimal loop's poles, to a power of two. The square of their product is known beforehand:
+   det(A)^2 + v'Q v/R with v = adj(A) b. Zero if one of them is zero. Where the square is out of range the norm will do,
+   for doubling succeeds with any number, only later. */
+static awiwi_real mean_pole(const plant *p)
 {
     const int n = p->n;
-    awiwi_real c[N], v[N], next[N], total;
+    awiwi_real c[N], v[N], next[N], square;
     int exponent;
-    characteristic(n, p->A, c);
+    awiwi_characteristic(n, p->A, c);
     for (int i = 0; i < n; i++)
         v[i] = p->b[i];
     for (int k = n - 1; k > 0; k--) {
@@ -236,149 +73,172 @@ static awiwi_real mean_pole(const balanced *p)
         for (int i = 0; i < n; i++)
             v[i] = next[i];
     }
-    total = c[0] * c[0];
+    square = c[0] * c[0];
     for (int i = 0; i < n; i++)
         for (int j = 0; j < n; j++)
-            total += v[i] * p->Q[i * n + j] * v[j] / p->R;
-    if (!(total > 0))
+            square += v[i] * p->Q[i * n + j] * v[j] / p->R;
+    if (!(square > 0))
         return 0;
-    (void)frexp(total, &exponent);
+    if (!(square <= AWIWI_REAL_MAX))
+        return awiwi_largest(p->A, n * n);
+    (void)frexp(square, &exponent);
     return ldexp((awiwi_real)1, exponent / (2 * n));
 }
 
-/* Doubling. Writes the solution in balanced coordinates; 0 if the closed loop does not vanish. */
-static int doubled(const balanced *p, awiwi_real pole, int iterations, awiwi_real *H)
+/* Cayley transform: the discrete equation's A, G and H, which are blocks of the inverse of a Hamiltonian matrix. */
+static int begin(const plant *p, awiwi_real pole, awiwi_real *A, awiwi_real *G, awiwi_real *H)
 {
     const int n = p->n, twice = 2 * n;
-    awiwi_real hamiltonian[DOUBLE * DOUBLE], both[DOUBLE * DOUBLE];
-    matrix A, G, At, V, W, T;
-    for (int i = 0; i < n; i++) /* A - pole over -G, beside -Q over -(A - pole)' */
+    awiwi_real shifted[4 * N * N], inverse[4 * N * N];
+    for (int i = 0; i < twice * twice; i++)
+        inverse[i] = i % (twice + 1) ? 0 : 1;
+    for (int i = 0; i < n; i++)
         for (int j = 0; j < n; j++) {
             const awiwi_real shift = i == j ? pole : 0;
-            hamiltonian[i * twice + j] = p->A[i * n + j] - shift;
-            hamiltonian[i * twice + n + j] = -p->b[i] * p->b[j] / p->R;
-            hamiltonian[(n + i) * twice + j] = -p->Q[i * n + j];
-            hamiltonian[(n + i) * twice + n + j] = shift - p->A[j * n + i];
+            shifted[i * twice + j] = p->A[i * n + j] - shift;
+            shifted[i * twice + n + j] = -p->b[i] * p->b[j] / p->R;
+            shifted[(n + i) * twice + j] = -p->Q[i * n + j];
+            shifted[(n + i) * twice + n + j] = shift - p->A[j * n + i];
         }
-    for (int i = 0; i < twice * twice; i++)
-        both[i] = i % (twice + 1) ? 0 : 1;
-    if (!solve(twice, twice, hamiltonian, both))
+    if (!awiwi_solve(twice, twice, shifted, inverse))
         return 0;
     for (int i = 0; i < n; i++)
         for (int j = 0; j < n; j++) {
-            A[i * n + j] = (i == j ? 1 : 0) + 2 * pole * both[i * twice + j];
-            G[i * n + j] = -pole * (both[i * twice + n + j] + both[j * twice + n + i]);
-            H[i * n + j] = -pole * (both[(n + i) * twice + j] + both[(n + j) * twice + i]);
-        }
-    for (int k = 0; k < iterations; k++) {
-        product(n, G, H, W);
-        for (int i = 0; i < n; i++) {
-            W[i * n + i] += 1;
-            for (int j = 0; j < n; j++) {
-                both[i * twice + j] = A[i * n + j];
-                both[i * twice + n + j] = G[i * n + j];
-            }
-        }
-        if (!solve(n, twice, W, both))
-            return 0;
-        transposed(n, A, At);
-        for (int i = 0; i < n; i++)
-            for (int j = 0; j < n; j++)
-                V[i * n + j] = both[i * twice + n + j];
-        product(n, A, V, W);
-        product(n, W, At, T);
-        add_symmetric(n, T, G);
-        for (int i = 0; i < n; i++)
-            for (int j = 0; j < n; j++)
-                V[i * n + j] = both[i * twice + j];
-        product(n, At, H, W);
-        product(n, W, V, T);
-        add_symmetric(n, T, H);
-        product(n, A, V, W);
-        for (int i = 0; i < n * n; i++)
-            A[i] = W[i];
-        if (!all_finite(A, n * n) || !all_finite(H, n * n))
-            return 0;
-        if (largest(A, n * n) * largest(A, n * n) <= AWIWI_REAL_EPSILON)
-            return 1;
-    }
-    return 0;
-}
-
-/* Gains of a solution, its closed loop F, the equation's left side E, and how large that is against its terms. */
-static awiwi_real left_side(const balanced *p, const awiwi_real *S, awiwi_real *K, awiwi_real *F, awiwi_real *E)
-{
-    const int n = p->n;
-    awiwi_real most = 0, worst = 0;
-    for (int j = 0; j < n; j++) {
-        K[j] = 0;
-        for (int i = 0; i < n; i++)
-            K[j] += p->b[i] * S[i * n + j] / p->R;
-    }
-    for (int i = 0; i < n; i++)
-        for (int j = 0; j < n; j++) {
-            awiwi_real sum = p->Q[i * n + j] - K[i] * p->R * K[j];
-            awiwi_real terms = size(p->Q[i * n + j]) + size(K[i] * p->R * K[j]);
-            for (int k = 0; k < n; k++) {
-                const awiwi_real one = S[i * n + k] * p->A[k * n + j], other = S[j * n + k] * p->A[k * n + i];
-                sum += one + other;
-                terms += size(one) + size(other);
-            }
-            E[i * n + j] = sum;
-            F[i * n + j] = p->A[i * n + j] - p->b[i] * K[j];
-            most = terms > most ? terms : most;
-            worst = size(sum) <= worst ? worst : size(sum);
-        }
-    return most > 0 ? worst / most : 0;
-}
-
-/* One step of Newton: S += X with F'X + X F = -E; 0 if there is no such X. */
-static int refine(int n, const awiwi_real *F, const awiwi_real *E, awiwi_real *S)
-{
-    awiwi_real L[SYMMETRIC * SYMMETRIC] = {0}, x[SYMMETRIC];
-    const int unknowns = n * (n + 1) / 2;
-    for (int i = 0; i < n; i++)
-        for (int j = 0; j <= i; j++) {
-            const int row = i * (i + 1) / 2 + j;
-            x[row] = -E[i * n + j];
-            for (int k = 0; k < n; k++) {
-                const int kj = k > j ? k * (k + 1) / 2 + j : j * (j + 1) / 2 + k;
-                const int ik = i > k ? i * (i + 1) / 2 + k : k * (k + 1) / 2 + i;
-                L[row * unknowns + kj] += F[k * n + i];
-                L[row * unknowns + ik] += F[k * n + j];
-            }
-        }
-    if (!solve(unknowns, 1, L, x))
-        return 0;
-    for (int i = 0; i < n; i++)
-        for (int j = 0; j <= i; j++) {
-            S[i * n + j] += x[i * (i + 1) / 2 + j];
-            S[j * n + i] = S[i * n + j];
+            const awiwi_real *above = inverse + i * twice, *below = inverse + (n + i) * twice;
+            A[i * n + j] = (i == j ? 1 : 0) + 2 * pole * above[j];
+            G[i * n + j] = -pole * (above[n + j] + inverse[j * twice + n + i]);
+            H[i * n + j] = -pole * (below[j] + inverse[(n + j) * twice + i]);
         }
     return 1;
 }
 
-static int solved(balanced *p, int iterations, awiwi_real *K, awiwi_real *S, awiwi_real *residual)
+/* X += (Y Z + (Y Z)')/2 */
+static void add_symmetric(int n, const awiwi_real *Y, const awiwi_real *Z, awiwi_real *X)
 {
-    matrix F, E;
-    awiwi_real pole;
+    awiwi_real YZ[N * N];
+    awiwi_product(n, Y, Z, YZ);
+    for (int i = 0; i < n; i++)
+        for (int j = 0; j < n; j++)
+            X[i * n + j] += (YZ[i * n + j] + YZ[j * n + i]) / 2;
+}
+
+/* One doubling: A <- A W A, G <- G + A W G A', H <- H + A'H W A with W = (1 + G H)^-1. */
+static int redouble(int n, awiwi_real *A, awiwi_real *G, awiwi_real *H)
+{
+    awiwi_real W[N * N], right[2 * N * N], WA[N * N], WG[N * N], turned[N * N], Y[N * N];
+    awiwi_product(n, G, H, W);
+    for (int i = 0; i < n; i++) {
+        W[i * n + i] += 1;
+        for (int j = 0; j < n; j++) {
+            right[2 * i * n + j] = A[i * n + j];
+            right[2 * i * n + n + j] = G[i * n + j];
+            turned[j * n + i] = A[i * n + j];
+        }
+    }
+    if (!awiwi_solve(n, 2 * n, W, right))
+        return 0;
+    for (int i = 0; i < n; i++)
+        for (int j = 0; j < n; j++) {
+            WA[i * n + j] = right[2 * i * n + j];
+            WG[i * n + j] = right[2 * i * n + n + j];
+        }
+    awiwi_product(n, A, WG, Y);
+    add_symmetric(n, Y, turned, G);
+    awiwi_product(n, turned, H, Y);
+    add_symmetric(n, Y, WA, H);
+    awiwi_product(n, A, WA, Y);
+    for (int i = 0; i < n * n; i++)
+        A[i] = Y[i];
+    return awiwi_all_finite(A, n * n) && awiwi_all_finite(H, n * n);
+}
+
+/* Gains, loop, left side and residual of S. */
+static void weigh(const plant *p, solution *x)
+{
+    const int n = p->n;
+    awiwi_real most = 0;
+    for (int j = 0; j < n; j++) {
+        x->K[j] = 0;
+        for (int i = 0; i < n; i++)
+            x->K[j] += p->b[i] * x->S[i * n + j] / p->R;
+    }
+    for (int i = 0; i < n; i++)
+        for (int j = 0; j < n; j++) {
+            const awiwi_real saved = x->K[i] * p->R * x->K[j];
+            awiwi_real sum = p->Q[i * n + j] - saved, terms = awiwi_size(p->Q[i * n + j]) + awiwi_size(saved);
+            for (int k = 0; k < n; k++) {
+                const awiwi_real SA = x->S[i * n + k] * p->A[k * n + j], AS = x->S[j * n + k] * p->A[k * n + i];
+                sum += SA + AS;
+                terms += awiwi_size(SA) + awiwi_size(AS);
+            }
+            x->E[i * n + j] = sum;
+            x->loop[i * n + j] = p->A[i * n + j] - p->b[i] * x->K[j];
+            most = terms > most ? terms : most;
+        }
+    x->residual = most > 0 ? awiwi_largest(x->E, n * n) / most : 0;
+}
+
+static int place(int i, int j)
+{
+    return i > j ? i * (i + 1) / 2 + j : j * (j + 1) / 2 + i;
+}
+
+/* One step of Newton: S += X with loop'X + X loop = -E; 0 if there is no such X. */
+static int refine(int n, solution *s)
+{
+    awiwi_real L[UNKNOWNS * UNKNOWNS] = {0}, X[UNKNOWNS];
+    const int unknowns = n * (n + 1) / 2;
+    for (int i = 0; i < n; i++)
+        for (int j = 0; j <= i; j++) {
+            awiwi_real *row = L + place(i, j) * unknowns;
+            X[place(i, j)] = -s->E[i * n + j];
+            for (int k = 0; k < n; k++) {
+                row[place(k, j)] += s->loop[k * n + i];
+                row[place(i, k)] += s->loop[k * n + j];
+            }
+        }
+    if (!awiwi_solve(unknowns, 1, L, X) || !awiwi_all_finite(X, unknowns))
+        return 0;
+    for (int i = 0; i < n; i++)
+        for (int j = 0; j < n; j++)
+            s->S[i * n + j] += X[place(i, j)];
+    return 1;
+}
+
+static int search(plant *p, int iterations, solution *x)
+{
+    const int n = p->n;
+    awiwi_real A[N * N], G[N * N], left = 1;
     balance(p);
-    pole = mean_pole(p);
-    if (!(pole > 0) || !stabilisable(p))
+    const awiwi_real pole = mean_pole(p);
+    if (!(pole > 0) || !awiwi_is_stabilisable(n, p->A, p->b))
         return AWIWI_OUT_OF_DOMAIN;
-    if (!doubled(p, pole, iterations, S))
+    if (!begin(p, pole, A, G, x->S))
         return AWIWI_NOT_CONVERGED;
-    *residual = left_side(p, S, K, F, E);
-    for (int k = 0; k < REFINEMENTS; k++)
-        if (refine(p->n, F, E, S))
-            *residual = left_side(p, S, K, F, E);
-    return *residual * *residual <= AWIWI_REAL_EPSILON && stable(p->n, F) ? AWIWI_OK : AWIWI_NOT_CONVERGED;
+    for (int i = 0; i < iterations && left * left > AWIWI_REAL_EPSILON; i++) {
+        if (!redouble(n, A, G, x->S))
+            return AWIWI_NOT_CONVERGED;
+        left = awiwi_largest(A, n * n);
+    }
+    weigh(p, x);
+    for (int k = 0; k < REFINEMENTS; k++) {
+        solution better = *x;
+        if (!refine(n, &better))
+            break;
+        weigh(p, &better);
+        if (!(better.residual < x->residual))
+            break;
+        *x = better;
+    }
+    return x->residual * x->residual <= AWIWI_REAL_EPSILON && awiwi_is_stable(n, x->loop) ? AWIWI_OK
+                                                                                          : AWIWI_NOT_CONVERGED;
 }
 
 int awiwi_riccati(int n, const awiwi_real *A, const awiwi_real *b, const awiwi_real *Q, awiwi_real R, int iterations,
                   awiwi_real *K, awiwi_real *S, awiwi_real *residual)
 {
-    balanced p = {.n = n, .R = R};
+    plant p = {.n = n, .R = R};
+    solution x = {.residual = 1};
     int status = AWIWI_OUT_OF_DOMAIN;
     for (int i = 0; i < n; i++) {
         p.b[i] = b[i];
@@ -387,17 +247,17 @@ int awiwi_riccati(int n, const awiwi_real *A, const awiwi_real *b, const awiwi_r
             p.Q[i * n + j] = (Q[i * n + j] + Q[j * n + i]) / 2;
         }
     }
-    *residual = 1; /* that of S = 0 */
-    if (!all_finite(A, n * n) || !all_finite(b, n) || !all_finite(Q, n * n) || !all_finite(&R, 1))
+    if (!awiwi_all_finite(A, n * n) || !awiwi_all_finite(b, n) || !awiwi_all_finite(Q, n * n) ||
+        !awiwi_all_finite(&R, 1))
         status = AWIWI_NOT_FINITE;
     else if (R > 0)
-        status = solved(&p, iterations, K, S, residual);
+        status = search(&p, iterations, &x);
+    const int known = status == AWIWI_OK || (status == AWIWI_NOT_CONVERGED && x.residual < 1);
     for (int i = 0; i < n; i++) { /* back to the caller's coordinates */
-        K[i] = status == AWIWI_OK ? K[i] / p.d[i] : 0;
+        K[i] = known ? x.K[i] / p.d[i] : 0;
         for (int j = 0; j < n; j++)
-            S[i * n + j] = status == AWIWI_OK ? S[i * n + j] / (p.d[i] * p.d[j]) : 0;
+            S[i * n + j] = known ? x.S[i * n + j] / (p.d[i] * p.d[j]) : 0;
     }
-    if (status != AWIWI_OK)
-        *residual = 1;
+    *residual = known ? x.residual : 1;
     return status;
 }

@@ -2,26 +2,9 @@
 
 from __future__ import annotations
 
-import sympy
-from sympy import Matrix, Rational, symbols
+from proofs import column, rate, shifts, spelled_out, vanishes
 
 from awiwi_gen.control.backstepping_laws import antagonistic_law, decoupled_laws
-from awiwi_gen.models.naming import definitions
-
-
-def column(names: str) -> Matrix:
-    return Matrix(symbols(names, real=True))
-
-
-def spelled_out(expr):
-    for name, meaning in reversed(definitions([expr])):
-        expr = expr.xreplace({name: meaning})
-    return expr
-
-
-def vanishes(expr) -> bool:
-    return sympy.expand(sympy.fraction(sympy.together(spelled_out(expr)))[0]) == 0
-
 
 JOINT = q, qd = column("q qd")
 TORQUES = tau1, tau1d, tau2, tau2d = column("tau1 tau1d tau2 tau2d")
@@ -40,13 +23,7 @@ def flow(motors):
     stretch1 = c1 * (tau1d / s1) ** 2 + s1 * ((motors[0] - tau1) / b1 - accelerated)
     stretch2 = c2 * (tau2d / s2) ** 2 + s2 * ((motors[1] - tau2) / b2 + accelerated)
     moving = {q: qd, qd: accelerated, tau1: tau1d, tau1d: stretch1, tau2: tau2d, tau2d: stretch2}
-    shifted = {a: b for s in (DESIRED, PRETENSION, EXTERNAL) for a, b in zip(s[:-1], s[1:], strict=True)}
-    return moving | shifted
-
-
-def rate(expr, flow):
-    expr = spelled_out(expr)
-    return sum(expr.diff(symbol) * velocity for symbol, velocity in flow.items())
+    return moving | shifts(DESIRED, PRETENSION, EXTERNAL)
 
 
 def test_the_energy_of_all_six_states_falls_but_for_the_power_of_the_outer_torque():

@@ -214,6 +214,10 @@ def test_between_the_samples_the_curve_errs_as_little_as_at_256_bits(spring):
     assert 1e-8 < worst < 2.5e-7
 
 
+def test_the_check_knows_the_curves_error_without_deriving_anything(spring):
+    assert Lever(spring).curve_error() == pytest.approx(2.30e-9, rel=0.01)
+
+
 def test_the_curves_agree_with_one_another(lib):
     x = np.linspace(0, 10.07e-3, 500)
     f, step = lib.spring_force(x).f, 1e-7
@@ -322,6 +326,7 @@ def test_two_guidings_in_a_row_take_what_one_of_both_bends_takes(guiding):
     ("old", "new", "expected"),
     [
         ('taut = "3.62 rad"', 'taut = "4.6 rad"', "fails at a lever angle of 4."),
+        ('taut = "3.62 rad"', 'taut = "3.8 rad"', "would miss its force by 0.0003 of the largest"),
         ('taut = "3.62 rad"', 'taut = "3.25 rad"', "it would not move"),
         ('slack = "3.25 rad"', 'slack = "3.1 rad"', "fails at a lever angle of 3.1 rad: the spring is not stretched"),
         ('\narm = "18 mm"', '\narm = "22 mm"', "is not strictly convex at a lever angle of 3.25"),

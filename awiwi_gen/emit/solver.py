@@ -36,6 +36,10 @@ def solver_function(
         definition=definition,
         kernels={family: f"{prefix}_{function.name}" for family, function in used.items()},
         context=f"(const {prefix}_params *)context, " if runtime else "",
+        contexts={
+            family: f"(const {prefix}_params *)context, " if "_params *" in function.prototype else ""
+            for family, function in used.items()
+        },
         given="p" if runtime else "0",
         n=len(solver.unknowns),
         m=len(solver.equations),

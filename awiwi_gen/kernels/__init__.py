@@ -6,13 +6,16 @@ from awiwi_gen.hand import Hand
 from awiwi_gen.kernel import Kernel
 from awiwi_gen.kernels.base_estimate import base_kernels
 from awiwi_gen.kernels.control_backstepping import backstepping_laws
+from awiwi_gen.kernels.control_joint import joint_laws
 from awiwi_gen.kernels.control_linear import linear_laws
 from awiwi_gen.kernels.control_optimal import optimal_laws
 from awiwi_gen.kernels.fibres import fibre_kernels
 from awiwi_gen.kernels.fingers import finger_kernels
+from awiwi_gen.kernels.fingers_control import elastic_kernels
 from awiwi_gen.kernels.four_bars import four_bar_kernels
 from awiwi_gen.kernels.measured import measured_kernels
 from awiwi_gen.kernels.motors import motor_kernels
+from awiwi_gen.kernels.plants import plant_kernels
 from awiwi_gen.kernels.springs import spring_kernels
 from awiwi_gen.kernels.whole_hand import hand_kernels
 from awiwi_gen.kernels.wrist import wrist_kernels
@@ -24,6 +27,7 @@ def catalog(hand: Hand) -> list[Kernel]:
         kernel
         for name, finger in hand.fingers.items()
         for kernel in [
+            *elastic_kernels(hand, name, finger),
             *finger_kernels(hand, name, finger),
             *base_kernels(hand, name, finger),
             *four_bar_kernels(name, finger),
@@ -35,5 +39,5 @@ def catalog(hand: Hand) -> list[Kernel]:
         *(spring_kernels(hand, hand.spring) if hand.spring else []),
         *(fibre_kernels(hand, hand.tendon) if hand.tendon else []),
     ]
-    laws = [*linear_laws(), *backstepping_laws(), *optimal_laws()]
+    laws = [*joint_laws(), *linear_laws(), *backstepping_laws(), *optimal_laws(), *plant_kernels()]
     return fingers + wrist + hand_kernels(hand) + measured_kernels(hand) + actuators + laws

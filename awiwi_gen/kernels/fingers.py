@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from awiwi_gen.hand import Hand
+from awiwi_gen.hand_lever import Lever
 from awiwi_gen.hand_parts import Finger, Tendon
 from awiwi_gen.kernel import Kernel, Port, Solver
 from awiwi_gen.kernels.declare import Family
@@ -25,6 +26,8 @@ class Size:
 
 per_finger: Family[Size] = Family()
 
+STIFFEST = 50.0  # [N m/rad]; beyond what tendons give any joint of a hand
+
 
 def finger_kernels(hand: Hand, name: str, finger: Finger) -> list[Kernel]:
     """All kernels of one finger."""
@@ -37,6 +40,7 @@ def input_ports(hand: Hand, finger: Finger, size: Size) -> dict[str, Port]:
     """The ports an argument name stands for, with the ranges of this hand."""
     n, limits = (size.joints,), hand.limits
     low, high = joint_limits(finger)
+    slack, taut = force_range(hand)
     shortest, longest = zip(*(length_range(finger, tendon) for tendon in finger.tendons), strict=True)
 
     def symmetric(shape: tuple[int, ...], unit: Unit, limit: Any) -> Port:
@@ -53,7 +57,19 @@ def input_ports(hand: Hand, finger: Finger, size: Size) -> dict[str, Port]:
         "start": Port(n, rad, low, high),
         "noise": Port((), m, 0.0, 1e-3),
         "g": symmetric((3,), m / s**2, limits.gravity),
+        "K": symmetric((size.joints, size.joints), N * m / rad, STIFFEST),
+        "f_min": Port((), N, slack, slack + (taut - slack) / 4),
+        "f_max": Port((), N, taut - (taut - slack) / 4, taut),
     }
+
+
+def force_range(hand: Hand) -> tuple[float, float]:
+    """Tendon forces [N] at which the stiffness of every tendon is known: those of its spring, or up to the limit."""
+    if hand.spring is None:
+        return 0.0, float(hand.limits.tendon_force)
+    levers = [Lever(spring) for spring in (hand.spring, *hand.spring.calibrated.values())]
+    ends = [(lever.at(lever.slack).force, lever.at(lever.taut).force) for lever in levers]
+    return max(slack for slack, _ in ends), min(taut for _, taut in ends)
 
 
 def joint_limits(finger: Finger) -> tuple[tuple[float, ...], tuple[float, ...]]:

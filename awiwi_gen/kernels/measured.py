@@ -45,6 +45,6 @@ def measured_ports(hand: Hand) -> dict[str, Port]:
 def measured_lengths(hand: Any, theta: Any, x: Any, w: Any = None) -> Any:
     """Tendon lengths in the finger, of motor angles theta, elongations x and changes w of the lengths in the wrist.
 
-    All three count from where the straight finger's tendons begin to stretch. The motor reels in for positive theta.
+    All three count from the straight finger at which they were zeroed. The motor reels in for positive theta.
     """
     return estimate.measured_lengths(hand, theta, x, w)

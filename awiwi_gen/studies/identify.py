@@ -27,7 +27,7 @@ Array = np.ndarray[Any, Any]
 
 OUTLIER = 8.0  # times the typical residual: one in 10^14 of normal errors is as far off
 VAGUE = 0.5  # standard deviation, as a share of its value, from which on a parameter counts as unknown
-LEAST_COVERAGE = 0.9  # of the lever's travel: a polynomial tells nothing of what it has not seen
+LEAST_COVERAGE = 0.9  # of a period, of the lever's travel: a fit tells nothing of what it has not seen
 
 
 # -- friction and ripple of motors ------------------------------------------------------------------------
@@ -42,6 +42,10 @@ class FrictionFit:
     viscosity: float
     deviations: tuple[float, float, float]
     residual: float
+
+    def curve(self, velocity: Any) -> Array:
+        """The fitted friction torque [N m] at speeds [rad/s]."""
+        return np.asarray(np.arctan(self.steepness * velocity) * self.level + self.viscosity * velocity)
 
     @property
     def toml(self) -> str:
@@ -123,11 +127,9 @@ def fit_ripple(
     lines = [("input", n, n * gear_ratio) for n in input_harmonics] + [
         ("output", n, float(n)) for n in output_harmonics
     ]
-    slowest = min(frequency for _, _, frequency in lines)
-    if np.ptp(angle) < 2 * np.pi / slowest:
-        raise InputError(
-            f"theta covers {np.ptp(angle):.3g} rad; the slowest ripple needs one period, {2 * np.pi / slowest:.3g} rad"
-        )
+    slowest, fastest = (2 * np.pi / extreme(f for _, _, f in lines) for extreme in (min, max))
+    if np.ptp(angle) < LEAST_COVERAGE * slowest:
+        raise InputError(f"theta covers {np.ptp(angle):.3g} rad; the slowest ripple has a period of {slowest:.3g} rad")
     columns = [np.ones_like(angle)]
     for _, _, frequency in lines:
         columns += [np.sin(frequency * angle), np.cos(frequency * angle)]
@@ -135,7 +137,7 @@ def fit_ripple(
     if len(angle) < 2 * matrix.shape[1] or np.linalg.cond(matrix) > 30:
         raise InputError(
             f"theta has {len(angle)} points, too few or too regular to tell {len(lines)} ripples apart; "
-            f"the fastest has a period of {2 * np.pi / max(f for _, _, f in lines):.3g} rad"
+            f"the fastest has a period of {fastest:.3g} rad"
         )
     solution = np.linalg.lstsq(matrix, tau, rcond=None)[0]
     errors = matrix @ solution - tau

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from flint import arb, arb_mat
@@ -14,12 +14,26 @@ from awiwi_gen.ir.algebras import Balls, Floats, ball
 from awiwi_gen.ir.graph import Graph, Node
 from awiwi_gen.ir.interpret import evaluate
 from awiwi_gen.kernel import Solver
+from awiwi_gen.verify.problems_distribution import Distribution
 from awiwi_gen.verify.reference import Reference, reference
 
 Array = np.ndarray[Any, Any]
 
 NOISE = 2.5e-4  # error of a measured length [m]; keeps the estimate inside the limits it starts in
 ROUNDS = 30  # of Gauss-Newton at 256 bits: the residual is small, each round gains a digit at least
+
+
+class Problem(Protocol):
+    """What a solver solves; made from the solver, the graphs of the kernels it calls, and the numbers of its part."""
+
+    def sample(self, drawn: dict[str, Array]) -> dict[str, Array]:
+        """Well-posed inputs."""
+
+    def solve(self, inputs: Mapping[str, Array]) -> Reference:
+        """Exact outputs; those named status are the status that must be returned, which is otherwise 0."""
+
+    def mirror(self, inputs: Mapping[str, Array]) -> Mapping[str, Array]:
+        """What the solver computes in floats, by output, where that is known to the last bit."""
 
 
 @dataclass(frozen=True)
@@ -135,4 +149,8 @@ def _clamped(x: Array, low: Array, high: Array) -> Array:
     return np.where(x < low, low, np.where(x > high, high, x))
 
 
-PROBLEMS: Mapping[str, type[LeastSquares]] = {"least squares": LeastSquares, "gradient search": GradientSearch}
+PROBLEMS: Mapping[str, Callable[[Solver, Mapping[str, Graph], Mapping[str, Fraction]], Problem]] = {
+    "least squares": LeastSquares,
+    "gradient search": GradientSearch,
+    "distribution": Distribution,
+}

@@ -18,6 +18,7 @@ Array = np.ndarray[Any, Any]
 
 
 NEAR_ZERO = 1e-3
+STATUS = "status"  # of a reference: what the kernel must return, if that is not always 0
 
 
 @dataclass(frozen=True)
@@ -89,10 +90,13 @@ def judge_solver(
     raw = call(**inputs)
     samples = len(raw.status)
     reasons = []
-    if np.any(raw.status):
-        reasons.append(f"it does not converge at {np.count_nonzero(raw.status)} samples")
+    wrong = raw.status != reference.high.get(STATUS, np.zeros((samples, 1)))[:, 0]
+    if np.any(wrong):
+        reasons.append(f"its status is not as expected at {np.count_nonzero(wrong)} samples")
     worst_ulp = worst_scaled = 0.0
     for port, exact in reference.high.items():
+        if port == STATUS:
+            continue
         values = getattr(raw, port).reshape(samples, -1)
         error = reference.error(port, values)
         scale = float(np.max(np.abs(exact)))

@@ -1,0 +1,83 @@
+"""Gains of the backstepping law as a hand file names them: one table per tendon, written by `awiwi-gen tune`.
+
+    gains = "gains.toml"         # in the hand file: a file of its own, found beside it
+    [[gains]]                    # or the tables themselves
+
+They are numbers of the hand like any other, so the generated parameters carry them to the firmware.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import Field
+
+from awiwi_gen.errors import InputError
+from awiwi_gen.hand_file import HandFile
+from awiwi_gen.hand_parts import Keys, Measure, Part, Source
+from awiwi_gen.units import Quantity
+
+__all__ = ["GainsFile", "TendonGains", "gains_complaints", "with_gains"]
+
+Rate = Annotated[Quantity, Measure("100 1/s", "0", "1000000 1/s")]
+
+
+class TendonGains(Part):
+    """What the antagonistic law needs for one tendon; tendons count from zero, finger by finger.
+
+    Both tendons of a joint share the joint's impedance K_p and K_d. The rates K_3 and K_4 are those of the errors of
+    the tendon's torque and of its rate, C_t and C_s what these weigh in the Lyapunov function.
+    """
+
+    tendon: Annotated[int, Field(ge=0, examples=["11"])]
+    K_p: Annotated[Quantity, Measure("0.5 N m/rad", "0", "10000 N m/rad")]
+    K_d: Annotated[Quantity, Measure("0.001 N m s/rad", "0", "1000 N m s/rad")]
+    K_3: Rate
+    K_4: Rate
+    C_t: Annotated[Quantity, Measure("1 rad/(N m)", "0", "1000000000 rad/(N m)")]
+    C_s: Annotated[Quantity, Measure("0.001 rad s^2/(N m)", "0", "1000000000 rad s^2/(N m)")]
+    source: Source
+
+
+Gains = Annotated[tuple[TendonGains, ...], Field(strict=False, max_length=256, examples=["[[gains]]"])]
+
+
+class GainsFile(Part):
+    """A file of gains and nothing else."""
+
+    gains: Gains
+
+
+def with_gains(file: HandFile) -> HandFile:
+    """A hand file with the gains of the file it names in the place of that name.
+
+    Raises `InputError` with the faults of that file, or with the line that names it if it cannot be read.
+    """
+    name = file.data.get("gains")
+    if not isinstance(name, str):
+        return file
+    path = Path(file.name).parent / name
+    try:
+        included = HandFile.read(path)
+    except InputError as error:
+        if any(fault.line for fault in error.faults):
+            raise
+        found = [file.fault(("gains",), f'= "{name}": {fault.file} {fault.message}') for fault in error.faults]
+        raise InputError(found) from None
+    included.validated(GainsFile)
+    return replace(file, data=file.data | included.data)
+
+
+def gains_complaints(gains: tuple[TendonGains, ...], tendons: int) -> Iterator[tuple[Keys, str]]:
+    """Gains for tendons that the hand has not, and for one tendon twice."""
+    seen: dict[int, int] = {}
+    for index, each in enumerate(gains):
+        key = ("gains", index, "tendon")
+        if each.tendon >= tendons:
+            yield key, f"= {each.tendon} is no tendon of this hand; it has 0 to {tendons - 1}"
+        elif each.tendon in seen:
+            yield key, f"= {each.tendon} has gains already in gains[{seen[each.tendon]}]"
+        seen.setdefault(each.tendon, index)

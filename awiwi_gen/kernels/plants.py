@@ -1,0 +1,139 @@
+"""The plants that laws are tried on (chapters 10 to 15), as the rates of their states: what a simulation integrates.
+
+All their numbers are inputs. Beside a plant's rates come the quantities that sensors see. What a law believes of its
+springs, and an observer of motions, are kernels of the same kind.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from awiwi_gen.kernel import Kernel, Port
+from awiwi_gen.kernels.declare import Family, Parameterless
+from awiwi_gen.models import plants, plants_energy
+from awiwi_gen.units import N, Unit, kg, m, rad, s
+
+
+
+def plant_kernels() -> list[Kernel]:
+    """All plants; they need no hand."""
+    return [
+        kernel
+        for family, ports in ((of_tendon, TENDON), (of_joint, JOINT), (of_pair, PAIR))
+        for kernel in family.kernels("", Parameterless(), "plants", {}, ports, None)
+    ]
+
+
+of_tendon: Family[None] = Family()
+of_joint: Family[None] = Family()
+of_pair: Family[None] = Family()
+
+TORQUE, INERTIA, STIFFNESS, DAMPING = N * m, kg * m**2, N * m / rad, N * m * s / rad
+MOTION, RATES = (rad, rad / s), (rad / s, rad / s**2)
+
+
+def box(units: tuple[Unit, ...], low: tuple[float, ...], high: tuple[float, ...], rows: int = 1) -> Port:
+    """A port of mixed units; with several rows, one after the other of the same kind."""
+    return Port((rows, len(units)) if rows > 1 else (len(units),), units * rows, low * rows, high * rows)
+
+
+def state(bodies: int) -> Port:
+    """Angle and speed of each body."""
+    return Port((2 * bodies,), MOTION * bodies, (-3.0, -50.0) * bodies, (3.0, 50.0) * bodies)
+
+
+def rates(bodies: int) -> Port:
+    """What a state changes by."""
+    return Port((2 * bodies,), RATES * bodies)
+
+
+FRICTION = {"friction": box((s / rad, TORQUE, DAMPING), (0.1, 0.0, 0.0), (100.0, 2.0, 0.2))}
+TENDON = FRICTION | {
+    "x": state(1),
+    "u": Port((), TORQUE, -3.0, 3.0),
+    "path": Port((), m, -0.03, 0.03),
+    "motor": box((INERTIA, m), (1e-4, 0.002), (1e-2, 0.02)),
+    "line": box((N / m, N / m**2, N / m**3), (1e3, 0.0, 0.0), (2e4, 1e6, 1e8)),
+}
+JOINT = {
+    "x": state(2),
+    "u": Port((), TORQUE, -3.0, 3.0),
+    "load": Port((), TORQUE, -1.0, 1.0),
+    "plant": box((INERTIA, INERTIA, STIFFNESS), (5e-7, 1e-4, 0.05), (1e-3, 1e-2, 50.0)),
+    "bodies": box((INERTIA, INERTIA), (5e-7, 1e-4), (1e-3, 1e-2)),
+    "curve": box((STIFFNESS, TORQUE / rad**3), (0.05, 0.0), (50.0, 100.0)),
+    "damping": box((DAMPING, DAMPING), (0.0, 0.0), (5e-3, 0.1)),
+}
+SPRING = (STIFFNESS, TORQUE / rad**2, TORQUE / rad**3)
+PAIR = FRICTION | {
+    "x": state(3),
+    "u": Port((2,), TORQUE, -5.0, 5.0),
+    "load": JOINT["load"],
+    "inertias": box((INERTIA,) * 3, (5e-7, 1e-4, 1e-4), (1e-3, 1e-2, 1e-2)),
+    "tendons": box(SPRING, (0.05, 0.0, 0.0), (2.0, 2.0, 10.0), rows=2),
+    "damping": Port((), DAMPING, 0.0, 5e-3),
+    "stretches": Port((2,), rad, -1.0, 2.0),
+    "speeds": Port((2,), rad / s, -50.0, 50.0),
+}
+TORQUES, LOCAL = (TORQUE, TORQUE / s), (STIFFNESS, TORQUE / rad**2)
+
+
+@of_tendon(
+    lambda _: {"xd": rates(1), "f": Port((), N)}, "eq. 10.1, mended; eq. 3.8", witness=plants_energy.plant_tendon
+)
+def plant_tendon(_: Any, x: Any, u: Any, path: Any, motor: Any, line: Any, friction: Any) -> Any:
+    """A motor that winds up a tendon with a spring, the joint held: rates of x = (theta, theta'), and the force f.
+
+    path is what the joint takes of the tendon; motor is (inertia, pulley's radius), line the spring's (k1, k2, k3) of
+    f = k1 p + k2 p^2 + k3 p^3 where it is taut, friction is (steepness, level, viscosity).
+    """
+    return plants.plant_tendon(_, x, u, path, motor, line, friction)
+
+
+@of_joint(
+    lambda _: {"xd": rates(2), "tau": Port((2,), TORQUES)},
+    "eq. 15.11, 15.12",
+    witness=plants_energy.plant_joint_linear,
+)
+def plant_joint_linear(_: Any, x: Any, u: Any, load: Any, plant: Any, damping: Any) -> Any:
+    """A link behind a linear spring: rates of x = (q, q', theta, theta'), and the spring's torque tau with its rate.
+
+    plant is (link, motor, spring), damping what holds link and motor back.
+    """
+    return plants.plant_joint_linear(_, x, u, load, plant, damping)
+
+
+@of_joint(
+    lambda _: {"xd": rates(2), "tau": Port((2,), TORQUES), "spring": Port((2,), LOCAL)},
+    "eq. 15.71",
+    witness=plants_energy.plant_joint_nonlinear,
+)
+def plant_joint_nonlinear(_: Any, x: Any, u: Any, load: Any, bodies: Any, curve: Any, damping: Any) -> Any:
+    """The same behind a spring phi(d) = k1 d + k3 d^3, with the coefficients curve; spring is (phi', phi'')."""
+    return plants.plant_joint_nonlinear(_, x, u, load, bodies, curve, damping)
+
+
+@of_pair(
+    lambda _: {"xd": rates(3), "stretches": Port((2,), rad), "tau": Port((2,), TORQUE)},
+    "eq. 15.82, with friction and springs that only pull",
+    witness=plants_energy.plant_antagonistic,
+)
+def plant_antagonistic(
+    _: Any, x: Any, u: Any, load: Any, inertias: Any, tendons: Any, damping: Any, friction: Any
+) -> Any:
+    """A link between two tendons: rates of (q, q', theta1, theta1', theta2, theta2'); elongations and torques of both.
+
+    inertias are (link, motor 1, motor 2), a row of tendons is (k1, k2, k3) of phi = k1 p + k2 p^2 + k3 p^3, where p is
+    the elongation theta1 - q or theta2 + q of a taut tendon; friction of either motor is (steepness, level, viscosity).
+    """
+    return plants.plant_antagonistic(_, x, u, load, inertias, tendons, damping, friction)
+
+
+@of_pair(
+    lambda _: {"torques": Port((2, 2), TORQUES * 2), "springs": Port((2, 2), LOCAL * 2)},
+    "eq. 15.71, 15.82",
+    witness=plants_energy.antagonistic_springs,
+)
+def antagonistic_springs(_: Any, stretches: Any, speeds: Any, tendons: Any) -> Any:
+    """What both springs of such a joint do at given elongations: a row (tau, tau') and a row (phi', phi'') for each."""
+    return plants.antagonistic_springs(_, stretches, speeds, tendons)

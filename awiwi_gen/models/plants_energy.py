@@ -1,0 +1,93 @@
+"""The same plants from energies: all forces are gradients, of what is stored and of what is dissipated.
+
+With the kinetic energy T of the velocities v, the springs' energy V, Rayleigh's dissipation D and the torques Q from
+outside, Lagrange's equations read (d2T/dv2) v' = Q - dV/dx - dD/dv: no inertia here depends on the position.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import casadi as ca
+from casadi import SX
+
+
+def plant_tendon(_: Any, x: SX, u: SX, path: SX, motor: SX, line: SX, friction: SX) -> tuple[SX, SX]:
+    """Rates of (theta, theta'), and the force of the tendon."""
+    place, speed = x[0], x[1]
+    stretch = motor[1] * place + path
+    force = _gradients(_pulling(line), _taut(stretch))[0]
+    outside = u - ca.jacobian(stretch, place) * force
+    return _rates(speed, motor[0], _dry(friction, speed), outside), force
+
+
+def plant_joint_linear(part: Any, x: SX, u: SX, load: SX, plant: SX, damping: SX) -> tuple[SX, SX]:
+    """Rates of (q, q', theta, theta'), torque of the spring and its rate."""
+    return plant_joint_nonlinear(part, x, u, load, plant[:2], ca.vertcat(plant[2], 0), damping)[:2]
+
+
+def plant_joint_nonlinear(_: Any, x: SX, u: SX, load: SX, bodies: SX, curve: SX, damping: SX) -> tuple[SX, SX, SX]:
+    """Rates of (q, q', theta, theta'), torque of the spring and its rate, slope and curvature."""
+    place, speed = x[0::2], x[1::2]
+    stretch = place[1] - place[0]
+    torque, slope, curvature = _gradients(lambda d: 6 * curve[0] * d**2 + 3 * curve[1] * (d**2) ** 2, stretch)
+    outside = ca.vertcat(load, u) - ca.jacobian(stretch, place).T * torque
+    rates = _rates(speed, bodies, ca.dot(damping, speed**2) / 2, outside)
+    return rates, ca.vertcat(torque, slope * ca.jtimes(stretch, place, speed)), ca.vertcat(slope, curvature)
+
+
+def plant_antagonistic(
+    _: Any, x: SX, u: SX, load: SX, inertias: SX, tendons: SX, damping: SX, friction: SX
+) -> tuple[SX, SX, SX]:
+    """Rates of (q, q', theta1, theta1', theta2, theta2'), elongation and torque of both springs."""
+    place, speed = x[0::2], x[1::2]
+    stretches = ca.vertcat(place[1] - place[0], place[2] + place[0])
+    torques = ca.vertcat(*(_gradients(_pulling(tendons[3 * i :]), _taut(stretches[i]))[0] for i in (0, 1)))
+    outside = ca.vertcat(load, u) - ca.jacobian(stretches, place).T @ torques
+    dissipated = damping * speed[0] ** 2 / 2 + _dry(friction, speed[1]) + _dry(friction, speed[2])
+    return _rates(speed, inertias, dissipated, outside), stretches, torques
+
+
+def antagonistic_springs(_: Any, stretches: SX, speeds: SX, tendons: SX) -> tuple[SX, SX]:
+    """Of each spring its torque with the rate, its slope and curvature."""
+    torques, local = [], []
+    for i in (0, 1):
+        torque, slope, curvature = _gradients(_pulling(tendons[3 * i :]), _taut(stretches[i]))
+        torques += [torque, slope * speeds[i]]
+        local += [slope, curvature]
+    return ca.vertcat(*torques), ca.vertcat(*local)
+
+
+def _rates(speed: SX, inertias: SX, dissipated: SX, outside: SX) -> SX:
+    """Each place's rate and its speed's, one after the other."""
+    kinetic = ca.dot(inertias, speed**2) / 2
+    momentum = ca.diag(ca.hessian(kinetic, speed)[0])
+    accelerated = (outside - ca.gradient(dissipated, speed)) / momentum
+    return ca.vec(ca.horzcat(speed, accelerated).T)
+
+
+def _dry(friction: SX, speed: SX) -> SX:
+    """Rayleigh's function [W] of a motor's friction; its gradient is the friction torque."""
+    steepness, level, viscosity = ca.vertsplit(friction)
+    dry = speed * ca.atan(steepness * speed) - ca.log(1 + (steepness * speed) ** 2) / (2 * steepness)
+    return level * dry + viscosity * speed**2 / 2
+
+
+def _pulling(spring: SX) -> Callable[[SX], SX]:
+    """Twelve times the energy [J] of a spring (k1, k2, k3) by what it is stretched: no coefficient is rounded."""
+    return lambda p: 6 * spring[0] * p**2 + 4 * spring[1] * p * p**2 + 3 * spring[2] * (p**2) ** 2
+
+
+def _taut(stretch: SX) -> SX:
+    """What an elongation stretches; the energy of less than nothing is none."""
+    return (ca.sqrt(stretch**2) + stretch) / 2
+
+
+def _gradients(energy12: Callable[[SX], SX], at: SX) -> tuple[SX, SX, SX]:
+    """The first three derivatives of an energy at some place, from twelve times that energy."""
+    d = ca.SX.sym("d")
+    first = ca.gradient(energy12(d), d)
+    second = ca.gradient(first, d)
+    found = ca.substitute([first, second, ca.gradient(second, d)], [d], [at])
+    return found[0] / 12, found[1] / 12, found[2] / 12

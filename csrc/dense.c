@@ -1,0 +1,71 @@
+/* Small dense linear algebra: products, elimination with row exchanges. */
+#include "dense.h"
+
+awiwi_real awiwi_largest(const awiwi_real *x, int n)
+{
+    awiwi_real found = 0;
+    for (int i = 0; i < n; i++)
+        found = awiwi_size(x[i]) <= found ? found : awiwi_size(x[i]);
+    return found;
+}
+
+int awiwi_all_finite(const awiwi_real *x, int n)
+{
+    for (int i = 0; i < n; i++)
+        if (!(awiwi_size(x[i]) <= AWIWI_REAL_MAX))
+            return 0;
+    return 1;
+}
+
+void awiwi_product(int n, const awiwi_real *A, const awiwi_real *B, awiwi_real *C)
+{
+    for (int i = 0; i < n; i++)
+        for (int j = 0; j < n; j++) {
+            awiwi_real sum = 0;
+            for (int k = 0; k < n; k++)
+                sum += A[i * n + k] * B[k * n + j];
+            C[i * n + j] = sum;
+        }
+}
+
+static void exchange(int m, awiwi_real *a, awiwi_real *b)
+{
+    for (int j = 0; j < m; j++) {
+        const awiwi_real kept = a[j];
+        a[j] = b[j];
+        b[j] = kept;
+    }
+}
+
+/* a -= f b */
+static void subtract(int m, awiwi_real f, const awiwi_real *b, awiwi_real *a)
+{
+    for (int j = 0; j < m; j++)
+        a[j] -= f * b[j];
+}
+
+int awiwi_solve(int n, int m, awiwi_real *A, awiwi_real *B)
+{
+    for (int k = 0; k < n; k++) {
+        int pivot = k;
+        for (int i = k + 1; i < n; i++)
+            if (awiwi_size(A[i * n + k]) > awiwi_size(A[pivot * n + k]))
+                pivot = i;
+        if (!(awiwi_size(A[pivot * n + k]) > 0))
+            return 0;
+        exchange(n, A + k * n, A + pivot * n);
+        exchange(m, B + k * m, B + pivot * m);
+        for (int i = k + 1; i < n; i++) {
+            const awiwi_real f = A[i * n + k] / A[k * n + k];
+            subtract(n - k, f, A + k * n + k, A + i * n + k);
+            subtract(m, f, B + k * m, B + i * m);
+        }
+    }
+    for (int i = n - 1; i >= 0; i--) {
+        for (int k = i + 1; k < n; k++)
+            subtract(m, A[i * n + k], B + k * m, B + i * m);
+        for (int j = 0; j < m; j++)
+            B[i * m + j] /= A[i * n + i];
+    }
+    return 1;
+}

@@ -1,0 +1,185 @@
+/* Sampled loops of kernels: what a law does on a real clock. */
+#include "awiwi_simulate.h"
+
+#include <stdint.h>
+#include <string.h>
+
+static int finite(awiwi_real x)
+{
+    return x >= -AWIWI_REAL_MAX && x <= AWIWI_REAL_MAX;
+}
+
+static int all_finite(const awiwi_real *x, int n)
+{
+    for (int i = 0; i < n; i++)
+        if (!finite(x[i]))
+            return 0;
+    return 1;
+}
+
+/* Run a kernel on its signals; `out` keeps its results. */
+static int call(const awiwi_block *block, const awiwi_real *signals, awiwi_real *out)
+{
+    awiwi_real in[AWIWI_MOST_ARGUMENTS];
+    for (int i = 0; i < block->inputs; i++)
+        in[i] = signals[block->from[i]];
+    return block->kernel(in, out);
+}
+
+static void put(const awiwi_block *block, const awiwi_real *out, awiwi_real *signals)
+{
+    for (int i = 0; i < block->outputs; i++)
+        signals[block->to[i]] = out[i];
+}
+
+int awiwi_rates(const awiwi_loop *loop, awiwi_real *signals)
+{
+    awiwi_real out[AWIWI_MOST_ARGUMENTS];
+    for (int i = 0; i < loop->plant_blocks; i++) {
+        const int status = call(loop->plant + i, signals, out);
+        if (status)
+            return AWIWI_OUT_OF_DOMAIN;
+        put(loop->plant + i, out, signals);
+    }
+    return AWIWI_OK;
+}
+
+/* One step of Runge and Kutta's method of fourth order. */
+static int advance(const awiwi_loop *loop, awiwi_real h, awiwi_real *signals)
+{
+    static const int reach[4] = {0, 1, 1, 2}, share[4] = {1, 2, 2, 1}; /* in halves, in sixths */
+    const int n = loop->states;
+    awiwi_real start[AWIWI_MOST_RATES], sum[AWIWI_MOST_RATES];
+    awiwi_real *x = signals;
+    const awiwi_real *rate = signals + n;
+    for (int i = 0; i < n; i++) {
+        start[i] = x[i];
+        sum[i] = 0;
+    }
+    for (int stage = 0; stage < 4; stage++) {
+        const awiwi_real ahead = h * (awiwi_real)reach[stage] / 2, weight = (awiwi_real)share[stage];
+        for (int i = 0; stage && i < n; i++)
+            x[i] = start[i] + ahead * rate[i];
+        const int status = awiwi_rates(loop, signals);
+        if (status)
+            return status;
+        for (int i = 0; i < n; i++)
+            sum[i] += weight * rate[i];
+    }
+    for (int i = 0; i < n; i++)
+        x[i] = start[i] + h / 6 * sum[i];
+    return AWIWI_OK;
+}
+
+/* The noise: bits that depend on the counter only (a mixer with full avalanche). */
+static uint32_t mixed(uint32_t x)
+{
+    x = (x ^ (x >> 16)) * UINT32_C(0x7feb352d);
+    x = (x ^ (x >> 15)) * UINT32_C(0x846ca68b);
+    return x ^ (x >> 16);
+}
+
+/* Nearly normal, of variance 1: four uniform numbers of 16 bits each. */
+static awiwi_real normal(uint32_t seed, uint32_t tick, uint32_t sensor)
+{
+    const uint32_t a = mixed(mixed(mixed(seed + 1) ^ tick) ^ sensor), b = mixed(a + UINT32_C(0x9e3779b9));
+    const uint32_t total = (a >> 16) + (a & 0xffff) + (b >> 16) + (b & 0xffff);
+    const awiwi_real root_of_three = (awiwi_real)1.7320508075688772935;
+    return root_of_three * ((awiwi_real)total / 65535 - 2);
+}
+
+static awiwi_real rounded(awiwi_real x, awiwi_real step)
+{
+    const awiwi_real steps = x / step, half = (awiwi_real)0.5;
+    if (!(steps > -(awiwi_real)1e9 && steps < (awiwi_real)1e9))
+        return x;
+    return step * (awiwi_real)(int32_t)(steps < 0 ? steps - half : steps + half);
+}
+
+static void sense(const awiwi_loop *loop, unsigned tick, awiwi_real *signals)
+{
+    for (int i = 0; i < loop->sensors; i++) {
+        const awiwi_sensor *sensor = loop->sensor + i;
+        awiwi_real x = signals[sensor->from];
+        if (sensor->noise > 0)
+            x += sensor->noise * normal((uint32_t)loop->seed, (uint32_t)tick, (uint32_t)i);
+        signals[sensor->to] = sensor->step > 0 ? rounded(x, sensor->step) : x;
+    }
+}
+
+static void act(const awiwi_loop *loop, int late, awiwi_real *signals)
+{
+    for (int i = 0; i < loop->actuators; i++) {
+        const awiwi_actuator *actuator = loop->actuator + i;
+        const awiwi_real u = signals[actuator->from], limit = actuator->limit;
+        if (!actuator->late == !late)
+            signals[actuator->to] = !finite(u) ? 0 : u < -limit ? -limit : u > limit ? limit : u;
+    }
+}
+
+static int think(const awiwi_loop *loop, awiwi_real *signals)
+{
+    awiwi_real out[AWIWI_MOST_ARGUMENTS];
+    int refused = 0;
+    for (int i = 0; i < loop->law_blocks; i++) {
+        const awiwi_block *block = loop->law + i;
+        const int status = call(block, signals, out);
+        if ((status == AWIWI_OK || status == AWIWI_NOT_CONVERGED) && all_finite(out, block->outputs))
+            put(block, out, signals);
+        else
+            refused = 1;
+    }
+    for (int i = 0; refused && i < loop->actuators; i++)
+        signals[loop->actuator[i].from] = 0;
+    return refused;
+}
+
+/* All but the plant's motion. */
+static int control(const awiwi_loop *loop, unsigned tick, awiwi_real *signals)
+{
+    if (awiwi_rates(loop, signals)) /* so that sensors see the present */
+        return AWIWI_OUT_OF_DOMAIN;
+    sense(loop, tick, signals);
+    act(loop, 1, signals);
+    const int refused = think(loop, signals);
+    act(loop, 0, signals);
+    return refused ? AWIWI_NOT_CONVERGED : AWIWI_OK;
+}
+
+static int integrate(const awiwi_loop *loop, awiwi_real *signals)
+{
+    const awiwi_real h = loop->period / (awiwi_real)loop->substeps;
+    for (int i = 0; i < loop->substeps; i++)
+        if (advance(loop, h, signals))
+            return AWIWI_OUT_OF_DOMAIN;
+    return all_finite(signals, loop->states) ? AWIWI_OK : AWIWI_NOT_FINITE;
+}
+
+int awiwi_tick(const awiwi_loop *loop, unsigned tick, awiwi_real *signals)
+{
+    const int thought = control(loop, tick, signals);
+    if (thought == AWIWI_OUT_OF_DOMAIN)
+        return thought;
+    const int moved = integrate(loop, signals);
+    return moved ? moved : thought;
+}
+
+int awiwi_simulate(const awiwi_loop *loop, const awiwi_run *run, awiwi_real *signals, int *refused, int *status)
+{
+    awiwi_real *row = run->record;
+    *refused = 0;
+    *status = all_finite(signals, loop->states) ? AWIWI_OK : AWIWI_NOT_FINITE;
+    for (int tick = 0; tick < run->ticks; tick++) {
+        if (*status == AWIWI_OUT_OF_DOMAIN || *status == AWIWI_NOT_FINITE)
+            return tick;
+        for (int i = 0; i < run->inputs; i++)
+            signals[run->input[i]] = run->values[tick * run->inputs + i];
+        const int thought = control(loop, (unsigned)tick, signals);
+        for (int i = 0; tick % run->every == 0 && i < run->watched; i++)
+            *row++ = signals[run->watch[i]];
+        *refused += thought == AWIWI_NOT_CONVERGED;
+        const int moved = thought == AWIWI_OUT_OF_DOMAIN ? thought : integrate(loop, signals);
+        *status = moved ? moved : thought;
+    }
+    return run->ticks;
+}

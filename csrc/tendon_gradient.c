@@ -1,0 +1,136 @@
+/* Algorithm 2 of chapter 7, mended: a gradient search among the forces that give the torque, limits as a penalty.
+
+   Printed, the gradient is that of the last trial, taken or not, while the search stands elsewhere. Here both move
+   together. A step along the projected gradient is one of alpha in an orthonormal null space of P'. */
+#include "awiwi_distribution.h"
+
+typedef awiwi_real vector[AWIWI_MOST_TENDONS];
+
+/* Orthogonal directions that span the columns of P. */
+typedef struct columns {
+    int count;
+    vector along[AWIWI_MOST_JOINTS];
+    awiwi_real square[AWIWI_MOST_JOINTS];
+} columns;
+
+static awiwi_real dot(const awiwi_real *a, const awiwi_real *b, int n)
+{
+    awiwi_real sum = 0;
+    for (int i = 0; i < n; i++)
+        sum += a[i] * b[i];
+    return sum;
+}
+
+static awiwi_real size(awiwi_real x)
+{
+    return x < 0 ? -x : x;
+}
+
+static int all_finite(const awiwi_real *x, int n)
+{
+    for (int i = 0; i < n; i++)
+        if (!(size(x[i]) <= AWIWI_REAL_MAX))
+            return 0;
+    return 1;
+}
+
+/* Take from v what changes the torque. */
+static void project(const awiwi_tendons *t, const columns *c, awiwi_real *v)
+{
+    for (int again = 0; again < 2; again++) {
+        for (int k = 0; k < c->count; k++) {
+            const awiwi_real share = dot(v, c->along[k], t->m) / c->square[k];
+            for (int i = 0; i < t->m; i++)
+                v[i] -= share * c->along[k][i];
+        }
+    }
+}
+
+/* Span the columns of P, and move f to where it gives the torque by the shortest way: one column after the other, each
+   with what is new in it. */
+static void span(const awiwi_tendons *t, const awiwi_real *tau, columns *c, awiwi_real *f)
+{
+    c->count = 0;
+    for (int j = 0; j < t->n; j++) {
+        awiwi_real *v = c->along[c->count];
+        awiwi_real missing = tau[j], before = 0;
+        for (int i = 0; i < t->m; i++) {
+            v[i] = t->P[i * t->n + j];
+            missing += v[i] * f[i];
+            before += v[i] * v[i];
+        }
+        project(t, c, v);
+        c->square[c->count] = dot(v, v, t->m);
+        if (c->square[c->count] > 64 * AWIWI_REAL_EPSILON * before) {
+            for (int i = 0; i < t->m; i++)
+                f[i] -= missing / c->square[c->count] * v[i];
+            c->count++;
+        }
+    }
+}
+
+/* Half of |K_q - K|^2 + weight (what lies outside the limits)^2 and its gradient, which leaves the torque; beyond the
+   limits the stiffness of a tendon is that at the limit. Not 0 where the curve is left. */
+static int cost(const awiwi_tendons *t, const columns *c, const awiwi_real *K, awiwi_real weight, const vector f,
+                awiwi_real *total, vector gradient)
+{
+    const int n = t->n;
+    vector inside, k, slope, unused;
+    *total = 0;
+    for (int i = 0; i < t->m; i++) {
+        inside[i] = f[i] < t->low ? t->low : f[i] > t->high ? t->high : f[i];
+        *total += weight * (f[i] - inside[i]) * (f[i] - inside[i]) / 2;
+        gradient[i] = weight * (f[i] - inside[i]);
+    }
+    if (t->curve(t->context, inside, k, slope, unused))
+        return 1;
+    for (int a = 0; a < n; a++) {
+        for (int b = 0; b < n; b++) {
+            awiwi_real excess = -(K[a * n + b] + K[b * n + a]) / 2;
+            for (int i = 0; i < t->m; i++)
+                excess += k[i] * t->P[i * n + a] * t->P[i * n + b] + (t->dP ? f[i] * t->dP[(i * n + a) * n + b] : 0);
+            *total += excess * excess / 2;
+            for (int i = 0; i < t->m; i++) {
+                const int moves = f[i] >= t->low && f[i] <= t->high;
+                gradient[i] += excess * ((moves ? slope[i] : 0) * t->P[i * n + a] * t->P[i * n + b]
+                                         + (t->dP ? t->dP[(i * n + a) * n + b] : 0));
+            }
+        }
+    }
+    project(t, c, gradient);
+    return 0;
+}
+
+int awiwi_gradient_forces(const awiwi_tendons *t, const awiwi_real *tau, const awiwi_real *K, int rounds,
+                          awiwi_real step, awiwi_real weight, awiwi_real *f)
+{
+    columns c;
+    vector gradient, trial, trial_gradient;
+    awiwi_real best, found;
+    const int usable = t->low <= t->high && all_finite(&t->low, 1) && all_finite(&t->high, 1);
+    for (int i = 0; i < t->m; i++)
+        f[i] = usable ? t->low + (t->high - t->low) / 2 : 0;
+    if (!usable)
+        return AWIWI_OUT_OF_DOMAIN;
+    if (!all_finite(tau, t->n) || !all_finite(K, t->n * t->n) || !all_finite(t->P, t->m * t->n))
+        return AWIWI_NOT_FINITE;
+    span(t, tau, &c, f);
+    if (cost(t, &c, K, weight, f, &best, gradient))
+        return AWIWI_OUT_OF_DOMAIN;
+    for (int round = 0; round < rounds; round++) {
+        for (int i = 0; i < t->m; i++)
+            trial[i] = f[i] - step * gradient[i];
+        if (cost(t, &c, K, weight, trial, &found, trial_gradient))
+            return AWIWI_OUT_OF_DOMAIN;
+        if (found < best) {
+            best = found;
+            for (int i = 0; i < t->m; i++) {
+                f[i] = trial[i];
+                gradient[i] = trial_gradient[i];
+            }
+        } else {
+            step = step / 2;
+        }
+    }
+    return AWIWI_OK;
+}

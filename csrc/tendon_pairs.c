@@ -1,0 +1,218 @@
+/* Tendon forces of antagonistic pairs: a global optimum by formulas, up to the inversion of the stiffness curve.
+
+   A pair of opposite couplings p, -p gives the torque -p (f1 - f2) and the stiffness (k1 + k2) p p'. So the torque
+   tells all differences of forces; what is left is one number for each pair, on which k1 + k2 grows. The stiffness is
+   linear in these sums and the limits are a box for them: a convex problem of two sums, for pairs that share joints. */
+#include "awiwi_distribution.h"
+
+typedef awiwi_real vector[AWIWI_MOST_TENDONS];
+typedef awiwi_real couple[2];
+
+static awiwi_real size(awiwi_real x)
+{
+    return x < 0 ? -x : x;
+}
+
+static awiwi_real clamp(awiwi_real x, awiwi_real low, awiwi_real high)
+{
+    return x < low ? low : x > high ? high : x;
+}
+
+static int all_finite(const awiwi_real *x, int n)
+{
+    for (int i = 0; i < n; i++)
+        if (!(size(x[i]) <= AWIWI_REAL_MAX))
+            return 0;
+    return 1;
+}
+
+/* The least of x' G x / 2 - c' x in a box, G = (a, b; b, d) positive definite. Where the least of all lies outside,
+   one of the sides it lies beyond holds the answer; the other number is then the best for that side. */
+static void nearest(awiwi_real a, awiwi_real b, awiwi_real d, const couple c, const couple low, const couple high,
+                    couple x)
+{
+    const awiwi_real determinant = a * d - b * b;
+    const couple G = {a, d}, free = {(d * c[0] - b * c[1]) / determinant, (a * c[1] - b * c[0]) / determinant};
+    awiwi_real best = AWIWI_REAL_MAX;
+    x[0] = free[0];
+    x[1] = free[1];
+    for (int i = 0; i < 2; i++) {
+        const int o = 1 - i;
+        couple edge;
+        edge[i] = clamp(free[i], low[i], high[i]);
+        if (edge[i] < free[i] || edge[i] > free[i]) {
+            edge[o] = clamp((c[o] - b * edge[i]) / G[o], low[o], high[o]);
+            const awiwi_real y0 = edge[0] - free[0], y1 = edge[1] - free[1];
+            const awiwi_real worse = a * y0 * y0 + 2 * b * y0 * y1 + d * y1 * y1;
+            if (worse < best) {
+                best = worse;
+                x[0] = edge[0];
+                x[1] = edge[1];
+            }
+        }
+    }
+}
+
+/* For all pairs, x_i in [low_i, high_i] with the least |sum x_i v_i - target|, where v_i is p_i or p_i p_i': the
+   products of two such are those of their couplings, or the squares of these. `aim` holds the products with the
+   target. */
+static void nearest_of_all(const awiwi_tendons *t, int squared, const vector aim, const vector low, const vector high,
+                           vector x)
+{
+    for (int i = 0; i < t->pairs; i++) {
+        const int o = t->pair[i].partner;
+        const awiwi_real *p = t->P + t->pair[i].first * t->n, *r = t->P + t->pair[o].first * t->n;
+        awiwi_real pp = 0, pr = 0, rr = 0;
+        if (o < i)
+            continue;
+        for (int j = 0; j < t->n; j++) {
+            pp += p[j] * p[j];
+            pr += p[j] * r[j];
+            rr += r[j] * r[j];
+        }
+        if (squared) {
+            pp *= pp;
+            pr *= pr;
+            rr *= rr;
+        }
+        if (o == i) {
+            x[i] = clamp(aim[i] / pp, low[i], high[i]);
+        } else {
+            const couple c = {aim[i], aim[o]}, least = {low[i], low[o]}, most = {high[i], high[o]};
+            couple both;
+            nearest(pp, pr, rr, c, least, most, both);
+            x[i] = both[0];
+            x[o] = both[1];
+        }
+    }
+}
+
+/* Forces whose differences are d and whose smaller ones are x above the lower limit. */
+static void place(const awiwi_tendons *t, const vector d, const vector x, awiwi_real *f)
+{
+    for (int i = 0; i < t->pairs; i++) {
+        f[t->pair[i].first] = clamp(t->low + x[i] + (d[i] > 0 ? d[i] : 0), t->low, t->high);
+        f[t->pair[i].second] = clamp(t->low + x[i] - (d[i] < 0 ? d[i] : 0), t->low, t->high);
+    }
+}
+
+/* The sums of stiffnesses of such forces, and how they grow with x; returns what the curve does. */
+static int sums(const awiwi_tendons *t, const vector d, const vector x, awiwi_real *f, vector k, vector slope)
+{
+    vector each, each_slope, unused;
+    place(t, d, x, f);
+    const int off = t->curve(t->context, f, each, each_slope, unused);
+    for (int i = 0; i < t->pairs; i++) {
+        k[i] = each[t->pair[i].first] + each[t->pair[i].second];
+        slope[i] = each_slope[t->pair[i].first] + each_slope[t->pair[i].second];
+    }
+    return off;
+}
+
+/* x between 0 and most, of all pairs at once, where the sums of stiffnesses are what is wanted: Newton's method, and
+   bisection where that leaves the bracket or does not halve its last step. */
+static int invert(const awiwi_tendons *t, const vector d, const vector wanted, const vector most, awiwi_real tolerance,
+                  awiwi_real *f)
+{
+    vector below, above, x, last, k, slope;
+    for (int i = 0; i < t->pairs; i++) {
+        below[i] = 0;
+        above[i] = most[i];
+        x[i] = most[i] / 2;
+        last[i] = most[i];
+    }
+    for (int round = 0; round < AWIWI_MOST_INVERSIONS; round++) {
+        awiwi_real longest = 0;
+        if (sums(t, d, x, f, k, slope))
+            return AWIWI_OUT_OF_DOMAIN;
+        for (int i = 0; i < t->pairs; i++) {
+            const awiwi_real here = x[i];
+            if (k[i] < wanted[i])
+                below[i] = here;
+            else
+                above[i] = here;
+            x[i] = slope[i] > 0 ? here - (k[i] - wanted[i]) / slope[i] : above[i] + 1;
+            if (!(x[i] >= below[i] && x[i] <= above[i] && 2 * size(x[i] - here) <= last[i]))
+                x[i] = below[i] + (above[i] - below[i]) / 2;
+            last[i] = size(x[i] - here);
+            longest = last[i] > longest ? last[i] : longest;
+        }
+        if (longest <= tolerance * t->high) {
+            place(t, d, x, f);
+            return AWIWI_OK;
+        }
+    }
+    return AWIWI_NOT_CONVERGED;
+}
+
+static int distribute_pairs(const awiwi_tendons *t, const awiwi_real *tau, const awiwi_real *K, awiwi_real tolerance,
+                            awiwi_real *f)
+{
+    const awiwi_real range = t->high - t->low;
+    vector aim = {0}, low = {0}, high = {0}, none = {0}, d, most, wanted, slope;
+    for (int i = 0; i < t->pairs; i++) { /* the torque is -sum d_i p_i */
+        const awiwi_real *p = t->P + t->pair[i].first * t->n;
+        aim[i] = 0;
+        low[i] = -range;
+        high[i] = range;
+        for (int j = 0; j < t->n; j++)
+            aim[i] -= p[j] * tau[j];
+    }
+    nearest_of_all(t, 0, aim, low, high, d);
+    for (int i = 0; i < t->pairs; i++)
+        most[i] = range - size(d[i]);
+    if (sums(t, d, none, f, low, slope) || sums(t, d, most, f, high, slope))
+        return AWIWI_OUT_OF_DOMAIN;
+    for (int i = 0; i < t->pairs; i++) { /* the stiffness is sum of (k_i1 + k_i2) p_i p_i' */
+        const awiwi_real *p = t->P + t->pair[i].first * t->n;
+        aim[i] = 0;
+        for (int j = 0; j < t->n; j++)
+            for (int l = 0; l < t->n; l++)
+                aim[i] += p[j] * K[j * t->n + l] * p[l];
+    }
+    nearest_of_all(t, 1, aim, low, high, wanted);
+    return invert(t, d, wanted, most, tolerance, f);
+}
+
+/* Whether the forces give the torque, up to rounding. */
+static int gives(const awiwi_tendons *t, const awiwi_real *f, const awiwi_real *tau)
+{
+    for (int j = 0; j < t->n; j++) {
+        awiwi_real missing = tau[j], terms = size(tau[j]);
+        for (int i = 0; i < t->m; i++) {
+            missing += t->P[i * t->n + j] * f[i];
+            terms += size(t->P[i * t->n + j]) * t->high;
+        }
+        if (!(size(missing) <= 16 * AWIWI_REAL_EPSILON * terms))
+            return 0;
+    }
+    return 1;
+}
+
+/* What is returned where nothing can be found: all forces in the middle of the limits. */
+static void fall_back(const awiwi_tendons *t, int bounded, awiwi_real *f)
+{
+    for (int i = 0; i < t->m; i++)
+        f[i] = bounded ? t->low + (t->high - t->low) / 2 : 0;
+}
+
+int awiwi_distribute(const awiwi_tendons *t, const awiwi_real *tau, const awiwi_real *K, awiwi_real tolerance,
+                     awiwi_real *f)
+{
+    const int bounded = all_finite(&t->low, 1) && all_finite(&t->high, 1);
+    int status = AWIWI_OK;
+    fall_back(t, bounded, f);
+    if (!bounded || !all_finite(tau, t->n) || !all_finite(K, t->n * t->n) || !all_finite(t->P, t->m * t->n))
+        return AWIWI_NOT_FINITE;
+    if (!(t->low <= t->high))
+        return AWIWI_OUT_OF_DOMAIN;
+    if (t->pairs > 0)
+        status = distribute_pairs(t, tau, K, tolerance, f);
+    if (t->searched > 0 && status == AWIWI_OK)
+        status = awiwi_search_forces(t, tau, K, tolerance, f);
+    if (!all_finite(f, t->m)) {
+        fall_back(t, bounded, f);
+        return AWIWI_NOT_FINITE;
+    }
+    return status == AWIWI_OK && !gives(t, f, tau) ? AWIWI_INFEASIBLE : status;
+}

@@ -1,0 +1,393 @@
+/* Tendon forces by search, for tendons that are not antagonistic pairs: a primal active-set Newton method.
+
+   First the torque: forces within the limits with the least |tau + P' f|. Then the stiffness, in the moves that keep
+   the torque. Tendons at a limit are held there until the slope of the cost says that they should leave; all others
+   share a Newton step that is cut where the first of them reaches a limit. So every iterate keeps both. */
+#include "awiwi_distribution.h"
+
+typedef awiwi_real vector[AWIWI_MOST_TENDONS];
+typedef awiwi_real matrix[AWIWI_MOST_TENDONS][AWIWI_MOST_TENDONS];
+
+/* What is to be minimised over the searched tendons, of which p[i] is the coupling. */
+typedef struct task {
+    const awiwi_tendons *t;
+    const awiwi_real *tau, *K;
+    const awiwi_real *p[AWIWI_MOST_TENDONS];
+    int touched[AWIWI_MOST_JOINTS]; /* joints that the searched tendons move: no other torque or stiffness is theirs */
+    int count;
+    int keep_torque;
+    awiwi_real tolerance;
+    awiwi_real *f; /* of all tendons */
+} task;
+
+/* Cost, its gradient and its Hessian: that of Gauss and Newton plus a diagonal, at forces f[count]. Costs that differ
+   by less than the blur are equal. */
+typedef struct model {
+    awiwi_real cost, blur;
+    vector gradient, curvature;
+    matrix hessian;
+} model;
+
+/* Orthogonal moves of the free tendons: the first `rank` change the torque, the others do not. The torque of joint
+   joint[k] is changed by moves 0 to k, in proportion to lower[k]. */
+typedef struct moves {
+    int rank, count;
+    int joint[AWIWI_MOST_JOINTS];
+    awiwi_real lower[AWIWI_MOST_JOINTS][AWIWI_MOST_JOINTS];
+    vector along[AWIWI_MOST_TENDONS];
+    awiwi_real square[AWIWI_MOST_TENDONS];
+} moves;
+
+enum { AT_LOW = -1, FREE = 0, AT_HIGH = 1 };
+
+static const awiwi_real LEAST_SHARE = (awiwi_real)1 / 32; /* of a unit move that is worth a direction: below 1 / 16 */
+static const awiwi_real DAMPING = (awiwi_real)1 / 4096;
+
+static awiwi_real size(awiwi_real x)
+{
+    return x < 0 ? -x : x;
+}
+
+static awiwi_real dot(const awiwi_real *a, const awiwi_real *b, int n)
+{
+    awiwi_real sum = 0;
+    for (int i = 0; i < n; i++)
+        sum += a[i] * b[i];
+    return sum;
+}
+
+/* Half of |tau + P' f|^2. */
+static int torque_cost(const task *s, const vector f, model *c)
+{
+    awiwi_real missing[AWIWI_MOST_JOINTS], trace = 0;
+    c->cost = c->blur = 0;
+    for (int j = 0; j < s->t->n; j++) {
+        awiwi_real terms = size(s->tau[j]);
+        missing[j] = s->touched[j] ? s->tau[j] : 0;
+        for (int i = 0; i < s->count; i++) {
+            missing[j] += s->p[i][j] * f[i];
+            terms += size(s->p[i][j] * f[i]);
+        }
+        if (size(missing[j]) <= 4 * AWIWI_REAL_EPSILON * terms)
+            missing[j] = 0;
+        c->cost += missing[j] * missing[j] / 2;
+        c->blur += 4 * AWIWI_REAL_EPSILON * size(missing[j]) * terms;
+    }
+    for (int i = 0; i < s->count; i++) {
+        c->gradient[i] = dot(s->p[i], missing, s->t->n);
+        for (int l = 0; l <= i; l++)
+            c->hessian[i][l] = c->hessian[l][i] = dot(s->p[i], s->p[l], s->t->n);
+        trace += c->hessian[i][i];
+    }
+    for (int i = 0; i < s->count; i++)
+        c->curvature[i] = DAMPING * trace; /* among moves that change nothing, the short ones */
+    return 0;
+}
+
+/* Half of |K_q - K|^2, over the joints that are touched. */
+static int stiffness_cost(const task *s, const vector f, model *c)
+{
+    const int n = s->t->n;
+    vector k, slope, curvature;
+    awiwi_real terms = 0;
+    for (int i = 0; i < s->count; i++)
+        s->f[s->t->searched_tendons[i]] = f[i];
+    if (s->t->curve(s->t->context, s->f, k, slope, curvature))
+        return AWIWI_OUT_OF_DOMAIN;
+    c->cost = 0;
+    for (int i = 0; i < s->count; i++) {
+        c->gradient[i] = c->curvature[i] = 0;
+        for (int l = 0; l <= i; l++)
+            c->hessian[i][l] = 0;
+    }
+    for (int a = 0; a < n; a++) {
+        for (int b = 0; b <= a; b++) {
+            const awiwi_real both = a == b ? 1 : 2;
+            awiwi_real excess = -(s->K[a * n + b] + s->K[b * n + a]) / 2, growth[AWIWI_MOST_TENDONS];
+            if (!s->touched[a] || !s->touched[b])
+                continue;
+            terms += size(excess) * size(excess);
+            for (int i = 0; i < s->count; i++) {
+                const int tendon = s->t->searched_tendons[i];
+                const awiwi_real pp = s->p[i][a] * s->p[i][b];
+                const awiwi_real bend = s->t->dP ? s->t->dP[(tendon * n + a) * n + b] : 0;
+                excess += k[tendon] * pp + f[i] * bend;
+                growth[i] = slope[tendon] * pp + bend;
+                terms += k[tendon] * k[tendon] * pp * pp;
+            }
+            c->cost += both * excess * excess / 2;
+            for (int i = 0; i < s->count; i++) {
+                c->gradient[i] += both * excess * growth[i];
+                c->curvature[i] += both * excess * curvature[s->t->searched_tendons[i]] * s->p[i][a] * s->p[i][b];
+                for (int l = 0; l <= i; l++)
+                    c->hessian[i][l] += both * growth[i] * growth[l];
+            }
+        }
+    }
+    for (int i = 0; i < s->count; i++)
+        for (int l = 0; l < i; l++)
+            c->hessian[l][i] = c->hessian[i][l];
+    /* an excess is known up to rounding of its terms: so is the cost, to first and second order */
+    c->blur = 4 * AWIWI_REAL_EPSILON * (2 * c->cost + 4 * AWIWI_REAL_EPSILON * terms);
+    return 0;
+}
+
+static int cost(const task *s, const vector f, model *c)
+{
+    return s->keep_torque ? stiffness_cost(s, f, c) : torque_cost(s, f, c);
+}
+
+/* Take from v what lies along the moves found so far, twice for the sake of rounding; sum what was taken. */
+static void project(const task *s, const moves *m, vector v, awiwi_real *taken)
+{
+    for (int again = 0; again < 2; again++) {
+        for (int k = 0; k < m->count; k++) {
+            const awiwi_real share = dot(v, m->along[k], s->count) / m->square[k];
+            for (int i = 0; i < s->count; i++)
+                v[i] -= share * m->along[k][i];
+            if (taken)
+                taken[k] += share;
+        }
+    }
+}
+
+static void keep(const task *s, moves *m, const vector v, awiwi_real square)
+{
+    for (int i = 0; i < s->count; i++)
+        m->along[m->count][i] = v[i];
+    m->square[m->count++] = square;
+}
+
+/* Split what the free tendons can do. The unit moves' remainders always add up to what is missing, in squares. */
+static void split(const task *s, const int *held, moves *m)
+{
+    int free = 0;
+    m->count = 0;
+    for (int j = 0; s->keep_torque && j < s->t->n; j++) {
+        awiwi_real taken[AWIWI_MOST_TENDONS] = {0}, before;
+        vector row;
+        for (int i = 0; i < s->count; i++)
+            row[i] = held[i] == FREE ? s->p[i][j] : 0;
+        before = dot(row, row, s->count);
+        project(s, m, row, taken);
+        const awiwi_real after = dot(row, row, s->count);
+        if (after > 64 * AWIWI_REAL_EPSILON * before) {
+            for (int k = 0; k < m->count; k++)
+                m->lower[m->count][k] = taken[k];
+            m->lower[m->count][m->count] = 1;
+            m->joint[m->count] = j;
+            keep(s, m, row, after);
+        }
+    }
+    m->rank = m->count;
+    for (int i = 0; i < s->count; i++)
+        free += held[i] == FREE;
+    for (int i = 0; i < s->count && m->count < free; i++) {
+        vector unit = {0};
+        unit[i] = 1;
+        if (held[i] != FREE)
+            continue;
+        project(s, m, unit, 0);
+        if (dot(unit, unit, s->count) > LEAST_SHARE)
+            keep(s, m, unit, dot(unit, unit, s->count));
+    }
+}
+
+/* x of H x = b by Cholesky without roots; 0 where H is not positive definite by a margin. */
+static int solve(int n, matrix H, awiwi_real least, const vector b, vector x)
+{
+    matrix L;
+    vector d;
+    for (int j = 0; j < n; j++) {
+        d[j] = H[j][j];
+        x[j] = b[j];
+        for (int k = 0; k < j; k++) {
+            awiwi_real sum = H[j][k];
+            for (int i = 0; i < k; i++)
+                sum -= L[j][i] * d[i] * L[k][i];
+            L[j][k] = sum / d[k];
+            d[j] -= L[j][k] * sum;
+            x[j] -= L[j][k] * x[k];
+        }
+        if (!(d[j] > least))
+            return 0;
+    }
+    for (int j = n - 1; j >= 0; j--) {
+        x[j] /= d[j];
+        for (int k = j + 1; k < n; k++)
+            x[j] -= L[k][j] * x[k];
+    }
+    return 1;
+}
+
+/* Newton's step of the free tendons along the moves that are allowed; where the cost bends down, that of Gauss and
+   Newton, damped. */
+static void newton(const task *s, const model *c, const moves *m, vector step)
+{
+    const int n = m->count - m->rank;
+    matrix H, full;
+    vector b, x, turned;
+    awiwi_real trace = 0;
+    for (int j = 0; j < n; j++) {
+        const awiwi_real *v = m->along[m->rank + j];
+        b[j] = -dot(v, c->gradient, s->count);
+        for (int i = 0; i < s->count; i++)
+            turned[i] = dot(c->hessian[i], v, s->count);
+        for (int l = 0; l <= j; l++) {
+            const awiwi_real *w = m->along[m->rank + l];
+            H[j][l] = full[j][l] = dot(w, turned, s->count);
+            for (int i = 0; i < s->count; i++)
+                full[j][l] += v[i] * c->curvature[i] * w[i];
+        }
+        trace += H[j][j];
+    }
+    for (int i = 0; i < s->count; i++)
+        step[i] = 0;
+    if (!solve(n, full, 64 * AWIWI_REAL_EPSILON * trace, b, x)) {
+        for (int j = 0; j < n; j++)
+            H[j][j] += DAMPING * trace;
+        if (!solve(n, H, 0, b, x))
+            return;
+    }
+    for (int j = 0; j < n; j++)
+        for (int i = 0; i < s->count; i++)
+            step[i] += x[j] * m->along[m->rank + j][i];
+}
+
+/* The held tendon that most lowers the cost by leaving its limit, with the free ones making up for its torque; -1 if
+   there is none. Slopes within rounding of their terms count as level. */
+static int leaving(const task *s, const model *c, const moves *m, const int *held)
+{
+    awiwi_real price[AWIWI_MOST_JOINTS] = {0}, most = 0, largest = 0;
+    int found = -1;
+    for (int k = m->rank - 1; k >= 0; k--) {
+        awiwi_real sum = -dot(m->along[k], c->gradient, s->count) / m->square[k];
+        for (int l = k + 1; l < m->rank; l++)
+            sum -= m->lower[l][k] * price[m->joint[l]];
+        price[m->joint[k]] = sum;
+    }
+    for (int i = 0; i < s->count; i++)
+        largest = size(c->gradient[i]) > largest ? size(c->gradient[i]) : largest;
+    most = 256 * AWIWI_REAL_EPSILON * largest;
+    for (int i = 0; i < s->count; i++) {
+        const awiwi_real gain = (awiwi_real)held[i] * (c->gradient[i] + dot(s->p[i], price, s->t->n));
+        if (gain > most) {
+            most = gain;
+            found = i;
+        }
+    }
+    return found;
+}
+
+/* How much of the step is possible, at most all of it; which tendon stops it, or -1. */
+static awiwi_real reach(const task *s, const vector f, const vector step, int *stopped)
+{
+    awiwi_real share = 1;
+    *stopped = -1;
+    for (int i = 0; i < s->count; i++) {
+        const awiwi_real room = step[i] < 0 ? s->t->low - f[i] : s->t->high - f[i];
+        if (size(step[i]) > 0 && room / step[i] < share) {
+            share = room / step[i];
+            *stopped = i;
+        }
+    }
+    return share > 0 ? share : 0;
+}
+
+static awiwi_real inside(const task *s, awiwi_real x)
+{
+    return x < s->t->low ? s->t->low : x > s->t->high ? s->t->high : x;
+}
+
+/* From f down to where no free move and no leaving tendon lowers the cost. */
+static int descend(const task *s, int steps, vector f, model *here)
+{
+    int held[AWIWI_MOST_TENDONS] = {0}, left = -1, stopped;
+    model there;
+    moves m;
+    if (cost(s, f, here))
+        return AWIWI_OUT_OF_DOMAIN;
+    split(s, held, &m);
+    while (steps-- > 0) {
+        vector step, trial;
+        awiwi_real longest = 0;
+        newton(s, here, &m, step);
+        for (int i = 0; i < s->count; i++)
+            longest = size(step[i]) > longest ? size(step[i]) : longest;
+        if (!(longest <= AWIWI_REAL_MAX))
+            return AWIWI_NOT_FINITE;
+        if (longest <= s->tolerance * s->t->high) {
+            left = leaving(s, here, &m, held);
+            if (left < 0)
+                return AWIWI_OK;
+            held[left] = FREE;
+            split(s, held, &m);
+            continue;
+        }
+        awiwi_real share = reach(s, f, step, &stopped);
+        if (share > 0) {
+            for (int tried = 0;; tried++) {
+                for (int i = 0; i < s->count; i++)
+                    trial[i] = inside(s, f[i] + share * step[i]);
+                if (cost(s, trial, &there))
+                    return AWIWI_OUT_OF_DOMAIN;
+                if (there.cost <= here->cost + here->blur)
+                    break;
+                if (--steps <= 0)
+                    return AWIWI_NOT_CONVERGED;
+                share /= 2;
+                stopped = -1;
+            }
+            for (int i = 0; i < s->count; i++)
+                f[i] = trial[i];
+            *here = there;
+        } else if (stopped == left) {
+            return AWIWI_OK; /* what seemed to gain by leaving wants back: rounding */
+        }
+        left = -1;
+        if (stopped >= 0) {
+            held[stopped] = step[stopped] < 0 ? AT_LOW : AT_HIGH;
+            f[stopped] = step[stopped] < 0 ? s->t->low : s->t->high;
+            split(s, held, &m);
+        }
+    }
+    return AWIWI_NOT_CONVERGED;
+}
+
+int awiwi_search_forces(const awiwi_tendons *t, const awiwi_real *tau, const awiwi_real *K, awiwi_real tolerance,
+                        awiwi_real *f)
+{
+    const awiwi_real starts[3] = {t->low + (t->high - t->low) / 2, t->low, t->high};
+    task s = {t, tau, K, {0}, {0}, t->searched, 0, tolerance, f};
+    awiwi_real least = 0;
+    vector best, trial;
+    model found;
+    int status = AWIWI_NOT_CONVERGED;
+    for (int i = 0; i < s.count; i++) {
+        s.p[i] = t->P + t->searched_tendons[i] * t->n;
+        for (int j = 0; j < t->n; j++)
+            s.touched[j] = s.touched[j] || size(s.p[i][j]) > 0;
+    }
+    for (int start = 0; start < 3; start++) {
+        for (int i = 0; i < s.count; i++)
+            trial[i] = starts[start];
+        s.keep_torque = 0;
+        int ended = descend(&s, AWIWI_MOST_TORQUE_STEPS, trial, &found);
+        s.keep_torque = 1;
+        if (ended == AWIWI_OK)
+            ended = descend(&s, AWIWI_MOST_STIFFNESS_STEPS, trial, &found);
+        if (ended != AWIWI_OK && ended != AWIWI_NOT_CONVERGED)
+            return ended;
+        if (start == 0 || (ended == AWIWI_OK && (status != AWIWI_OK || found.cost < least - found.blur))) {
+            status = ended;
+            least = found.cost;
+            for (int i = 0; i < s.count; i++)
+                best[i] = trial[i];
+        }
+        if (status == AWIWI_OK && least <= found.blur)
+            break; /* exactly what was asked for */
+    }
+    for (int i = 0; i < s.count; i++)
+        f[t->searched_tendons[i]] = best[i];
+    return status;
+}

@@ -1,0 +1,59 @@
+"""The same hand gives the same bytes: whatever the hash seed, the place, the time zone, the number of cores."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+# Kernels of every structure of the hand, small enough to derive them from nothing again and again.
+PATTERNS = ("*_mass_matrix", "*_joint_stiffness", "*_estimate", "wrist_coupling", "motor_acceleration")
+SURROUNDINGS = [
+    {"PYTHONHASHSEED": "0"},
+    {"PYTHONHASHSEED": "1", "LC_ALL": "C", "TZ": "Pacific/Chatham"},
+    {"PYTHONHASHSEED": "12345", "HOME": "/nonexistent", "AWIWI_CORES": "1"},
+    {"PYTHONHASHSEED": "99999999", "PYTHONUTF8": "0", "LANG": "de_DE"},
+    {"PYTHONHASHSEED": "4294967295", "PYTHONOPTIMIZE": "1"},
+]
+PROGRAM = """
+import os, sys
+from pathlib import Path
+from awiwi_gen.hand import Hand
+from awiwi_gen.pipeline import Job, generate
+os.cpu_count = lambda: int(os.environ.get("AWIWI_CORES", 2))
+for number, pattern in enumerate(sys.argv[2:]):
+    generate(Job(Hand.load(), only=pattern), Path(sys.argv[1]) / str(number))
+"""
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory, root) -> list[dict[str, str]]:
+    """Digests of all generated files, once for each surrounding, every time in a new process with an empty cache."""
+    found = []
+    for surrounding in SURROUNDINGS:
+        here = tmp_path_factory.mktemp("run")
+        env = dict(os.environ) | {"AWIWI_GEN_CACHE": str(here / "cache"), "PYTHONPATH": str(root)} | surrounding
+        words = [sys.executable, "-c", PROGRAM, str(here / "out"), *PATTERNS]
+        subprocess.run(words, env=env, cwd=here, check=True, timeout=300)
+        files = sorted(path for path in (here / "out").rglob("*") if path.is_file())
+        found.append({str(p.relative_to(here)): hashlib.sha256(p.read_bytes()).hexdigest() for p in files})
+    return found
+
+
+@pytest.mark.parametrize("other", range(1, len(SURROUNDINGS)), ids=lambda i: SURROUNDINGS[i]["PYTHONHASHSEED"])
+def test_every_byte_is_the_same(runs, other):
+    assert len(runs[0]) > 30
+    assert runs[other] == runs[0]
+
+
+def test_what_comes_from_an_empty_cache_is_what_comes_from_a_full_one(runs, hand, tmp_path):
+    from awiwi_gen.pipeline import Job, generate
+
+    for number, pattern in enumerate(PATTERNS):
+        generate(Job(hand, only=pattern), tmp_path / str(number))
+    for name, digest in runs[0].items():
+        assert hashlib.sha256((tmp_path / Path(*Path(name).parts[1:])).read_bytes()).hexdigest() == digest, name

@@ -1,0 +1,150 @@
+"""The page of all studies: every figure says whether its claim holds, and nothing but its results decides its bytes."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+from html import escape
+from html.parser import HTMLParser
+
+import pytest
+from typer.testing import CliRunner
+
+from awiwi_gen.__main__ import app
+from awiwi_gen.emit.tree import read_manifest
+from awiwi_gen.errors import InputError
+from awiwi_gen.pipeline import Job, Proof, cached_tree, verify
+from awiwi_gen.studies import page
+from awiwi_gen.studies.figures_fingers import coriolis, released
+
+
+@pytest.fixture(scope="module")
+def figures(lib, hand):
+    return page.all_figures(lib, hand)
+
+
+@pytest.fixture(scope="module")
+def some_proof(hand):
+    """The proof of three kernels, one of which iterates, and their manifest."""
+    job = Job(hand, only="thumb_base*")
+    directory = cached_tree(job)
+    return verify(job, directory), read_manifest(directory)
+
+
+class Tags(HTMLParser):
+    """Which tags are open, which ids there are, what is loaded from elsewhere."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.ids, self.loaded, self.images = [], [], [], 0
+        self.feed(text)
+
+    def handle_starttag(self, tag, attributes):
+        given = dict(attributes)
+        self.images += tag == "svg"
+        self.ids += [given["id"]] if "id" in given else []
+        self.loaded += [given[k] for k in ("src", "href", "xlink:href") if k in given and not given[k].startswith("#")]
+        if tag != "meta":
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+
+@pytest.fixture(scope="module")
+def text(tmp_path_factory, hand, figures, some_proof):
+    path = tmp_path_factory.mktemp("page") / "report" / "index.html"
+    page.write_page(path, hand, figures, *some_proof)
+    return path.read_text(encoding="utf-8")
+
+
+def test_every_figure_of_the_source_is_there_and_says_whether_its_claim_holds(text, figures):
+    numbers = [figure.number for figure in figures]
+
+    assert {"5.7", "5.16", "5.17", "6.9", "6.10"} <= set(numbers)
+    assert numbers.index("5.7") < numbers.index("5.16") < numbers.index("6.9") < numbers.index("6.10")
+    for figure in figures:
+        heading = f"Figure {figure.number}: {escape(figure.title)}</h2>"
+        own = text.partition(heading)[2].partition("<h2")[0]
+        assert f"The claim {'holds' if figure.holds else 'does not hold'}." in own
+        assert "<svg" in own
+        assert "<path" in own
+
+
+def test_the_page_is_whole_and_needs_no_other_file(text, figures):
+    tags = Tags(text)
+
+    assert tags.open == []
+    assert tags.loaded == []
+    assert tags.images == len(figures)
+    assert len([name for name in tags.ids if name.startswith("figure-")]) == len(figures)
+
+
+def test_the_page_shows_the_proof_of_every_kernel(text, some_proof):
+    proof, _ = some_proof
+
+    assert len(proof.verdicts) == 3
+    for verdict in proof.verdicts:
+        assert re.search(rf"<tr><td>{verdict.name}</td>.*<td>proved</td></tr>", text)
+    for law in proof.laws:
+        assert f"<td>{law.statement}</td>" in text
+
+
+def test_equal_results_give_equal_bytes_without_dates(tmp_path, hand, lib, text, some_proof):
+    page.write_page(tmp_path / "again.html", hand, page.all_figures(lib, hand), *some_proof)
+
+    assert (tmp_path / "again.html").read_text(encoding="utf-8") == text
+    assert not re.search(r"20\d\d-\d\d|Matplotlib", text)
+
+
+def test_text_of_a_figure_cannot_become_markup(tmp_path, hand, figures):
+    bad = replace(figures[0], title="<script>", claim="a < b & c", holds=False)
+    page.write_page(tmp_path / "bad.html", hand, [bad], Proof([], []), {"kernels": []})
+    written = (tmp_path / "bad.html").read_text(encoding="utf-8")
+
+    assert "<script>" not in written
+    assert "a &lt; b &amp; c" in written
+
+
+def test_the_command_writes_the_page_and_tells_each_verdict(tmp_path, monkeypatch, figures, some_proof, hand):
+    def publish(job, path):
+        page.write_page(path, hand, figures, *some_proof)
+        return figures, some_proof[0]
+
+    monkeypatch.setattr(page, "publish", publish)
+    target = tmp_path / "index.html"
+    told = CliRunner().invoke(app, ["report", "--page", str(target)])
+    as_json = CliRunner().invoke(app, ["report", "--page", str(target), "--json"])
+
+    assert told.exit_code == as_json.exit_code == 0
+    assert target.exists()
+    assert [f["number"] for f in json.loads(as_json.stdout)] == [figure.number for figure in figures]
+    assert "figure 5.7: the claim does not hold" in told.stdout
+
+
+def test_without_the_drawing_libraries_the_command_says_what_to_install(tmp_path, monkeypatch, hand):
+    monkeypatch.setattr(page.importlib.util, "find_spec", lambda name: None)
+
+    with pytest.raises(InputError, match="pip install 'awiwi_gen\\[studies\\]'"):
+        page.publish(Job(hand), tmp_path / "index.html")
+
+
+def test_a_claw_without_springs_or_thumb_has_no_figures_of_fingers(root):
+    from awiwi_gen.hand import Hand
+    from awiwi_gen.studies import figures_fingers
+
+    claw = Hand.load(root / "examples" / "claw.toml")
+
+    assert figures_fingers.figures(None, claw.model_copy(update={"spring": None})) == []
+
+
+def test_coriolis_terms_matter_as_far_as_figure_5_7_can_be_read(lib, hand):
+    """With little damping they change the motion by many counts of a sensor, with much damping by less than one."""
+    release = released(lib, hand)
+    worst = dict(zip(release.readings, release.difference.max(axis=(1, 2)), strict=True))
+
+    assert release.full[:, 0, 1] == pytest.approx(0.1)
+    assert 0.05 < worst["0.1 % of each mode"] < 0.2
+    assert worst["1e-3 N m s/rad in each joint"] < 5e-4
+    assert not coriolis(lib, hand).holds
