@@ -211,13 +211,15 @@ def call(
     function = find(library, kernel)
     given = parse_inputs(inputs or [], function) if inputs or not as_json else read_json_inputs()
     result = function(**given)
-    values = result._asdict() if len(function.outputs) > 1 else {function.outputs[0]["name"]: result}
+    values = result._asdict() if hasattr(result, "_asdict") else {function.outputs[0]["name"]: result}
     if as_json:
         print_json({name: value.tolist() for name, value in values.items()})
         return 0
     for port in function.outputs:
         print(f"{port['name']} [{port['unit']}]")
         print(np.array2string(values[port["name"]], precision=9, suppress_small=False, max_line_width=100))
+    if "status" in values:
+        print(f"status {values['status']}")
     return 0
 
 

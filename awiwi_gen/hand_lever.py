@@ -72,7 +72,7 @@ class Lever:
         return [self.slack + (self.taut - self.slack) * i / steps for i in range(steps + 1)]
 
     def curve_error(self) -> float:
-        """How far the polynomial through `CURVE_NODES` samples misses the force of an elongation, over the largest force."""
+        """How far the polynomial through `CURVE_NODES` samples misses an elongation's force, over the largest force."""
         slack = self._path(self.slack)
         samples = [self.at(self.slack + float(share) * (self.taut - self.slack)) for share in chebyshev(CURVE_NODES)]
         nodes = [(slack - pose.path) / self.travel for pose in samples]

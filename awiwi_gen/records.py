@@ -21,7 +21,7 @@ from awiwi_gen.errors import VerificationError
 from awiwi_gen.ir.cost import cost
 from awiwi_gen.ir.graph import Graph
 from awiwi_gen.ir.passes import optimise
-from awiwi_gen.ir.passes.bind import bind
+from awiwi_gen.ir.passes.bind import bind, fill
 from awiwi_gen.kernel import Kernel, Port, Solver
 from awiwi_gen.verify.physics import Law, obey
 from awiwi_gen.verify.problems import PROBLEMS, Problem
@@ -165,7 +165,7 @@ def make_solver_record(
 def _problem(kernel: Kernel, used: Mapping[str, Record]) -> Problem:
     """What a kernel with a solver solves; the kernels it calls may belong to other parts, so their numbers are bound."""
     solver = _solver(kernel)
-    graphs = {family: bind(record.graph, record.values) for family, record in used.items() if record.graph is not None}
+    graphs = {family: fill(record.graph, record.values) for family, record in used.items() if record.graph is not None}
     return PROBLEMS[solver.problem](solver, graphs, _values(kernel))
 
 
@@ -186,7 +186,7 @@ def judge_record(
     if record.graph is None:
         problem, tolerance = _problem(kernel, used), _solver(kernel).tolerance[options.scalar]
         inputs = problem.sample(draw(kernel.inputs, kernel.path, options.dtype))
-        mirror = problem.mirror(inputs)
+        mirror = problem.mirror(inputs, options.trig == "own")
         return judge_solver(kernel.name, record.reference, mirror, inputs, function, tolerance, SEED)
     return judge(
         kernel.name,

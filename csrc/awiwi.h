@@ -3,6 +3,7 @@
 #define AWIWI_H
 
 #include "awiwi_distribution.h"
+#include "awiwi_regulators.h"
 #include "awiwi_simulate.h"
 #include "awiwi_solvers.h"
 #include "kernels.h"

@@ -35,6 +35,9 @@ typedef struct awiwi_joint {
 int awiwi_joint_gains(const awiwi_joint *joint, const awiwi_real *q, awiwi_real R, const awiwi_real *last,
                       int iterations, awiwi_real *K);
 
+/* Zero in place of torques u[n] that are not all numbers, and AWIWI_NOT_FINITE; else the status given. */
+int awiwi_refuse(int status, awiwi_real *u, int n);
+
 #ifdef __cplusplus
 }
 #endif

@@ -76,7 +76,9 @@ static gains descend(const scaled *p, awiwi_real t, int iterations)
         rise -= step;
     }
     const awiwi_real e = rise - p->brake * f;
-    return (gains){.h = p->sum - e, .g = (k1 - p->brake * e) / p->link - f, .e = e, .f = f};
+    const awiwi_real h = p->sum - e;
+    const awiwi_real g = ((e * (e + 2 * p->motor) - p->q3) / (2 * p->link) + h) / c3;
+    return (gains){.h = h, .g = g, .e = e, .f = f};
 }
 
 /* The gains of motor speed and link angle that belong to that of the motor angle; returns de/df. */
@@ -146,4 +148,13 @@ int awiwi_joint_gains(const awiwi_joint *joint, const awiwi_real *q, awiwi_real 
     K[2] = x.e / twice;
     K[3] = x.f / once;
     return AWIWI_OK;
+}
+
+int awiwi_refuse(int status, awiwi_real *u, int n)
+{
+    if (awiwi_all_finite(u, n))
+        return status;
+    for (int i = 0; i < n; i++)
+        u[i] = 0;
+    return AWIWI_NOT_FINITE;
 }

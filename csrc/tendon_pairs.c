@@ -109,35 +109,40 @@ static int sums(const awiwi_tendons *t, const vector d, const vector x, awiwi_re
     return off;
 }
 
-/* x between 0 and most, of all pairs at once, where the sums of stiffnesses are what is wanted: Newton's method, and
-   bisection where that leaves the bracket or does not halve its last step. */
-static int invert(const awiwi_tendons *t, const vector d, const vector wanted, const vector most, awiwi_real tolerance,
-                  awiwi_real *f)
+/* x between 0 and most, of all pairs at once, where the sums of stiffnesses, least and greatest at the ends, are what
+   is wanted: Newton's method from the stiff end, where a stiffening spring lets it never overshoot; bisection where it
+   leaves the bracket or does not halve what is missing. */
+static int invert(const awiwi_tendons *t, const vector d, const vector least, const vector greatest,
+                  const vector wanted, const vector most, awiwi_real tolerance, awiwi_real *f)
 {
-    vector below, above, x, last, k, slope;
+    const awiwi_real near = tolerance * t->high;
+    vector below, above, x, missing, k, slope;
     for (int i = 0; i < t->pairs; i++) {
-        below[i] = 0;
-        above[i] = most[i];
-        x[i] = most[i] / 2;
-        last[i] = most[i];
+        below[i] = wanted[i] < greatest[i] ? 0 : most[i];
+        above[i] = wanted[i] > least[i] ? most[i] : below[i];
+        x[i] = above[i];
+        missing[i] = AWIWI_REAL_MAX;
     }
     for (int round = 0; round < AWIWI_MOST_INVERSIONS; round++) {
         awiwi_real longest = 0;
         if (sums(t, d, x, f, k, slope))
             return AWIWI_OUT_OF_DOMAIN;
         for (int i = 0; i < t->pairs; i++) {
-            const awiwi_real here = x[i];
-            if (k[i] < wanted[i])
+            const awiwi_real here = x[i], excess = k[i] - wanted[i];
+            if (excess < 0)
                 below[i] = here;
             else
                 above[i] = here;
-            x[i] = slope[i] > 0 ? here - (k[i] - wanted[i]) / slope[i] : above[i] + 1;
-            if (!(x[i] >= below[i] && x[i] <= above[i] && 2 * size(x[i] - here) <= last[i]))
+            x[i] = slope[i] > 0 ? here - excess / slope[i] : above[i] + 2 * near;
+            if (size(x[i] - here) <= near
+                || (x[i] >= below[i] && x[i] <= above[i] && size(excess) <= missing[i] / 2))
+                x[i] = clamp(x[i], 0, most[i]);
+            else
                 x[i] = below[i] + (above[i] - below[i]) / 2;
-            last[i] = size(x[i] - here);
-            longest = last[i] > longest ? last[i] : longest;
+            missing[i] = size(excess);
+            longest = size(x[i] - here) > longest ? size(x[i] - here) : longest;
         }
-        if (longest <= tolerance * t->high) {
+        if (longest <= near) {
             place(t, d, x, f);
             return AWIWI_OK;
         }
@@ -171,7 +176,7 @@ static int distribute_pairs(const awiwi_tendons *t, const awiwi_real *tau, const
                 aim[i] += p[j] * K[j * t->n + l] * p[l];
     }
     nearest_of_all(t, 1, aim, low, high, wanted);
-    return invert(t, d, wanted, most, tolerance, f);
+    return invert(t, d, low, high, wanted, most, tolerance, f);
 }
 
 /* Whether the forces give the torque, up to rounding. */

@@ -316,7 +316,10 @@ static int descend(const task *s, int steps, vector f, model *here)
             longest = size(step[i]) > longest ? size(step[i]) : longest;
         if (!(longest <= AWIWI_REAL_MAX))
             return AWIWI_NOT_FINITE;
+        awiwi_real share = reach(s, f, step, &stopped);
         if (longest <= s->tolerance * s->t->high) {
+            for (int i = 0; i < s->count; i++)
+                f[i] = inside(s, f[i] + share * step[i]);
             left = leaving(s, here, &m, held);
             if (left < 0)
                 return AWIWI_OK;
@@ -324,7 +327,6 @@ static int descend(const task *s, int steps, vector f, model *here)
             split(s, held, &m);
             continue;
         }
-        awiwi_real share = reach(s, f, step, &stopped);
         if (share > 0) {
             for (int tried = 0;; tried++) {
                 for (int i = 0; i < s->count; i++)
@@ -358,7 +360,7 @@ int awiwi_search_forces(const awiwi_tendons *t, const awiwi_real *tau, const awi
                         awiwi_real *f)
 {
     const awiwi_real starts[3] = {t->low + (t->high - t->low) / 2, t->low, t->high};
-    task s = {t, tau, K, {0}, {0}, t->searched, 0, tolerance, f};
+    task s = {t, tau, K, {0}, {0}, t->searched, 0, 0, f};
     awiwi_real least = 0;
     vector best, trial;
     model found;
@@ -372,8 +374,10 @@ int awiwi_search_forces(const awiwi_tendons *t, const awiwi_real *tau, const awi
         for (int i = 0; i < s.count; i++)
             trial[i] = starts[start];
         s.keep_torque = 0;
+        s.tolerance = 4 * AWIWI_REAL_EPSILON;
         int ended = descend(&s, AWIWI_MOST_TORQUE_STEPS, trial, &found);
         s.keep_torque = 1;
+        s.tolerance = tolerance;
         if (ended == AWIWI_OK)
             ended = descend(&s, AWIWI_MOST_STIFFNESS_STEPS, trial, &found);
         if (ended != AWIWI_OK && ended != AWIWI_NOT_CONVERGED)

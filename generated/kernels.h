@@ -11,6 +11,20 @@ extern "C" {
 extern const char awiwi_model_digest[65];
 
 /*
+ * Stiffness of every tendon that is pulled with a tension: spring and fibre in series, and its
+ * derivatives. slope and curvature are dk/df and d2k/df2.
+ * Source: figure 4.7, section 4.3.
+ *   in   tension[8] in N, 3.87595 to 100.149
+ *   out  k[8] in N/m
+ *   out  slope[8] in 1/m
+ *   out  curvature[8] in 1/(N m)
+ * Returns 0 where every tension is on its spring's curve, give or take a hundredth; elsewhere 1, and
+ * what is not defined is NaN.
+ * Cost: 198 add, 230 mul, 7 calls.
+ */
+int awiwi_thumb_tendon_stiffness(const double tension[8], double k[8], double slope[8], double curvature[8]);
+
+/*
  * Pose of the fingertip: maps fingertip coordinates into the finger's base frame.
  * Source: eq. 5.2, 5.3, table 5.1.
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
@@ -211,6 +225,23 @@ int awiwi_thumb_joint_estimate(const double h[8], const double start[4], double 
 void awiwi_thumb_joint_estimate_error(const double q[4], const double noise[1], double covariance[16], double worst[4]);
 
 /*
+ * Tendon forces from f_min to f_max that give the joint torque tau and come nearest to the joint
+ * stiffness K. The torque is exact where the limits allow it, else the nearest (AWIWI_INFEASIBLE). The
+ * stiffness is the nearest of all with that torque, by the sum of the squares of the errors of all
+ * entries (the squared Frobenius norm).
+ * Source: eq. 7.2, 7.6, mended.
+ *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
+ *   in   tau[4] in N m, -1 to 1
+ *   in   K[4][4] in N m/rad, -50 to 50
+ *   in   f_min[1] in N, 3.87595 to 27.9443
+ *   in   f_max[1] in N, 76.0811 to 100.149
+ *   out  f[8] in N
+ * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
+ * Cost: at most 357 times that of thumb_coupling and thumb_tendon_stiffness and thumb_coupling_derivative.
+ */
+int awiwi_thumb_tendon_distribution(const double q[4], const double tau[4], const double K[16], const double f_min[1], const double f_max[1], double f[8]);
+
+/*
  * Base joint angles whose span lengths are nearest to the measured h, by gradient search from start.
  * Source: eq. 5.20, 5.24, algorithm 1, mended.
  *   in   h[4] in m, 0 to 0.15149
@@ -220,6 +251,20 @@ void awiwi_thumb_joint_estimate_error(const double q[4], const double noise[1], 
  * Cost: at most 51 times that of thumb_tendon_lengths and thumb_coupling.
  */
 int awiwi_thumb_base_estimate_by_gradient(const double h[4], const double start[2], double q[2]);
+
+/*
+ * Stiffness of every tendon that is pulled with a tension: spring and fibre in series, and its
+ * derivatives. slope and curvature are dk/df and d2k/df2.
+ * Source: figure 4.7, section 4.3.
+ *   in   tension[8] in N, 3.87595 to 100.149
+ *   out  k[8] in N/m
+ *   out  slope[8] in 1/m
+ *   out  curvature[8] in 1/(N m)
+ * Returns 0 where every tension is on its spring's curve, give or take a hundredth; elsewhere 1, and
+ * what is not defined is NaN.
+ * Cost: 198 add, 230 mul, 7 calls.
+ */
+int awiwi_index_tendon_stiffness(const double tension[8], double k[8], double slope[8], double curvature[8]);
 
 /*
  * Pose of the fingertip: maps fingertip coordinates into the finger's base frame.
@@ -421,6 +466,37 @@ void awiwi_index_joint_estimate(const double h[8], const double start[4], double
 void awiwi_index_joint_estimate_error(const double q[4], const double noise[1], double covariance[16], double worst[4]);
 
 /*
+ * Tendon forces from f_min to f_max that give the joint torque tau and come nearest to the joint
+ * stiffness K. The torque is exact where the limits allow it, else the nearest (AWIWI_INFEASIBLE). The
+ * stiffness is the nearest of all with that torque, by the sum of the squares of the errors of all
+ * entries (the squared Frobenius norm).
+ * Source: eq. 7.2, 7.6, mended.
+ *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
+ *   in   tau[4] in N m, -1 to 1
+ *   in   K[4][4] in N m/rad, -50 to 50
+ *   in   f_min[1] in N, 3.87595 to 27.9443
+ *   in   f_max[1] in N, 76.0811 to 100.149
+ *   out  f[8] in N
+ * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
+ * Cost: at most 357 times that of index_coupling and index_tendon_stiffness.
+ */
+int awiwi_index_tendon_distribution(const double q[4], const double tau[4], const double K[16], const double f_min[1], const double f_max[1], double f[8]);
+
+/*
+ * Stiffness of every tendon that is pulled with a tension: spring and fibre in series, and its
+ * derivatives. slope and curvature are dk/df and d2k/df2.
+ * Source: figure 4.7, section 4.3.
+ *   in   tension[8] in N, 3.87595 to 100.149
+ *   out  k[8] in N/m
+ *   out  slope[8] in 1/m
+ *   out  curvature[8] in 1/(N m)
+ * Returns 0 where every tension is on its spring's curve, give or take a hundredth; elsewhere 1, and
+ * what is not defined is NaN.
+ * Cost: 198 add, 230 mul, 7 calls.
+ */
+int awiwi_middle_tendon_stiffness(const double tension[8], double k[8], double slope[8], double curvature[8]);
+
+/*
  * Pose of the fingertip: maps fingertip coordinates into the finger's base frame.
  * Source: eq. 5.2, 5.3, table 5.1.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
@@ -618,6 +694,37 @@ void awiwi_middle_joint_estimate(const double h[8], const double start[4], doubl
  * Cost: 10 mul.
  */
 void awiwi_middle_joint_estimate_error(const double q[4], const double noise[1], double covariance[16], double worst[4]);
+
+/*
+ * Tendon forces from f_min to f_max that give the joint torque tau and come nearest to the joint
+ * stiffness K. The torque is exact where the limits allow it, else the nearest (AWIWI_INFEASIBLE). The
+ * stiffness is the nearest of all with that torque, by the sum of the squares of the errors of all
+ * entries (the squared Frobenius norm).
+ * Source: eq. 7.2, 7.6, mended.
+ *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
+ *   in   tau[4] in N m, -1 to 1
+ *   in   K[4][4] in N m/rad, -50 to 50
+ *   in   f_min[1] in N, 3.87595 to 27.9443
+ *   in   f_max[1] in N, 76.0811 to 100.149
+ *   out  f[8] in N
+ * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
+ * Cost: at most 357 times that of middle_coupling and middle_tendon_stiffness.
+ */
+int awiwi_middle_tendon_distribution(const double q[4], const double tau[4], const double K[16], const double f_min[1], const double f_max[1], double f[8]);
+
+/*
+ * Stiffness of every tendon that is pulled with a tension: spring and fibre in series, and its
+ * derivatives. slope and curvature are dk/df and d2k/df2.
+ * Source: figure 4.7, section 4.3.
+ *   in   tension[6] in N, 3.87595 to 100.149
+ *   out  k[6] in N/m
+ *   out  slope[6] in 1/m
+ *   out  curvature[6] in 1/(N m)
+ * Returns 0 where every tension is on its spring's curve, give or take a hundredth; elsewhere 1, and
+ * what is not defined is NaN.
+ * Cost: 148 add, 172 mul, 5 calls.
+ */
+int awiwi_ring_tendon_stiffness(const double tension[6], double k[6], double slope[6], double curvature[6]);
 
 /*
  * Pose of the fingertip: maps fingertip coordinates into the finger's base frame.
@@ -819,6 +926,37 @@ void awiwi_ring_joint_estimate(const double h[6], const double start[3], double 
 void awiwi_ring_joint_estimate_error(const double q[3], const double noise[1], double covariance[9], double worst[3]);
 
 /*
+ * Tendon forces from f_min to f_max that give the joint torque tau and come nearest to the joint
+ * stiffness K. The torque is exact where the limits allow it, else the nearest (AWIWI_INFEASIBLE). The
+ * stiffness is the nearest of all with that torque, by the sum of the squares of the errors of all
+ * entries (the squared Frobenius norm).
+ * Source: eq. 7.2, 7.6, mended.
+ *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
+ *   in   tau[3] in N m, -1 to 1
+ *   in   K[3][3] in N m/rad, -50 to 50
+ *   in   f_min[1] in N, 3.87595 to 27.9443
+ *   in   f_max[1] in N, 76.0811 to 100.149
+ *   out  f[6] in N
+ * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
+ * Cost: at most 66 times that of ring_coupling and ring_tendon_stiffness.
+ */
+int awiwi_ring_tendon_distribution(const double q[3], const double tau[3], const double K[9], const double f_min[1], const double f_max[1], double f[6]);
+
+/*
+ * Stiffness of every tendon that is pulled with a tension: spring and fibre in series, and its
+ * derivatives. slope and curvature are dk/df and d2k/df2.
+ * Source: figure 4.7, section 4.3.
+ *   in   tension[8] in N, 3.87595 to 100.149
+ *   out  k[8] in N/m
+ *   out  slope[8] in 1/m
+ *   out  curvature[8] in 1/(N m)
+ * Returns 0 where every tension is on its spring's curve, give or take a hundredth; elsewhere 1, and
+ * what is not defined is NaN.
+ * Cost: 198 add, 230 mul, 7 calls.
+ */
+int awiwi_fifth_tendon_stiffness(const double tension[8], double k[8], double slope[8], double curvature[8]);
+
+/*
  * Pose of the fingertip: maps fingertip coordinates into the finger's base frame.
  * Source: eq. 5.2, 5.3, table 5.1.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
@@ -1018,6 +1156,23 @@ void awiwi_fifth_joint_estimate(const double h[8], const double start[4], double
 void awiwi_fifth_joint_estimate_error(const double q[4], const double noise[1], double covariance[16], double worst[4]);
 
 /*
+ * Tendon forces from f_min to f_max that give the joint torque tau and come nearest to the joint
+ * stiffness K. The torque is exact where the limits allow it, else the nearest (AWIWI_INFEASIBLE). The
+ * stiffness is the nearest of all with that torque, by the sum of the squares of the errors of all
+ * entries (the squared Frobenius norm).
+ * Source: eq. 7.2, 7.6, mended.
+ *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
+ *   in   tau[4] in N m, -1 to 1
+ *   in   K[4][4] in N m/rad, -50 to 50
+ *   in   f_min[1] in N, 3.87595 to 27.9443
+ *   in   f_max[1] in N, 76.0811 to 100.149
+ *   out  f[8] in N
+ * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
+ * Cost: at most 66 times that of fifth_coupling and fifth_tendon_stiffness.
+ */
+int awiwi_fifth_tendon_distribution(const double q[4], const double tau[4], const double K[16], const double f_min[1], const double f_max[1], double f[8]);
+
+/*
  * Angles of coupler and rocker at a joint angle, and their turns per turn of the joint. The
  * transmission is the sine of the angle between coupler and rocker: where it is zero the linkage
  * locks.
@@ -1129,8 +1284,8 @@ void awiwi_hand_joint_stiffness(const double q[19], const double f[38], const do
 
 /*
  * Tendon lengths in the finger, of motor angles theta, elongations x and changes w of the lengths in
- * the wrist. All three count from where the straight finger's tendons begin to stretch. The motor
- * reels in for positive theta.
+ * the wrist. All three count from the straight finger at which they were zeroed. The motor reels in
+ * for positive theta.
  * Source: eq. 5.1.
  *   in   theta[8] in rad, -5 to 5
  *   in   x[8] in m, 0 to 0.1
@@ -1142,8 +1297,8 @@ void awiwi_thumb_measured_lengths(const double theta[8], const double x[8], cons
 
 /*
  * Tendon lengths in the finger, of motor angles theta, elongations x and changes w of the lengths in
- * the wrist. All three count from where the straight finger's tendons begin to stretch. The motor
- * reels in for positive theta.
+ * the wrist. All three count from the straight finger at which they were zeroed. The motor reels in
+ * for positive theta.
  * Source: eq. 5.1.
  *   in   theta[8] in rad, -5 to 5
  *   in   x[8] in m, 0 to 0.1
@@ -1155,8 +1310,8 @@ void awiwi_index_measured_lengths(const double theta[8], const double x[8], cons
 
 /*
  * Tendon lengths in the finger, of motor angles theta, elongations x and changes w of the lengths in
- * the wrist. All three count from where the straight finger's tendons begin to stretch. The motor
- * reels in for positive theta.
+ * the wrist. All three count from the straight finger at which they were zeroed. The motor reels in
+ * for positive theta.
  * Source: eq. 5.1.
  *   in   theta[8] in rad, -5 to 5
  *   in   x[8] in m, 0 to 0.1
@@ -1168,8 +1323,8 @@ void awiwi_middle_measured_lengths(const double theta[8], const double x[8], con
 
 /*
  * Tendon lengths in the finger, of motor angles theta, elongations x and changes w of the lengths in
- * the wrist. All three count from where the straight finger's tendons begin to stretch. The motor
- * reels in for positive theta.
+ * the wrist. All three count from the straight finger at which they were zeroed. The motor reels in
+ * for positive theta.
  * Source: eq. 5.1.
  *   in   theta[6] in rad, -5 to 5
  *   in   x[6] in m, 0 to 0.1
@@ -1181,8 +1336,8 @@ void awiwi_ring_measured_lengths(const double theta[6], const double x[6], const
 
 /*
  * Tendon lengths in the finger, of motor angles theta, elongations x and changes w of the lengths in
- * the wrist. All three count from where the straight finger's tendons begin to stretch. The motor
- * reels in for positive theta.
+ * the wrist. All three count from the straight finger at which they were zeroed. The motor reels in
+ * for positive theta.
  * Source: eq. 5.1.
  *   in   theta[8] in rad, -5 to 5
  *   in   x[8] in m, 0 to 0.1
@@ -1372,6 +1527,142 @@ void awiwi_tendon_stiffness(const double k[1], double stiffness[1]);
  * Cost: 1 add, 2 mul, 1 calls.
  */
 void awiwi_guiding_friction(const double f[1], const double bend[1], double loss[1]);
+
+/*
+ * Controller stiffness that, behind tendons of stiffness K_mech, makes the joints feel like K_eff.
+ * Both are symmetric, their lower triangles are read. The tendons must be stiffer than what is to be
+ * felt in every direction; where they are not, no positive definite controller exists. Stiffer by a
+ * factor eps, as eq. 8.2 has it, gives eps / (eps - 1) K_eff.
+ * Source: eq. 8.1, with the condition of section 8.2 mended.
+ *   in   K_eff[4][4] in N m/rad, from [0.2, -0.05, -0.05, -0.05, -0.05, 0.2, -0.05, -0.05, -0.05, -0.05, 0.2, -0.05, -0.05, -0.05, -0.05, 0.2] to [2, 0.05, 0.05, 0.05, 0.05, 2, 0.05, 0.05, 0.05, 0.05, 2, 0.05, 0.05, 0.05, 0.05, 2]
+ *   in   K_mech[4][4] in N m/rad, from [4, -0.5, -0.5, -0.5, -0.5, 4, -0.5, -0.5, -0.5, -0.5, 4, -0.5, -0.5, -0.5, -0.5, 4] to [20, 0.5, 0.5, 0.5, 0.5, 20, 0.5, 0.5, 0.5, 0.5, 20, 0.5, 0.5, 0.5, 0.5, 20]
+ *   out  K_imp[4][4] in N m/rad
+ * Returns 0 where pivot 0 of K_eff is positive and pivot 1 of K_eff is positive and pivot 2 of K_eff
+ * is positive and pivot 3 of K_eff is positive and pivot 0 of K_mech - K_eff is positive and pivot 1
+ * of K_mech - K_eff is positive and pivot 2 of K_mech - K_eff is positive and pivot 3 of K_mech -
+ * K_eff is positive; elsewhere 1, and what is not defined is NaN.
+ * Cost: 91 add, 111 mul, 7 div, 8 neg.
+ */
+int awiwi_stiffness_correction(const double K_eff[16], const double K_mech[16], double K_imp[16]);
+
+/*
+ * The same for one joint, and by how much k_imp changes with k_mech: what a poor guess of the tendons
+ * costs.
+ * Source: eq. 8.1.
+ *   in   k_eff[1] in N m/rad, 0.05 to 3
+ *   in   k_mech[1] in N m/rad, 3.5 to 20
+ *   out  k_imp[1] in N m/rad
+ *   out  sensitivity[1] in 1
+ * Returns 0 where k_eff is positive and k_mech - k_eff is positive; elsewhere 1, and what is not
+ * defined is NaN.
+ * Cost: 1 add, 4 mul, 2 div, 3 neg.
+ */
+int awiwi_stiffness_correction_scalar(const double k_eff[1], const double k_mech[1], double k_imp[1], double sensitivity[1]);
+
+/*
+ * Friction torque of a motor that turned under the torque u against the load tau in the sample that
+ * just ended. thd is the velocity at the end of that sample. The momentum is the observer's memory:
+ * begin with that of the motor at rest, zero, and pass on what is returned. Stable for all gains and
+ * periods.
+ * Source: eq. 9.1, 9.2, mended, over one sample.
+ *   in   momentum[1] in N m s, -0.05 to 0.05
+ *   in   u[1] in N m, -3 to 3
+ *   in   tau[1] in N m, -3 to 3
+ *   in   thd[1] in rad/s, -20 to 20
+ *   in   B[1] in kg m^2, 0.0001 to 0.01
+ *   in   gain[1] in 1/s, 1 to 10000
+ *   in   period[1] in s, 0.0001 to 0.01
+ *   out  momentum_next[1] in N m s
+ *   out  friction[1] in N m
+ * Returns 0 where the motor's inertia is positive and the gain is positive and the period is positive;
+ * elsewhere 1, and what is not defined is NaN.
+ * Cost: 5 add, 5 mul, 1 div, 1 neg.
+ */
+int awiwi_friction_observer(const double momentum[1], const double u[1], const double tau[1], const double thd[1], const double B[1], const double gain[1], const double period[1], double momentum_next[1], double friction[1]);
+
+/*
+ * Joint torques that make the joints feel like a spring K and a damper D about the desired motion. M,
+ * C and gravity are those of the joints where they are; C must make dM/dt - 2 C skew-symmetric. It
+ * acts on the desired velocity: so the joints stay passive.
+ * Source: eq. 11.4, 11.10, mended.
+ *   in   M[4][4] in kg m^2, from [1e-07, -0.0001, -0.0001, -0.0001, -0.0001, 1e-07, -0.0001, -0.0001, -0.0001, -0.0001, 1e-07, -0.0001, -0.0001, -0.0001, -0.0001, 1e-07] to [0.0001, 0.0001, 0.0001, 0.0001, 0.0001, 0.0001, 0.0001, 0.0001, 0.0001, 0.0001, 0.0001, 0.0001, 0.0001, 0.0001, 0.0001, 0.0001]
+ *   in   C[4][4] in N m s/rad, -0.001 to 0.001
+ *   in   gravity[4] in N m, -0.1 to 0.1
+ *   in   q[4] in rad, -2 to 2
+ *   in   qd[4] in rad/s, -20 to 20
+ *   in   q_des[4] in rad, -2 to 2
+ *   in   qd_des[4] in rad/s, -20 to 20
+ *   in   qdd_des[4] in rad/s^2, -2000 to 2000
+ *   in   K[4][4] in N m/rad, from [0, -2, -2, -2, -2, 0, -2, -2, -2, -2, 0, -2, -2, -2, -2, 0] to [20, 2, 2, 2, 2, 20, 2, 2, 2, 2, 20, 2, 2, 2, 2, 20]
+ *   in   D[4][4] in N m s/rad, from [0.001, -0.02, -0.02, -0.02, -0.02, 0.001, -0.02, -0.02, -0.02, -0.02, 0.001, -0.02, -0.02, -0.02, -0.02, 0.001] to [0.1, 0.02, 0.02, 0.02, 0.02, 0.1, 0.02, 0.02, 0.02, 0.02, 0.1, 0.02, 0.02, 0.02, 0.02, 0.1]
+ *   out  tau[4] in N m
+ * Cost: 72 add, 64 mul.
+ */
+void awiwi_joint_impedance(const double M[16], const double C[16], const double gravity[4], const double q[4], const double qd[4], const double q_des[4], const double qd_des[4], const double qdd_des[4], const double K[16], const double D[16], double tau[4]);
+
+/*
+ * Motor torque that brings a motor to the angle at which its tendon pulls with f_des; a spring and a
+ * damper hold it. For joints that are slow against it: the law of the two time scales. friction is the
+ * torque to compensate.
+ * Source: eq. 11.3, mended.
+ *   in   theta[1] in rad, -10 to 10
+ *   in   thd[1] in rad/s, -20 to 20
+ *   in   theta_des[1] in rad, -10 to 10
+ *   in   f_des[1] in N, 0 to 120
+ *   in   friction[1] in N m, -2 to 2
+ *   in   r[1] in m, 0.002 to 0.02
+ *   in   motor_kp[1] in N m/rad, 0.01 to 100
+ *   in   motor_kd[1] in N m s/rad, 0.001 to 1
+ *   out  tau[1] in N m
+ * Returns 0 where the pulley's radius is positive and the proportional gain is positive and the
+ * derivative gain is positive; elsewhere 1, and what is not defined is NaN.
+ * Cost: 4 add, 3 mul.
+ */
+int awiwi_motor_impedance(const double theta[1], const double thd[1], const double theta_des[1], const double f_des[1], const double friction[1], const double r[1], const double motor_kp[1], const double motor_kd[1], double tau[1]);
+
+/*
+ * Motor torque that makes the error of a tendon's force die out as e'' + kd e' + kp e = 0, whatever
+ * the joints do. The tendon has the stiffness k, with the slope dk/df, and is stretched at the rate
+ * xd; hdd is the acceleration of its path, by which the joints stretch it.
+ * Source: eq. 11.16, mended.
+ *   in   f[1] in N, 0 to 120
+ *   in   xd[1] in m/s, -0.2 to 0.2
+ *   in   stiffness[1] in N/m, 1000 to 50000
+ *   in   slope[1] in 1/m, 0 to 1000
+ *   in   hdd[1] in m/s^2, -20 to 20
+ *   in   f_des[1] in N, 0 to 120
+ *   in   fd_des[1] in N/s, -5000 to 5000
+ *   in   fdd_des[1] in N/s^2, -1e+06 to 1e+06
+ *   in   friction[1] in N m, -2 to 2
+ *   in   r[1] in m, 0.002 to 0.02
+ *   in   B[1] in kg m^2, 0.0001 to 0.01
+ *   in   force_kp[1] in 1/s^2, 100 to 1e+06
+ *   in   force_kd[1] in 1/s, 10 to 10000
+ *   out  tau[1] in N m
+ * Returns 0 where the tendon's stiffness is positive and the pulley's radius is positive and the
+ * motor's inertia is positive and the gain kp is positive and the gain kd is positive; elsewhere 1,
+ * and what is not defined is NaN.
+ * Cost: 8 add, 8 mul, 2 div.
+ */
+int awiwi_cascade(const double f[1], const double xd[1], const double stiffness[1], const double slope[1], const double hdd[1], const double f_des[1], const double fd_des[1], const double fdd_des[1], const double friction[1], const double r[1], const double B[1], const double force_kp[1], const double force_kd[1], double tau[1]);
+
+/*
+ * Whether joint damping D and force loops kp, kd make a stable cascade: proved where the margin is
+ * positive. The proof is the energy qd' M qd / 2 + q' K q / 2 + sum (S11 e^2 + 2 S12 e e' + S22 e'^2),
+ * which falls. weight and omega choose it: force errors cost weight (e^2 + e'^2 / omega^2). A heavier
+ * weight proves more, and bounds less.
+ * Source: eq. 11.17 to 11.21, mended.
+ *   in   D[4][4] in N m s/rad, from [0.001, -0.02, -0.02, -0.02, -0.02, 0.001, -0.02, -0.02, -0.02, -0.02, 0.001, -0.02, -0.02, -0.02, -0.02, 0.001] to [0.1, 0.02, 0.02, 0.02, 0.02, 0.1, 0.02, 0.02, 0.02, 0.02, 0.1, 0.02, 0.02, 0.02, 0.02, 0.1]
+ *   in   P[8][4] in m/rad, -0.03 to 0.03
+ *   in   kp[8] in 1/s^2, 100 to 1e+06
+ *   in   kd[8] in 1/s, 10 to 10000
+ *   in   weight[1] in m/(N s), 0.001 to 1
+ *   in   omega[1] in rad/s, 10 to 1000
+ *   out  margin[1] in 1
+ *   out  S[8][3] in m/N, m s/N, m s^2/N
+ * Cost: 166 add, 209 mul, 23 div, 19 calls.
+ */
+void awiwi_cascade_certificate(const double D[16], const double P[32], const double kp[8], const double kd[8], const double weight[1], const double omega[1], double margin[1], double S[24]);
 
 /*
  * Motor torque that brings the tendon force f to f_des: kp and kd on its error, estimates cancel the
@@ -1706,6 +1997,89 @@ int awiwi_optimal_backstepping_rates(const double K_opt[4], const double plant[3
  * Cost: 8 add, 10 mul, 5 div, 7 neg.
  */
 int awiwi_optimal_backstepping_weights(const double K_opt[4], const double plant[3], const double impedance[2], double rates[2], double weights[2]);
+
+/*
+ * A motor that winds up a tendon with a spring, the joint held: rates of x = (theta, theta'), and the
+ * force f. path is what the joint takes of the tendon; motor is (inertia, pulley's radius), line the
+ * spring's (k1, k2, k3) of f = k1 p + k2 p^2 + k3 p^3 where it is taut, friction is (steepness, level,
+ * viscosity).
+ * Source: eq. 10.1, mended; eq. 3.8.
+ *   in   x[2] in rad, rad/s, from [-3, -50] to [3, 50]
+ *   in   u[1] in N m, -3 to 3
+ *   in   path[1] in m, -0.03 to 0.03
+ *   in   motor[2] in kg m^2, m, from [0.0001, 0.002] to [0.01, 0.02]
+ *   in   line[3] in N/m, N/m^2, N/m^3, from [1000, 0, 0] to [2e+04, 1e+06, 1e+08]
+ *   in   friction[3] in s/rad, N m, N m s/rad, from [0.1, 0, 0] to [100, 2, 0.2]
+ *   out  xd[2] in rad/s, rad/s^2
+ *   out  f[1] in N
+ * Cost: 7 add, 9 mul, 1 div, 2 calls.
+ */
+void awiwi_plant_tendon(const double x[2], const double u[1], const double path[1], const double motor[2], const double line[3], const double friction[3], double xd[2], double f[1]);
+
+/*
+ * A link behind a linear spring: rates of x = (q, q', theta, theta'), and the spring's torque tau with
+ * its rate. plant is (link, motor, spring), damping what holds link and motor back.
+ * Source: eq. 15.11, 15.12.
+ *   in   x[4] in rad, rad/s, from [-3, -50, -3, -50] to [3, 50, 3, 50]
+ *   in   u[1] in N m, -3 to 3
+ *   in   load[1] in N m, -1 to 1
+ *   in   plant[3] in kg m^2, N m/rad, from [5e-07, 0.0001, 0.05] to [0.001, 0.01, 50]
+ *   in   damping[2] in N m s/rad, from [0, 0] to [0.005, 0.1]
+ *   out  xd[4] in rad/s, rad/s^2
+ *   out  tau[2] in N m, N m/s
+ * Cost: 6 add, 4 mul, 2 div, 1 neg.
+ */
+void awiwi_plant_joint_linear(const double x[4], const double u[1], const double load[1], const double plant[3], const double damping[2], double xd[4], double tau[2]);
+
+/*
+ * The same behind a spring phi(d) = k1 d + k3 d^3, with the coefficients curve; spring is (phi',
+ * phi'').
+ * Source: eq. 15.71.
+ *   in   x[4] in rad, rad/s, from [-3, -50, -3, -50] to [3, 50, 3, 50]
+ *   in   u[1] in N m, -3 to 3
+ *   in   load[1] in N m, -1 to 1
+ *   in   bodies[2] in kg m^2, from [5e-07, 0.0001] to [0.001, 0.01]
+ *   in   curve[2] in N m/rad, N m/rad^3, from [0.05, 0] to [50, 100]
+ *   in   damping[2] in N m s/rad, from [0, 0] to [0.005, 0.1]
+ *   out  xd[4] in rad/s, rad/s^2
+ *   out  tau[2] in N m, N m/s
+ *   out  spring[2] in N m/rad, N m/rad^2
+ * Cost: 8 add, 8 mul, 2 div, 1 neg.
+ */
+void awiwi_plant_joint_nonlinear(const double x[4], const double u[1], const double load[1], const double bodies[2], const double curve[2], const double damping[2], double xd[4], double tau[2], double spring[2]);
+
+/*
+ * A link between two tendons: rates of (q, q', theta1, theta1', theta2, theta2'); elongations and
+ * torques of both. inertias are (link, motor 1, motor 2), a row of tendons is (k1, k2, k3) of phi = k1
+ * p + k2 p^2 + k3 p^3, where p is the elongation theta1 - q or theta2 + q of a taut tendon; friction
+ * of either motor is (steepness, level, viscosity).
+ * Source: eq. 15.82, with friction and springs that only pull.
+ *   in   x[6] in rad, rad/s, from [-3, -50, -3, -50, -3, -50] to [3, 50, 3, 50, 3, 50]
+ *   in   u[2] in N m, -5 to 5
+ *   in   load[1] in N m, -1 to 1
+ *   in   inertias[3] in kg m^2, from [5e-07, 0.0001, 0.0001] to [0.001, 0.01, 0.01]
+ *   in   tendons[2][3] in N m/rad, N m/rad^2, N m/rad^3, from [0.05, 0, 0, 0.05, 0, 0] to [2, 2, 10, 2, 2, 10]
+ *   in   damping[1] in N m s/rad, 0 to 0.005
+ *   in   friction[3] in s/rad, N m, N m s/rad, from [0.1, 0, 0] to [100, 2, 0.2]
+ *   out  xd[6] in rad/s, rad/s^2
+ *   out  stretches[2] in rad
+ *   out  tau[2] in N m
+ * Cost: 19 add, 16 mul, 3 div, 2 neg, 4 calls.
+ */
+void awiwi_plant_antagonistic(const double x[6], const double u[2], const double load[1], const double inertias[3], const double tendons[6], const double damping[1], const double friction[3], double xd[6], double stretches[2], double tau[2]);
+
+/*
+ * What both springs of such a joint do at given elongations: a row (tau, tau') and a row (phi', phi'')
+ * for each.
+ * Source: eq. 15.71, 15.82.
+ *   in   stretches[2] in rad, -1 to 2
+ *   in   speeds[2] in rad/s, -50 to 50
+ *   in   tendons[2][3] in N m/rad, N m/rad^2, N m/rad^3, from [0.05, 0, 0, 0.05, 0, 0] to [2, 2, 10, 2, 2, 10]
+ *   out  torques[2][2] in N m, N m/s
+ *   out  springs[2][2] in N m/rad, N m/rad^2
+ * Cost: 12 add, 18 mul, 2 calls.
+ */
+void awiwi_antagonistic_springs(const double stretches[2], const double speeds[2], const double tendons[6], double torques[4], double springs[4]);
 
 #ifdef __cplusplus
 }

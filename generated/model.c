@@ -2,4 +2,4 @@
  */
 #include "kernels.h"
 
-const char awiwi_model_digest[65] = "8ec1a32256a12626e6a534d07d9716d731729c7ea21934b48f6b42e3cf6a6788";
+const char awiwi_model_digest[65] = "5c8ef537942d4ebfd1e7acd113c996b15b752390154980226c0be10d78c9a1fe";

@@ -8,12 +8,10 @@ from actuators import compiled, hand_text
 from awiwi_gen.hand import Hand
 from awiwi_gen.studies.figures_actuation import figures
 
-ONLY = "[ms][op][tr][oi]*"  # motor_* and spring_*
-
 
 @pytest.fixture(scope="module")
 def shown():
-    return {figure.number: figure for figure in figures(compiled(only=ONLY), Hand.parse(hand_text()))}
+    return {figure.number: figure for figure in figures(compiled(), Hand.parse(hand_text()))}
 
 
 def test_every_figure_is_there_and_its_claim_holds(shown):
@@ -23,7 +21,7 @@ def test_every_figure_is_there_and_its_claim_holds(shown):
 
 def test_a_timid_compensation_does_not_pass_for_one(shown):
     change = ('compensation = "0.9"', 'compensation = "0.3"')
-    timid = {f.number: f for f in figures(compiled(change, only=ONLY), Hand.parse(hand_text(change)))}
+    timid = {f.number: f for f in figures(compiled(change), Hand.parse(hand_text(change)))}
 
     assert not timid["3.6"].holds
     assert timid["3.4"].holds
@@ -34,7 +32,7 @@ def test_a_hand_without_ripple_or_spring_has_fewer_figures():
     text = hand_text()
     smooth = text[: text.index("[[motor.ripple]]")]
     hand = Hand.parse(smooth)
-    assert [figure.number for figure in figures(compiled(only=ONLY), hand)] == ["3.3"]
+    assert [figure.number for figure in figures(compiled(), hand)] == ["3.3"]
     assert figures(None, Hand.parse(text.split("[motor]")[0])) == []
 
 

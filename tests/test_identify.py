@@ -16,7 +16,7 @@ SLACK, TAUT = 3.25, 3.62
 
 @pytest.fixture(scope="module")
 def lib():
-    return compiled(only="[msc][opa][trl]*")
+    return compiled()
 
 
 @pytest.fixture

@@ -16,7 +16,7 @@ INERTIA = 2e-7 * 100**2 + 1e-6
 
 @pytest.fixture(scope="module")
 def motor():
-    return compiled(only="motor_*")
+    return compiled()
 
 
 def random(count, *limits):

@@ -12,10 +12,12 @@ import pytest
 from typer.testing import CliRunner
 
 from awiwi_gen.__main__ import app
+from awiwi_gen.build import load
 from awiwi_gen.emit.tree import read_manifest
 from awiwi_gen.errors import InputError
+from awiwi_gen.hand import Hand
 from awiwi_gen.pipeline import Job, Proof, cached_tree, verify
-from awiwi_gen.studies import page
+from awiwi_gen.studies import figures_fingers, page
 from awiwi_gen.studies.figures_fingers import coriolis, released
 
 
@@ -130,13 +132,14 @@ def test_without_the_drawing_libraries_the_command_says_what_to_install(tmp_path
         page.publish(Job(hand), tmp_path / "index.html")
 
 
-def test_a_claw_without_springs_or_thumb_has_no_figures_of_fingers(root):
-    from awiwi_gen.hand import Hand
-    from awiwi_gen.studies import figures_fingers
-
+def test_a_claw_shows_what_it_has_a_finger_on_straight_tendons_but_no_index(root):
     claw = Hand.load(root / "examples" / "claw.toml")
+    job = Job(claw, only="beak_*")
+    shown = figures_fingers.figures(load(cached_tree(job), job.store), claw)
 
-    assert figures_fingers.figures(None, claw.model_copy(update={"spring": None})) == []
+    assert [figure.number for figure in shown] == ["5.16", "5.17"]
+    assert "beak" in shown[0].title
+    assert all("<svg" in page.drawing(figure) for figure in shown)
 
 
 def test_coriolis_terms_matter_as_far_as_figure_5_7_can_be_read(lib, hand):
@@ -147,4 +150,4 @@ def test_coriolis_terms_matter_as_far_as_figure_5_7_can_be_read(lib, hand):
     assert release.full[:, 0, 1] == pytest.approx(0.1)
     assert 0.05 < worst["0.1 % of each mode"] < 0.2
     assert worst["1e-3 N m s/rad in each joint"] < 5e-4
-    assert not coriolis(lib, hand).holds
+    assert not coriolis(lib, hand, hand.spring).holds

@@ -30,7 +30,7 @@ SLACK, TAUT = 3.25, 3.62
 
 @pytest.fixture(scope="module")
 def lib():
-    return compiled(only="[sct][pae][rln]*")
+    return compiled()
 
 
 @pytest.fixture(scope="module")
@@ -290,7 +290,7 @@ def test_a_fibre_in_series_adds_its_elongation(lib):
 
 @pytest.fixture(scope="module")
 def guiding():
-    return compiled(only="guiding_*").guiding_friction
+    return compiled().guiding_friction
 
 
 def test_guiding_friction_is_what_many_small_bends_take(guiding):

@@ -47,15 +47,14 @@ def joint_gains(m: Expr, b: Expr, k: Expr, dq: Expr, dtheta: Expr, polynomial: l
 
 def pole_placement_motor(_: Any, b: Matrix, dtheta: Matrix, k: Matrix, omega0: Matrix, xi0: Matrix) -> Any:
     """Gains of the second-order plant, and what must be positive."""
-    parameters = [port[0] for port in (b, dtheta, k, omega0, xi0)]
-    return motor_gains(*parameters), [b[0], omega0[0], xi0[0]]
+    return motor_gains(b[0], dtheta[0], k[0], omega0[0], xi0[0]), [b[0], omega0[0], xi0[0]]
 
 
 def pole_placement(
     _: Any, m: Matrix, b: Matrix, k: Matrix, dq: Matrix, dtheta: Matrix, omega: Matrix, xi: Matrix
 ) -> Any:
     """Gains of the flexible joint, and what must be positive."""
-    K = joint_gains(*(port[0] for port in (m, b, k, dq, dtheta)), target(omega, xi))
+    K = joint_gains(m[0], b[0], k[0], dq[0], dtheta[0], target(omega, xi))
     return K, [m[0], b[0], k[0], *omega, *xi]
 
 

@@ -39,11 +39,11 @@ def tendon_force_pd(
 
 def tendon_force_scheduled(
     _: Any, f: Matrix, fd: Matrix, f_des: Matrix, fd_des: Matrix, f_hat: Matrix, friction: Matrix,
-    r: Matrix, B: Matrix, stiffness: Matrix, stiffness_rate: Matrix, omega0: Matrix, xi0: Matrix,
+    r: Matrix, b: Matrix, stiffness: Matrix, stiffness_rate: Matrix, omega0: Matrix, xi0: Matrix,
 ) -> Any:  # fmt: skip
     """Motor torque [N m], the gains it takes, and what must be positive."""
-    gains = scheduled_gains(B[0], r[0] * stiffness[0], r[0] * stiffness_rate[0], omega0[0], xi0[0])
+    kp, kd = gains = scheduled_gains(b[0], r[0] * stiffness[0], r[0] * stiffness_rate[0], omega0[0], xi0[0])
     error, rate = f_des[0] - f[0], fd_des[0] - fd[0]
-    tau = effort(*gains, error, rate, r[0], f_hat[0], friction[0])
+    tau = effort(kp, kd, error, rate, r[0], f_hat[0], friction[0])
     slow_enough = omega0[0] * stiffness[0] - 2 * xi0[0] * stiffness_rate[0]  # has the sign of kp
-    return tau, gains, [r[0], B[0], stiffness[0], omega0[0], xi0[0], slow_enough]
+    return tau, gains, [r[0], b[0], stiffness[0], omega0[0], xi0[0], slow_enough]

@@ -21,13 +21,13 @@ def tendon_force_pd(
 
 def tendon_force_scheduled(
     _: Any, f: SX, fd: SX, f_des: SX, fd_des: SX, f_hat: SX, friction: SX,
-    r: SX, B: SX, stiffness: SX, stiffness_rate: SX, omega0: SX, xi0: SX,
+    r: SX, b: SX, stiffness: SX, stiffness_rate: SX, omega0: SX, xi0: SX,
 ) -> Any:  # fmt: skip
     """Motor torque [N m], the gains it takes, and what must be positive."""
-    gains = _identified(r, B, stiffness, stiffness_rate, omega0, xi0)
+    gains = _identified(r, b, stiffness, stiffness_rate, omega0, xi0)
     slow_enough = omega0 * stiffness - 2 * xi0 * stiffness_rate
     tau = _torque(f, fd, f_des, fd_des, f_hat, friction, r, *ca.vertsplit(gains))
-    return tau, gains, [r, B, stiffness, omega0, xi0, slow_enough]
+    return tau, gains, [r, b, stiffness, omega0, xi0, slow_enough]
 
 
 def _torque(f: SX, fd: SX, f_des: SX, fd_des: SX, f_hat: SX, friction: SX, r: SX, kp: SX, kd: SX) -> SX:
@@ -38,13 +38,13 @@ def _torque(f: SX, fd: SX, f_des: SX, fd_des: SX, f_hat: SX, friction: SX, r: SX
     return ca.substitute(-balance, tau, SX(0)) / ca.jacobian(balance, tau)
 
 
-def _identified(r: SX, B: SX, stiffness: SX, stiffness_rate: SX, omega0: SX, xi0: SX) -> SX:
+def _identified(r: SX, b: SX, stiffness: SX, stiffness_rate: SX, omega0: SX, xi0: SX) -> SX:
     """Gains (2) from the linearised loop: its coefficients are linear in them, so two equations give both."""
     x, v, gains = SX.sym("x"), SX.sym("v"), SX.sym("gains", 2)
     slope, bend = r * stiffness, r * stiffness_rate  # of the force over the motor angle, and how it changes
     pull = gains[0] * slope * x + gains[1] * (bend * x + slope * v)
     found = ca.vertcat(ca.jacobian(pull, x), ca.jacobian(pull, v))
-    wanted = ca.vertcat(B * omega0**2, 2 * B * xi0 * omega0)
+    wanted = ca.vertcat(b * omega0**2, 2 * b * xi0 * omega0)
     matrix = ca.jacobian(found, gains)
     determinant = matrix[0, 0] * matrix[1, 1] - matrix[0, 1] * matrix[1, 0]
     cofactors = ca.vertcat(

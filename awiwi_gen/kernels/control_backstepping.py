@@ -87,9 +87,9 @@ def torques_of_motors(_: None) -> dict[str, Port]:
     return {"tau_m": Port((2,), Nm)}
 
 
-def lyapunov(energy: Unit, power: Unit, virtual: Port) -> dict[str, Port]:
+def lyapunov(energy: Unit, power: Unit, controls: Port) -> dict[str, Port]:
     """V, its rate under the law, and the virtual controls on the way to it."""
-    return {"V": Port((), energy), "Vdot": Port((), power), "virtual": virtual}
+    return {"V": Port((), energy), "Vdot": Port((), power), "controls": controls}
 
 
 # -- the example, and a joint in its link's derivatives ----------------------------------------------------

@@ -9,22 +9,27 @@ from typing import Any
 
 from awiwi_gen.control import pole_placement as placed
 from awiwi_gen.control import pole_placement_ackermann as ackermann
-from awiwi_gen.control import tendon_force, tendon_force_energy
-from awiwi_gen.kernel import Kernel, Port
+from awiwi_gen.control import state_dependent, state_dependent_spectral, tendon_force, tendon_force_energy
+from awiwi_gen.kernel import Kernel, Port, Solver
 from awiwi_gen.kernels.declare import Family, Parameterless
 from awiwi_gen.units import N, kg, m, one, rad, s
 
-laws: Family[None] = Family()
+of_tendon: Family[None] = Family()
+of_joint: Family[None] = Family()
+of_plant: Family[None] = Family()
 
 
 def linear_laws() -> list[Kernel]:
     """All kernels of the linear laws."""
-    return laws.kernels("", Parameterless(), "control", {}, PORTS, None)
+    families = ((of_tendon, TENDON), (of_joint, JOINT), (of_plant, PLANT))
+    return [k for family, ports in families for k in family.kernels("", Parameterless(), "control", {}, ports, None)]
 
 
 TORQUE = Port((), N * m)
 STATE = (rad, rad / s) * 2
 GAINS = (N * m / rad, N * m * s / rad) * 2
+WEIGHTS = (one / rad**2, s**2 / rad**2) * 2
+SPRING = (N * m / rad, N * m / rad**2, N * m / rad**3)
 
 
 def positive(*things: str) -> tuple[str, ...]:
@@ -32,8 +37,16 @@ def positive(*things: str) -> tuple[str, ...]:
     return tuple(f"{thing} is positive" for thing in things)
 
 
-PORTS = {
-    # a tendon and its motor
+MOTOR = {
+    "b": Port((), kg * m**2, 1e-4, 1e-2),
+    "dtheta": Port((), N * m * s / rad, 0.0, 0.1),
+    "k": Port((), N * m / rad, 0.05, 20.0),
+    "omega0": Port((), rad / s, 50.0, 500.0),
+    "xi0": Port((), one, 0.2, 2.0),
+    "R": Port((), one / (N * m) ** 2, 1e-6, 1.0),
+}
+TENDON = {
+    **MOTOR,
     "f": Port((), N, 0.0, 120.0),
     "fd": Port((), N / s, -5000.0, 5000.0),
     "f_des": Port((), N, 0.0, 120.0),
@@ -41,32 +54,45 @@ PORTS = {
     "f_hat": Port((), N, 0.0, 120.0),
     "friction": Port((), N * m, -2.0, 2.0),
     "r": Port((), m, 0.002, 0.02),
-    "B": Port((), kg * m**2, 1e-4, 1e-2),
     "kp": Port((), m, 1e-4, 1.0),
     "kd": Port((), m * s, 1e-6, 1e-1),
     "stiffness": Port((), N / m, 1000.0, 50000.0),
     "stiffness_rate": Port((), N / (m * s), -1e4, 1e4),
-    "omega0": Port((), rad / s, 50.0, 500.0),
-    "xi0": Port((), one, 0.2, 2.0),
-    # a joint with a spring between motor and link
-    "m": Port((), kg * m**2, 1e-7, 1e-4),
-    "b": Port((), kg * m**2, 1e-4, 1e-2),
-    "k": Port((), N * m / rad, 0.05, 20.0),
-    "dq": Port((), N * m * s / rad, 0.0, 5e-3),
-    "dtheta": Port((), N * m * s / rad, 0.0, 0.1),
+    "theta": Port((), rad, 0.0, 3.0),
+    "thd": Port((), rad / s, -20.0, 20.0),
+    "theta_des": Port((), rad, 0.0, 3.0),
+    "spring": Port((3,), SPRING, (0.01, 0.0, 0.0), (1.0, 1.0, 1.0)),
+    "weights": Port((2,), WEIGHTS[:2], (0.1, 1e-5), (100.0, 1.0)),
+}
+JOINT = {
+    **MOTOR,
+    "m": Port((), kg * m**2, 3e-7, 1e-4),
+    "dq": Port((), N * m * s / rad, 1e-5, 5e-3),
     "omega": Port((2,), rad / s, 5.0, 500.0),
     "xi": Port((2,), one, 0.2, 2.0),
+    "spring": Port((3,), SPRING, (0.1, -50.0, 0.0), (5.0, 50.0, 50.0)),
+    "weights": Port((4,), WEIGHTS, (1.0, 1e-3, 0.1, 1e-3), (100.0, 1.0, 10.0, 1.0)),
+    "R": Port((), one / (N * m) ** 2, 1e-4, 1.0),
+    "deflexion": Port((), rad, -1.0, 1.0),
+    "deflexion_des": Port((), rad, -1.0, 1.0),
     "K": Port((4,), GAINS, (-1e4, -1e2) * 2, (1e4, 1e2) * 2),
+    "K_last": Port((4,), GAINS, (-1e4, -1e2) * 2, (1e4, 1e2) * 2),
     "x": Port((4,), STATE, (-3.0, -50.0) * 2, (3.0, 50.0) * 2),
     "x_des": Port((4,), STATE, (-3.0, -50.0) * 2, (3.0, 50.0) * 2),
     "u_des": Port((), N * m, -3.0, 3.0),
+}
+PLANT = {
+    "A": Port((4, 4), one, -1e7, 1e7),
+    "B": Port((4,), one, -1e4, 1e4),
+    "Q": Port((4, 4), one, -1e6, 1e6),
+    "R": Port((), one, 1e-6, 1e3),
 }
 
 
 # -- tendon force -----------------------------------------------------------------------------------------
 
 
-@laws(
+@of_tendon(
     lambda _: {"tau": TORQUE},
     "eq. 10.2, with the signs mended",
     witness=tendon_force_energy.tendon_force_pd,
@@ -82,7 +108,7 @@ def tendon_force_pd(
     return tendon_force.tendon_force_pd(_, f, fd, f_des, fd_des, f_hat, friction, r, kp, kd)
 
 
-@laws(
+@of_tendon(
     lambda _: {"tau": TORQUE, "gains": Port((2,), (m, m * s))},
     "eq. 10.8 to 10.12, mended",
     witness=tendon_force_energy.tendon_force_scheduled,
@@ -93,22 +119,22 @@ def tendon_force_pd(
 )  # fmt: skip
 def tendon_force_scheduled(
     _: Any, f: Any, fd: Any, f_des: Any, fd_des: Any, f_hat: Any, friction: Any,
-    r: Any, B: Any, stiffness: Any, stiffness_rate: Any, omega0: Any, xi0: Any,
+    r: Any, b: Any, stiffness: Any, stiffness_rate: Any, omega0: Any, xi0: Any,
 ) -> Any:  # fmt: skip
-    """Motor torque that brings the tendon force to f_des as a motor of inertia B does on a spring of omega0 and xi0.
+    """Motor torque that brings the tendon force to f_des as a motor of inertia b does on a spring of omega0 and xi0.
 
     The gains (kp, kd) follow from the tendon's stiffness at the desired force and from its rate, which is zero where
     the desired force rests.
     """
     return tendon_force.tendon_force_scheduled(
-        _, f, fd, f_des, fd_des, f_hat, friction, r, B, stiffness, stiffness_rate, omega0, xi0
+        _, f, fd, f_des, fd_des, f_hat, friction, r, b, stiffness, stiffness_rate, omega0, xi0
     )
 
 
 # -- poles --------------------------------------------------------------------------------------------------
 
 
-@laws(
+@of_tendon(
     lambda _: {"K": Port((2,), GAINS[:2])},
     "eq. 12.7",
     witness=ackermann.pole_placement_motor,
@@ -119,7 +145,7 @@ def pole_placement_motor(_: Any, b: Any, dtheta: Any, k: Any, omega0: Any, xi0: 
     return placed.pole_placement_motor(_, b, dtheta, k, omega0, xi0)
 
 
-@laws(
+@of_joint(
     lambda _: {"K": Port((4,), GAINS)},
     "eq. 12.13 to 12.16, mended",
     witness=ackermann.pole_placement,
@@ -133,7 +159,88 @@ def pole_placement(_: Any, m: Any, b: Any, k: Any, dq: Any, dtheta: Any, omega: 
     return placed.pole_placement(_, m, b, k, dq, dtheta, omega, xi)
 
 
-@laws(lambda _: {"u": TORQUE}, "eq. 12.2, 13.3, 14.12", witness=ackermann.state_feedback)
+@of_joint(lambda _: {"u": TORQUE}, "eq. 12.2, 13.3, 14.12", witness=ackermann.state_feedback)
 def pole_placement_law(_: Any, K: Any, x: Any, x_des: Any, u_des: Any) -> Any:
     """Motor torque u_des - K (x - x_des), where u_des holds the desired state; for optimal gains just as well."""
     return placed.state_feedback(_, K, x, x_des, u_des)
+
+
+# -- optima -------------------------------------------------------------------------------------------------
+
+
+def doubling(_: Any, doublings: int = 32) -> Solver:
+    """The Riccati equation of any plant with one input."""
+    return Solver(
+        template="lqr.c.j2",
+        problem="riccati",
+        uses=(),
+        equations=(),
+        unknowns=(),
+        arrays={},
+        strings={"doublings": str(doublings)},
+        iterations=0,
+        tolerance={"f64": 1e-13, "f32": 1e-4},
+    )
+
+
+def descent(_: Any, steps: int = 32) -> Solver:
+    """The optimum of a joint with a spring."""
+    return Solver(
+        template="sdre_joint.c.j2",
+        problem="joint regulator",
+        uses=("secant_stiffness", "pole_placement_law"),
+        equations=(),
+        unknowns=(),
+        arrays={},
+        strings={"steps": str(steps)},
+        iterations=1,
+        tolerance={"f64": 1e-13, "f32": 1e-4},
+    )
+
+
+@of_plant(
+    lambda _: {"K": Port((4,), one), "S": Port((4, 4), one), "residual": Port((), one)},
+    "eq. 13.1 to 13.5",
+    solver=doubling,
+)
+def lqr(_: Any, A: Any, B: Any, Q: Any, R: Any) -> Any:
+    """Gains of u = -K x that minimise the integral of x'Q x + R u^2, and the least cost x'S x; in coherent units.
+
+    The residual is that of the Riccati equation for S, relative to its terms.
+    """
+
+
+@of_joint(
+    lambda _: {"k": Port((), N * m / rad), "torque": TORQUE},
+    "eq. 14.10, with the secant",
+    witness=state_dependent_spectral.secant_stiffness,
+)
+def secant_stiffness(_: Any, spring: Any, deflexion: Any, deflexion_des: Any) -> Any:
+    """Secant stiffness of a cubic spring between two deflexions, and its torque at the second."""
+    return state_dependent.secant_stiffness(_, spring, deflexion, deflexion_des)
+
+
+@of_tendon(
+    lambda _: {"K": Port((2,), GAINS[:2]), "u": TORQUE},
+    "eq. 14.4 to 14.9, mended",
+    witness=state_dependent_spectral.sdre_tendon,
+    guards=positive("the motor's inertia", "the torque's weight", "the angle's weight", "the speed's weight"),
+)
+def sdre_tendon(
+    _: Any, theta: Any, thd: Any, theta_des: Any, b: Any, dtheta: Any, spring: Any, weights: Any, R: Any
+) -> Any:
+    """Gains and torque of a motor on a tendon: optimal for the secant between theta and theta_des, in closed form.
+
+    The tendon's torque is spring . (theta, theta^2, theta^3).
+    """
+    return state_dependent.sdre_tendon(_, theta, thd, theta_des, b, dtheta, spring, weights, R)
+
+
+@of_joint(lambda _: {"K": Port((4,), GAINS), "u": TORQUE}, "eq. 14.10 to 14.12, mended", solver=descent)
+def sdre_joint(
+    _: Any, m: Any, b: Any, dq: Any, dtheta: Any, spring: Any, weights: Any, R: Any, K_last: Any, x: Any, x_des: Any
+) -> Any:
+    """Gains and torque of a joint with a spring: optimal for its secant between the state and the desired one.
+
+    K_last are the gains of the last tick: a guess, and what remains where there are no new ones.
+    """

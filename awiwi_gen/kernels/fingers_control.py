@@ -141,7 +141,7 @@ def antagonists(finger: Finger, group: list[int]) -> list[tuple[int, int]]:
         pairs.append((first, second))
     if len(pairs) == 2:
         a, b = (senses(finger, finger.tendons[first]) for first, _ in pairs)
-        if all(a[x] * b[y] == a[y] * b[x] for x in a | b for y in a | b):
+        if all(a[x] * b[y] == a[y] * b[x] for x in {*a, *b} for y in {*a, *b}):
             return []
     return pairs if len(pairs) <= 2 else []
 

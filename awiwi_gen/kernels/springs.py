@@ -44,7 +44,8 @@ def spring_ports(spring: Spring) -> dict[str, Port]:
 
 def reading_port(spring: Spring, tendons: int) -> Port:
     """The readings of all sensors [counts]."""
-    sensors = [spring.calibrated.get(tendon, spring).sensor for tendon in range(tendons)]
+    own = spring.calibrated
+    sensors = [own.get(tendon, spring).sensor for tendon in range(tendons)]
     ends = [sorted((float(sensor.slack), float(sensor.taut))) for sensor in sensors]
     return Port((tendons,), one, tuple(low for low, _ in ends), tuple(high for _, high in ends))
 
@@ -88,7 +89,10 @@ def lever(spring: Any, theta: Any) -> Any:
 
 @of_spring(lambda _: {"f": Port((), N)}, "figure 4.7", witness=neville.force, guards=WITHIN)
 def force(spring: Any, x: Any) -> Any:
-    """Tendon force at the elongation x, counted from the slack end of the lever's travel."""
+    """Tendon force at the elongation x, counted from the slack end of the lever's travel.
+
+    A polynomial that the check of the hand file has found within 1e-6 of the largest force from the lever's own.
+    """
     return spring_curve.force(spring, x)
 
 

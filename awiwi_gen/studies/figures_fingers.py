@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from awiwi_gen.hand import Hand
+from awiwi_gen.hand import Hand, Spring
 from awiwi_gen.hand_lever import Lever
 from awiwi_gen.kernels.base_estimate import base_of
 from awiwi_gen.studies.base_search import BaseSearch
@@ -21,12 +21,13 @@ DURATION, STEPS = 0.5, 2001  # s
 GRID = 9  # poses along each base joint
 COUNTS = (15, 30, 50)
 NOISES = (0.0, 0.5e-3, 1e-3)  # m
+VISIBLE = 1e-3  # of what a figure spans
 SEED = 517
 
 
 def figures(library: Any, hand: Hand) -> list[Figure]:
     """All figures that this hand can show: 5.7 needs an index finger and springs, the others a tensegrity base."""
-    found = [coriolis(library, hand)] if "index" in hand.fingers and hand.spring else []
+    found = [coriolis(library, hand, hand.spring)] if "index" in hand.fingers and hand.spring else []
     based = [name for name, finger in hand.fingers.items() if base_of(finger).spans]
     return found + [figure for name in based[:1] for figure in estimates(library, hand, name)]
 
@@ -53,10 +54,14 @@ class Release:
         return change
 
 
-def coriolis(library: Any, hand: Hand) -> Figure:
+def coriolis(library: Any, hand: Hand, spring: Spring) -> Figure:
     """Figure 5.7, for all that "a damping of 0.1 %" and its neighbours can mean."""
     release = released(library, hand)
-    change, seen, coarse = release.difference, resolution(library, hand, "index"), joint_error(library, "index", 0.5e-3)
+    change, seen, coarse = (
+        release.difference,
+        resolution(library, spring, "index"),
+        joint_error(library, "index", 0.5e-3),
+    )
     worst = change.max(axis=(1, 2))
     early = change[:, release.times <= DURATION / 5].max(axis=(1, 2))
     unseen = " and ".join(reading for reading, change in zip(release.readings, worst, strict=True) if change < seen)
@@ -146,7 +151,8 @@ class Estimates:
 
 def estimates(library: Any, hand: Hand, finger: str) -> list[Figure]:
     """Figures 5.16 and 5.17, over the whole range of the base joints."""
-    result, seen = estimated(BaseSearch(library, hand, finger)), resolution(library, hand, finger)
+    search = BaseSearch(library, hand, finger)
+    result, visible = estimated(search), VISIBLE * float(np.ptp(search.limits, axis=0).max())
     clean = ", ".join(f"{result.error(0.0, count):.1e} rad after {count}" for count in COUNTS)
     noisy = "; ".join(
         f"{noise * 1e3:g} mm: {', '.join(f'{result.error(noise, c):.4f}' for c in COUNTS)} rad, "
@@ -174,9 +180,9 @@ def estimates(library: Any, hand: Hand, finger: str) -> list[Figure]:
             title=f"Base joints of the {finger} by the gradient search, 30 iterations from (0, 0)",
             claim=(
                 "30 iterations find the joints, but for the corners. The mended search finds these too, from exact "
-                f"lengths within {clean} iterations; a count of the sensors is {seen:.1e} rad."
+                f"lengths to {clean} iterations; the figure shows {visible:.1e} rad."
             ),
-            holds=bool(result.error(0.0, 30) < seen),
+            holds=bool(result.error(0.0, 30) < visible),
             draw=draw_one,
         ),
         Figure(
@@ -215,12 +221,10 @@ def scatter(axes: Any, poses: Array, found: Array) -> None:
 # -- what the sensors can tell ----------------------------------------------------------------------------
 
 
-def resolution(library: Any, hand: Hand, finger: str) -> float:
+def resolution(library: Any, spring: Spring, finger: str) -> float:
     """Largest joint error [rad] at the straight finger from lengths wrong by one count of the lever's sensor."""
-    if hand.spring is None:
-        return 0.0
-    sensor = hand.spring.sensor
-    return joint_error(library, finger, Lever(hand.spring).travel / abs(float(sensor.taut) - float(sensor.slack)))
+    counts = abs(float(spring.sensor.taut) - float(spring.sensor.slack))
+    return joint_error(library, finger, Lever(spring).travel / counts)
 
 
 def joint_error(library: Any, finger: str, noise: float) -> float:

@@ -1,7 +1,7 @@
 """Algorithm 3, mended: gains of the impedance law that come near wanted feedback gains, drawn at random (section 16.3).
 
 The printed algorithm keeps the feedback gains of the best draw where it means the draw itself, and draws each gain from
-(0, 1), where no useful K_3 or K_4 lies. Its cost is the distance of two vectors whose elements have four different units.
+(0, 1), where no useful K_3 or K_4 lies. Its cost is the distance of two vectors whose elements differ in their units.
 """
 
 from __future__ import annotations

@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 from scipy.linalg import expm
 
+from awiwi_gen.studies.sampling import PERIOD, delay_margin, sampled
+
 Array = np.ndarray[Any, Any]
 
-PERIOD = 1 / 3000  # s, of the hand's clock; a measurement acts one period later
 UNIT_WEIGHTS = (1.0, 1.0)
 
 
@@ -63,7 +64,7 @@ class Loop:
         """Whether all poles lie in the left half plane."""
         return bool(self.poles().real.max() < 0)
 
-    def response(self, start: Array, times: Array, w: Array | float = 0.0) -> Array:
+    def response(self, start: Any, times: Array, w: Any = 0.0) -> Array:
         """States (times, n) from ``start`` under a constant w; the times are evenly spaced and begin at the start."""
         n = len(self.A)
         moved = (self.E + self.B @ self.H) @ np.broadcast_to(np.asarray(w, float), self.E.shape[1:])
@@ -73,47 +74,18 @@ class Loop:
             states.append(step @ states[-1])
         return np.array(states)[:, :n]
 
-    def at_rest(self, w: Array | float) -> Array:
+    def at_rest(self, w: Any) -> Array:
         """The state that the loop comes to under a constant w."""
         moved = (self.E + self.B @ self.H) @ np.broadcast_to(np.asarray(w, float), self.E.shape[1:])
         return -np.linalg.solve(self.closed, moved)
 
-    def sampled_radius(self, period: float = PERIOD, late: int = 1) -> float:
-        """Largest modulus of a pole when the law runs on a clock, its torque held and acting ``late`` samples later."""
-        n, p = self.B.shape
-        step = expm(np.block([[self.A, self.B], [np.zeros((p, n + p))]]) * period)
-        Ad, Bd = step[:n, :n], step[:n, n:]
-        if late == 0:
-            return float(np.abs(np.linalg.eigvals(Ad - Bd @ self.K)).max())
-        size = n + late * p
-        chain = np.eye(size, k=-p)  # each held torque moves one place on
-        chain[:n] = 0
-        chain[:n, :n], chain[:n, size - p :] = Ad, Bd
-        chain[n : n + p] = 0
-        chain[n : n + p, :n] = -self.K
-        return float(np.abs(np.linalg.eigvals(chain)).max())
+    def sampled_radius(self, delay: int = 1) -> float:
+        """Largest modulus of a pole when the law runs on the hand's clock and acts ``delay`` ticks later."""
+        return float(np.abs(np.linalg.eigvals(sampled(self.A, self.B, self.K, PERIOD, delay))).max())
 
     def delay_margin(self) -> float:
-        """The shortest delay [s] of a single torque that takes a pole to the imaginary axis; infinite if none does."""
-        scale = max(1.0, float(np.abs(self.poles()).max()))  # of time, so that polynomials keep their digits
-        below = np.poly(self.A / scale)
-        above = np.poly(self.closed / scale) - below
-        gap = _squared_modulus(above) - _squared_modulus(below)
-        crossings = np.sqrt(
-            [root.real for root in np.roots(gap) if abs(root.imag) < 1e-9 * abs(root) and root.real > 0]
-        )
-        if not crossings.size:
-            return float("inf")
-        angles = np.angle(np.polyval(above, 1j * crossings) / np.polyval(below, 1j * crossings))
-        return float(np.min(np.mod(np.pi + angles, 2 * np.pi) / crossings) / scale)
-
-
-def _squared_modulus(polynomial: Array) -> Array:
-    """|p(i w)|^2 as a polynomial of w^2."""
-    turned = polynomial * np.array([1j**power for power in range(len(polynomial) - 1, -1, -1)])
-    product = np.convolve(turned, turned.conj())
-    squared: Array = product.real[::2]
-    return squared
+        """The shortest delay [s] that takes a pole to the imaginary axis; infinite if none does."""
+        return delay_margin(self.A, self.B, self.K)
 
 
 def slopes(law: Any, port: str, size: int, **held: Any) -> Array:

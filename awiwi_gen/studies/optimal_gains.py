@@ -18,6 +18,8 @@ from scipy.linalg import solve_continuous_are
 from awiwi_gen.errors import InputError
 from awiwi_gen.studies.joint_loops import Array, Loop, Plant, joint_loop
 
+Quadratic = tuple[float, float]
+
 STEPS = 0.5 ** np.arange(1.0, 40.0)  # tried from the longest on, in parts of the distance to the impedance's origin
 _PAIRINGS: dict[int, tuple[tuple[int, ...], ...]] = {
     0: ((),),
@@ -57,7 +59,7 @@ def cancelling(plant: Plant) -> Array:
 
 
 def exact_gains(library: Any, plant: Plant, wanted: Array) -> Gains:
-    """Gains whose feedback on the plant of table 16.1 is exactly ``wanted``.
+    """Gains whose feedback on the plant of table 16.1 is exactly ``wanted``: those that settle a pretension fastest.
 
     Raises InputError where the closed loop is not stable, or four equal poles leave no two pairs.
     """
@@ -66,25 +68,30 @@ def exact_gains(library: Any, plant: Plant, wanted: Array) -> Gains:
     poles = np.roots([1, c[3], c[2], c[1] / m, c[0] / m])
     if not poles.real.max() < 0:
         raise InputError(
-            f"the feedback gains {wanted.tolist()} do not stabilise the joint: a pole at {poles.max():.3g}"
+            f"the feedback gains {_short(wanted)} do not stabilise the joint; its poles are {_short(poles)}"
         )
-    for (a1, a0), (sigma, pi) in pairs(poles):
-        slow = min(sigma / 2, pi / (2 * sigma))  # a K_4 that leaves K_3 and C_s positive
-        towards = np.array([[pi / a0 - 1, a1 - sigma], [a1 * pi / a0 - sigma, a0 - pi]])
-        if abs(np.linalg.det(towards)) <= 1e-12 * np.prod(np.linalg.norm(towards, axis=1)):
-            continue
-        impedance = m * np.array([a0, a1])
-        direction = np.linalg.solve(towards, [1, slow])
-        tried = impedance + STEPS[:, None] * direction / np.max(np.abs(direction) / impedance)
-        found = library.optimal_backstepping_weights(K_opt=wanted, plant=plant.numbers, impedance=tried)
-        for place in np.flatnonzero(found.status == 0):
-            return Gains(np.append(tried[place], found.rates[place]), found.weights[place])
-    raise InputError(
-        f"the feedback gains {wanted.tolist()} put the poles where they form no two different pairs: {poles}"
-    )
+    found = [gains for link, torque in pairs(poles) for gains in _near(library, plant, wanted, link, torque)]
+    if not found:
+        raise InputError(f"the feedback gains {_short(wanted)} leave no two different pairs of poles: {_short(poles)}")
+    return min(found, key=lambda gains: pretension_loop(plant, gains).sampled_radius())
 
 
-def pairs(poles: Array) -> Iterator[tuple[tuple[float, float], tuple[float, float]]]:
+def _near(library: Any, plant: Plant, wanted: Array, link: Quadratic, torque: Quadratic) -> Iterator[Gains]:
+    """The exact gains nearest to an impedance that alone would have one pair of the poles, at most one set."""
+    (a1, a0), (sigma, pi) = link, torque
+    slow = min(sigma / 2, pi / (2 * sigma))  # a K_4 that leaves K_3 and C_s positive
+    towards = np.array([[pi / a0 - 1, a1 - sigma], [a1 * pi / a0 - sigma, a0 - pi]])
+    if abs(np.linalg.det(towards)) <= 1e-12 * np.prod(np.linalg.norm(towards, axis=1)):
+        return
+    impedance = plant.m * np.array([a0, a1])
+    direction = np.linalg.solve(towards, [1, slow])
+    tried = impedance + STEPS[:, None] * direction / np.max(np.abs(direction) / impedance)
+    found = library.optimal_backstepping_weights(K_opt=wanted, plant=plant.numbers, impedance=tried)
+    for place in np.flatnonzero(found.status == 0)[:1]:
+        yield Gains(np.append(tried[place], found.rates[place]), found.weights[place])
+
+
+def pairs(poles: Array) -> Iterator[tuple[Quadratic, Quadratic]]:
     """All ways to group four poles into two real quadratics s^2 + a s + b, given as (a, b), in either order."""
     upper = sorted((z for z in poles if z.imag > 0), key=abs)
     real = sorted(-z.real for z in poles if z.imag == 0)
@@ -99,3 +106,16 @@ def pairs(poles: Array) -> Iterator[tuple[tuple[float, float], tuple[float, floa
 def loop_of(plant: Plant, wanted: Array) -> Loop:
     """The joint under feedback gains of the plant of table 16.1, with the spring cancelled."""
     return joint_loop(plant, wanted - cancelling(plant), np.zeros(2))
+
+
+def pretension_loop(plant: Plant, gains: Gains) -> Loop:
+    """The torque that both motors of a pair have in common: the link does not feel it (section 15.5)."""
+    _, _, fast, slow = gains.gains
+    back = plant.b / plant.k
+    K = back * np.array([[fast * slow + gains.weights[0] / gains.weights[1], fast + slow]]) - [[1, 0]]
+    A = np.array([[0, 1], [-1 / back, 0]])
+    return Loop(A, np.array([[0], [1 / back]]), np.zeros((2, 1)), K, np.zeros((1, 1)))
+
+
+def _short(numbers: Array) -> str:
+    return ", ".join(f"{number:.4g}" for number in numbers)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -82,29 +83,20 @@ def at_rest(loop: Loop, constant: Array) -> Array:
 
 
 def literal_loop(pair: Pair, impedance: Any, tuning: Any = TUNING) -> Loop:
-    """The closed loop of eq. 15.106 as it stands, its algebraic loop through tau'' solved; K is not used on its own.
+    """The closed loop of eq. 15.106 as it stands, with its algebraic loop through tau'' solved.
 
-    Everything is a row over the six states. Without a pretension tau_d = s (-K_p q - K_d q') / 2 for the side s.
+    Without a pretension tau_d = s (-K_p q - K_d q') / 2 on the side s; all signals are rows over the six states.
     """
     A, B, E = pair.open_loop()
-    K_p, K_d = impedance
-    K_3, K_4, C_t, C_s = tuning
+    (K_p, K_d), (K_3, K_4, C_t, C_s) = impedance, tuning
     states = np.eye(6)
-    q, qd, qdd = states[0], states[1], A[1]
+    motion = [states[0], states[1], A[1], A[1] @ A]
     feedback = np.zeros((2, 6))
     for i, (b, k, side) in enumerate(zip(pair.b, pair.k, SIDES, strict=True)):
-        tau, taud = states[2 * i + 2], states[2 * i + 3]
-        third = qdd @ _known(A, 1)
-        target = [side * (-K_p * x - K_d * y) / 2 for x, y in ((q, qd), (qd, qdd), (qdd, third))]
-        error, rate = tau - target[0], taud - target[1]
-        # (1 - K_t / C_t) (tau'' - tau_d'') = -s q''' / C_t - C_t / C_s e - K_s / C_s (s q' / C_t + (1 - K_t / C_t) e')
-        fed_back = 1 - K_3 * C_t / C_t
-        pull = -side * third / C_t - C_t / C_s * error - K_4 * (side * qd / C_t + fed_back * rate)
-        second = target[2] + pull / fed_back
-        feedback[i] = tau + b * side * qdd + b / k * second
+        tau, rate = states[2 * i + 2 : 2 * i + 4]
+        target = [-side * (K_p * x + K_d * y) / 2 for x, y in pairwise(motion)]
+        # (1 - K_t / C_t) (tau'' - tau_d'') = -s q''' / C_t - C_t / C_s e - K_4 (s q' / C_t + (1 - K_t / C_t) e')
+        error, error_rate, factor = tau - target[0], rate - target[1], 1 - K_3
+        pull = -side * motion[3] / C_t - C_t / C_s * error - K_4 * (side * motion[1] / C_t + factor * error_rate)
+        feedback[i] = tau + b * side * motion[2] + b / k * (target[2] + pull / factor)
     return Loop(A, B, E, -feedback, np.zeros((2, 2)))
-
-
-def _known(A: Array, order: int) -> Array:
-    """The plant's matrix; rows of torque rates are never reached by so few derivatives of the link."""
-    return A if order else np.eye(len(A))

@@ -9,9 +9,9 @@
     R = 1.0
 
 Every tendon is tuned as one half of its joint; tendons are shared out so that each joint has its pair. Two motors of
-inertia b behind springs k move the link as one motor 2 b behind a spring 2 k does, with half the weights (section 15.5);
-so the regulator is that of a single joint, and its gains are those of either motor. Gains that a clock of 3 kHz would
-make unstable are refused.
+inertia b behind springs k move the link as one motor 2 b behind a spring 2 k does, with half the weights (section
+15.5); so the regulator is that of a single joint, and its gains are those of either motor. Gains that a clock of 3 kHz
+would make unstable are refused.
 """
 
 from __future__ import annotations
@@ -29,8 +29,9 @@ from awiwi_gen.hand import Finger, Hand
 from awiwi_gen.hand_file import HandFile
 from awiwi_gen.hand_gains import TendonGains
 from awiwi_gen.hand_parts import Measure, Part
-from awiwi_gen.studies.joint_loops import PERIOD, Array, Plant
-from awiwi_gen.studies.optimal_gains import Gains, cancelling, exact_gains, loop_of, regulator
+from awiwi_gen.studies.joint_loops import Array, Loop, Plant
+from awiwi_gen.studies.optimal_gains import Gains, cancelling, exact_gains, loop_of, pretension_loop, regulator
+from awiwi_gen.studies.sampling import PERIOD
 from awiwi_gen.units import Quantity
 
 Rows = tuple[tuple[float, ...], ...]
@@ -160,24 +161,29 @@ def joints_of(arms: Array) -> list[int]:
 
 def tune_tendon(library: Any, tendon: int, joint: str, plant: Plant, Q: Array, R: float) -> Tuned:
     """Gains of one tendon of a pair. Raises InputError if they fail on the clock, with the nearest R that does not."""
-    wanted = regulator(plant, Q, R) + cancelling(plant)
-    loop = loop_of(plant, wanted)
-    radius = loop.sampled_radius()
+    single, loops = _regulated(library, plant, Q, R)
+    radius, margin = max(loop.sampled_radius() for loop in loops), min(loop.delay_margin() for loop in loops)
     if radius >= 1:
         raise InputError(
-            f"R = {R:g} asks for gains that are unstable at {1 / PERIOD:.0f} Hz and a delay of one sample "
-            f"(spectral radius {radius:.3g}, delay margin {loop.delay_margin() * 1e6:.0f} us); {_way_out(plant, Q, R)}"
+            f"R = {R:g} asks for gains that are unstable at {1 / PERIOD:.0f} Hz and a delay of one sample (spectral "
+            f"radius {radius:.3g}, delay margin {margin * 1e6:.0f} us); {_way_out(library, plant, Q, R)}"
         )
-    single = exact_gains(library, plant, wanted)
-    gains = Gains(single.gains, 2 * single.weights)
-    return Tuned(tendon, joint, plant, gains, radius, loop.delay_margin())
+    return Tuned(tendon, joint, plant, Gains(single.gains, 2 * single.weights), radius, margin)
 
 
-def _way_out(plant: Plant, Q: Array, R: float) -> str:
+def _regulated(library: Any, plant: Plant, Q: Array, R: float) -> tuple[Gains, tuple[Loop, Loop]]:
+    """The gains of the regulator, and the loops of the link and of the pretension."""
+    wanted = regulator(plant, Q, R) + cancelling(plant)
+    gains = exact_gains(library, plant, wanted)
+    return gains, (loop_of(plant, wanted), pretension_loop(plant, gains))
+
+
+def _way_out(library: Any, plant: Plant, Q: Array, R: float) -> str:
     """The least R that the clock allows, by bisection."""
 
     def works(factor: float) -> bool:
-        return loop_of(plant, regulator(plant, Q, factor * R) + cancelling(plant)).sampled_radius() < 1
+        _, loops = _regulated(library, plant, Q, factor * R)
+        return all(loop.sampled_radius() < 1 for loop in loops)
 
     low, high = 1.0, 10.0
     while not works(high):
