@@ -251,12 +251,36 @@ def report(
 
     figures, proof = publish(make_job(hand), page)
     if as_json:
-        print_json([{key: getattr(f, key) for key in ("number", "title", "claim", "holds")} for f in figures])
+        print_json([{"number": f.number, "title": f.title, "claim": f.claim, "holds": bool(f.holds)} for f in figures])
     else:
         print("\n".join(f"figure {figure.number}: the claim {verdict(figure)}" for figure in figures))
         proved = f"{sum(v.passed for v in proof.verdicts)} of {len(proof.verdicts)} kernels proved"
         print(f"{page}: {len(figures)} figures, {proved}")
     return 0 if proof.passed else 1
+
+
+@command
+def tune(
+    costs: Annotated[Path, typer.Option("--costs", help="TOML file of what motion and torque cost.")],
+    hand: HandFile = None, as_json: Json = False,
+    output: Annotated[Path, typer.Option("--output", "-o", help="File of gains to write.")] = Path("gains.toml"),
+) -> int:  # fmt: skip
+    """Find gains of the backstepping law for every tendon, and write them for the hand file to take in."""
+    from awiwi_gen.report import print_json
+
+    try:
+        from awiwi_gen.studies.tune import tune_hand, write_gains
+    except ModuleNotFoundError as error:
+        raise InputError(f"{error.name} needed for tuning; install it: pip install 'awiwi_gen[studies]'") from None
+    tuned = tune_hand(make_job(hand).hand, costs)
+    write_gains(output, tuned)
+    if as_json:
+        print_json([each.as_dict() for each in tuned])
+    else:
+        radius, margin = max(e.sampled_radius for e in tuned), min(e.delay_margin for e in tuned)
+        print(f"{output}: gains of {len(tuned)} tendons; spectral radius {radius:.4f} at most at 3 kHz and one sample")
+        print(f"of delay, delay margin {margin * 1e6:.0f} us at least")
+    return 0
 
 
 def mend(job: Any, hand: Path | None, output: Path) -> str:

@@ -156,7 +156,7 @@ class Machine:
         return sum(self._size(name) for name in self.loop.states)
 
     def _size(self, name: str) -> int:
-        return self.places[name].stop - self.places[name].start
+        return len(self.where(name))
 
     # -- places ---------------------------------------------------------------------------------------------
 
@@ -261,7 +261,8 @@ class Machine:
         """Run the scenario from the present signals on."""
         ffi = self.library.ffi
         driven = [(self.where(name), self._rows(value, scenario)) for name, value in scenario.inputs.items()]
-        values = np.hstack([np.zeros((scenario.ticks, 0)), *(rows for _, rows in driven)]).astype(self._dtype, order="C")
+        rows = np.hstack([np.zeros((scenario.ticks, 0)), *(rows for _, rows in driven)])
+        values = np.ascontiguousarray(rows, self._dtype)
         inputs = [place for places, _ in driven for place in places]
         parts = {name: self.where(name) for name in watch}
         places = [place for part in parts.values() for place in part]

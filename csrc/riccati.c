@@ -156,7 +156,7 @@ static int redouble(int n, awiwi_real *A, awiwi_real *G, awiwi_real *H)
 static void weigh(const plant *p, solution *x)
 {
     const int n = p->n;
-    awiwi_real most = 0;
+    awiwi_real terms[N] = {0};
     for (int j = 0; j < n; j++) {
         x->K[j] = 0;
         for (int i = 0; i < n; i++)
@@ -164,18 +164,22 @@ static void weigh(const plant *p, solution *x)
     }
     for (int i = 0; i < n; i++)
         for (int j = 0; j < n; j++) {
-            const awiwi_real saved = x->K[i] * p->R * x->K[j];
-            awiwi_real sum = p->Q[i * n + j] - saved, terms = awiwi_size(p->Q[i * n + j]) + awiwi_size(saved);
+            awiwi_real sum = p->Q[i * n + j] - x->K[i] * p->R * x->K[j];
             for (int k = 0; k < n; k++) {
                 const awiwi_real SA = x->S[i * n + k] * p->A[k * n + j], AS = x->S[j * n + k] * p->A[k * n + i];
                 sum += SA + AS;
-                terms += awiwi_size(SA) + awiwi_size(AS);
+                terms[i] += i == j ? awiwi_size(SA) + awiwi_size(AS) : 0;
             }
             x->E[i * n + j] = sum;
             x->loop[i * n + j] = p->A[i * n + j] - p->b[i] * x->K[j];
-            most = terms > most ? terms : most;
         }
-    x->residual = most > 0 ? awiwi_largest(x->E, n * n) / most : 0;
+    for (int i = 0; i < n; i++)
+        terms[i] = sqrt(terms[i] + awiwi_size(p->Q[i * n + i]) + x->K[i] * p->R * x->K[i]);
+    x->residual = 0;
+    for (int i = 0; i < n * n; i++) {
+        const awiwi_real part = awiwi_size(x->E[i]), whole = terms[i / n] * terms[i % n];
+        x->residual = part <= x->residual * whole ? x->residual : part / whole;
+    }
 }
 
 static int place(int i, int j)

@@ -41,7 +41,7 @@ typedef struct moves {
 enum { AT_LOW = -1, FREE = 0, AT_HIGH = 1 };
 
 static const awiwi_real LEAST_SHARE = (awiwi_real)1 / 32; /* of a unit move that is worth a direction: below 1 / 16 */
-static const awiwi_real DAMPING = (awiwi_real)1 / 4096;
+static const awiwi_real DAMPING = (awiwi_real)1 / 4096;       /* of steps where the cost bends down */
 
 static awiwi_real size(awiwi_real x)
 {
@@ -80,7 +80,7 @@ static int torque_cost(const task *s, const vector f, model *c)
         trace += c->hessian[i][i];
     }
     for (int i = 0; i < s->count; i++)
-        c->curvature[i] = DAMPING * trace; /* among moves that change nothing, the short ones */
+        c->curvature[i] = 1024 * AWIWI_REAL_EPSILON * trace; /* of moves that do the same, the shortest */
     return 0;
 }
 
@@ -221,8 +221,8 @@ static int solve(int n, matrix H, awiwi_real least, const vector b, vector x)
 }
 
 /* Newton's step of the free tendons along the moves that are allowed; where the cost bends down, that of Gauss and
-   Newton, damped. */
-static void newton(const task *s, const model *c, const moves *m, vector step)
+   Newton, damped. Returns what it is to gain. */
+static awiwi_real newton(const task *s, const model *c, const moves *m, vector step)
 {
     const int n = m->count - m->rank;
     matrix H, full;
@@ -247,11 +247,12 @@ static void newton(const task *s, const model *c, const moves *m, vector step)
         for (int j = 0; j < n; j++)
             H[j][j] += DAMPING * trace;
         if (!solve(n, H, 0, b, x))
-            return;
+            return 0;
     }
     for (int j = 0; j < n; j++)
         for (int i = 0; i < s->count; i++)
             step[i] += x[j] * m->along[m->rank + j][i];
+    return dot(b, x, n) / 2;
 }
 
 /* The held tendon that most lowers the cost by leaving its limit, with the free ones making up for its torque; -1 if
@@ -303,6 +304,7 @@ static awiwi_real inside(const task *s, awiwi_real x)
 static int descend(const task *s, int steps, vector f, model *here)
 {
     int held[AWIWI_MOST_TENDONS] = {0}, left = -1, stopped;
+    awiwi_real last = AWIWI_REAL_MAX;
     model there;
     moves m;
     if (cost(s, f, here))
@@ -311,19 +313,22 @@ static int descend(const task *s, int steps, vector f, model *here)
     while (steps-- > 0) {
         vector step, trial;
         awiwi_real longest = 0;
-        newton(s, here, &m, step);
+        const awiwi_real gain = newton(s, here, &m, step);
         for (int i = 0; i < s->count; i++)
             longest = size(step[i]) > longest ? size(step[i]) : longest;
         if (!(longest <= AWIWI_REAL_MAX))
             return AWIWI_NOT_FINITE;
         awiwi_real share = reach(s, f, step, &stopped);
-        if (longest <= s->tolerance * s->t->high) {
+        const int rounding = gain <= here->blur && 2 * longest >= last; /* nothing to gain, and no nearer */
+        last = longest;
+        if (longest <= s->tolerance * s->t->high || rounding) {
             for (int i = 0; i < s->count; i++)
                 f[i] = inside(s, f[i] + share * step[i]);
             left = leaving(s, here, &m, held);
             if (left < 0)
                 return AWIWI_OK;
             held[left] = FREE;
+            last = AWIWI_REAL_MAX;
             split(s, held, &m);
             continue;
         }
@@ -350,6 +355,7 @@ static int descend(const task *s, int steps, vector f, model *here)
         if (stopped >= 0) {
             held[stopped] = step[stopped] < 0 ? AT_LOW : AT_HIGH;
             f[stopped] = step[stopped] < 0 ? s->t->low : s->t->high;
+            last = AWIWI_REAL_MAX;
             split(s, held, &m);
         }
     }

@@ -6,13 +6,13 @@
  *   in   k[2] in 1, 0.01 to 10
  *   out  V[1] in 1
  *   out  Vdot[1] in 1
- *   out  virtual[1] in 1
+ *   out  controls[1] in 1
  * Cost: 5 add, 6 mul, 2 neg.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
 #include "kernels.h"
 
-void awiwi_backstepping_academic_lyapunov(const double x[restrict 2], const double k[restrict 2], double V[restrict 1], double Vdot[restrict 1], double virtual[restrict 1])
+void awiwi_backstepping_academic_lyapunov(const double x[restrict 2], const double k[restrict 2], double V[restrict 1], double Vdot[restrict 1], double controls[restrict 1])
 {
     const double t0 = x[0]*x[0];
     const double t1 = k[0]*x[0] + t0;
@@ -20,5 +20,5 @@ void awiwi_backstepping_academic_lyapunov(const double x[restrict 2], const doub
     const double t3 = t2*t2;
     V[0] = 0.5*(t0 + t3);
     Vdot[0] = -(t0*(k[0] + t0)) - k[1]*t3;
-    virtual[0] = -t1;
+    controls[0] = -t1;
 }

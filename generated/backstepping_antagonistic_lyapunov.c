@@ -14,13 +14,13 @@
  *   in   tunings[2][4] in 1/s, rad/(N m), rad s^2/(N m), from [0.1, 0.1, 0.01, 1e-06, 0.1, 0.1, 0.01, 1e-06] to [2000, 2000, 100, 100, 2000, 2000, 100, 100]
  *   out  V[1] in J
  *   out  Vdot[1] in W
- *   out  virtual[2][2] in N m, N m/s
+ *   out  controls[2][2] in N m, N m/s
  * Cost: 31 add, 29 mul, 3 div, 1 neg.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
 #include "kernels.h"
 
-void awiwi_backstepping_antagonistic_lyapunov(const double joint[restrict 2], const double torques[restrict 4], const double desired[restrict 5], const double pretension[restrict 3], const double external[restrict 2], const double inertias[restrict 3], const double springs[restrict 4], const double impedance[restrict 2], const double tunings[restrict 8], double V[restrict 1], double Vdot[restrict 1], double virtual[restrict 4])
+void awiwi_backstepping_antagonistic_lyapunov(const double joint[restrict 2], const double torques[restrict 4], const double desired[restrict 5], const double pretension[restrict 3], const double external[restrict 2], const double inertias[restrict 3], const double springs[restrict 4], const double impedance[restrict 2], const double tunings[restrict 8], double V[restrict 1], double Vdot[restrict 1], double controls[restrict 4])
 {
     (void)springs;
     const double t0 = desired[0] - joint[0];
@@ -48,8 +48,8 @@ void awiwi_backstepping_antagonistic_lyapunov(const double joint[restrict 2], co
     const double t22 = t21*(tunings[7]*t21);
     V[0] = t0*t2 + t3*t5 + 0.5*(t9*t10 + t12*t13 + t18 + t22);
     Vdot[0] = -(external[0]*t4) - impedance[1]*t5 - t15*t10 - t19*t13 - tunings[1]*t18 - tunings[5]*t22;
-    virtual[0] = t8;
-    virtual[1] = t16;
-    virtual[2] = t11;
-    virtual[3] = t20;
+    controls[0] = t8;
+    controls[1] = t16;
+    controls[2] = t11;
+    controls[3] = t20;
 }

@@ -11,13 +11,13 @@
  *   in   weights[2] in rad/(N m), rad s^2/(N m), from [0.01, 1e-06] to [100, 100]
  *   out  V[1] in J
  *   out  Vdot[1] in W
- *   out  virtual[2] in N m, N m/s
+ *   out  controls[2] in N m, N m/s
  * Cost: 18 add, 18 mul, 2 div, 1 neg.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
 #include "kernels.h"
 
-void awiwi_backstepping_impedance_lyapunov(const double state[restrict 4], const double desired[restrict 5], const double external[restrict 2], const double plant[restrict 3], const double gains[restrict 4], const double weights[restrict 2], double V[restrict 1], double Vdot[restrict 1], double virtual[restrict 2])
+void awiwi_backstepping_impedance_lyapunov(const double state[restrict 4], const double desired[restrict 5], const double external[restrict 2], const double plant[restrict 3], const double gains[restrict 4], const double weights[restrict 2], double V[restrict 1], double Vdot[restrict 1], double controls[restrict 2])
 {
     const double t0 = desired[1] - state[1];
     const double t1 = desired[0] - state[0];
@@ -32,6 +32,6 @@ void awiwi_backstepping_impedance_lyapunov(const double state[restrict 4], const
     const double t10 = t9*(weights[1]*t9);
     V[0] = 0.5*(plant[0]*t0*t0 + t1*t2 + t5*t6 + t10);
     Vdot[0] = -(t0*(external[0] + t3)) - t7*t6 - gains[3]*t10;
-    virtual[0] = t4;
-    virtual[1] = t8;
+    controls[0] = t4;
+    controls[1] = t8;
 }

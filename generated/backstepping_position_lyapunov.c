@@ -10,13 +10,13 @@
  *   in   scales[3] in s^2, s^4, s^6, from [0.0001, 1e-08, 1e-12] to [10, 10, 10]
  *   out  V[1] in rad^2
  *   out  Vdot[1] in rad^2/s
- *   out  virtual[3] in rad/s, rad/s^2, rad/s^3
+ *   out  controls[3] in rad/s, rad/s^2, rad/s^3
  * Cost: 22 add, 20 mul, 2 div, 1 neg.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
 #include "kernels.h"
 
-void awiwi_backstepping_position_lyapunov(const double motion[restrict 4], const double desired[restrict 5], const double plant[restrict 3], const double rates[restrict 4], const double scales[restrict 3], double V[restrict 1], double Vdot[restrict 1], double virtual[restrict 3])
+void awiwi_backstepping_position_lyapunov(const double motion[restrict 4], const double desired[restrict 5], const double plant[restrict 3], const double rates[restrict 4], const double scales[restrict 3], double V[restrict 1], double Vdot[restrict 1], double controls[restrict 3])
 {
     (void)plant;
     const double t0 = desired[0] - motion[0];
@@ -37,7 +37,7 @@ void awiwi_backstepping_position_lyapunov(const double motion[restrict 4], const
     const double t15 = t14*(scales[2]*t14);
     V[0] = 0.5*(t0*t0 + t3*t4 + t10*t11 + t15);
     Vdot[0] = -(t0*t1) - t8*t4 - t12*t11 - rates[3]*t15;
-    virtual[0] = t2;
-    virtual[1] = t9;
-    virtual[2] = t13;
+    controls[0] = t2;
+    controls[1] = t9;
+    controls[2] = t13;
 }

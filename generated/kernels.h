@@ -208,7 +208,7 @@ void awiwi_thumb_joint_stiffness(const double q[4], const double f[8], const dou
  *   in   start[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   out  q[4] in rad
  * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
- * Cost: at most 24 times that of thumb_tendon_lengths and thumb_coupling.
+ * Cost: at most 24 times that of thumb_tendon_lengths and thumb_coupling, and the solver's own.
  */
 int awiwi_thumb_joint_estimate(const double h[8], const double start[4], double q[4]);
 
@@ -225,30 +225,13 @@ int awiwi_thumb_joint_estimate(const double h[8], const double start[4], double 
 void awiwi_thumb_joint_estimate_error(const double q[4], const double noise[1], double covariance[16], double worst[4]);
 
 /*
- * Tendon forces from f_min to f_max that give the joint torque tau and come nearest to the joint
- * stiffness K. The torque is exact where the limits allow it, else the nearest (AWIWI_INFEASIBLE). The
- * stiffness is the nearest of all with that torque, by the sum of the squares of the errors of all
- * entries (the squared Frobenius norm).
- * Source: eq. 7.2, 7.6, mended.
- *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
- *   in   tau[4] in N m, -1 to 1
- *   in   K[4][4] in N m/rad, -50 to 50
- *   in   f_min[1] in N, 3.87595 to 27.9443
- *   in   f_max[1] in N, 76.0811 to 100.149
- *   out  f[8] in N
- * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
- * Cost: at most 357 times that of thumb_coupling and thumb_tendon_stiffness and thumb_coupling_derivative.
- */
-int awiwi_thumb_tendon_distribution(const double q[4], const double tau[4], const double K[16], const double f_min[1], const double f_max[1], double f[8]);
-
-/*
  * Base joint angles whose span lengths are nearest to the measured h, by gradient search from start.
  * Source: eq. 5.20, 5.24, algorithm 1, mended.
  *   in   h[4] in m, 0 to 0.15149
  *   in   start[2] in rad, -0.610865 to 0.610865
  *   out  q[2] in rad
  * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
- * Cost: at most 51 times that of thumb_tendon_lengths and thumb_coupling.
+ * Cost: at most 51 times that of thumb_tendon_lengths and thumb_coupling, and the solver's own.
  */
 int awiwi_thumb_base_estimate_by_gradient(const double h[4], const double start[2], double q[2]);
 
@@ -466,23 +449,6 @@ void awiwi_index_joint_estimate(const double h[8], const double start[4], double
 void awiwi_index_joint_estimate_error(const double q[4], const double noise[1], double covariance[16], double worst[4]);
 
 /*
- * Tendon forces from f_min to f_max that give the joint torque tau and come nearest to the joint
- * stiffness K. The torque is exact where the limits allow it, else the nearest (AWIWI_INFEASIBLE). The
- * stiffness is the nearest of all with that torque, by the sum of the squares of the errors of all
- * entries (the squared Frobenius norm).
- * Source: eq. 7.2, 7.6, mended.
- *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
- *   in   tau[4] in N m, -1 to 1
- *   in   K[4][4] in N m/rad, -50 to 50
- *   in   f_min[1] in N, 3.87595 to 27.9443
- *   in   f_max[1] in N, 76.0811 to 100.149
- *   out  f[8] in N
- * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
- * Cost: at most 357 times that of index_coupling and index_tendon_stiffness.
- */
-int awiwi_index_tendon_distribution(const double q[4], const double tau[4], const double K[16], const double f_min[1], const double f_max[1], double f[8]);
-
-/*
  * Stiffness of every tendon that is pulled with a tension: spring and fibre in series, and its
  * derivatives. slope and curvature are dk/df and d2k/df2.
  * Source: figure 4.7, section 4.3.
@@ -694,23 +660,6 @@ void awiwi_middle_joint_estimate(const double h[8], const double start[4], doubl
  * Cost: 10 mul.
  */
 void awiwi_middle_joint_estimate_error(const double q[4], const double noise[1], double covariance[16], double worst[4]);
-
-/*
- * Tendon forces from f_min to f_max that give the joint torque tau and come nearest to the joint
- * stiffness K. The torque is exact where the limits allow it, else the nearest (AWIWI_INFEASIBLE). The
- * stiffness is the nearest of all with that torque, by the sum of the squares of the errors of all
- * entries (the squared Frobenius norm).
- * Source: eq. 7.2, 7.6, mended.
- *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
- *   in   tau[4] in N m, -1 to 1
- *   in   K[4][4] in N m/rad, -50 to 50
- *   in   f_min[1] in N, 3.87595 to 27.9443
- *   in   f_max[1] in N, 76.0811 to 100.149
- *   out  f[8] in N
- * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
- * Cost: at most 357 times that of middle_coupling and middle_tendon_stiffness.
- */
-int awiwi_middle_tendon_distribution(const double q[4], const double tau[4], const double K[16], const double f_min[1], const double f_max[1], double f[8]);
 
 /*
  * Stiffness of every tendon that is pulled with a tension: spring and fibre in series, and its
@@ -926,23 +875,6 @@ void awiwi_ring_joint_estimate(const double h[6], const double start[3], double 
 void awiwi_ring_joint_estimate_error(const double q[3], const double noise[1], double covariance[9], double worst[3]);
 
 /*
- * Tendon forces from f_min to f_max that give the joint torque tau and come nearest to the joint
- * stiffness K. The torque is exact where the limits allow it, else the nearest (AWIWI_INFEASIBLE). The
- * stiffness is the nearest of all with that torque, by the sum of the squares of the errors of all
- * entries (the squared Frobenius norm).
- * Source: eq. 7.2, 7.6, mended.
- *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
- *   in   tau[3] in N m, -1 to 1
- *   in   K[3][3] in N m/rad, -50 to 50
- *   in   f_min[1] in N, 3.87595 to 27.9443
- *   in   f_max[1] in N, 76.0811 to 100.149
- *   out  f[6] in N
- * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
- * Cost: at most 66 times that of ring_coupling and ring_tendon_stiffness.
- */
-int awiwi_ring_tendon_distribution(const double q[3], const double tau[3], const double K[9], const double f_min[1], const double f_max[1], double f[6]);
-
-/*
  * Stiffness of every tendon that is pulled with a tension: spring and fibre in series, and its
  * derivatives. slope and curvature are dk/df and d2k/df2.
  * Source: figure 4.7, section 4.3.
@@ -1154,23 +1086,6 @@ void awiwi_fifth_joint_estimate(const double h[8], const double start[4], double
  * Cost: 8 mul.
  */
 void awiwi_fifth_joint_estimate_error(const double q[4], const double noise[1], double covariance[16], double worst[4]);
-
-/*
- * Tendon forces from f_min to f_max that give the joint torque tau and come nearest to the joint
- * stiffness K. The torque is exact where the limits allow it, else the nearest (AWIWI_INFEASIBLE). The
- * stiffness is the nearest of all with that torque, by the sum of the squares of the errors of all
- * entries (the squared Frobenius norm).
- * Source: eq. 7.2, 7.6, mended.
- *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
- *   in   tau[4] in N m, -1 to 1
- *   in   K[4][4] in N m/rad, -50 to 50
- *   in   f_min[1] in N, 3.87595 to 27.9443
- *   in   f_max[1] in N, 76.0811 to 100.149
- *   out  f[8] in N
- * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
- * Cost: at most 66 times that of fifth_coupling and fifth_tendon_stiffness.
- */
-int awiwi_fifth_tendon_distribution(const double q[4], const double tau[4], const double K[16], const double f_min[1], const double f_max[1], double f[8]);
 
 /*
  * Angles of coupler and rocker at a joint angle, and their turns per turn of the joint. The
@@ -1434,7 +1349,8 @@ void awiwi_motor_torque(const double theta[1], const double thd[1], const double
 int awiwi_spring_lever(const double theta[1], double dL[1], double force[1], double stiffness[1]);
 
 /*
- * Tendon force at the elongation x, counted from the slack end of the lever's travel.
+ * Tendon force at the elongation x, counted from the slack end of the lever's travel. A polynomial
+ * that the check of the hand file has found within 1e-6 of the largest force from the lever's own.
  * Source: figure 4.7.
  *   in   x[1] in m, 0 to 0.0100745
  *   out  f[1] in N
@@ -1686,7 +1602,7 @@ void awiwi_cascade_certificate(const double D[16], const double P[32], const dou
 int awiwi_tendon_force_pd(const double f[1], const double fd[1], const double f_des[1], const double fd_des[1], const double f_hat[1], const double friction[1], const double r[1], const double kp[1], const double kd[1], double tau[1]);
 
 /*
- * Motor torque that brings the tendon force to f_des as a motor of inertia B does on a spring of
+ * Motor torque that brings the tendon force to f_des as a motor of inertia b does on a spring of
  * omega0 and xi0. The gains (kp, kd) follow from the tendon's stiffness at the desired force and from
  * its rate, which is zero where the desired force rests.
  * Source: eq. 10.8 to 10.12, mended.
@@ -1697,7 +1613,7 @@ int awiwi_tendon_force_pd(const double f[1], const double fd[1], const double f_
  *   in   f_hat[1] in N, 0 to 120
  *   in   friction[1] in N m, -2 to 2
  *   in   r[1] in m, 0.002 to 0.02
- *   in   B[1] in kg m^2, 0.0001 to 0.01
+ *   in   b[1] in kg m^2, 0.0001 to 0.01
  *   in   stiffness[1] in N/m, 1000 to 50000
  *   in   stiffness_rate[1] in N/(m s), -10000 to 10000
  *   in   omega0[1] in rad/s, 50 to 500
@@ -1709,7 +1625,7 @@ int awiwi_tendon_force_pd(const double f[1], const double fd[1], const double f_
  * positive and the proportional gain is positive; elsewhere 1, and what is not defined is NaN.
  * Cost: 6 add, 17 mul, 1 div.
  */
-int awiwi_tendon_force_scheduled(const double f[1], const double fd[1], const double f_des[1], const double fd_des[1], const double f_hat[1], const double friction[1], const double r[1], const double B[1], const double stiffness[1], const double stiffness_rate[1], const double omega0[1], const double xi0[1], double tau[1], double gains[2]);
+int awiwi_tendon_force_scheduled(const double f[1], const double fd[1], const double f_des[1], const double fd_des[1], const double f_hat[1], const double friction[1], const double r[1], const double b[1], const double stiffness[1], const double stiffness_rate[1], const double omega0[1], const double xi0[1], double tau[1], double gains[2]);
 
 /*
  * Gains of a motor that pulls against a grounded spring k: poles of frequency omega0 and damping ratio
@@ -1728,13 +1644,33 @@ int awiwi_tendon_force_scheduled(const double f[1], const double fd[1], const do
 int awiwi_pole_placement_motor(const double b[1], const double dtheta[1], const double k[1], const double omega0[1], const double xi0[1], double K[2]);
 
 /*
+ * Gains and torque of a motor on a tendon: optimal for the secant between theta and theta_des, in
+ * closed form. The tendon's torque is spring . (theta, theta^2, theta^3).
+ * Source: eq. 14.4 to 14.9, mended.
+ *   in   theta[1] in rad, 0 to 3
+ *   in   thd[1] in rad/s, -20 to 20
+ *   in   theta_des[1] in rad, 0 to 3
+ *   in   b[1] in kg m^2, 0.0001 to 0.01
+ *   in   dtheta[1] in N m s/rad, 0 to 0.1
+ *   in   spring[3] in N m/rad, N m/rad^2, N m/rad^3, from [0.01, 0, 0] to [1, 1, 1]
+ *   in   weights[2] in 1/rad^2, s^2/rad^2, from [0.1, 1e-05] to [100, 1]
+ *   in   R[1] in 1/(N^2 m^2), 1e-06 to 1
+ *   out  K[2] in N m/rad, N m s/rad
+ *   out  u[1] in N m
+ * Returns 0 where the motor's inertia is positive and the torque's weight is positive and the angle's
+ * weight is positive and the speed's weight is positive; elsewhere 1, and what is not defined is NaN.
+ * Cost: 12 add, 18 mul, 2 div, 2 neg, 2 sqrt.
+ */
+int awiwi_sdre_tendon(const double theta[1], const double thd[1], const double theta_des[1], const double b[1], const double dtheta[1], const double spring[3], const double weights[2], const double R[1], double K[2], double u[1]);
+
+/*
  * Gains on (q, dq/dt, theta, dtheta/dt) that make a joint with a spring k two oscillators omega and
  * xi.
  * Source: eq. 12.13 to 12.16, mended.
- *   in   m[1] in kg m^2, 1e-07 to 0.0001
+ *   in   m[1] in kg m^2, 3e-07 to 0.0001
  *   in   b[1] in kg m^2, 0.0001 to 0.01
  *   in   k[1] in N m/rad, 0.05 to 20
- *   in   dq[1] in N m s/rad, 0 to 0.005
+ *   in   dq[1] in N m s/rad, 1e-05 to 0.005
  *   in   dtheta[1] in N m s/rad, 0 to 0.1
  *   in   omega[2] in rad/s, 5 to 500
  *   in   xi[2] in 1, 0.2 to 2
@@ -1761,6 +1697,55 @@ int awiwi_pole_placement(const double m[1], const double b[1], const double k[1]
 void awiwi_pole_placement_law(const double K[4], const double x[4], const double x_des[4], const double u_des[1], double u[1]);
 
 /*
+ * Secant stiffness of a cubic spring between two deflexions, and its torque at the second.
+ * Source: eq. 14.10, with the secant.
+ *   in   spring[3] in N m/rad, N m/rad^2, N m/rad^3, from [0.1, -50, 0] to [5, 50, 50]
+ *   in   deflexion[1] in rad, -1 to 1
+ *   in   deflexion_des[1] in rad, -1 to 1
+ *   out  k[1] in N m/rad
+ *   out  torque[1] in N m
+ * Cost: 4 add, 5 mul.
+ */
+void awiwi_secant_stiffness(const double spring[3], const double deflexion[1], const double deflexion_des[1], double k[1], double torque[1]);
+
+/*
+ * Gains and torque of a joint with a spring: optimal for its secant between the state and the desired
+ * one. K_last are the gains of the last tick: a guess, and what remains where there are no new ones.
+ * Source: eq. 14.10 to 14.12, mended.
+ *   in   m[1] in kg m^2, 3e-07 to 0.0001
+ *   in   b[1] in kg m^2, 0.0001 to 0.01
+ *   in   dq[1] in N m s/rad, 1e-05 to 0.005
+ *   in   dtheta[1] in N m s/rad, 0 to 0.1
+ *   in   spring[3] in N m/rad, N m/rad^2, N m/rad^3, from [0.1, -50, 0] to [5, 50, 50]
+ *   in   weights[4] in 1/rad^2, s^2/rad^2, from [1, 0.001, 0.1, 0.001] to [100, 1, 10, 1]
+ *   in   R[1] in 1/(N^2 m^2), 0.0001 to 1
+ *   in   K_last[4] in N m/rad, N m s/rad, from [-1e+04, -100, -1e+04, -100] to [1e+04, 100, 1e+04, 100]
+ *   in   x[4] in rad, rad/s, from [-3, -50, -3, -50] to [3, 50, 3, 50]
+ *   in   x_des[4] in rad, rad/s, from [-3, -50, -3, -50] to [3, 50, 3, 50]
+ *   out  K[4] in N m/rad, N m s/rad
+ *   out  u[1] in N m
+ * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
+ * Cost: at most 1 times that of secant_stiffness and pole_placement_law, and the solver's own.
+ */
+int awiwi_sdre_joint(const double m[1], const double b[1], const double dq[1], const double dtheta[1], const double spring[3], const double weights[4], const double R[1], const double K_last[4], const double x[4], const double x_des[4], double K[4], double u[1]);
+
+/*
+ * Gains of u = -K x that minimise the integral of x'Q x + R u^2, and the least cost x'S x; in coherent
+ * units. The residual is that of the Riccati equation for S, relative to its terms.
+ * Source: eq. 13.1 to 13.5.
+ *   in   A[4][4] in 1, -1e+07 to 1e+07
+ *   in   B[4] in 1, -10000 to 10000
+ *   in   Q[4][4] in 1, -1e+06 to 1e+06
+ *   in   R[1] in 1, 1e-06 to 1000
+ *   out  K[4] in 1
+ *   out  S[4][4] in 1
+ *   out  residual[1] in 1
+ * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
+ * Cost: the solver's own.
+ */
+int awiwi_lqr(const double A[16], const double B[4], const double Q[16], const double R[1], double K[4], double S[16], double residual[1]);
+
+/*
  * Control of the example x1' = -x1^3 + x1^2 + x2, x2' = u.
  * Source: eq. 15.1 to 15.10, mended.
  *   in   x[2] in 1, from [-3, -10] to [3, 10]
@@ -1778,10 +1763,10 @@ int awiwi_backstepping_academic(const double x[2], const double k[2], double u[1
  *   in   k[2] in 1, 0.01 to 10
  *   out  V[1] in 1
  *   out  Vdot[1] in 1
- *   out  virtual[1] in 1
+ *   out  controls[1] in 1
  * Cost: 5 add, 6 mul, 2 neg.
  */
-void awiwi_backstepping_academic_lyapunov(const double x[2], const double k[2], double V[1], double Vdot[1], double virtual[1]);
+void awiwi_backstepping_academic_lyapunov(const double x[2], const double k[2], double V[1], double Vdot[1], double controls[1]);
 
 /*
  * Motor torque that takes the link (q and three derivatives) to desired (q_d and four); scales of 1 as
@@ -1811,10 +1796,10 @@ int awiwi_backstepping_position(const double motion[4], const double desired[5],
  *   in   scales[3] in s^2, s^4, s^6, from [0.0001, 1e-08, 1e-12] to [10, 10, 10]
  *   out  V[1] in rad^2
  *   out  Vdot[1] in rad^2/s
- *   out  virtual[3] in rad/s, rad/s^2, rad/s^3
+ *   out  controls[3] in rad/s, rad/s^2, rad/s^3
  * Cost: 22 add, 20 mul, 2 div, 1 neg.
  */
-void awiwi_backstepping_position_lyapunov(const double motion[4], const double desired[5], const double plant[3], const double rates[4], const double scales[3], double V[1], double Vdot[1], double virtual[3]);
+void awiwi_backstepping_position_lyapunov(const double motion[4], const double desired[5], const double plant[3], const double rates[4], const double scales[3], double V[1], double Vdot[1], double controls[3]);
 
 /*
  * Motor torque that gives the link the stiffness K_p and the damping K_d about desired (q_d and four
@@ -1848,10 +1833,10 @@ int awiwi_backstepping_impedance(const double state[4], const double desired[5],
  *   in   weights[2] in rad/(N m), rad s^2/(N m), from [0.01, 1e-06] to [100, 100]
  *   out  V[1] in J
  *   out  Vdot[1] in W
- *   out  virtual[2] in N m, N m/s
+ *   out  controls[2] in N m, N m/s
  * Cost: 18 add, 18 mul, 2 div, 1 neg.
  */
-void awiwi_backstepping_impedance_lyapunov(const double state[4], const double desired[5], const double external[2], const double plant[3], const double gains[4], const double weights[2], double V[1], double Vdot[1], double virtual[2]);
+void awiwi_backstepping_impedance_lyapunov(const double state[4], const double desired[5], const double external[2], const double plant[3], const double gains[4], const double weights[2], double V[1], double Vdot[1], double controls[2]);
 
 /*
  * The impedance law behind a nonlinear spring phi: tau = phi, and spring is (phi', phi'') at its
@@ -1913,10 +1898,10 @@ int awiwi_backstepping_antagonistic(const double joint[2], const double torques[
  *   in   tunings[2][4] in 1/s, rad/(N m), rad s^2/(N m), from [0.1, 0.1, 0.01, 1e-06, 0.1, 0.1, 0.01, 1e-06] to [2000, 2000, 100, 100, 2000, 2000, 100, 100]
  *   out  V[1] in J
  *   out  Vdot[1] in W
- *   out  virtual[2][2] in N m, N m/s
+ *   out  controls[2][2] in N m, N m/s
  * Cost: 31 add, 29 mul, 3 div, 1 neg.
  */
-void awiwi_backstepping_antagonistic_lyapunov(const double joint[2], const double torques[4], const double desired[5], const double pretension[3], const double external[2], const double inertias[3], const double springs[4], const double impedance[2], const double tunings[8], double V[1], double Vdot[1], double virtual[4]);
+void awiwi_backstepping_antagonistic_lyapunov(const double joint[2], const double torques[4], const double desired[5], const double pretension[3], const double external[2], const double inertias[3], const double springs[4], const double impedance[2], const double tunings[8], double V[1], double Vdot[1], double controls[4]);
 
 /*
  * The printed decoupling of the motors, for comparison only: it takes the pretension for motion and
@@ -1997,6 +1982,148 @@ int awiwi_optimal_backstepping_rates(const double K_opt[4], const double plant[3
  * Cost: 8 add, 10 mul, 5 div, 7 neg.
  */
 int awiwi_optimal_backstepping_weights(const double K_opt[4], const double plant[3], const double impedance[2], double rates[2], double weights[2]);
+
+/*
+ * (K_p, K_d) and (K_3, K_4) whose feedback gains are nearest to K_opt, by relative errors; start is a
+ * guess. Status 0: they are equal. 1: no positive gains have them, these come nearest. 2: these are
+ * the nearest found.
+ * Source: eq. 16.4.
+ *   in   K_opt[4] in N m/rad, N m s/rad, 1, s, 1e-09 to 1e+09
+ *   in   plant[3] in kg m^2, N m/rad, from [5e-07, 0.0001, 0.05] to [0.001, 0.01, 50]
+ *   in   weights[2] in rad/(N m), rad s^2/(N m), from [0.001, 1e-12] to [1000, 1000]
+ *   in   start[4] in N m/rad, N m s/rad, 1/s, from [0.001, 1e-09, 0.01, 0.01] to [1000, 1000, 1e+06, 1e+06]
+ *   out  impedance[2] in N m/rad, N m s/rad
+ *   out  rates[2] in 1/s
+ * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
+ * Cost: at most 40 times that of backstepping_state_gains and backstepping_state_gains_derivatives, and the solver's own.
+ */
+int awiwi_optimal_backstepping(const double K_opt[4], const double plant[3], const double weights[2], const double start[4], double impedance[2], double rates[2]);
+
+/*
+ * A motion and its first four derivatives, a sample later, on the way to the desired motion and its
+ * derivatives. What is desired with all its derivatives is reached without error, and a jump after 1.7
+ * times the delay. motion is the filter's memory: begin with where the joint is, at rest, and pass on
+ * what is returned.
+ * Source: Bessel's filter of fifth order.
+ *   in   motion[5] in rad, rad/s, rad/s^2, rad/s^3, rad/s^4, from [-2, -20, -2000, -2e+05, -2e+07] to [2, 20, 2000, 2e+05, 2e+07]
+ *   in   desired[5] in rad, rad/s, rad/s^2, rad/s^3, rad/s^4, from [-2, -20, -2000, -2e+05, -2e+07] to [2, 20, 2000, 2e+05, 2e+07]
+ *   in   delay[1] in s, 0.005 to 0.1
+ *   in   period[1] in s, 0.0001 to 0.01
+ *   out  motion_next[5] in rad, rad/s, rad/s^2, rad/s^3, rad/s^4
+ * Returns 0 where the delay is positive and the period is positive; elsewhere 1, and what is not
+ * defined is NaN.
+ * Cost: 45 add, 64 mul, 5 div.
+ */
+int awiwi_reference_filter(const double motion[5], const double desired[5], const double delay[1], const double period[1], double motion_next[5]);
+
+/*
+ * All that the laws of such a joint ask for, a sample ahead, from angles of motors, elongations and
+ * torques. acted are the motors' torques of the sample that ended, acting those of the next;
+ * bandwidths are of the link, the motors, the torques and the springs' scales. resistance is what the
+ * motors must overcome, modelled what they would by the friction model alone. The memory begins with
+ * angles at rest, the torques, and scales of 1.
+ * Source: eq. 15.82, observed.
+ *   in   memory[13] in rad, rad/s, rad/s^2, N m, 1, from [-2, -20, -2000, -2, -20, -2000, -2, -20, -2000, 0, 0, 0, 0] to [2, 20, 2000, 2, 20, 2000, 2, 20, 2000, 2, 2, 2, 2]
+ *   in   thetas[2] in rad, -2 to 2
+ *   in   stretches[2] in rad, -1 to 2
+ *   in   measured[2] in N m, 0 to 2
+ *   in   acted[2] in N m, -5 to 5
+ *   in   acting[2] in N m, -5 to 5
+ *   in   inertias[3] in kg m^2, from [5e-07, 0.0001, 0.0001] to [0.001, 0.01, 0.01]
+ *   in   tendons[2][3] in N m/rad, N m/rad^2, N m/rad^3, from [0.05, 0, 0, 0.05, 0, 0] to [2, 2, 10, 2, 2, 10]
+ *   in   damping[1] in N m s/rad, 0 to 0.005
+ *   in   friction[3] in s/rad, N m, N m s/rad, from [0.1, 0, 0] to [100, 2, 0.2]
+ *   in   bandwidths[4] in 1/s, 1 to 2000
+ *   in   period[1] in s, 0.0001 to 0.01
+ *   out  memory_next[13] in rad, rad/s, rad/s^2, N m, 1
+ *   out  joint[2] in rad, rad/s
+ *   out  motors[2][2] in rad, rad/s
+ *   out  torques[2][2] in N m, N m/s
+ *   out  springs[2][2] in N m/rad, N m/rad^2
+ *   out  load[1] in N m
+ *   out  modelled[2] in N m
+ *   out  resistance[2] in N m
+ * Cost: 119 add, 134 mul, 13 div, 4 neg, 12 calls.
+ */
+void awiwi_antagonistic_observer(const double memory[13], const double thetas[2], const double stretches[2], const double measured[2], const double acted[2], const double acting[2], const double inertias[3], const double tendons[6], const double damping[1], const double friction[3], const double bandwidths[4], const double period[1], double memory_next[13], double joint[2], double motors[4], double torques[4], double springs[4], double load[1], double modelled[2], double resistance[2]);
+
+/*
+ * State and motor torques of a desired motion, with springs that are linear about their elongations.
+ * Source: eq. 15.82, solved for a desired motion.
+ *   in   desired[5] in rad, rad/s, rad/s^2, rad/s^3, rad/s^4, from [-2, -20, -2000, -2e+05, -2e+07] to [2, 20, 2000, 2e+05, 2e+07]
+ *   in   pretension[3] in N m, N m/s, N m/s^2, from [0, -10, -1000] to [1, 10, 1000]
+ *   in   elongations[2] in rad, 0 to 2
+ *   in   slopes[2] in N m/rad, 0.05 to 50
+ *   in   inertias[3] in kg m^2, from [5e-07, 0.0001, 0.0001] to [0.001, 0.01, 0.01]
+ *   in   damping[1] in N m s/rad, 0 to 0.005
+ *   out  x_des[6] in rad, rad/s, from [-3, -50, -3, -50, -3, -50] to [3, 50, 3, 50, 3, 50]
+ *   out  u_des[2] in N m
+ * Returns 0 where slope 1 is positive and slope 2 is positive; elsewhere 1, and what is not defined is
+ * NaN.
+ * Cost: 15 add, 15 mul, 2 div, 1 neg.
+ */
+int awiwi_antagonistic_setpoint(const double desired[5], const double pretension[3], const double elongations[2], const double slopes[2], const double inertias[3], const double damping[1], double x_des[6], double u_des[2]);
+
+/*
+ * Motor torques u_des - K (x - x_des), with the gains K = feedback, and what the motors must overcome
+ * besides.
+ * Source: eq. 12.2, 13.3, for two motors.
+ *   in   x[6] in rad, rad/s, from [-3, -50, -3, -50, -3, -50] to [3, 50, 3, 50, 3, 50]
+ *   in   x_des[6] in rad, rad/s, from [-3, -50, -3, -50, -3, -50] to [3, 50, 3, 50, 3, 50]
+ *   in   u_des[2] in N m, -5 to 5
+ *   in   feedback[2][6] in N m/rad, N m s/rad, from [-50, -1, -50, -1, -50, -1, -50, -1, -50, -1, -50, -1] to [50, 1, 50, 1, 50, 1, 50, 1, 50, 1, 50, 1]
+ *   in   resistance[2] in N m, -4 to 4
+ *   out  tau_m[2] in N m
+ * Cost: 20 add, 12 mul.
+ */
+void awiwi_antagonistic_feedback(const double x[6], const double x_des[6], const double u_des[2], const double feedback[12], const double resistance[2], double tau_m[2]);
+
+/*
+ * Angle and speed of half the motors' difference, which moves the link, and of half their sum, which
+ * pulls.
+ * Source: eq. 15.82, for equal motors.
+ *   in   motors[2][2] in rad, rad/s, from [-2, -50, -2, -50] to [2, 50, 2, 50]
+ *   out  against[2] in rad, rad/s
+ *   out  together[2] in rad, rad/s
+ * Cost: 4 add, 4 mul.
+ */
+void awiwi_antagonistic_modes(const double motors[4], double against[2], double together[2]);
+
+/*
+ * Torques of the springs that together pull the link with a torque, about a common pretension.
+ * Source: eq. 15.88.
+ *   in   torque[1] in N m, -2 to 2
+ *   in   pretension[3] in N m, N m/s, N m/s^2, from [0, -10, -1000] to [1, 10, 1000]
+ *   out  shares[2] in N m
+ * Cost: 2 add, 1 mul.
+ */
+void awiwi_antagonistic_sharing(const double torque[1], const double pretension[3], double shares[2]);
+
+/*
+ * The antagonistic law for a link with damping; springs, external torque and resistance are those
+ * observed.
+ * Source: eq. 15.82 to 15.106, mended, with the link's damping and an observer.
+ *   in   joint[2] in rad, rad/s, from [-2, -20] to [2, 20]
+ *   in   torques[2][2] in N m, N m/s, from [0, -200, 0, -200] to [2, 200, 2, 200]
+ *   in   desired[5] in rad, rad/s, rad/s^2, rad/s^3, rad/s^4, from [-2, -20, -2000, -2e+05, -2e+07] to [2, 20, 2000, 2e+05, 2e+07]
+ *   in   pretension[3] in N m, N m/s, N m/s^2, from [0, -10, -1000] to [1, 10, 1000]
+ *   in   external[2] in N m, N m/s, from [-1, -100] to [1, 100]
+ *   in   inertias[3] in kg m^2, from [5e-07, 0.0001, 0.0001] to [0.001, 0.01, 0.01]
+ *   in   springs[2][2] in N m/rad, N m/rad^2, from [0.05, -100, 0.05, -100] to [50, 100, 50, 100]
+ *   in   damping[1] in N m s/rad, 0 to 0.005
+ *   in   impedance[2] in N m/rad, N m s/rad, from [0.01, 0.0001] to [50, 1]
+ *   in   tunings[2][4] in 1/s, rad/(N m), rad s^2/(N m), from [0.1, 0.1, 0.01, 1e-06, 0.1, 0.1, 0.01, 1e-06] to [2000, 2000, 100, 100, 2000, 2000, 100, 100]
+ *   in   resistance[2] in N m, -4 to 4
+ *   out  tau_m[2] in N m
+ * Returns 0 where the link's inertia is positive and motor 1's inertia is positive and motor 2's
+ * inertia is positive and slope 1 is positive and slope 2 is positive and K_p is positive and K_d is
+ * positive and K_3 of motor 1 is positive and K_4 of motor 1 is positive and C_t of motor 1 is
+ * positive and C_s of motor 1 is positive and K_3 of motor 2 is positive and K_4 of motor 2 is
+ * positive and C_t of motor 2 is positive and C_s of motor 2 is positive; elsewhere 1, and what is not
+ * defined is NaN.
+ * Cost: 49 add, 39 mul, 7 div.
+ */
+int awiwi_backstepping_adaptive(const double joint[2], const double torques[4], const double desired[5], const double pretension[3], const double external[2], const double inertias[3], const double springs[4], const double damping[1], const double impedance[2], const double tunings[8], const double resistance[2], double tau_m[2]);
 
 /*
  * A motor that winds up a tendon with a spring, the joint held: rates of x = (theta, theta'), and the

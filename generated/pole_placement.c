@@ -3,10 +3,10 @@
  * Gains on (q, dq/dt, theta, dtheta/dt) that make a joint with a spring k two oscillators omega and
  * xi.
  * Source: eq. 12.13 to 12.16, mended.
- *   in   m[1] in kg m^2, 1e-07 to 0.0001
+ *   in   m[1] in kg m^2, 3e-07 to 0.0001
  *   in   b[1] in kg m^2, 0.0001 to 0.01
  *   in   k[1] in N m/rad, 0.05 to 20
- *   in   dq[1] in N m s/rad, 0 to 0.005
+ *   in   dq[1] in N m s/rad, 1e-05 to 0.005
  *   in   dtheta[1] in N m s/rad, 0 to 0.1
  *   in   omega[2] in rad/s, 5 to 500
  *   in   xi[2] in 1, 0.2 to 2

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import sympy
 from sympy import Matrix, symbols
 
@@ -32,4 +34,4 @@ def rate(expr, flow):
 
 def shifts(*signals):
     """Each derivative of a signal is the rate of the one before it."""
-    return {a: b for signal in signals for a, b in zip(signal[:-1], signal[1:], strict=True)}
+    return {a: b for signal in signals for a, b in itertools.pairwise(signal)}

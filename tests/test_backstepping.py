@@ -11,7 +11,6 @@ from awiwi_gen.control.backstepping_gains import state_gains
 from awiwi_gen.control.backstepping_laws import academic_law, impedance_law, nonlinear_law, position_law
 from awiwi_gen.models.naming import Derivation
 
-
 PLANT = m, b, k = column("m b k")
 GAINS = K_p, K_d, K_3, K_4 = column("K_p K_d K_3 K_4")
 WEIGHTS = C_t, C_s = column("C_t C_s")

@@ -138,12 +138,15 @@ def test_a_batch_equals_a_loop_in_every_bit(lib):
             assert all(a[i].tobytes() == b.tobytes() for a, b in zip(batch, alone, strict=True)), name
 
 
+WARM_STARTS = {"K_last"}  # a gain to begin with: one that is no number is left aside, and the gain found all the same
+
+
 def test_nothing_plausible_comes_of_something_that_is_not_a_number(lib):
     for name, function in lib.items():
         here = points(function)
         for port, elsewhere in points(function).items():
             spoilt = function(**here | {port: np.full_like(elsewhere, np.nan)})
-            if getattr(spoilt, "status", 0):
+            if getattr(spoilt, "status", 0) or port in WARM_STARTS:
                 continue
             usual, moved = function(**here), function(**here | {port: elsewhere})
             for a, b, c in zip(fields(usual), fields(moved), fields(spoilt), strict=True):
@@ -260,8 +263,12 @@ def test_single_and_double_precision_agree_as_far_as_they_can(single):
     double = awiwi_gen.build(awiwi_gen.Hand.load(ONE_FINGER))
     for name, function in double.items():
         given = points(function, 20)
-        for a, b in zip(fields(function(**given)), fields(single[name](**given)), strict=True):
-            assert b == pytest.approx(a, rel=1e-3, abs=1e-4 * np.max(np.abs(a), initial=1e-30)), name
+        results = function(**given), single[name](**given)
+        ok = np.ones(20, bool)
+        for result in results:  # where one of them says that it has no result there is nothing to compare
+            ok &= np.asarray(getattr(result, "status", 0)) == 0
+        for a, b in zip(*map(fields, results), strict=True):
+            assert b[ok] == pytest.approx(a[ok], rel=1e-3, abs=1e-4 * np.max(np.abs(a[ok]), initial=1e-30)), name
 
 
 # ------------------------------------------------------------------------------------------------- what it tells

@@ -93,8 +93,8 @@ def test_the_page_shows_the_proof_of_every_kernel(text, some_proof):
         assert f"<td>{law.statement}</td>" in text
 
 
-def test_equal_results_give_equal_bytes_without_dates(tmp_path, hand, lib, text, some_proof):
-    page.write_page(tmp_path / "again.html", hand, page.all_figures(lib, hand), *some_proof)
+def test_equal_results_give_equal_bytes_without_dates(tmp_path, hand, figures, text, some_proof):
+    page.write_page(tmp_path / "again.html", hand, figures, *some_proof)
 
     assert (tmp_path / "again.html").read_text(encoding="utf-8") == text
     assert not re.search(r"20\d\d-\d\d|Matplotlib", text)

@@ -137,7 +137,9 @@ def test_what_was_generated_passes(small, generated):
     proof = verify(Job(small, only=PATTERN), generated)
 
     assert proof.passed
-    assert all(verdict.bit_exact and verdict.bound_use <= 1 for verdict in proof.verdicts)
+    closed = {kernel.name for kernel in Job(small, only=PATTERN).kernels if kernel.solver is None}
+    assert all(verdict.bit_exact for verdict in proof.verdicts if verdict.name in closed)
+    assert all(verdict.bound_use <= 1 for verdict in proof.verdicts)
     assert all(verdict.agreement <= 1e-40 and verdict.passes <= 1e-50 for verdict in proof.verdicts)
 
 

@@ -49,4 +49,3 @@ def cascade(
     wanted = fdd_des[0] + kd[0] * (fd_des[0] - k * xd[0]) + kp[0] * (f_des[0] - f[0])
     winding = (wanted / k - slope[0] * xd[0] ** 2 - hdd[0]) / r[0]
     return B[0] * winding + r[0] * f[0] + friction[0], [k, r[0], B[0], kp[0], kd[0]]
-

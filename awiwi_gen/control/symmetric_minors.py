@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from functools import reduce
 
 import casadi as ca
@@ -17,7 +18,7 @@ def symmetric(entries: SX, n: int) -> SX:
 def pivots(matrix: SX) -> list[SX]:
     """Quotients of successive leading minors: all positive where the matrix is positive definite, and only there."""
     minors = [ca.det(matrix[:k, :k]) for k in range(1, matrix.shape[0] + 1)]
-    return [minors[0], *(high / low for low, high in zip(minors, minors[1:], strict=False))]
+    return [minors[0], *(high / low for low, high in itertools.pairwise(minors))]
 
 
 def least(values: list[SX]) -> SX:

@@ -29,7 +29,9 @@ def solver_function(
         runtime and prefix,
     )
     called = " and ".join(function.name for function in used.values())
-    times = f"at most {solver.iterations} times that of {called}, and the solver's own" if called else "the solver's own"
+    times = (
+        f"at most {solver.iterations} times that of {called}, and the solver's own" if called else "the solver's own"
+    )
     comment = describe(kernel, f"Cost: {times}.")
     text = render(
         solver.template,

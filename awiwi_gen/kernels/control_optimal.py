@@ -12,7 +12,7 @@ from typing import Any
 
 from awiwi_gen.control import backstepping_gains as gain
 from awiwi_gen.control import backstepping_gains_ad as gain_ad
-from awiwi_gen.kernel import Kernel, Port
+from awiwi_gen.kernel import Kernel, Port, Solver
 from awiwi_gen.kernels.control_backstepping import DAMPING, INERTIA, PORTS, RATES, STIFFNESS, WEIGHTS, box
 from awiwi_gen.kernels.declare import Family, Parameterless
 from awiwi_gen.models.derivatives import derivatives_of
@@ -20,15 +20,18 @@ from awiwi_gen.units import Unit, one, s
 
 FEEDBACK = (STIFFNESS, DAMPING, one, s)
 EXTERNAL = (one, s)
+REACH = 1e6  # how many times the start, or how small a part of it, a gain may be
+MATCHED = 1 << 14  # roundings of a feedback gain: what counts as equal
 
 feedback: Family[None] = Family()
 by_rates: Family[None] = Family()
 by_weights: Family[None] = Family()
+by_iteration: Family[None] = Family()
 
 
 def optimal_laws() -> list[Kernel]:
     """All kernels of chapter 16; they need no hand."""
-    families = ((feedback, PORTS), (by_rates, ROUND_RATES), (by_weights, ROUND_WEIGHTS))
+    families = ((feedback, PORTS), (by_rates, ROUND_RATES), (by_weights, ROUND_WEIGHTS), (by_iteration, WIDE))
     return [
         kernel
         for family, ports in families
@@ -52,6 +55,13 @@ ROUND_WEIGHTS = {
     "K_opt": around(FEEDBACK, (21.0, 0.91, 530.0, 0.31), 0.1),
     "plant": around((INERTIA, INERTIA, STIFFNESS), (1e-4, 2e-3, 0.6), 0.02),
     "impedance": around((STIFFNESS, DAMPING), (1.0, 9.2e-4), 0.1),
+}
+
+
+WIDE = PORTS | {
+    "K_opt": box(FEEDBACK, (1e-9,) * 4, (1e9,) * 4),
+    "weights": box(WEIGHTS, (1e-3, 1e-12), (1e3, 1e3)),
+    "start": box((STIFFNESS, DAMPING, *RATES), (1e-3, 1e-9, 1e-2, 1e-2), (1e3, 1e3, 1e6, 1e6)),
 }
 
 
@@ -104,3 +114,32 @@ def optimal_backstepping_weights(_: Any, K_opt: Any, plant: Any, impedance: Any)
     Some K_p and K_d do whenever the closed loop is stable and has two different pairs of poles: near those of one pair.
     """
     return gain.matched_weights(K_opt, plant, impedance)
+
+
+def newton(_: Any, iterations: int = 40) -> Solver:
+    """Levenberg's and Marquardt's steps towards all four feedback gains, in parts of what is wanted."""
+    return Solver(
+        template="optimal_backstepping.c.j2",
+        problem="gain matching",
+        uses=("backstepping_state_gains", "backstepping_state_gains_derivatives"),
+        equations=(),
+        unknowns=(),
+        arrays={},
+        strings={
+            "iterations": str(iterations),
+            "exact": f"{MATCHED} * AWIWI_REAL_EPSILON",
+            "range": f"(awiwi_real){REACH!r}",
+        },
+        iterations=iterations,
+        tolerance={"f64": 1e-13, "f32": 1e-5},
+    )
+
+
+@by_iteration(
+    lambda _: {"impedance": Port((2,), (STIFFNESS, DAMPING)), "rates": Port((2,), RATES)}, "eq. 16.4", solver=newton
+)
+def optimal_backstepping(_: Any, K_opt: Any, plant: Any, weights: Any, start: Any) -> Any:
+    """(K_p, K_d) and (K_3, K_4) whose feedback gains are nearest to K_opt, by relative errors; start is a guess.
+
+    Status 0: they are equal. 1: no positive gains have them, these come nearest. 2: these are the nearest found.
+    """

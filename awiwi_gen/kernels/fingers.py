@@ -193,17 +193,13 @@ def forward_dynamics(finger: Any, q: Any, qd: Any, tau: Any, g: Any) -> Any:
     return lagrange.forward_dynamics(finger, q, qd, tau, g)
 
 
-@per_finger(
-    lambda z: {"M": inertia(z), "C": coriolis(z), "gravity": torque(z)}, "eq. 2.17", witness=recursive.dynamics
-)
+@per_finger(lambda z: {"M": inertia(z), "C": coriolis(z), "gravity": torque(z)}, "eq. 2.17", witness=recursive.dynamics)
 def dynamics(finger: Any, q: Any, qd: Any, g: Any) -> Any:
     """Mass matrix, Coriolis matrix and gravity torques in one call that shares their work."""
     return lagrange.dynamics(finger, q, qd, g)
 
 
-@per_finger(
-    lambda z: {"kinetic": Port((), J), "potential": Port((), J)}, "eq. 2.16, 5.4", witness=recursive.energy
-)
+@per_finger(lambda z: {"kinetic": Port((), J), "potential": Port((), J)}, "eq. 2.16, 5.4", witness=recursive.energy)
 def energy(finger: Any, q: Any, qd: Any, g: Any) -> Any:
     """Kinetic energy and potential energy in the gravity field g (zero at the base frame's origin)."""
     return lagrange.energy(finger, q, qd, g)
@@ -218,9 +214,7 @@ def tendon_lengths(finger: Any, q: Any) -> Any:
     return tendons.tendon_lengths(finger, q)
 
 
-@per_finger(
-    lambda z: {"P": Port((z.tendons, z.joints), m / rad)}, "eq. 5.6, 5.9, 5.21", witness=tendons_ad.coupling
-)
+@per_finger(lambda z: {"P": Port((z.tendons, z.joints), m / rad)}, "eq. 5.6, 5.9, 5.21", witness=tendons_ad.coupling)
 def coupling(finger: Any, q: Any) -> Any:
     """Coupling matrix P = dh/dq: tendon velocities are P qd."""
     return tendons.coupling(finger, q)
@@ -242,9 +236,7 @@ def joint_torque(finger: Any, q: Any, f: Any) -> Any:
     return tendons.joint_torque(finger, q, f)
 
 
-@per_finger(
-    lambda z: {"K": stiffness(z)}, "eq. 5.12, 5.23", witness=tendons_ad.joint_stiffness
-)
+@per_finger(lambda z: {"K": stiffness(z)}, "eq. 5.12, 5.23", witness=tendons_ad.joint_stiffness)
 def joint_stiffness(finger: Any, q: Any, f: Any, k: Any) -> Any:
     """Joint stiffness -d tau/dq felt through tendons of stiffness k that pull with forces f."""
     return tendons.joint_stiffness(finger, q, f, k)

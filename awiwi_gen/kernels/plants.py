@@ -14,7 +14,6 @@ from awiwi_gen.models import plants, plants_energy
 from awiwi_gen.units import N, Unit, kg, m, rad, s
 
 
-
 def plant_kernels() -> list[Kernel]:
     """All plants; they need no hand."""
     return [

@@ -66,9 +66,7 @@ class Moments:
         xx, xy, xz, yy, yz, zz = (self.second[i, j] for i, j in ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)))
         swing = (xx - yy) * c - 2 * xy * s
         first = (c * x - s * y, s * x + c * y, z)
-        second = _symmetric(
-            yy + c * swing, xx - c * swing, zz, xy + s * swing, c * xz - s * yz, s * xz + c * yz
-        )
+        second = _symmetric(yy + c * swing, xx - c * swing, zz, xy + s * swing, c * xz - s * yz, s * xz + c * yz)
         return Moments(self.mass, ca.vertcat(*first), second, self.trace)
 
     def split(self) -> tuple["Moments", "Moments"]:

@@ -98,10 +98,12 @@ class _Lagrangian:
         """The left side of Lagrange's equation (n)."""
         motion = dict(zip(self.q, self.qd, strict=True)) | dict(zip(self.qd, qdd, strict=True))
         difference = self.kinetic - self.potential
-        return Matrix([
-            self.derive.along(momentum, motion) - self.derive.partial(difference, angle)
-            for momentum, angle in zip(self.momenta(), self.q, strict=True)
-        ])
+        return Matrix(
+            [
+                self.derive.along(momentum, motion) - self.derive.partial(difference, angle)
+                for momentum, angle in zip(self.momenta(), self.q, strict=True)
+            ]
+        )
 
 
 def _lagrangian(finger: Finger, q: Matrix, qd: Matrix, g: Matrix) -> _Lagrangian:
@@ -124,11 +126,13 @@ def _velocities(q: Matrix) -> Matrix:
 
 def _tensor(inertia: Any) -> Matrix:
     """The inertia tensor (3 x 3) [kg m^2] about the centre of mass, in link axes."""
-    return Matrix([
-        [inertia.xx, inertia.xy, inertia.xz],
-        [inertia.xy, inertia.yy, inertia.yz],
-        [inertia.xz, inertia.yz, inertia.zz],
-    ])
+    return Matrix(
+        [
+            [inertia.xx, inertia.xy, inertia.xz],
+            [inertia.xy, inertia.yy, inertia.yz],
+            [inertia.xz, inertia.yz, inertia.zz],
+        ]
+    )
 
 
 def cofactor_matrix(matrix: Matrix, derive: Derivation) -> Matrix:
@@ -137,10 +141,14 @@ def cofactor_matrix(matrix: Matrix, derive: Derivation) -> Matrix:
 
     def minor(rows: tuple[int, ...], columns: tuple[int, ...]) -> Expr:
         if (rows, columns) not in known:
-            known[rows, columns] = derive.name(sympy.Add(*(
-                (-1) ** k * matrix[rows[0], column] * minor(rows[1:], columns[:k] + columns[k + 1:])
-                for k, column in enumerate(columns)
-            )))
+            known[rows, columns] = derive.name(
+                sympy.Add(
+                    *(
+                        (-1) ** k * matrix[rows[0], column] * minor(rows[1:], columns[:k] + columns[k + 1 :])
+                        for k, column in enumerate(columns)
+                    )
+                )
+            )
         return known[rows, columns]
 
     def cofactor(i: int, j: int) -> Expr:

@@ -73,7 +73,9 @@ class Derivation:
             return sympy.Add(*rates)
         if expr.is_Mul:
             factors = expr.args
-            return sympy.Add(*(sympy.Mul(*factors[:i], rate, *factors[i + 1:]) for i, rate in enumerate(rates) if rate))
+            return sympy.Add(
+                *(sympy.Mul(*factors[:i], rate, *factors[i + 1 :]) for i, rate in enumerate(rates) if rate)
+            )
         slopes = self._power_slope(expr) if expr.is_Pow else self._function_slopes(expr)
         return sympy.Add(*(sympy.Mul(slope, rate) for slope, rate in zip(slopes, rates, strict=True)))
 
@@ -90,7 +92,7 @@ class Derivation:
         if exponent is sympy.S.Half:
             return self.name(1 / self.name(power)) / 2, sympy.S.Zero
         if exponent is sympy.S.NegativeOne:
-            return -self.name(power) ** 2, sympy.S.Zero
+            return -(self.name(power) ** 2), sympy.S.Zero
         return exponent * base ** (exponent - 1), sympy.S.Zero
 
 

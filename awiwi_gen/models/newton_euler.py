@@ -92,6 +92,9 @@ def _swirl(body: Moments, spin: SX, gradient: SX) -> SX:
         a[2, 1] * s[1, 1] - a[1, 2] * s[2, 2] + (z**2 - y**2) * s[1, 2] + a[2, 0] * s[0, 1] - a[1, 0] * s[0, 2],
         a[0, 2] * s[2, 2] - a[2, 0] * s[0, 0] + (x**2 - z**2) * s[0, 2] + a[0, 1] * s[1, 2] - a[2, 1] * s[0, 1],
         # By the moment of inertia about z, which unlike S_xx and S_yy is constant while the body turns about z.
-        2 * x * y * s[0, 0] - a[0, 1] * (body.trace - s[2, 2])
-        + (y**2 - x**2) * s[0, 1] + a[1, 2] * s[0, 2] - a[0, 2] * s[1, 2],
+        2 * x * y * s[0, 0]
+        - a[0, 1] * (body.trace - s[2, 2])
+        + (y**2 - x**2) * s[0, 1]
+        + a[1, 2] * s[0, 2]
+        - a[0, 2] * s[1, 2],
     )

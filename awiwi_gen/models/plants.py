@@ -56,7 +56,8 @@ def plant_antagonistic(
     """Rates of x = (q, q', theta1, theta1', theta2, theta2'), and elongation and torque of both springs (eq. 15.82)."""
     names = Derivation()
     stretches = Matrix([x[2 * i + 2] - side * x[0] for i, side in enumerate(SIDES)])
-    torques = [names.name(pull(spring, names.name(taut(d)))) for spring, d in zip(_rows(tendons), stretches, strict=True)]
+    parts = names.name_all(stretches.applyfunc(taut))
+    torques = [names.name(pull(spring, p)) for spring, p in zip(_rows(tendons), parts, strict=True)]
     rates = [x[1], (torques[0] - torques[1] + load[0] - damping[0] * x[1]) / inertias[0]]
     for i, torque in enumerate(torques):
         speed = x[2 * i + 3]

@@ -17,9 +17,9 @@ def plant_tendon(_: Any, x: SX, u: SX, path: SX, motor: SX, line: SX, friction: 
     """Rates of (theta, theta'), and the force of the tendon."""
     place, speed = x[0], x[1]
     stretch = motor[1] * place + path
-    force = _gradients(_pulling(line), _taut(stretch))[0]
+    force = gradients(pulling(line), taut(stretch))[0]
     outside = u - ca.jacobian(stretch, place) * force
-    return _rates(speed, motor[0], _dry(friction, speed), outside), force
+    return _rates(speed, motor[0], dry(friction, speed), outside), force
 
 
 def plant_joint_linear(part: Any, x: SX, u: SX, load: SX, plant: SX, damping: SX) -> tuple[SX, SX]:
@@ -31,7 +31,7 @@ def plant_joint_nonlinear(_: Any, x: SX, u: SX, load: SX, bodies: SX, curve: SX,
     """Rates of (q, q', theta, theta'), torque of the spring and its rate, slope and curvature."""
     place, speed = x[0::2], x[1::2]
     stretch = place[1] - place[0]
-    torque, slope, curvature = _gradients(lambda d: 6 * curve[0] * d**2 + 3 * curve[1] * (d**2) ** 2, stretch)
+    torque, slope, curvature = gradients(lambda d: 6 * curve[0] * d**2 + 3 * curve[1] * (d**2) ** 2, stretch)
     outside = ca.vertcat(load, u) - ca.jacobian(stretch, place).T * torque
     rates = _rates(speed, bodies, ca.dot(damping, speed**2) / 2, outside)
     return rates, ca.vertcat(torque, slope * ca.jtimes(stretch, place, speed)), ca.vertcat(slope, curvature)
@@ -43,9 +43,9 @@ def plant_antagonistic(
     """Rates of (q, q', theta1, theta1', theta2, theta2'), elongation and torque of both springs."""
     place, speed = x[0::2], x[1::2]
     stretches = ca.vertcat(place[1] - place[0], place[2] + place[0])
-    torques = ca.vertcat(*(_gradients(_pulling(tendons[3 * i :]), _taut(stretches[i]))[0] for i in (0, 1)))
+    torques = ca.vertcat(*(gradients(pulling(tendons[3 * i :]), taut(stretches[i]))[0] for i in (0, 1)))
     outside = ca.vertcat(load, u) - ca.jacobian(stretches, place).T @ torques
-    dissipated = damping * speed[0] ** 2 / 2 + _dry(friction, speed[1]) + _dry(friction, speed[2])
+    dissipated = damping * speed[0] ** 2 / 2 + dry(friction, speed[1]) + dry(friction, speed[2])
     return _rates(speed, inertias, dissipated, outside), stretches, torques
 
 
@@ -53,7 +53,7 @@ def antagonistic_springs(_: Any, stretches: SX, speeds: SX, tendons: SX) -> tupl
     """Of each spring its torque with the rate, its slope and curvature."""
     torques, local = [], []
     for i in (0, 1):
-        torque, slope, curvature = _gradients(_pulling(tendons[3 * i :]), _taut(stretches[i]))
+        torque, slope, curvature = gradients(pulling(tendons[3 * i :]), taut(stretches[i]))
         torques += [torque, slope * speeds[i]]
         local += [slope, curvature]
     return ca.vertcat(*torques), ca.vertcat(*local)
@@ -67,24 +67,24 @@ def _rates(speed: SX, inertias: SX, dissipated: SX, outside: SX) -> SX:
     return ca.vec(ca.horzcat(speed, accelerated).T)
 
 
-def _dry(friction: SX, speed: SX) -> SX:
+def dry(friction: SX, speed: SX) -> SX:
     """Rayleigh's function [W] of a motor's friction; its gradient is the friction torque."""
     steepness, level, viscosity = ca.vertsplit(friction)
     dry = speed * ca.atan(steepness * speed) - ca.log(1 + (steepness * speed) ** 2) / (2 * steepness)
     return level * dry + viscosity * speed**2 / 2
 
 
-def _pulling(spring: SX) -> Callable[[SX], SX]:
+def pulling(spring: SX) -> Callable[[SX], SX]:
     """Twelve times the energy [J] of a spring (k1, k2, k3) by what it is stretched: no coefficient is rounded."""
     return lambda p: 6 * spring[0] * p**2 + 4 * spring[1] * p * p**2 + 3 * spring[2] * (p**2) ** 2
 
 
-def _taut(stretch: SX) -> SX:
+def taut(stretch: SX) -> SX:
     """What an elongation stretches; the energy of less than nothing is none."""
     return (ca.sqrt(stretch**2) + stretch) / 2
 
 
-def _gradients(energy12: Callable[[SX], SX], at: SX) -> tuple[SX, SX, SX]:
+def gradients(energy12: Callable[[SX], SX], at: SX) -> tuple[SX, SX, SX]:
     """The first three derivatives of an energy at some place, from twelve times that energy."""
     d = ca.SX.sym("d")
     first = ca.gradient(energy12(d), d)

@@ -48,7 +48,9 @@ class _Curve:
 
     def __init__(self, spring: Any, strand: Any, derivation: Derivation) -> None:
         def pose(share: Any) -> Any:
-            return pose_at(spring, Named(f"angle{share}", spring.slack + share * (spring.taut - spring.slack)), derivation)
+            return pose_at(
+                spring, Named(f"angle{share}", spring.slack + share * (spring.taut - spring.slack)), derivation
+            )
 
         self.derivation = derivation
         self.slack, self.taut = (pose(Rational(end)).force for end in (0, 1))

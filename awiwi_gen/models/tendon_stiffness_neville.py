@@ -13,6 +13,8 @@ from awiwi_gen.models.spring_statics import Pose, pose_at
 
 def tendon_stiffness(elastic: Any, tension: SX) -> tuple[SX, SX, SX, list[SX]]:
     """k [N/m], dk/df [1/m] and d2k/df2 [1/(N m)] of each tendon (m) at its force (m) [N]."""
+    if elastic.limits:
+        return _between(elastic.limits, tension)
     columns: list[list[SX]] = [[], [], []]
     farthest = SX(0)
     for force, spring in zip(ca.vertsplit(tension), elastic.springs, strict=True):
@@ -24,6 +26,21 @@ def tendon_stiffness(elastic: Any, tension: SX) -> tuple[SX, SX, SX, list[SX]]:
             column.append(value)
         distance = ((2 * force - slack - taut) / (taut - slack)) ** 2
         farthest = (farthest + distance + ca.fabs(farthest - distance)) / 2  # the larger of the two
+    k, slope, curvature = (ca.vertcat(*column) for column in columns)
+    return k, slope, curvature, [float(BEYOND) - farthest]
+
+
+def _between(limits: Any, tension: SX) -> tuple[SX, SX, SX, list[SX]]:
+    """Without springs: the two limits of stiffness, each weighed by the nearness of its end of the forces."""
+    most = limits.tendon_force
+    columns: list[list[SX]] = [[], [], []]
+    farthest = SX(0)
+    for force in ca.vertsplit(tension):
+        k = (limits.tendon_stiffness_low * (most - force) + limits.tendon_stiffness_high * force) / most
+        for column, value in zip(columns, (k, ca.gradient(k, force), ca.hessian(k, force)[0]), strict=True):
+            column.append(value)
+        distance = ((force + force - most) / most) ** 2
+        farthest = (farthest + distance + ca.fabs(farthest - distance)) / 2
     k, slope, curvature = (ca.vertcat(*column) for column in columns)
     return k, slope, curvature, [float(BEYOND) - farthest]
 

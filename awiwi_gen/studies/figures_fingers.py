@@ -57,11 +57,8 @@ class Release:
 def coriolis(library: Any, hand: Hand, spring: Spring) -> Figure:
     """Figure 5.7, for all that "a damping of 0.1 %" and its neighbours can mean."""
     release = released(library, hand)
-    change, seen, coarse = (
-        release.difference,
-        resolution(library, spring, "index"),
-        joint_error(library, "index", 0.5e-3),
-    )
+    change = release.difference
+    seen, coarse = resolution(library, spring, "index"), joint_error(library, "index", 0.5e-3)
     worst = change.max(axis=(1, 2))
     early = change[:, release.times <= DURATION / 5].max(axis=(1, 2))
     unseen = " and ".join(reading for reading, change in zip(release.readings, worst, strict=True) if change < seen)
@@ -113,7 +110,7 @@ def released(library: Any, hand: Hand) -> Release:
 
     times = np.linspace(0.0, DURATION, STEPS)
     whole = np.broadcast_to(start, (len(D), 2, 2, n)).ravel()
-    path = solve_ivp(motion, (0.0, DURATION), whole, "DOP853", times, rtol=1e-9, atol=1e-12)
+    path = solve_ivp(motion, (0.0, DURATION), whole, "DOP853", times, rtol=1e-7, atol=1e-10)
     q = path.y.reshape(len(D), 2, 2, n, -1)[:, :, 0].swapaxes(2, 3)
     return Release(tuple(dampings), times, q[:, 0], q[:, 1])
 

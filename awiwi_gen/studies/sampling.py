@@ -45,7 +45,7 @@ class Report:
         """Why it is, or is not."""
         clock = f"at {1 / self.period:.0f} Hz and {self.delay} period{'s' * (self.delay != 1)} of delay"
         if self.implementable:
-            return f"stable {clock}: spectral radius {self.radius:.4g}"
+            return f"stable {clock}: spectral radius {self.radius:.6g}"
         worst = max(self.poles, key=lambda pole: float(np.real(pole)))
         if np.real(worst) >= 0:
             return f"unstable without any delay: a pole at {_pole(worst)} 1/s"
@@ -93,7 +93,8 @@ def is_implementable(
     """Whether a law runs on the clock, and else the nearest that does.
 
     ``design`` gives the gains for a share of the bandwidth, those in question for 1. Without it, the poles that K gives
-    a plant with one input are slowed down alike.
+    a plant with one input are slowed down alike. The nearest must have something to spare: it also runs when every
+    torque comes one period later.
     """
     A, B, K = _shaped(A, B, K)
     found = report(A, B, K, period, delay)
@@ -102,7 +103,8 @@ def is_implementable(
     family = design or slowed(A, B, K)
 
     def works(bandwidth: float) -> bool:
-        return report(A, B, family(bandwidth), period, delay).implementable
+        gains = family(bandwidth)
+        return all(report(A, B, gains, period, late).implementable for late in (delay, delay + 1))
 
     shares = np.geomspace(1, SLOWEST, STEPS)
     first = next((i for i in range(1, STEPS) if works(shares[i])), None)

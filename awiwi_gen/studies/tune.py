@@ -24,6 +24,7 @@ import numpy as np
 from pydantic import Field, PlainValidator
 from scipy.optimize import linear_sum_assignment
 
+import awiwi_gen
 from awiwi_gen.errors import Fault, InputError
 from awiwi_gen.hand import Finger, Hand
 from awiwi_gen.hand_file import HandFile
@@ -35,6 +36,12 @@ from awiwi_gen.studies.sampling import PERIOD
 from awiwi_gen.units import Quantity
 
 Rows = tuple[tuple[float, ...], ...]
+GAINS = {
+    name: note.unit
+    for name, field in TendonGains.model_fields.items()
+    for note in field.metadata
+    if isinstance(note, Measure)
+}
 DEAREST = 1e12  # times R is what is tried before a tendon counts as too fast for the clock
 
 
@@ -99,6 +106,21 @@ class Tuned:
     gains: Gains
     sampled_radius: float
     delay_margin: float
+
+    def values(self) -> dict[str, float]:
+        """The gains by their names in a file of gains."""
+        return dict(zip(GAINS, map(float, (*self.gains.gains, *self.gains.weights)), strict=True))
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        clock = {"sampled_radius": self.sampled_radius, "delay_margin": self.delay_margin}
+        return {"tendon": self.tendon, "joint": self.joint, **self.values(), **clock}
+
+
+def tune_hand(hand: Hand, costs: Path) -> list[Tuned]:
+    """Gains of every tendon of a hand from a file of costs. Raises InputError with all its faults."""
+    read = read_costs(costs, hand)
+    return tune(awiwi_gen.build(hand), hand, read)
 
 
 def read_costs(path: Path, hand: Hand) -> CostFile:
@@ -197,14 +219,14 @@ def _way_out(library: Any, plant: Plant, Q: Array, R: float) -> str:
     return f"R = {high * R:.3g} is the least that works"
 
 
-def gains_text(tuned: list[Tuned]) -> str:
-    """The tables of a gains file; numbers are written so that reading them gives the same doubles."""
-    notes = {name: field.metadata for name, field in TendonGains.model_fields.items()}
-    units = {name: note.unit for name, found in notes.items() for note in found if isinstance(note, Measure)}
+def write_gains(path: Path, tuned: list[Tuned]) -> None:
+    """Write a file of gains; numbers are spelled so that reading them gives the same doubles. Raises InputError."""
     lines = ['# Written by awiwi-gen tune; a hand file takes it in with: gains = "gains.toml"']
     for each in tuned:
-        values = [float(value) for value in (*each.gains.gains, *each.gains.weights)]
         lines += ["", "[[gains]]", f"tendon = {each.tendon}  # {each.joint}"]
-        lines += [f'{name} = "{value!r} {unit}"' for (name, unit), value in zip(units.items(), values, strict=True)]
+        lines += [f'{name} = "{value!r} {GAINS[name]}"' for name, value in each.values().items()]
         lines.append('source = "awiwi-gen tune"')
-    return "\n".join(lines) + "\n"
+    try:
+        path.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
+    except OSError as error:
+        raise InputError(f"{path} cannot be written: {error.strerror}") from None

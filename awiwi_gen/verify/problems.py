@@ -15,6 +15,7 @@ from awiwi_gen.ir.graph import Graph, Node
 from awiwi_gen.ir.interpret import evaluate
 from awiwi_gen.kernel import Solver
 from awiwi_gen.verify.problems_distribution import Distribution
+from awiwi_gen.verify.problems_gains import GainMatching
 from awiwi_gen.verify.problems_riccati import JointRegulator, Riccati
 from awiwi_gen.verify.reference import Reference, reference
 
@@ -156,4 +157,5 @@ PROBLEMS: Mapping[str, Callable[[Solver, Mapping[str, Graph], Mapping[str, Fract
     "distribution": Distribution,
     "riccati": Riccati,
     "joint regulator": JointRegulator,
+    "gain matching": GainMatching,
 }

@@ -20,6 +20,7 @@ Array = np.ndarray[Any, Any]
 
 INFEASIBLE = 4  # AWIWI_INFEASIBLE
 HELD = 0.3  # share of the tendons that are at a limit, in the demands that have such
+IN_HAND = 0.05  # least torque of free tendons by unit forces, in parts of the largest
 UNREACHABLE = 0.05  # how far a stiffness is from what the tendons can do, in parts of its largest entry
 UNREACHABLE_TORQUE = 0.2  # [N m]
 ROUNDS = 8  # of Newton's method with a derivative in floats: each gains ten digits at least
@@ -188,9 +189,7 @@ class _System:
         steps = [
             sum((arb(float(x)) * miss for x, miss in zip(row, misses, strict=True)), arb(0)) for row in self.inverse
         ]
-        self.prices = [
-            (price - step).mid() for price, step in zip(self.prices, steps[len(self.free) :], strict=True)
-        ]
+        self.prices = [(price - step).mid() for price, step in zip(self.prices, steps[len(self.free) :], strict=True)]
         moved = dict(zip(self.free, steps, strict=False))
         return [(force - moved[i]).mid() if i in moved else force for i, force in enumerate(f)]
 
@@ -201,11 +200,12 @@ def _forces(share: Array, held: Array, ends: tuple[float, float]) -> Array:
 
 
 def _some_held(P: Array, random: Any) -> Array:
-    """Some tendons at a limit, but no more than leave the torque free."""
-    held, rank = np.zeros(len(P), int), np.linalg.matrix_rank(P)
+    """Some tendons at a limit; the others must have every torque well in hand."""
+    held, sizes = np.zeros(len(P), int), np.linalg.svd(P, compute_uv=False)
+    rank, weak = int(np.sum(sizes > 1e-9 * sizes[0])), IN_HAND * sizes[0]
     for i in random.permutation(len(P)):
-        rest = [l for l in range(len(P)) if l != i and not held[l]]
-        if random.uniform() < HELD and np.linalg.matrix_rank(P[rest]) == rank:
+        rest = [k for k in range(len(P)) if k != i and not held[k]]
+        if random.uniform() < HELD and np.linalg.matrix_rank(P[rest], tol=weak) == rank:
             held[i] = random.choice((-1, 1))
     return held
 
@@ -218,7 +218,7 @@ def _push(P: Array, random: Any) -> Array:
         while (more := set(np.flatnonzero(np.abs(P[np.abs(P[:, list(joints)]).any(axis=1)]).any(axis=0)))) - joints:
             joints |= more
         left -= joints
-        if not left and not push.any() or random.uniform() < 0.5:
+        if (not left and not push.any()) or random.uniform() < 0.5:
             push[list(joints)] = random.normal(size=len(joints)) * UNREACHABLE_TORQUE
     return push
 
