@@ -183,12 +183,13 @@ def delay_margin(A: Array, B: Array, K: Array) -> float:
 def _crossing(A: Array, feedback: Array, z: complex) -> float | None:
     """The delay at which a pole crosses near z = exp(-j angle), if one does: Newton's method for frequency and angle."""
     angle = float(-np.angle(z))
+    size = np.linalg.norm(A) + np.linalg.norm(feedback)
     values = eigvals(A - feedback * np.exp(-1j * angle))
     frequency = float(values[np.abs(values.real).argmin()].imag)
     for _ in range(20):
         turned = feedback * np.exp(-1j * angle)
         left, sizes, right = np.linalg.svd(1j * frequency * np.eye(len(A)) - A + turned)
-        if sizes[-1] <= 1e-12 * sizes[0]:
+        if sizes[-1] <= 1e-12 * size:
             break
         u, v = left[:, -1].conj(), right[-1].conj()
         slopes = np.array([1j * (u @ v), -1j * (u @ turned @ v)])
