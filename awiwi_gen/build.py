@@ -73,9 +73,10 @@ def _version(command: list[str]) -> str:
 
 
 def headers(directory: Path) -> str:
-    """Everything a generated C file may include, as one text."""
+    """Everything a generated C file may include, as one text; comments, which tell of ranges, decide no object."""
     files = sorted(directory.glob("*.h")) + sorted(CSRC.glob("*.h"))
-    return "\0".join(path.read_text(encoding="utf-8") for path in files)
+    texts = (path.read_text(encoding="utf-8") for path in files)
+    return "\0".join(re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL) for text in texts)
 
 
 def compile_objects(directory: Path, store: Cache) -> list[Path]:
