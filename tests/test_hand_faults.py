@@ -11,7 +11,7 @@ import pytest
 
 from awiwi_gen.errors import InputError
 from awiwi_gen.hand import Hand
-from awiwi_gen.hand_lint import complaints
+from awiwi_gen.hand.lint import complaints
 from awiwi_gen.units import Quantity
 
 PACKAGED = Path(__file__).parents[1] / "awiwi_gen" / "hand.toml"

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 PACKAGE = Path(__file__).resolve().parent.parent / "awiwi_gen"
-PHYSICS = [["errors", "units"], ["hand*", "kernel"], ["models"], ["control"], ["kernels"]]
+PHYSICS = [["errors", "units", "resources"], ["hand", "kernel"], ["models"], ["control"], ["kernels"]]
 COMPILER = [["errors", "units", "resources"], ["kernel", "cache"], ["ir"], ["emit"], ["library"], ["build"], ["verify"]]
 TOP = [["derive", "records"], ["pipeline"], ["report", "explain", "simulate", "studies"], ["__init__"], ["__main__"]]
 HOMES = {
@@ -23,8 +23,7 @@ FILES = sorted(path for path in PACKAGE.rglob("*.py"))
 
 
 def room(module: str) -> str:
-    name = module.split(".")[1] if "." in module else "__init__"
-    return "hand*" if name.startswith("hand") else name
+    return module.split(".")[1] if "." in module else "__init__"
 
 
 def imports(path: Path) -> set[str]:

@@ -14,7 +14,7 @@ from flint import arb, ctx
 from awiwi_gen.derive import Deriver
 from awiwi_gen.errors import InputError
 from awiwi_gen.hand import Hand
-from awiwi_gen.hand_lever import Lever
+from awiwi_gen.hand.lever import Lever
 from awiwi_gen.ir.algebras import Balls
 from awiwi_gen.ir.builder import Builder
 from awiwi_gen.ir.from_sympy import lower_sympy

@@ -9,7 +9,7 @@ import pytest
 import sympy
 
 from awiwi_gen.derive import Deriver
-from awiwi_gen.hand_wrist import Linkage
+from awiwi_gen.hand.wrist import Linkage
 from awiwi_gen.ir.algebras import ball
 from awiwi_gen.ir.passes.bind import bind
 from awiwi_gen.kernels.wrist import wrist_kernels

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from awiwi_gen.hand import Hand
-from awiwi_gen.hand_lever import Lever
-from awiwi_gen.hand_parts import Finger, Tendon
+from awiwi_gen.hand.lever import Lever
+from awiwi_gen.hand.parts import Finger, Tendon
 from awiwi_gen.kernel import Kernel, Port, Solver
 from awiwi_gen.kernels.declare import Family
 from awiwi_gen.models import chain, estimate, estimate_qr, lagrange, recursive, tendons, tendons_ad

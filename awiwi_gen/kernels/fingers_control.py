@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from awiwi_gen.hand import Finger, Hand
-from awiwi_gen.hand_lever import Lever
-from awiwi_gen.hand_parts import Tendon
+from awiwi_gen.hand.lever import Lever
+from awiwi_gen.hand.parts import Tendon
 from awiwi_gen.kernel import Kernel, Port, Solver
 from awiwi_gen.kernels.declare import Family
 from awiwi_gen.kernels.fingers import force_range, per_finger

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from awiwi_gen.hand import Hand, Spring
-from awiwi_gen.hand_lever import POWERS, Lever
+from awiwi_gen.hand.lever import POWERS, Lever
 from awiwi_gen.kernel import Kernel, Port
 from awiwi_gen.kernels.declare import Family, Parameterless
 from awiwi_gen.models import calibration, calibration_horner, spring_curve, spring_statics

@@ -3,7 +3,7 @@
 import sympy
 from sympy import Expr, Matrix, Rational
 
-from awiwi_gen.hand_lever import BEYOND
+from awiwi_gen.hand.lever import BEYOND
 
 
 def polynomials(

@@ -6,7 +6,7 @@ from typing import Any
 import casadi as ca
 from casadi import SX
 
-from awiwi_gen.hand_lever import BEYOND
+from awiwi_gen.hand.lever import BEYOND
 
 
 def polynomials(_: Any, counts: SX, ends: SX, length: SX, force: SX, stiffness: SX) -> tuple[SX, SX, SX, list[SX]]:

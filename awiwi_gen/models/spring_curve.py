@@ -11,7 +11,7 @@ from typing import Any
 
 from sympy import Abs, Expr, Matrix, Rational
 
-from awiwi_gen.hand_lever import BEYOND, CURVE_NODES, READING_NODES, chebyshev
+from awiwi_gen.hand.lever import BEYOND, CURVE_NODES, READING_NODES, chebyshev
 from awiwi_gen.models.interpolation import coefficients, horner
 from awiwi_gen.models.naming import Derivation, Named
 from awiwi_gen.models.spring import Pose, pose_at

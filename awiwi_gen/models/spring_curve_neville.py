@@ -6,7 +6,7 @@ from typing import Any
 import casadi as ca
 from casadi import SX
 
-from awiwi_gen.hand_lever import BEYOND, CURVE_NODES, READING_NODES, chebyshev
+from awiwi_gen.hand.lever import BEYOND, CURVE_NODES, READING_NODES, chebyshev
 from awiwi_gen.models.interpolation_neville import interpolate
 from awiwi_gen.models.spring_statics import Pose, pose_at
 

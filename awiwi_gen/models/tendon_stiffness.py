@@ -8,7 +8,7 @@ from typing import Any
 
 from sympy import Expr, Matrix, Rational
 
-from awiwi_gen.hand_lever import BEYOND, READING_NODES, chebyshev
+from awiwi_gen.hand.lever import BEYOND, READING_NODES, chebyshev
 from awiwi_gen.models import fibre
 from awiwi_gen.models.interpolation import coefficients, horner
 from awiwi_gen.models.naming import Derivation, Named

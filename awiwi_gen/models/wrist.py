@@ -1,6 +1,6 @@
 """The wrist by its definition: three bars, solved one after the other by angles (chapter 6, eq. 6.1 to 6.9).
 
-A wrist is anything with the attributes a0[3], a[3], b[3], palm[3] and tendons[i].forearm[3], .palm[3]; `hand_wrist`
+A wrist is anything with the attributes a0[3], a[3], b[3], palm[3] and tendons[i].forearm[3], .palm[3]; `hand.wrist`
 tells where they lie. q71 and q73 are the internal angles [rad]. Frame {0}: origin B0, x distal, y from B0 to C0.
 
 The plane of the side bars contains B0C0 and is turned about it by q71; in it, B and C run on circles about B0 and C0.

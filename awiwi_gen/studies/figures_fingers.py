@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from awiwi_gen.hand import Hand, Spring
-from awiwi_gen.hand_lever import Lever
+from awiwi_gen.hand.lever import Lever
 from awiwi_gen.kernels.base_estimate import base_of
 from awiwi_gen.studies.base_search import BaseSearch
 from awiwi_gen.studies.figure import Figure

@@ -21,7 +21,7 @@ from scipy.optimize import least_squares
 
 from awiwi_gen.errors import Fault, InputError
 from awiwi_gen.hand import Spring
-from awiwi_gen.hand_lever import POWERS, Lever
+from awiwi_gen.hand.lever import POWERS, Lever
 
 Array = np.ndarray[Any, Any]
 

@@ -27,9 +27,9 @@ from scipy.optimize import linear_sum_assignment
 import awiwi_gen
 from awiwi_gen.errors import Fault, InputError
 from awiwi_gen.hand import Finger, Hand
-from awiwi_gen.hand_file import HandFile
-from awiwi_gen.hand_gains import TendonGains
-from awiwi_gen.hand_parts import Measure, Part
+from awiwi_gen.hand.file import HandFile
+from awiwi_gen.hand.gains import TendonGains
+from awiwi_gen.hand.parts import Measure, Part
 from awiwi_gen.studies.joint_loops import Array, Loop, Plant
 from awiwi_gen.studies.optimal_gains import Gains, cancelling, exact_gains, loop_of, pretension_loop, regulator
 from awiwi_gen.studies.sampling import PERIOD

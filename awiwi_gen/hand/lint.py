@@ -12,8 +12,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from fractions import Fraction
 from typing import Protocol
 
-from awiwi_gen.hand_parts import Finger, FourBar, Keys, Limits, Link, Part, covers
-from awiwi_gen.hand_wrist import Wrist, closure
+from awiwi_gen.hand.parts import Finger, FourBar, Keys, Limits, Link, Part, covers
+from awiwi_gen.hand.wrist import Wrist, closure
 from awiwi_gen.units import Quantity
 
 __all__ = ["Complaint", "below", "complaints", "sources"]

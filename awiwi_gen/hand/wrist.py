@@ -20,7 +20,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from awiwi_gen.hand_parts import Angle, Keys, Part, Point, Source
+from awiwi_gen.hand.parts import Angle, Keys, Part, Point, Source
 
 __all__ = ["Linkage", "Swing", "Wrist", "WristTendon", "closure"]
 
@@ -77,7 +77,7 @@ class Wrist(Part):
 
 
 def closure(wrist: Wrist) -> Iterator[tuple[Keys, str]]:
-    """What keeps the drawn linkage from moving through its whole range: (keys, predicate) pairs as for `hand_lint`."""
+    """What keeps the drawn linkage from moving through its whole range: (keys, predicate) pairs as for `lint`."""
     if drawn := list(_misdrawn(wrist)):
         yield from drawn
         return

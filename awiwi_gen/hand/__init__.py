@@ -4,28 +4,26 @@
     float(hand.fingers["index"].radii["pip"])     # 0.006, in metres
     hand.symbolic(lambda path, _: Symbol(path))   # the same tree, with fingers.index.pulleys[2].radius in its place
 
-The parts of a hand are in `hand_parts`, reading a file is in `hand_file`, what physics demands is in `hand_lint`.
+The parts of a hand are in `parts`, reading a file is in `file`, what physics demands is in `lint`.
 """
 
 from __future__ import annotations
 
 import os
-from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import Field
 
-from awiwi_gen.hand_actuation import Fibre, Motor, Spring
-from awiwi_gen.hand_file import HandFile
-from awiwi_gen.hand_gains import Gains, gains_complaints, with_gains
-from awiwi_gen.hand_lint import complaints
-from awiwi_gen.hand_lint_actuation import actuator_complaints
-from awiwi_gen.hand_parts import Finger, FingerName, Limits, Link, Part, Prefix, Title
-from awiwi_gen.hand_wrist import Wrist
+from awiwi_gen.hand.actuation import Fibre, Motor, Spring
+from awiwi_gen.hand.file import HandFile
+from awiwi_gen.hand.gains import Gains, gains_complaints, with_gains
+from awiwi_gen.hand.lint import complaints
+from awiwi_gen.hand.lint_actuation import actuator_complaints
+from awiwi_gen.hand.parts import Finger, FingerName, Limits, Link, Part, Prefix, Title
+from awiwi_gen.hand.wrist import Wrist
+from awiwi_gen.resources import DEFAULT_HAND
 
 __all__ = ["Fibre", "Finger", "Hand", "Limits", "Link", "Motor", "Spring", "Wrist"]
-
-_PACKAGED = Path(__file__).with_name("hand.toml")
 
 
 class Hand(Part):
@@ -69,7 +67,7 @@ class Hand(Part):
 
         Raises `InputError` with every fault of the first stage that fails: reading, schema, physics.
         """
-        return cls._checked(HandFile.read(path) if path is not None else HandFile.read(_PACKAGED, _PACKAGED.name))
+        return cls._checked(HandFile.read(path) if path is not None else HandFile.read(DEFAULT_HAND, DEFAULT_HAND.name))
 
     @classmethod
     def parse(cls, text: str, name: str = "hand.toml") -> Hand:

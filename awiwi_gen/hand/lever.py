@@ -14,7 +14,7 @@ from fractions import Fraction
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from awiwi_gen.hand_actuation import Spring
+    from awiwi_gen.hand.actuation import Spring
 
 __all__ = ["BEYOND", "CURVE_NODES", "POWERS", "READING_NODES", "Lever", "Pose", "chebyshev"]
 

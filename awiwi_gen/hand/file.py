@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 
 from awiwi_gen.errors import Fault, InputError
-from awiwi_gen.hand_parts import Keys, Measure
+from awiwi_gen.hand.parts import Keys, Measure
 
 if TYPE_CHECKING:
     from pydantic.fields import FieldInfo

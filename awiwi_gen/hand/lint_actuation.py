@@ -1,12 +1,12 @@
-"""What a schema cannot see in motors, springs and fibres: complaints as in `hand_lint`, with the angle that fails."""
+"""What a schema cannot see in motors, springs and fibres: complaints as in `lint`, with the angle that fails."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from awiwi_gen.hand_actuation import CalibratedUnit, Fibre, Motor, Sensor, Spring
-from awiwi_gen.hand_lever import CURVE_NODES, Lever, Pose
-from awiwi_gen.hand_lint import Complaint, below, sources
+from awiwi_gen.hand.actuation import CalibratedUnit, Fibre, Motor, Sensor, Spring
+from awiwi_gen.hand.lever import CURVE_NODES, Lever, Pose
+from awiwi_gen.hand.lint import Complaint, below, sources
 
 __all__ = ["actuator_complaints"]
 
