@@ -1,4 +1,8 @@
-"""Pinocchio: its C++ headers, out of the wheel, compiled here with each variant's flags; a model at run time."""
+"""Pinocchio: its C++ library, out of the wheel, called from C++; it computes with a model at run time.
+
+Its templates can also be compiled here with other flags, and with CasADi's scalars to generate code. Either takes minutes
+and gigabytes for one file, so it is not done.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +14,7 @@ from bench.peers.eigen import eigen_include
 from bench.peers.kit import Contender
 
 DEFINES = (
+    "-DPINOCCHIO_ENABLE_TEMPLATE_INSTANTIATION",  # the algorithms as the wheel has compiled them
     "-DBOOST_MPL_CFG_NO_PREPROCESSED_HEADERS",
     "-DBOOST_MPL_LIMIT_LIST_SIZE=30", "-DBOOST_MPL_LIMIT_VECTOR_SIZE=30", "-DBOOST_FUSION_INVOKE_MAX_ARITY=12")
 
@@ -77,20 +82,20 @@ static void fall(const double *g) { model.gravity.linear() << g[0], g[1], g[2]; 
 
 BODIES = {
     "mass_matrix": "    mass(q, M);",
-    "inverse_dynamics": "    fall(g); Out(tau) = pinocchio::rnea(model, data, In(q), In(qd), In(qdd));",
-    "bias": "    fall(g); Out(bias) = pinocchio::nonLinearEffects(model, data, In(q), In(qd));",
-    "forward_dynamics": "    fall(g); Out(qdd) = pinocchio::aba(model, data, In(q), In(qd), In(tau), "
+    "inverse_dynamics": "    fall(g); Out{tau} = pinocchio::rnea(model, data, In(q), In(qd), In(qdd));",
+    "bias": "    fall(g); Out{bias} = pinocchio::nonLinearEffects(model, data, In(q), In(qd));",
+    "forward_dynamics": "    fall(g); Out{qdd} = pinocchio::aba(model, data, In(q), In(qd), In(tau), "
     "pinocchio::Convention::LOCAL);",
     "pose_jacobian": """    Eigen::Matrix<double, 6, N> columns;
     columns.setZero();
     pinocchio::computeJointJacobians(model, data, In(q));
     const auto &pose = pinocchio::updateFramePlacement(model, data, tip);
     pinocchio::getFrameJacobian(model, data, tip, pinocchio::LOCAL_WORLD_ALIGNED, columns);
-    Eigen::Map<Eigen::Matrix<double, 6, N, Eigen::RowMajor>>(J) = columns;
-    Eigen::Map<Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(T) = pose.toHomogeneousMatrix();""",
+    Eigen::Map<Eigen::Matrix<double, 6, N, Eigen::RowMajor>>{J} = columns;
+    Eigen::Map<Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>{T} = pose.toHomogeneousMatrix();""",
     "dynamics": """    fall(g); mass(q, M);
-    Square(C) = pinocchio::computeCoriolisMatrix(model, data, In(q), In(qd));
-    Out(gravity) = pinocchio::computeGeneralizedGravity(model, data, In(q));""",
+    Square{C} = pinocchio::computeCoriolisMatrix(model, data, In(q), In(qd));
+    Out{gravity} = pinocchio::computeGeneralizedGravity(model, data, In(q));""",
 }
 
 
@@ -99,8 +104,10 @@ def main(finger: dict[str, Any], directory: Path) -> None:
     import pinocchio
 
     contender = Contender("pinocchio", pinocchio.__version__, directory, language="c++", counted=False)
-    contender.flags, contender.variants = include_flags(), ["portable", "avx2+fma"]
-    contender.note = "C++ headers of its wheel, compiled here; a model at run time"
+    contender.flags, contender.variants = include_flags(), ["portable"]
+    folder = Path(sysconfig.get_paths()["purelib"]) / "cmeel.prefix" / "lib"
+    contender.libraries = [str(folder / "libpinocchio_default.so"), f"-Wl,-rpath,{folder}"]
+    contender.note = "C++ library as in its wheel; a model at run time"
     (directory / "finger.txt").write_text(numbers(finger), encoding="utf-8")
     contender.environment, contender.kept = {"BENCH_FINGER": str((directory / "finger.txt").resolve())}, True
     contender.adapt(PRELUDE + GLOBALS, BODIES)
