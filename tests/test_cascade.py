@@ -140,7 +140,7 @@ def test_over_compensation_below_the_damping_is_harmless_and_above_it_is_not():
 def test_the_motor_finds_the_desired_force(lib):
     stiffness, radius, inertia, wanted = 8000.0, 0.004, 2e-3, 40.0
     at, speed = 0.0, 0.0
-    for _ in range(2000):
+    for _ in range(4000):
         force = stiffness * radius * at
         tau = lib.motor_impedance(at, speed, wanted / (stiffness * radius), wanted, 0.0, radius, 5.0, 0.3).tau
         speed += (tau - radius * force) / inertia / 3000
@@ -198,7 +198,7 @@ def certified():
     D, P = symbols("D"), Matrix(symbols("p:2"))
     stiff, damp = Matrix(symbols("kp:2", positive=True)), Matrix(symbols("kd:2", positive=True))
     weight, omega = symbols("weight omega", positive=True)
-    _, S = cascade_certificate(None, *column(D), P, stiff, damp, *column(weight, omega))
+    _, S, _ = cascade_certificate(None, *column(D), P, stiff, damp, *column(weight, omega))
     return D, P, stiff, damp, weight * sympy.diag(1, 1 / omega**2), S
 
 
@@ -284,6 +284,13 @@ def test_the_energy_it_returns_is_that_of_scipys_lyapunov_solver(lib, gain_sets)
             assert np.allclose(found, linalg.solve_continuous_lyapunov(A.T, -Q), rtol=1e-8, atol=1e-12)
 
 
+@pytest.mark.parametrize(("weight", "omega"), [(-0.1, 100.0), (0.0, 100.0), (0.1, -100.0), (np.nan, 100.0)])
+def test_an_energy_with_a_weight_that_is_not_positive_certifies_nothing(lib, weight, omega):
+    D, P, stiff, damp = 0.05 * np.eye(4), np.full((8, 4), 0.005), np.full(8, 1e4), np.full(8, 150.0)
+
+    assert lib.cascade_certificate(D, P, stiff, damp, weight, omega).status == 1
+
+
 @pytest.mark.parametrize("bad", ["nothing", "damping", "kp", "kd", "nan"])
 def test_a_bad_gain_is_never_certified(lib, bad):
     D, P = 0.05 * np.eye(4), np.full((8, 4), 0.005)
@@ -300,11 +307,17 @@ def test_a_bad_gain_is_never_certified(lib, bad):
     assert bool(margin > 0) == (bad == "nothing")
 
 
+def test_joints_that_are_driven_instead_of_damped_are_not_certified(lib):
+    loops = np.full(8, 1e4), np.full(8, 150.0)
+
+    assert lib.cascade_certificate(-0.05 * np.eye(4), np.full((8, 4), 0.005), *loops, 0.1, 100.0).margin < 0
+
+
 def test_the_certified_energy_falls_along_the_motion_of_the_index_finger(lib):
     q_des, zero, weightless = np.array([0.1, 0.5, 0.6, 0.4]), np.zeros(4), np.zeros(3)
     K, D = np.diag([0.5, 0.5, 0.3, 0.2]), np.diag([0.01, 0.01, 0.006, 0.004])
     P, stiff, damp = lib.index_coupling(q_des), np.full(8, 150.0**2), np.full(8, 240.0)
-    margin, S = lib.cascade_certificate(D, P, stiff, damp, 0.2, 150.0)
+    margin, S, _ = lib.cascade_certificate(D, P, stiff, damp, 0.2, 150.0)
     assert margin > 0
 
     def flow(x):
