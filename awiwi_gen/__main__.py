@@ -282,6 +282,23 @@ def tune(
     return 0
 
 
+@command
+def simulate(
+    law: Annotated[str, typer.Argument(help="A law; all of them if left out.")] = "",
+    gains: Annotated[str, typer.Option("--gains", help="Gains such as K_p=0.5,K_d=0.003.")] = "",
+    scenario: Annotated[str, typer.Option("--scenario", help="Show one run: step, load or sine.")] = "",
+    force: Annotated[float, typer.Option("--force", help="Pretension of that run [N].")] = 10.0,
+    plant: Annotated[str, typer.Option("--plant", help="Plant of that run.")] = "as known",
+    hand: HandFile = None, as_json: Json = False,
+) -> int:  # fmt: skip
+    """Run laws on a joint between two tendons, on the hand's clock, and tell how they bear it."""
+    from awiwi_gen.studies.benchmark.command import benchmark, one_run
+
+    shown = one_run(hand, law, gains, scenario, force, plant) if scenario else benchmark(hand, law, gains)
+    shown.show(as_json)
+    return 0
+
+
 def mend(job: Any, hand: Path | None, output: Path) -> str:
     """The command that brings a generated directory up to date."""
     usual, chosen = vars(type(job.options)()), vars(job.options) | {"only": job.only}
