@@ -11,7 +11,7 @@ from awiwi_gen.models.assembly import Assembly, assemble
 from awiwi_gen.models.composite import mass_and_coriolis
 from awiwi_gen.models.newton_euler import torques, weight
 from awiwi_gen.models.tree import Finger
-from awiwi_gen.models.turning_plane import turning_plane
+from awiwi_gen.models.turning_plane import TurningPlane, turning_plane
 
 _Z = SX([0, 0, 1])
 
@@ -84,6 +84,9 @@ def inverse_dynamics(finger: Finger, q: SX, qd: SX, qdd: SX, g: SX) -> SX:
 def forward_dynamics(finger: Finger, q: SX, qd: SX, tau: SX, g: SX) -> SX:
     """Joint accelerations (n) [rad/s^2] that joint torques tau cause: M qdd = tau - bias (eq. 2.1)."""
     assembly, none = assemble(finger, q), SX.zeros(q.numel())
+    plane = turning_plane(assembly)
+    if plane is not None and all(joint.rate.is_one() for joint in assembly.joints):
+        return _solve_absolute(plane, qd, tau, g)
     return _solve(_mass_and_coriolis(assembly, none)[0], tau - _torques(assembly, qd, none, g))
 
 
@@ -143,6 +146,16 @@ def _ways(assembly: Assembly, qd: SX) -> tuple[SX, SX]:
 
 def _pose(axes: SX, origin: SX) -> SX:
     return ca.vertcat(ca.horzcat(axes, origin), SX([[0, 0, 0, 1]]))
+
+
+def _solve_absolute(plane: TurningPlane, qd: SX, tau: SX, g: SX) -> SX:
+    """Accelerations of the absolute angles, of whose mass matrix the diagonal is constant, and their differences."""
+    n, start = qd.numel(), 1 if plane.lead else 0
+    differences = SX.eye(n)
+    for joint in range(start, n - 1):
+        differences[joint, joint + 1] = -1
+    torque = plane.torques(ca.vertsplit(qd), [SX(0)] * n, g, absolute=True)
+    return differences.T @ _solve(plane.absolute_mass(), differences @ tau - ca.vertcat(*torque))
 
 
 def _solve(mass: SX, torque: SX) -> SX:
