@@ -245,18 +245,17 @@ def report(
     hand: HandFile = None, as_json: Json = False,
     page: Annotated[Path, typer.Option("--page", "-o", help="HTML file to write.")] = PAGE,
 ) -> int:  # fmt: skip
-    """Compute the source's figures again, and write them on one page with the proof of every kernel."""
+    """Compute the source's figures and numbers again, and write them on one page with the proof of every kernel."""
     from awiwi_gen.report import print_json
-    from awiwi_gen.studies.page import publish, verdict
+    from awiwi_gen.studies.page import publish, summary, verdict
 
-    figures, proof = publish(make_job(hand), page)
+    results = publish(make_job(hand), page)
     if as_json:
-        print_json([{"number": f.number, "title": f.title, "claim": f.claim, "holds": bool(f.holds)} for f in figures])
+        print_json(results.as_dict())
     else:
-        print("\n".join(f"figure {figure.number}: the claim {verdict(figure)}" for figure in figures))
-        proved = f"{sum(v.passed for v in proof.verdicts)} of {len(proof.verdicts)} kernels proved"
-        print(f"{page}: {len(figures)} figures, {proved}")
-    return 0 if proof.passed else 1
+        print("\n".join(f"figure {figure.number}: the claim {verdict(figure)}" for figure in results.figures))
+        print(f"{page}: {summary(results)}")
+    return 0 if results.proof.passed else 1
 
 
 @command
@@ -280,6 +279,23 @@ def tune(
         radius, margin = max(e.sampled_radius for e in tuned), min(e.delay_margin for e in tuned)
         print(f"{output}: gains of {len(tuned)} tendons; spectral radius {radius:.4f} at most at 3 kHz and one sample")
         print(f"of delay, delay margin {margin * 1e6:.0f} us at least")
+    return 0
+
+
+@command
+def simulate(
+    law: Annotated[str, typer.Argument(help="A law; all of them if left out.")] = "",
+    gains: Annotated[str, typer.Option("--gains", help="Gains such as K_p=0.5,K_d=0.003.")] = "",
+    scenario: Annotated[str, typer.Option("--scenario", help="Show one run: step, load or sine.")] = "",
+    force: Annotated[float, typer.Option("--force", help="Pretension of that run [N].")] = 10.0,
+    plant: Annotated[str, typer.Option("--plant", help="Plant of that run.")] = "as known",
+    hand: HandFile = None, as_json: Json = False,
+) -> int:  # fmt: skip
+    """Run laws on a joint between two tendons, on the hand's clock, and tell how they bear it."""
+    from awiwi_gen.studies.benchmark.command import benchmark, one_run
+
+    shown = one_run(hand, law, gains, scenario, force, plant) if scenario else benchmark(hand, law, gains)
+    shown.show(as_json)
     return 0
 
 
