@@ -45,6 +45,11 @@ def jacobian(finger: Finger, q: SX) -> SX:
     return result
 
 
+def pose_and_jacobian(finger: Finger, q: SX) -> tuple[SX, SX]:
+    """Pose (4 x 4) of the fingertip and its Jacobian (6 x n), in base axes."""
+    return fingertip_pose(finger, q), jacobian(finger, q)
+
+
 def seat_point(finger: Finger, q: SX, joint: str, local: SX) -> SX:
     """Base coordinates (3) [m] of a point (3) that `joint` does not move, given in the frame it turns in."""
     assembly = assemble(finger, q)
