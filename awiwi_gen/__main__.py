@@ -247,18 +247,17 @@ def report(
     hand: HandFile = None, as_json: Json = False,
     page: Annotated[Path, typer.Option("--page", "-o", help="HTML file to write.")] = PAGE,
 ) -> int:  # fmt: skip
-    """Compute the source's figures again, and write them on one page with the proof of every kernel."""
+    """Compute the source's figures and numbers again, and write them on one page with the proof of every kernel."""
     from awiwi_gen.report import print_json
-    from awiwi_gen.studies.page import publish, verdict
+    from awiwi_gen.studies.page import publish, summary, verdict
 
-    figures, proof = publish(make_job(hand), page)
+    results = publish(make_job(hand), page)
     if as_json:
-        print_json([{"number": f.number, "title": f.title, "claim": f.claim, "holds": bool(f.holds)} for f in figures])
+        print_json(results.as_dict())
     else:
-        print("\n".join(f"figure {figure.number}: the claim {verdict(figure)}" for figure in figures))
-        proved = f"{sum(v.passed for v in proof.verdicts)} of {len(proof.verdicts)} kernels proved"
-        print(f"{page}: {len(figures)} figures, {proved}")
-    return 0 if proof.passed else 1
+        print("\n".join(f"figure {figure.number}: the claim {verdict(figure)}" for figure in results.figures))
+        print(f"{page}: {summary(results)}")
+    return 0 if results.proof.passed else 1
 
 
 @command
