@@ -191,7 +191,7 @@ def judge_record(
     if record.graph is None:
         problem, tolerance = _problem(kernel, used), _solver(kernel).tolerance[options.scalar]
         inputs = problem.sample(draw(kernel.inputs, kernel.path, options.dtype))
-        mirror = problem.mirror(inputs, options.trig == "own")
+        mirror = problem.mirror(inputs, options.math == "own")
         return judge_solver(kernel.name, record.reference, mirror, inputs, function, tolerance, SEED)
     return judge(
         kernel.name,
@@ -205,7 +205,7 @@ def judge_record(
         record.passes,
         SEED,
         options.dtype,
-        options.trig == "own",
+        options.math == "own",
     )
 
 

@@ -9,7 +9,15 @@ static inline awiwi_real awiwi_size(awiwi_real x)
     return x < 0 ? -x : x;
 }
 
-/* The largest magnitude among x[n]; NaN if one of them is. */
+static inline awiwi_real awiwi_clamp(awiwi_real x, awiwi_real low, awiwi_real high)
+{
+    return x < low ? low : x > high ? high : x;
+}
+
+/* a'b of n numbers, summed from the first on. */
+awiwi_real awiwi_dot(const awiwi_real *a, const awiwi_real *b, int n);
+
+/* The largest magnitude among x[n]; not finite if one of them is not. */
 awiwi_real awiwi_largest(const awiwi_real *x, int n);
 
 /* Whether x[n] are all numbers and none is infinite. */
