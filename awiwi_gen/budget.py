@@ -61,7 +61,9 @@ def excess(old: Steps, new: Steps) -> list[str]:
     removed = dict(_removals(old))
     losses = {name: removed.get(name, 0) - weight for name, weight in _removals(new)}
     worst = max(losses, key=lambda name: losses[name])
-    cause = f"pass {worst} removes {losses[worst]} less" if worst != new[0][0] else f"{worst} gives {losses[worst]} more"
+    cause = (
+        f"pass {worst} removes {losses[worst]} less" if worst != new[0][0] else f"{worst} gives {losses[worst]} more"
+    )
     return [f"costs {after}, its budget is {before} (+{100 * (after / before - 1):.1f} %): {cause} than before"]
 
 
