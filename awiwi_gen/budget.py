@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -70,4 +71,4 @@ def excess(old: Steps, new: Steps) -> list[str]:
 def _removals(steps: Steps) -> list[tuple[str, int]]:
     """What each pass takes away; the first step is where the passes start from."""
     first = [(steps[0][0], -steps[0][1])]
-    return first + [(name, last - weight) for (_, last), (name, weight) in zip(steps, steps[1:], strict=False)]
+    return first + [(name, last - weight) for (_, last), (name, weight) in pairwise(steps)]
