@@ -70,10 +70,10 @@ class InputError(AwiwiError, ValueError):
         return "\n".join(lines + [f"... and {more} more"] * (more > 0))
 
 
-def unknown(kind: str, name: str, known: Iterable[str]) -> InputError:
-    """The exception for a name that is not known, with those that look like it."""
+def unknown(kind: str, name: str, known: Iterable[str], otherwise: str = "see awiwi-gen list") -> InputError:
+    """The exception for a name that is not known, with those that look like it, or else where to find names."""
     near = difflib.get_close_matches(name, list(known), 3)
-    return InputError(f"no {kind} {name!r}; {'did you mean ' + ', '.join(near) if near else 'see awiwi-gen list'}")
+    return InputError(f"no {kind} {name!r}; {'did you mean ' + ', '.join(near) if near else otherwise}")
 
 
 class OutputError(InputError):

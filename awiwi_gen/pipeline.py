@@ -227,7 +227,7 @@ def verify(job: Job, directory: Path) -> Proof:
 
 def _examine(job: Job, directory: Path) -> Proof:
     from awiwi_gen.build import compiler, headers, load
-    from awiwi_gen.records import judge_record
+    from awiwi_gen.records import judge_record, verdict_key
 
     library = load(directory, job.store)
     shared = headers(directory)
@@ -236,7 +236,7 @@ def _examine(job: Job, directory: Path) -> Proof:
     for kernel in job.kernels:
         record, used = records[kernel.name], {family: records[name] for family, name in kernel.needs.items()}
         text = (directory / f"{kernel.name}.c").read_text(encoding="utf-8")
-        digest = key(text, shared, record.digest, code_digest(), compiler())
+        digest = verdict_key(record, key(text, shared, compiler()))
         examine = partial(judge_record, kernel, record, used, library[kernel.name], job.options)
         verdicts.append(job.store.memo("verdicts", digest, examine))
         job.progress("verify", len(verdicts), len(job.kernels))
@@ -244,10 +244,12 @@ def _examine(job: Job, directory: Path) -> Proof:
 
 
 def _obey_physics(job: Job, records: Mapping[str, Record]) -> list[Law]:
+    from awiwi_gen.records import laws_key
+
     parts: dict[str, list[tuple[Any, Record]]] = {}
     for kernel in job.kernels:
         parts.setdefault(kernel.path, []).append((kernel, records[kernel.name]))
-    keys = [key(*(record.digest for _, record in members), code_digest()) for members in parts.values()]
+    keys = [laws_key([record for _, record in members]) for members in parts.values()]
     absent = set(job.store.missing("laws", keys))
     ports: dict[str, dict[str, Any]] = {}
     for kernel in job.catalog:  # a law may need a velocity that none of the kernels asked for takes

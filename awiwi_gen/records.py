@@ -12,7 +12,9 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
+from awiwi_gen.build import load
 from awiwi_gen.cache import Cache, code_digest, key, libraries
+from awiwi_gen.derive import Deriver, check_dimensions
 from awiwi_gen.emit.c import CFunction, c_function
 from awiwi_gen.emit.files import cost_line, describe, kernel_file
 from awiwi_gen.emit.options import Options
@@ -23,6 +25,7 @@ from awiwi_gen.ir.graph import Graph
 from awiwi_gen.ir.passes import optimise
 from awiwi_gen.ir.passes.bind import bind, fill
 from awiwi_gen.kernel import Kernel, Port, Solver
+from awiwi_gen.sources import code_of
 from awiwi_gen.verify.physics import Law, obey
 from awiwi_gen.verify.problems import PROBLEMS, Problem
 from awiwi_gen.verify.reference import BallArrays, Reference, ball_values, disagreement, reference
@@ -31,15 +34,6 @@ from awiwi_gen.verify.verdict import Verdict, judge, judge_solver
 
 ROUTES_AGREE = 1e-40  # level 4
 PASSES_AGREE = 1e-50  # level 2
-DERIVATION_CODE = tuple(
-    f"awiwi_gen/{place}"
-    for place in ("models", "control", "kernels", "derive.py", "kernel.py", "units.py", "ir/graph.py", "ir/builder.py",
-                  "ir/from_sympy.py", "ir/from_casadi.py")
-)  # fmt: skip
-RECORD_CODE = (
-    *(f"awiwi_gen/{place}" for place in ("ir", "emit", "verify", "records.py", "kernel.py", "units.py")),
-    "templates",
-)
 HOPELESS = 2  # passes seldom halve a cost
 
 
@@ -62,16 +56,17 @@ class Record:
 
 
 def derivation_key(kernel: Kernel, route: str) -> str:
-    """What a derivation depends on: the structure of the part and the code of the physics, no number."""
-    code = code_digest(*DERIVATION_CODE)
-    return key(kernel.structure, kernel.family, route, code, libraries())
+    """What a derivation depends on: the structure of the part, the ports, the code of the route; no number."""
+    code = code_of(Deriver, check_dimensions, kernel.routes[route], type(kernel.part))
+    ports = [(name, port.shape, port.unit) for side in (kernel.inputs, kernel.outputs) for name, port in side.items()]
+    return key(kernel.structure, kernel.family, route, ports, kernel.guards, code, libraries())
 
 
 def record_key(kernel: Kernel, graphs: Mapping[str, Graph], prefix: str, options: Options) -> str:
     """What a record depends on: the derivations, the numbers in them, the ports, the compiler's own code."""
     values = kernel.part.quantities()
     used = {path: str(values[path].value) for graph in graphs.values() for path in graph.params}
-    code = code_digest(*RECORD_CODE)
+    code = code_of(make_solver_record if kernel.solver else make_record) + code_digest("templates")
     digests = {route: graph.digest for route, graph in graphs.items()}
     ports = (dict(kernel.inputs), dict(kernel.outputs), kernel.doc, kernel.source, kernel.solver)
     return key(kernel.name, digests, json.dumps(used, sort_keys=True), ports, prefix, options, code, libraries())
@@ -179,6 +174,16 @@ def _values(kernel: Kernel) -> dict[str, Fraction]:
     return {path: quantity.value for path, quantity in kernel.part.quantities().items()}
 
 
+def verdict_key(record: Record, compiled: str) -> str:
+    """What a verdict depends on: the record, the compiled text, what compiles it, and the judge."""
+    return key(record.digest, compiled, code_of(judge_record, load), code_digest("csrc"))
+
+
+def laws_key(records: Sequence[Record]) -> str:
+    """What the laws of physics on a part depend on: its records, and the laws."""
+    return key(*(record.digest for record in records), code_of(physics))
+
+
 def judge_record(
     kernel: Kernel, record: Record, used: Mapping[str, Record], function: Callable[..., Any], options: Options
 ) -> Verdict:
@@ -186,7 +191,7 @@ def judge_record(
     if record.graph is None:
         problem, tolerance = _problem(kernel, used), _solver(kernel).tolerance[options.scalar]
         inputs = problem.sample(draw(kernel.inputs, kernel.path, options.dtype))
-        mirror = problem.mirror(inputs, options.trig == "own")
+        mirror = problem.mirror(inputs, options.math == "own")
         return judge_solver(kernel.name, record.reference, mirror, inputs, function, tolerance, SEED)
     return judge(
         kernel.name,
@@ -200,7 +205,7 @@ def judge_record(
         record.passes,
         SEED,
         options.dtype,
-        options.trig == "own",
+        options.math == "own",
     )
 
 
