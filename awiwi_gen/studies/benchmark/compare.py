@@ -21,6 +21,15 @@ CLOCK_COLUMNS = ("law", "pretension", "spectral radius", "delay margin", "noise"
 
 
 @dataclass(frozen=True)
+class Table:
+    """Columns and rows of text, the last of them a verdict."""
+
+    title: str
+    columns: tuple[str, ...]
+    rows: list[tuple[str, ...]]
+
+
+@dataclass(frozen=True)
 class Row:
     """A law on one plant under one pretension [N]."""
 
@@ -82,7 +91,23 @@ def clocks(library: Any, hand: Hand, laws: Iterable[Law] = tuple(LAWS.values()))
     return [(force, clocked(library, law, law.gains_with({}), joint, force)) for law in laws for force in FORCES]
 
 
-def clock_cells(force: float, found: Clocked) -> tuple[str, ...]:
+def tables(clocked: Iterable[tuple[float, Clocked]], rows: Iterable[Row]) -> list[Table]:
+    """Both as text."""
+    return [
+        Table("Laws at 3 kHz with one sample of delay", CLOCK_COLUMNS, [_clock_cells(*each) for each in clocked]),
+        Table("Laws on one joint; the goal is 40 ms, 2 % overshoot, 3 % stiffness error, no slack", COLUMNS,
+              [row.cells() for row in rows]),
+    ]  # fmt: skip
+
+
+def all_tables(library: Any, hand: Hand) -> list[Table]:
+    """Both, for all laws; none for a hand that has no motors with friction or no springs."""
+    if hand.motor is None or hand.motor.friction is None or hand.spring is None:
+        return []
+    return tables(clocks(library, hand), compare(library, hand))
+
+
+def _clock_cells(force: float, found: Clocked) -> tuple[str, ...]:
     """A row of the table of clocks as text."""
     margin = f"{found.margin * 1e6:.0f} us" if found.margin < float("inf") else "beyond 2 ms"
     return (
