@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
-_PACKAGE = Path(__file__).resolve().parent
+PACKAGE = Path(__file__).resolve().parent
 
 
 def _find(name: str) -> Path:
-    inside = _PACKAGE / name
-    return inside if inside.is_dir() else _PACKAGE.parent / name
+    inside = PACKAGE / name
+    return inside if inside.is_dir() else PACKAGE.parent / name
 
 
 TEMPLATES = _find("templates")
 CSRC = _find("csrc")
-DEFAULT_HAND = _PACKAGE / "hand.toml"
-SOURCES = (_PACKAGE, TEMPLATES, CSRC)
+DEFAULT_HAND = PACKAGE / "hand.toml"
+SOURCES = (PACKAGE, TEMPLATES, CSRC)

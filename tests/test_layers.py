@@ -11,8 +11,22 @@ import pytest
 
 PACKAGE = Path(__file__).resolve().parent.parent / "awiwi_gen"
 PHYSICS = [["errors", "units", "resources"], ["hand", "kernel"], ["models"], ["control"], ["kernels"]]
-COMPILER = [["errors", "units", "resources"], ["kernel", "cache"], ["ir"], ["emit"], ["library"], ["build"], ["verify"]]
-TOP = [["derive", "records"], ["pipeline"], ["report", "explain", "simulate", "studies"], ["__init__"], ["__main__"]]
+COMPILER = [
+    ["errors", "units", "resources"],
+    ["kernel", "cache", "sources"],
+    ["ir"],
+    ["emit"],
+    ["library"],
+    ["build"],
+    ["verify"],
+]
+TOP = [
+    ["derive", "records", "budget"],
+    ["pipeline"],
+    ["report", "explain", "simulate", "studies"],
+    ["__init__"],
+    ["__main__"],
+]
 HOMES = {
     "sympy": {"models", "ir/from_sympy.py", "derive.py", "control"},
     "casadi": {"models", "ir/from_casadi.py", "derive.py", "control"},

@@ -24,17 +24,17 @@ from awiwi_gen.models.naming import Derivation
 
 def cascade_certificate(
     _: Any, D: Matrix, P: Matrix, kp: Matrix, kd: Matrix, weight: Matrix, omega: Matrix
-) -> tuple[Expr, Matrix]:
-    """Margin, and S11, S12 and S22 of every force loop (m x 3); D (n x n) and P (m x n) row by row."""
+) -> tuple[Expr, Matrix, list[Expr]]:
+    """Margin, and S11, S12 and S22 of every force loop (m x 3), and what must be positive; D and P row by row."""
     derivation, n = Derivation(), int(sympy.sqrt(len(D)))
     damping, coupling = symmetric(D, n), Matrix(len(kp), n, list(P))
     pushed = (coupling.T * coupling).applyfunc(lambda entry: derivation.name(entry / (4 * weight[0])))
     _lower, pivots = factors(derivation.name_all(damping - pushed), derivation)
-    mean = derivation.name(damping.trace() / n)
+    mean = derivation.name(sympy.Abs(damping.trace()) / n)  # a scale, without a sign of its own
     spring = [derivation.name(gain / omega[0] ** 2) for gain in kp]
     shares = [pivot / mean for pivot in pivots] + spring + [gain / omega[0] for gain in kd]
     energy = Matrix([_energy(p, v, weight[0], omega[0]) for p, v in zip(kp, kd, strict=True)])
-    return least(shares, derivation), energy
+    return least(shares, derivation), energy, [weight[0], omega[0]]
 
 
 def _energy(kp: Expr, kd: Expr, weight: Expr, omega: Expr) -> list[Expr]:

@@ -11,14 +11,14 @@ from casadi import SX
 from awiwi_gen.control.symmetric_minors import least, pivots, symmetric
 
 
-def cascade_certificate(_: Any, D: SX, P: SX, kp: SX, kd: SX, weight: SX, omega: SX) -> tuple[SX, SX]:
-    """Margin, and S11, S12 and S22 of every force loop (m x 3); D (n x n) and P (m x n) row by row."""
+def cascade_certificate(_: Any, D: SX, P: SX, kp: SX, kd: SX, weight: SX, omega: SX) -> tuple[SX, SX, list[SX]]:
+    """Margin, and S11, S12 and S22 of every force loop (m x 3), and what must be positive; D and P row by row."""
     n, m = isqrt(D.numel()), kp.numel()
     damping, coupling = symmetric(D, n), ca.reshape(P, n, m).T
-    shares = [pivot * n / ca.trace(damping) for pivot in pivots(_least_loss(damping, coupling, weight))]
+    shares = [pivot * n / ca.fabs(ca.trace(damping)) for pivot in pivots(_least_loss(damping, coupling, weight))]
     shares += ca.vertsplit(kp / omega**2) + ca.vertsplit(kd / omega)
     rows = [_energy(p, v, weight, omega).T for p, v in zip(ca.vertsplit(kp), ca.vertsplit(kd), strict=True)]
-    return least(shares), ca.vertcat(*rows)
+    return least(shares), ca.vertcat(*rows), [weight, omega]
 
 
 def _least_loss(damping: SX, coupling: SX, weight: SX) -> SX:

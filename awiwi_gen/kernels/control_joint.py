@@ -210,6 +210,7 @@ def cascade(
     },
     "eq. 11.17 to 11.21, mended",
     witness=certificate_minors.cascade_certificate,
+    guards=positive("the weight", "the frequency omega"),
 )
 def cascade_certificate(_: Any, D: Any, P: Any, kp: Any, kd: Any, weight: Any, omega: Any) -> Any:
     """Whether joint damping D and force loops kp, kd make a stable cascade: proved where the margin is positive.
