@@ -77,6 +77,10 @@ def build(contender: dict[str, Any], variant: str) -> Built:
                     _run(*command, "-o", str(object_))
                 objects[object_] = None
             sizes[name] = sum(code_bytes(o, [call[0] for call in kernel["calls"]]) for o in made)
+        for source in contender.get("support", ()):
+            object_ = place / f"{source.name}.o"
+            _run(*compiler, *flags, "-c", str(source), "-o", str(object_))
+            objects[object_] = None
         loops, object_ = place / "loops.c", place / "loops.o"
         loops.write_text(loop_source(contender), encoding="utf-8")
         _run(*COMPILER["c"], *VARIANTS[variant], "-std=c99", "-fPIC", "-c", str(loops), "-o", str(object_))
