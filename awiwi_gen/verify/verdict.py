@@ -126,7 +126,7 @@ def judge(
     passes: float,
     seed: int,
     dtype: type,
-    own_trig: bool,
+    own: bool,
 ) -> Verdict:
     """Levels 1 and 3 for one compiled kernel, joined with what is known of its graphs."""
     samples = len(next(iter(inputs.values())))
@@ -136,8 +136,8 @@ def judge(
     guarded = len(outputs) < len(graph.outputs)
     computed = dict(zip(outputs, raw if len(outputs) + guarded > 1 else (raw,), strict=False))
     computed = {port: np.asarray(a).reshape(samples, -1) for port, a in computed.items()}
-    mirrored = float_values(graph, inputs, params, Floats(dtype, own_trig))
-    bounds = float_values(graph, inputs, params, Bounded(dtype, own_trig))
+    mirrored = float_values(graph, inputs, params, Floats(dtype, own))
+    bounds = float_values(graph, inputs, params, Bounded(dtype, own))
     exact = True
     worst_ulp = worst_scaled = bound_use = 0.0
     reasons = []
