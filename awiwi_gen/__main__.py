@@ -9,6 +9,7 @@ import json
 import shlex
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from enum import StrEnum
 from functools import wraps
 from pathlib import Path
@@ -101,16 +102,19 @@ def generate(
     hand: HandFile = None, output: Output = GENERATED, scalar: ScalarOption = Scalar.f64,
     params: ParamsOption = Params.baked, math: MathOption = Math.own, only: Only = "*", as_json: Json = False,
     verify: Annotated[bool, typer.Option("--verify", help="Verify what was generated.")] = False,
+    accept_cost: Annotated[bool, typer.Option("--accept-cost", help="Let kernels exceed their budget.")] = False,
 ) -> int:  # fmt: skip
     """Derive, compare the witnesses, optimise and write the C."""
     from awiwi_gen.pipeline import generate
     from awiwi_gen.report import print_json
 
-    job = make_job(hand, scalar, params, only, math)
+    job = replace(make_job(hand, scalar, params, only, math), accept_cost=accept_cost)
     if verify:
         from awiwi_gen.build import compiler
 
         compiler()  # without one nothing can be verified: better told before anything is replaced
+    if job.hand.gains:
+        with_studies("the check of its gains").require_running_gains(job.hand, job.store)
     changed = generate(job, output)
     if verify:
         return prove(job, hand, output, as_json)
@@ -267,12 +271,9 @@ def tune(
     """Find gains of the backstepping law for every tendon, and write them for the hand file to take in."""
     from awiwi_gen.report import print_json
 
-    try:
-        from awiwi_gen.studies.tune import tune_hand, write_gains
-    except ModuleNotFoundError as error:
-        raise InputError(f"{error.name} needed for tuning; install it: pip install 'awiwi_gen[studies]'") from None
-    tuned = tune_hand(make_job(hand).hand, costs)
-    write_gains(output, tuned)
+    studies = with_studies("tuning", "tune")
+    tuned = studies.tune_hand(make_job(hand).hand, costs)
+    studies.write_gains(output, tuned)
     if as_json:
         print_json([each.as_dict() for each in tuned])
     else:
@@ -292,11 +293,21 @@ def simulate(
     hand: HandFile = None, as_json: Json = False,
 ) -> int:  # fmt: skip
     """Run laws on a joint between two tendons, on the hand's clock, and tell how they bear it."""
-    from awiwi_gen.studies.benchmark.command import benchmark, one_run
-
-    shown = one_run(hand, law, gains, scenario, force, plant) if scenario else benchmark(hand, law, gains)
+    studies = with_studies("simulation", "benchmark.command")
+    one = scenario != ""
+    shown = studies.one_run(hand, law, gains, scenario, force, plant) if one else studies.benchmark(hand, law, gains)
     shown.show(as_json)
     return 0
+
+
+def with_studies(purpose: str, module: str = "hand_gains") -> Any:
+    """A module of the studies. Raises InputError where the libraries are missing that it needs."""
+    from importlib import import_module
+
+    try:
+        return import_module(f"awiwi_gen.studies.{module}")
+    except ModuleNotFoundError as error:
+        raise InputError(f"{error.name} needed for {purpose}; install it: pip install 'awiwi_gen[studies]'") from None
 
 
 def mend(job: Any, hand: Path | None, output: Path) -> str:
