@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -48,6 +48,10 @@ class Verdict:
     def as_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
         return asdict(self)
+
+    def refused(self, reason: str) -> Verdict:
+        """The same with one more reason not to pass."""
+        return replace(self, passed=False, reasons=(*self.reasons, reason))
 
 
 def float_values(graph: Graph, inputs: Mapping[str, Array], params: Mapping[str, Any], algebra: Any) -> dict[str, Any]:
