@@ -59,8 +59,8 @@ def excess(old: Steps, new: Steps) -> list[str]:
     before, after = old[-1][1], new[-1][1]
     if after <= before * (1 + SLACK):
         return []
-    removed = dict(_removals(old))
-    losses = {name: removed.get(name, 0) - weight for name, weight in _removals(new)}
+    removed, removes = _removals(old), _removals(new)
+    losses = {name: removed.get(name, 0) - weight for name, weight in removes.items()}
     worst = max(losses, key=lambda name: losses[name])
     cause = (
         f"pass {worst} removes {losses[worst]} less" if worst != new[0][0] else f"{worst} gives {losses[worst]} more"
@@ -68,7 +68,9 @@ def excess(old: Steps, new: Steps) -> list[str]:
     return [f"costs {after}, its budget is {before} (+{100 * (after / before - 1):.1f} %): {cause} than before"]
 
 
-def _removals(steps: Steps) -> list[tuple[str, int]]:
-    """What each pass takes away; the first step is where the passes start from."""
-    first = [(steps[0][0], -steps[0][1])]
-    return first + [(name, last - weight) for (_, last), (name, weight) in pairwise(steps)]
+def _removals(steps: Steps) -> dict[str, int]:
+    """What each pass takes away, all its turns together; the first step is where the passes start from."""
+    result = {steps[0][0]: -steps[0][1]}
+    for (_, last), (name, weight) in pairwise(steps):
+        result[name] = result.get(name, 0) + last - weight
+    return result
