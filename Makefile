@@ -34,6 +34,8 @@ report: .venv/installed
 	@$(BIN)/awiwi-gen report
 
 bench: .venv/installed
+	@$(BIN)/python bench/passes.py
+	@$(BIN)/python bench/sizes.py
 	@$(BIN)/python bench/generation.py
 
 clean:
