@@ -46,7 +46,7 @@ def require_budget(directory: Path, text: str) -> None:
     excesses = [
         f"{name} {sentence}"
         for name, row in json.loads(text).items()
-        if isinstance(old.get(name), dict) and old[name].get("part") == row["part"]
+        if isinstance(old.get(name), dict) and old[name].get("part") == row["part"] and "steps" in old[name]
         for sentence in excess(old[name]["steps"], row["steps"])
     ]
     if excesses:

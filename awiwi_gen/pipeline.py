@@ -1,6 +1,6 @@
 """Read me first: the road from a hand file to verified C, one call for each stage.
 
-    hand.toml -> Hand -> catalog -> derive -> make_record -> files -> install     (generate)
+    hand.toml -> Hand -> catalog -> derive -> make_records -> files -> install     (generate)
     generated/ -> load -> judge -> Verdict                                        (verify)
 
 Data walks this road once, left to right. Everything expensive is kept by the digest of what it depends on.
@@ -36,6 +36,7 @@ GENERATOR = (
     "templates",
 )
 Progress = Callable[[str, int, int], None]
+Task = tuple[Any, Mapping[str, Any], str]  # a kernel, the graphs or records its record is made from, and its key
 
 
 def silent(stage: str, done: int, total: int) -> None:
@@ -77,6 +78,11 @@ class Job:
         wanted |= {name for kernel in known if kernel.name in wanted for name in kernel.needs.values()}
         return [kernel for kernel in known if kernel.name in wanted]
 
+    @cached_property
+    def records(self) -> dict[str, Record]:
+        """All that is known of the kernels before they are compiled."""
+        return make_records(self)
+
     def parallel(self, stage: str, function: Callable[[Any], Any], items: Sequence[Any]) -> list[Any]:
         """Apply a function to items on all cores, in order, with progress."""
         results: list[Any] = []
@@ -110,7 +116,7 @@ def generate(job: Job, directory: Path) -> bool:
     from awiwi_gen.emit.files import shared_files
     from awiwi_gen.records import manifest_entry
 
-    records = make_records(job)
+    records = job.records
     functions = [record.function for record in records.values()]
     files = {f"{name}.c": record.file for name, record in records.items()}
     graphs = [(kernel.path, records[kernel.name].graph) for kernel in job.kernels]
@@ -139,45 +145,53 @@ def make_records(job: Job) -> dict[str, Record]:
 
     Kernels with solvers come second: they are built from the records of the kernels they call.
     """
-    from awiwi_gen.records import load_graphs, make_record, make_solver_record, record_key, solver_key
+    from awiwi_gen.records import load_graphs, record_key, solver_key
 
     derive_missing(job)
-    made: dict[str, Record] = {}
     closed = [kernel for kernel in job.kernels if kernel.solver is None]
-    graphs = [load_graphs(kernel, job.store) for kernel in closed]
-    tasks: list[tuple[str, Any, tuple[Any, ...]]] = [
-        (record_key(kernel, own, job.hand.prefix, job.options), make_record, (kernel, own))
-        for kernel, own in zip(closed, graphs, strict=True)
-    ]
-    made |= zip((kernel.name for kernel in closed), _kept_records(job, "emit", tasks), strict=True)
+    tasks: list[Task] = []
+    for kernel in closed:
+        graphs = load_graphs(kernel, job.store)
+        tasks.append((kernel, graphs, record_key(kernel, graphs, job.hand.prefix, job.options)))
+    made = dict(zip((kernel.name for kernel in closed), _kept_records(job, "emit", tasks), strict=True))
     iterating = [kernel for kernel in job.kernels if kernel.solver is not None]
-    used = [{family: made[name] for family, name in kernel.needs.items()} for kernel in iterating]
-    solving: list[tuple[str, Any, tuple[Any, ...]]] = [
-        (solver_key(kernel, own, job.hand.prefix, job.options), make_solver_record, (kernel, own))
-        for kernel, own in zip(iterating, used, strict=True)
-    ]
+    solving: list[Task] = []
+    for kernel in iterating:
+        used = {family: made[name] for family, name in kernel.needs.items()}
+        solving.append((kernel, used, solver_key(kernel, used, job.hand.prefix, job.options)))
     made |= zip((kernel.name for kernel in iterating), _kept_records(job, "solve", solving), strict=True)
     return {kernel.name: made[kernel.name] for kernel in job.kernels}
 
 
-def _kept_records(job: Job, stage: str, tasks: Sequence[tuple[str, Any, tuple[Any, ...]]]) -> list[Any]:
-    """Records by their keys, those that are not kept yet made on all cores."""
-    keys = [digest for digest, _, _ in tasks]
-    absent = set(job.store.missing("records", keys))
-    work = [(*task, job.hand.prefix, job.options, job.store) for task in tasks if task[0] in absent]
-    work.sort(key=lambda task: -_size(task[2][1]))  # the long ones first, so that no core waits for one at the end
+def _kept_records(job: Job, stage: str, tasks: Sequence[Task]) -> list[Any]:
+    """Records by their keys; those that are not kept yet are made on all cores, part by part."""
+    absent = set(job.store.missing("records", [digest for _, _, digest in tasks]))
+    parts: dict[str, list[Task]] = {}
+    for kernel, given, digest in tasks:
+        if digest in absent:
+            group = kernel.path if kernel.solver is None else kernel.name
+            parts.setdefault(group, []).append((kernel, given, digest))
+    work = [(members, job.hand.prefix, job.options, job.store) for members in parts.values()]
+    work.sort(key=lambda task: -sum(map(_size, task[0])))  # the long ones first, so that no core waits in the end
     job.parallel(stage, _record_task, work)
-    return [job.store.get("records", digest) for digest in keys]
+    return [job.store.get("records", digest) for _, _, digest in tasks]
 
 
-def _size(given: Mapping[str, Any]) -> int:
+def _size(task: Task) -> int:
     """Number of nodes of the graphs a record is made from."""
-    return sum(len(getattr(graph, "nodes", ())) for graph in given.values())
+    return sum(len(getattr(graph, "nodes", ())) for graph in task[1].values())
 
 
-def _record_task(task: tuple[Any, ...]) -> None:
-    digest, make, given, prefix, options, store = task
-    store.put("records", digest, make(*given, prefix, options, digest))
+def _record_task(task: tuple[list[Task], str, Options, Cache]) -> None:
+    from awiwi_gen.records import make_records, make_solver_record
+
+    members, prefix, options, store = task
+    if members[0][0].solver is None:
+        made = make_records(members, prefix, options)
+    else:
+        made = [make_solver_record(*member, prefix, options) for member in members]
+    for record in made:
+        store.put("records", record.digest, record)
 
 
 def derive_missing(job: Job) -> None:
@@ -237,7 +251,7 @@ def _examine(job: Job, directory: Path) -> Proof:
 
     library = load(directory, job.store)
     shared = headers(directory)
-    records = make_records(job)
+    records = job.records
     verdicts = []
     for kernel in job.kernels:
         record, used = records[kernel.name], {family: records[name] for family, name in kernel.needs.items()}

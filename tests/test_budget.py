@@ -15,7 +15,7 @@ from awiwi_gen.emit.options import Options
 from awiwi_gen.errors import BudgetError
 from awiwi_gen.hand import Hand
 from awiwi_gen.pipeline import Job, generate
-from awiwi_gen.records import make_record
+from awiwi_gen.records import make_records
 
 BEFORE = (("derivation", 100, 100), ("share", 80, 80), ("factor", 70, 70))
 
@@ -61,7 +61,7 @@ def test_a_pass_that_does_nothing_any_more_is_named(monkeypatch):
     def costs(*beginning) -> tuple[tuple[str, int, int], ...]:
         monkeypatch.setattr(passes, "BEGINNINGS", (beginning,))
         monkeypatch.setattr(passes, "AGAIN", ())
-        return make_record(kernel, graphs, "x", Options(), "digest").costs
+        return make_records([(kernel, graphs, "digest")], "x", Options())[0].costs
 
     beginning = passes.BEGINNINGS[2]
     before = costs(*beginning)

@@ -16,6 +16,7 @@ from awiwi_gen.emit.files import render
 from awiwi_gen.errors import InputError
 from awiwi_gen.hand import Hand
 from awiwi_gen.report import COLUMNS, proof_rows
+from awiwi_gen.studies.benchmark.compare import Table, all_tables
 from awiwi_gen.studies.figures import all_figures
 from awiwi_gen.studies.figures.absent import ABSENT
 from awiwi_gen.studies.figures.figure import Figure
@@ -47,6 +48,7 @@ class Results:
     figures: Sequence[Figure]
     numbers: Sequence[Printed]
     proof: Proof
+    compared: Sequence[Table] = ()
 
     def as_dict(self) -> dict[str, Any]:
         """For programs."""
@@ -54,7 +56,11 @@ class Results:
             {"number": f.number, "title": f.title, "claim": f.claim, "found": f.found, "holds": bool(f.holds)}
             for f in self.figures
         ]
-        return {"figures": shown, "numbers": [vars(number) for number in self.numbers]}
+        return {
+            "figures": shown,
+            "numbers": [vars(number) for number in self.numbers],
+            "compared": [vars(table) for table in self.compared],
+        }
 
 
 def publish(job: Job, path: Path) -> Results:
@@ -67,7 +73,12 @@ def publish(job: Job, path: Path) -> Results:
         raise InputError(f"{' and '.join(missing)} needed for figures; install them: pip install 'awiwi_gen[studies]'")
     directory = cached_tree(job)
     library = load(directory, job.store)
-    results = Results(all_figures(library, job.hand), all_numbers(library, job.hand), verify(job, directory))
+    results = Results(
+        all_figures(library, job.hand),
+        all_numbers(library, job.hand),
+        verify(job, directory),
+        all_tables(library, job.hand),
+    )
     write_page(path, job.hand, results, library.manifest)
     return results
 
@@ -93,6 +104,7 @@ def write_page(path: Path, hand: Hand, results: Results, manifest: Mapping[str, 
         parts=parts,
         absent=_escaped(ABSENT.items()),
         columns=COLUMNS,
+        compared=[{"title": escape(t.title), "columns": t.columns, "rows": _escaped(t.rows)} for t in results.compared],
         numbers=_escaped((n.where, n.printed, n.ours, n.verdict, n.reason) for n in results.numbers),
         laws=_escaped(
             (law.part, law.statement, f"{law.worst:.0e}", "holds" if law.passed else "fails")

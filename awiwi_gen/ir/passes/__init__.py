@@ -9,6 +9,7 @@ from awiwi_gen.ir.graph import Graph
 from awiwi_gen.ir.passes.factor import factor
 from awiwi_gen.ir.passes.finish import orient, quotients, schedule
 from awiwi_gen.ir.passes.flatten import flatten
+from awiwi_gen.ir.passes.gather import gather
 from awiwi_gen.ir.passes.scale import scale
 from awiwi_gen.ir.passes.share import share_products, share_sums
 from awiwi_gen.ir.passes.turn import turn
@@ -23,7 +24,7 @@ BEGINNINGS: tuple[tuple[Pass, ...], ...] = (
     (),
 )
 AGAIN: tuple[Pass, ...] = (flatten, share_products, share_sums, factor, scale)  # as long as it helps
-END: tuple[Pass, ...] = (quotients, orient, schedule)
+END: tuple[Pass, ...] = (quotients, orient, schedule, gather)
 
 Stages = list[tuple[str, Graph]]
 

@@ -23,18 +23,18 @@ SHOWN = 30  # ticks from one shown line of a run to the next
 
 @dataclass(frozen=True)
 class Shown:
-    """A result for programs, and as tables (columns, rows, title) for people."""
+    """A result for programs, and as tables for people."""
 
     data: Any
-    tables: Sequence[tuple[tuple[str, ...], list[tuple[str, ...]], str]]
+    tables: Sequence[compare.Table]
 
     def show(self, as_json: bool) -> None:
         """Print one or the other."""
         if as_json:
             print_json(self.data)
             return
-        for columns, rows, title in self.tables:
-            print_table(columns, rows, title)
+        for table in self.tables:
+            print_table(table.columns, table.rows, table.title)
 
 
 def read_gains(text: str) -> dict[str, float]:
@@ -70,10 +70,7 @@ def benchmark(hand_file: Path | None, name: str, gains: str) -> Shown:
             "clock": [{"force": force, **found.as_dict()} for force, found in clocked],
             "benchmark": [row.as_dict() for row in rows],
         },
-        [
-            (compare.CLOCK_COLUMNS, [compare.clock_cells(*each) for each in clocked], "at 3 kHz, one sample of delay"),
-            (compare.COLUMNS, [row.cells() for row in rows], "goal: 40 ms, 2 % overshoot, 3 % stiffness, no slack"),
-        ],
+        compare.tables(clocked, rows),
     )
 
 
@@ -94,10 +91,11 @@ def one_run(hand_file: Path | None, name: str, gains: str, scenario: str, force:
     columns = {"q": trace["x"][:, 0], "tau_1": trace["tau"][:, 0], "tau_2": trace["tau"][:, 1]}
     columns |= {"u_1": trace["u"][:, 0], "u_2": trace["u"][:, 1]}
     rows = [(f"{time[i]:.3f}", *(f"{c[i]:.4f}" for c in columns.values())) for i in range(0, len(time), SHOWN)]
+    head = ("t [s]", "q [rad]", *(f"{name} [N m]" for name in list(columns)[1:]))
     return Shown(
         {
             "law": name, "scenario": scenario, "plant": plant, "force": force, "gains": own, "refused": trace.refused,
             "status": trace.status, "time": time.tolist(), **{name: c.tolist() for name, c in columns.items()},
         },
-        [(("t [s]", "q [rad]", *(f"{n} [N m]" for n in list(columns)[1:])), rows, f"{name}: {scenario}, {plant}")],
+        [compare.Table(f"{name}: {scenario}, {plant}", head, rows)],
     )  # fmt: skip

@@ -11,6 +11,8 @@ from awiwi_gen.hand import Hand
 from awiwi_gen.studies.benchmark.clock import Clocked, clocked
 from awiwi_gen.studies.benchmark.joint import joint_of
 from awiwi_gen.studies.benchmark.laws import LAWS, STIFFNESS, Law
+from awiwi_gen.studies.benchmark.printed_gains import COLUMNS as PRINTED_COLUMNS
+from awiwi_gen.studies.benchmark.printed_gains import printed_gains
 from awiwi_gen.studies.benchmark.scenarios import FORCES, PLANTS, Score, run, score
 
 COLUMNS = (
@@ -18,6 +20,15 @@ COLUMNS = (
     "energy", "chatter", "goal",
 )  # fmt: skip
 CLOCK_COLUMNS = ("law", "pretension", "spectral radius", "delay margin", "noise", "verdict")
+
+
+@dataclass(frozen=True)
+class Table:
+    """Columns and rows of text, the last of them a verdict."""
+
+    title: str
+    columns: tuple[str, ...]
+    rows: list[tuple[str, ...]]
 
 
 @dataclass(frozen=True)
@@ -82,7 +93,27 @@ def clocks(library: Any, hand: Hand, laws: Iterable[Law] = tuple(LAWS.values()))
     return [(force, clocked(library, law, law.gains_with({}), joint, force)) for law in laws for force in FORCES]
 
 
-def clock_cells(force: float, found: Clocked) -> tuple[str, ...]:
+def tables(clocked: Iterable[tuple[float, Clocked]], rows: Iterable[Row]) -> list[Table]:
+    """Both as text."""
+    return [
+        Table("Laws at 3 kHz with one sample of delay", CLOCK_COLUMNS, [_clock_cells(*each) for each in clocked]),
+        Table("Laws on one joint; the goal is 40 ms, 2 % overshoot, 3 % stiffness error, no slack", COLUMNS,
+              [row.cells() for row in rows]),
+    ]  # fmt: skip
+
+
+def all_tables(library: Any, hand: Hand) -> list[Table]:
+    """Both, for all laws; none for a hand that has no motors with friction or no springs."""
+    if hand.motor is None or hand.motor.friction is None or hand.spring is None:
+        return []
+    printed = [each.cells() for each in printed_gains(library)]
+    return [
+        *tables(clocks(library, hand), compare(library, hand)),
+        Table("Printed gains at 3 kHz with one sample of delay", PRINTED_COLUMNS, printed),
+    ]
+
+
+def _clock_cells(force: float, found: Clocked) -> tuple[str, ...]:
     """A row of the table of clocks as text."""
     margin = f"{found.margin * 1e6:.0f} us" if found.margin < float("inf") else "beyond 2 ms"
     return (
