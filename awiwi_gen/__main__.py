@@ -9,6 +9,7 @@ import json
 import shlex
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from enum import StrEnum
 from functools import wraps
 from pathlib import Path
@@ -101,12 +102,13 @@ def generate(
     hand: HandFile = None, output: Output = GENERATED, scalar: ScalarOption = Scalar.f64,
     params: ParamsOption = Params.baked, math: MathOption = Math.own, only: Only = "*", as_json: Json = False,
     verify: Annotated[bool, typer.Option("--verify", help="Verify what was generated.")] = False,
+    accept_cost: Annotated[bool, typer.Option("--accept-cost", help="Let kernels exceed their budget.")] = False,
 ) -> int:  # fmt: skip
     """Derive, compare the witnesses, optimise and write the C."""
     from awiwi_gen.pipeline import generate
     from awiwi_gen.report import print_json
 
-    job = make_job(hand, scalar, params, only, math)
+    job = replace(make_job(hand, scalar, params, only, math), accept_cost=accept_cost)
     if verify:
         from awiwi_gen.build import compiler
 

@@ -319,7 +319,10 @@ class Machine:
 
     def substeps(self) -> int:
         """How many steps a period needs so that the plant's fastest motion is followed closely."""
-        fastest = float(np.abs(np.linalg.eigvals(self.plant_slopes())).max(initial=0.0))
+        slopes_now = self.plant_slopes()
+        if not np.isfinite(slopes_now).all():
+            return 1  # the run ends before it begins
+        fastest = float(np.abs(np.linalg.eigvals(slopes_now)).max(initial=0.0))
         return max(1, ceil(fastest * self.loop.period / REACH))
 
 

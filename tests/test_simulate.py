@@ -24,6 +24,11 @@ def controlled(limit=np.inf, late=True, noise=0.0, step=0.0):
     return joint(FEEDBACK, [Sensor("x", "seen", noise, step)], [Actuator("wanted", "u", limit, late)])
 
 
+def agree(found, exact, share):
+    """Whether all columns agree, each to a share of its largest value."""
+    return (np.abs(found - exact).max(axis=0) <= share * np.abs(exact).max(axis=0)).all()
+
+
 def run(lib, loop, values, ticks, watch, **more):
     (trace,) = simulate(lib, loop, [Scenario(values, ticks, **more)], watch)
     return trace
@@ -40,7 +45,7 @@ def test_a_free_motion_is_that_of_scipys_integrator(lib):
         return lib.plant_joint_linear(x, 0.05, 0.0, PLANT, DAMPING).xd
 
     exact = integrate.solve_ivp(flow, (0, trace.time[-1]), START, t_eval=trace.time, rtol=1e-10, atol=1e-12).y.T
-    assert trace["x"] == pytest.approx(exact, rel=1e-4, abs=1e-5)
+    assert agree(trace["x"], exact, 1e-4)
 
 
 def test_so_is_that_of_two_tendons_that_become_slack_and_taut_with_friction(lib):
@@ -57,7 +62,7 @@ def test_so_is_that_of_two_tendons_that_become_slack_and_taut_with_friction(lib)
         flow, (0, trace.time[-1]), start, t_eval=trace.time, rtol=1e-9, atol=1e-11, max_step=1e-4
     ).y.T
     assert (trace["tau"] == 0).any()
-    assert trace["x"] == pytest.approx(exact, rel=1e-3, abs=1e-4)
+    assert agree(trace["x"], exact, 1e-3)
 
 
 def test_without_friction_the_energy_stays(lib):
@@ -176,13 +181,13 @@ def test_while_a_law_refuses_nothing_is_commanded_and_afterwards_it_goes_on(lib)
             {"theta": "x[2]", "thd": "x[3]", "theta_des": "zero", "f_des": "zero", "friction": "zero", "tau": "wanted"},
         )
     ]
-    gains = np.full(300, 5.0)
+    gains = np.full(3000, 5.0)
     gains[100:110] = -1.0
     values = {name: JOINT[name] for name in ("plant", "damping", "load", "x")}
     values |= {"u": 0.0, "wanted": 0.0, "zero": 0.0, "r": 0.004, "motor_kd": 0.3}
     loop = joint(law, actuators=[Actuator("wanted", "u", 3.0)])
 
-    trace = run(lib, loop, values, 300, ["x", "u"], inputs={"motor_kp": gains})
+    trace = run(lib, loop, values, 3000, ["x", "u"], inputs={"motor_kp": gains})
 
     assert trace.refused == 10
     assert trace.status == 0
@@ -262,11 +267,12 @@ def test_the_spectral_radius_is_that_of_exact_sampling_for_every_whole_delay(lib
 def test_the_delay_margin_is_where_the_loop_turns_unstable_and_near_that_of_continuous_time(lib):
     sampling = pytest.importorskip("awiwi_gen.studies.sampling")
     loops = pytest.importorskip("awiwi_gen.studies.sampled_loop")
-    machine = Machine(lib, controlled(), Scenario(JOINT | {"K": GAINS, "u": 0.0, "wanted": 0.0}, 0))
+    fast = (30.0, 0.0, 20.0, 0.5)
+    machine = Machine(lib, controlled(), Scenario(JOINT | {"K": fast, "u": 0.0, "wanted": 0.0}, 0))
     A, B = machine.plant_slopes(), np.array([0, 0, 0, 1 / PLANT[1]])
     loop = loops.SampledLoop(machine)
 
     margin = loop.margin()
 
     assert loop.radius(margin / PERIOD - 0.01) < 1 < loop.radius(margin / PERIOD + 0.01)
-    assert margin + 1.5 * PERIOD == pytest.approx(sampling.delay_margin(A, B, np.array(GAINS)), rel=0.1)
+    assert margin + 1.5 * PERIOD == pytest.approx(sampling.delay_margin(A, B, np.array(fast)), rel=0.02)

@@ -184,6 +184,9 @@ def _slopes(operation: str, args: tuple[Any, ...]) -> tuple[Any, ...]:
 class Dimensions:
     """Dimension checking: a value is a unit. Zero, which fits any unit, is None."""
 
+    def __init__(self) -> None:
+        self._products: dict[tuple[Unit, Unit], Unit] = {}
+
     def const(self, value: Fraction) -> Unit | None:
         return one if value else None
 
@@ -193,14 +196,18 @@ class Dimensions:
     def add(self, a: Unit | None, b: Unit | None) -> Unit | None:
         if a is None or b is None:
             return b if a is None else a
-        if a != b:
+        if a is not b and a != b:
             raise DimensionError(f"adds {a} and {b}")
         return a
 
     sub = add
 
     def mul(self, a: Unit | None, b: Unit | None) -> Unit | None:
-        return None if a is None or b is None else a * b
+        if a is None or b is None:
+            return None
+        if (a, b) not in self._products:
+            self._products[a, b] = a * b
+        return self._products[a, b]
 
     def div(self, a: Unit | None, b: Unit | None) -> Unit | None:
         return None if a is None or b is None else a / b

@@ -9,7 +9,6 @@ rest is a planar chain, whose absolute angles need no sums of velocities.
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import casadi as ca
 from casadi import SX
@@ -88,6 +87,8 @@ class TurningPlane:
 
     def turning_inertia(self) -> SX:
         """M00 [kg m^2]: about the turning axis."""
+        if self.lead is None:
+            return SX(0)
         total = self.lead.body.trace - _form(self.axis, self.lead.body.second, self.axis)
         for body, (u, _) in zip(self.bodies, self.first[1:], strict=True):
             (c, s), (along, across) = body.spin, body.arm
@@ -109,6 +110,8 @@ class TurningPlane:
         return (ca.dot(self.rho, down), -ca.dot(self.axis, down)), down[2]
 
     def _turning_weight(self, down: Vector, along: SX) -> SX:
+        if self.lead is None:
+            return SX(0)
         first = self.lead.body.first
         return first[2] * down[0] - along * (ca.dot(self.rho, first) + self.first[0][0])
 

@@ -11,6 +11,8 @@ from awiwi_gen.hand import Hand
 from awiwi_gen.studies.benchmark.clock import Clocked, clocked
 from awiwi_gen.studies.benchmark.joint import joint_of
 from awiwi_gen.studies.benchmark.laws import LAWS, STIFFNESS, Law
+from awiwi_gen.studies.benchmark.printed_gains import COLUMNS as PRINTED_COLUMNS
+from awiwi_gen.studies.benchmark.printed_gains import printed_gains
 from awiwi_gen.studies.benchmark.scenarios import FORCES, PLANTS, Score, run, score
 
 COLUMNS = (
@@ -104,7 +106,11 @@ def all_tables(library: Any, hand: Hand) -> list[Table]:
     """Both, for all laws; none for a hand that has no motors with friction or no springs."""
     if hand.motor is None or hand.motor.friction is None or hand.spring is None:
         return []
-    return tables(clocks(library, hand), compare(library, hand))
+    printed = [each.cells() for each in printed_gains(library)]
+    return [
+        *tables(clocks(library, hand), compare(library, hand)),
+        Table("Printed gains at 3 kHz with one sample of delay", PRINTED_COLUMNS, printed),
+    ]
 
 
 def _clock_cells(force: float, found: Clocked) -> tuple[str, ...]:
