@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 import tendon_solvers as solvers
@@ -17,7 +20,10 @@ from tendon_solvers import (
 )
 
 import awiwi_gen
-from awiwi_gen.kernels.fingers_control import antagonists, distribution, groups
+from awiwi_gen.kernels.fingers_control import INVERSIONS, SEARCHES, antagonists, distribution, groups
+from awiwi_gen.resources import CSRC
+
+DOCS = Path(__file__).resolve().parent.parent / "docs"
 
 
 @pytest.fixture(scope="module")
@@ -34,6 +40,17 @@ def test_the_search_finds_what_the_formulas_of_pairs_give(library):
         by_formula, by_search = told.distribute(tau, K), untold.distribute(tau, K)
         assert by_formula[0] == by_search[0] == OK
         assert np.abs(by_formula[1] - by_search[1]).max() < 1e-8
+
+
+def test_the_bounds_told_are_those_of_the_header():
+    header = (CSRC / "awiwi_distribution.h").read_text()
+    most = {name: int(number) for name, number in re.findall(r"AWIWI_MOST_(\w+) = (\d+)", header)}
+
+    assert most["INVERSIONS"] + 2 == INVERSIONS
+    assert 3 * (1 + most["STIFFNESS_STEPS"]) == SEARCHES
+    assert f"| {INVERSIONS} evaluations" in (DOCS / "solvers.md").read_text()
+    assert f"3 x {most['TORQUE_STEPS']} steps" in (DOCS / "solvers.md").read_text()
+    assert f"3 x {SEARCHES // 3} evaluations" in (DOCS / "solvers.md").read_text()
 
 
 def test_the_work_is_bounded_as_the_header_says_and_small(library):
