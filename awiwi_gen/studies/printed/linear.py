@@ -159,7 +159,9 @@ def optimum(library: Any) -> Iterator[Printed]:
 def fit_13_11(library: Any) -> Joint:
     """A joint near table 13.1 whose optimum is eq. 13.11: its m as in table 14.2, b and d_q by Newton's method."""
     joint = TABLE_13_1.with_(m=TABLE_14_2.m, b=4.1e-3, dq=5e-4)
-    wanted = np.array([float(GAINS_13_11[2]), float(GAINS_13_11[3])])
+    first, _, third, fourth = map(float, GAINS_13_11)
+    q1, _, q3, _ = joint.weights
+    wanted = np.array([(third + np.sqrt((q1 + q3) / joint.R) - first) / 2, fourth])  # K1 and K3 have one rounding each
     for _ in range(8):
         steps = {"b": 1e-6 * joint.b, "dq": 1e-6 * joint.dq}
         here = joint.optimum(library)[2:]
