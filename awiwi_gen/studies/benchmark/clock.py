@@ -95,11 +95,12 @@ def running_gains(library: Any, law: Law, gains: Mapping[str, float], joint: Joi
 
     def works(chosen: Mapping[str, float]) -> bool:
         try:
+            if noise(library, law, chosen, joint, force) >= 1:  # the quicker look, and it sees what is unstable, too
+                return False
             loops = loops_of(library, law, chosen, joint, force)
         except InputError:
             return False
-        stable = all(loop.radius(late) < STABLE for late in SPARE for loop in loops)
-        return stable and noise(library, law, chosen, joint, force) < 1
+        return all(loop.radius(late) < STABLE for loop in loops for late in SPARE)
 
     found = nearest(gains, {name: gain.power for name, gain in law.gains.items()}, works)
     return clocked(library, law, found.gains, joint, force) if found else None
