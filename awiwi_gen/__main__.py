@@ -9,6 +9,7 @@ import json
 import shlex
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from enum import StrEnum
 from functools import wraps
 from pathlib import Path
@@ -41,7 +42,7 @@ class Params(StrEnum):
     runtime = "runtime"
 
 
-class Trig(StrEnum):
+class Math(StrEnum):
     """Whose sine and cosine the C calls."""
 
     own = "own"
@@ -53,7 +54,7 @@ Output = Annotated[Path, typer.Option("--output", "-o", help="Directory of the g
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for programs.")]
 Only = Annotated[str, typer.Option("--only", metavar="GLOB", help="Only kernels whose name matches.")]
 ScalarOption = Annotated[Scalar, typer.Option("--scalar", help="Scalar type of the C.")]
-TrigOption = Annotated[Trig, typer.Option("--trig", help="Own sine and cosine, or the C library's.")]
+MathOption = Annotated[Math, typer.Option("--math", help="Own sine and cosine, or the C library's.")]
 ParamsOption = Annotated[Params, typer.Option("--params", help="Numbers as constants or in a struct.")]
 GENERATED = Path("generated")
 PAGE = Path("build/report/index.html")
@@ -85,7 +86,7 @@ def make_job(
     scalar: Scalar = Scalar.f64,
     params: Params = Params.baked,
     only: str = "*",
-    trig: Trig = Trig.libm,
+    math: Math = Math.own,
 ) -> Any:
     """A job from command-line options."""
     from awiwi_gen.emit.options import Options
@@ -93,20 +94,21 @@ def make_job(
     from awiwi_gen.pipeline import Job
     from awiwi_gen.report import Progress
 
-    return Job(Hand.load(hand), Options(scalar.value, params.value, trig.value), only, progress=Progress())
+    return Job(Hand.load(hand), Options(scalar.value, params.value, math.value), only, progress=Progress())
 
 
 @command
 def generate(
     hand: HandFile = None, output: Output = GENERATED, scalar: ScalarOption = Scalar.f64,
-    params: ParamsOption = Params.baked, trig: TrigOption = Trig.libm, only: Only = "*", as_json: Json = False,
+    params: ParamsOption = Params.baked, math: MathOption = Math.own, only: Only = "*", as_json: Json = False,
     verify: Annotated[bool, typer.Option("--verify", help="Verify what was generated.")] = False,
+    accept_cost: Annotated[bool, typer.Option("--accept-cost", help="Let kernels exceed their budget.")] = False,
 ) -> int:  # fmt: skip
     """Derive, compare the witnesses, optimise and write the C."""
     from awiwi_gen.pipeline import generate
     from awiwi_gen.report import print_json
 
-    job = make_job(hand, scalar, params, only, trig)
+    job = replace(make_job(hand, scalar, params, only, math), accept_cost=accept_cost)
     if verify:
         from awiwi_gen.build import compiler
 
@@ -126,13 +128,13 @@ def generate(
 @command
 def check(
     hand: HandFile = None, output: Output = GENERATED, scalar: ScalarOption = Scalar.f64,
-    params: ParamsOption = Params.baked, trig: TrigOption = Trig.libm, only: Only = "*", as_json: Json = False,
+    params: ParamsOption = Params.baked, math: MathOption = Math.own, only: Only = "*", as_json: Json = False,
 ) -> int:  # fmt: skip
     """Check the hand file, and whether the generated C is fresh and unedited."""
     from awiwi_gen.pipeline import state
     from awiwi_gen.report import print_json, state_lines
 
-    job = make_job(hand, scalar, params, only, trig)
+    job = make_job(hand, scalar, params, only, math)
     found = state(job, output)
     if as_json:
         print_json({"hand": job.hand.name, "fresh": found.fresh, **vars(found)})
@@ -161,11 +163,11 @@ def build(hand: HandFile = None, output: Output = GENERATED, as_json: Json = Fal
 @command
 def verify(
     hand: HandFile = None, output: Output = GENERATED, scalar: ScalarOption = Scalar.f64,
-    params: ParamsOption = Params.baked, trig: TrigOption = Trig.libm, only: Only = "*", as_json: Json = False,
+    params: ParamsOption = Params.baked, math: MathOption = Math.own, only: Only = "*", as_json: Json = False,
 ) -> int:  # fmt: skip
     """Compile the generated C as it stands and compare every kernel with its reference."""
     require(output)
-    return prove(make_job(hand, scalar, params, only, trig), hand, output, as_json)
+    return prove(make_job(hand, scalar, params, only, math), hand, output, as_json)
 
 
 @command

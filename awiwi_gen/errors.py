@@ -6,6 +6,7 @@
     ├── DimensionError        an expression adds metres to newtons: the physics, not the file, is wrong
     ├── BuildError            the C compiler refused the generated code
     │   └── NoCompilerError   there is none that works; exit code 2
+    ├── BudgetError           a kernel costs more than what is committed
     └── VerificationError     two independent routes to one number disagree
 
 Anything else that escapes is a bug of ours.
@@ -19,7 +20,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 __all__ = [
-    "AwiwiError", "BuildError", "DimensionError", "Fault", "InputError", "NoCompilerError", "OutputError",
+    "AwiwiError", "BudgetError", "BuildError", "DimensionError", "Fault", "InputError", "NoCompilerError", "OutputError",
     "VerificationError", "unknown",
 ]  # fmt: skip
 
@@ -92,6 +93,10 @@ class NoCompilerError(BuildError):
     """There is no C compiler, or none that works: the machine is to be mended, not the code."""
 
     exit_code = 2
+
+
+class BudgetError(AwiwiError):
+    """Kernels cost more than their committed budget."""
 
 
 class VerificationError(AwiwiError):

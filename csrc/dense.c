@@ -77,3 +77,25 @@ int awiwi_solve(int n, int m, awiwi_real *A, awiwi_real *B)
     }
     return 1;
 }
+
+/* By elimination: a pivot that vanishes must have nothing beside it. */
+int awiwi_is_semidefinite(int n, const awiwi_real *Q)
+{
+    const awiwi_real rounding = 64 * AWIWI_REAL_EPSILON;
+    awiwi_real left[4][4];
+    for (int i = 0; i < n; i++)
+        for (int j = 0; j < n; j++)
+            left[i][j] = Q[i * n + j];
+    for (int k = 0; k < n; k++) {
+        if (!(left[k][k] >= -rounding * Q[k * n + k]))
+            return 0;
+        const int vanishes = left[k][k] <= rounding * Q[k * n + k];
+        for (int i = k + 1; i < n; i++) {
+            if (vanishes && left[i][k] * left[i][k] > rounding * Q[k * n + k] * Q[i * n + i])
+                return 0;
+            for (int j = k + 1; j < n && !vanishes; j++)
+                left[i][j] -= left[i][k] / left[k][k] * left[k][j];
+        }
+    }
+    return 1;
+}

@@ -32,11 +32,12 @@ class Demands:
 
     @classmethod
     def feasible(cls, library: Any, finger: str, count: int, seed: int = 7) -> Demands:
-        """Those of random forces."""
+        """Those of random forces, many of them at a limit."""
         random = np.random.default_rng(seed)
         kernel = library[f"{finger}_coupling"]
         P = kernel(np.zeros(kernel.inputs[0]["shape"]))
-        f = random.uniform(*LIMITS, (count, len(P)))
+        beyond = (LIMITS[1] - LIMITS[0]) / 4
+        f = np.clip(random.uniform(LIMITS[0] - beyond, LIMITS[1] + beyond, (count, len(P))), *LIMITS)
         demands = cls(library, finger, P, -f @ P, np.zeros((count, P.shape[1], P.shape[1])))
         return cls(library, finger, P, demands.tau, demands.stiffness(f))
 

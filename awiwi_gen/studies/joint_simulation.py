@@ -16,7 +16,7 @@ from awiwi_gen.kernels.fingers_control import antagonists, groups, senses
 
 Array = np.ndarray[Any, Any]
 
-PERIOD, SUBSTEPS = 1 / 3000, 12
+PERIOD, SUBSTEPS = 1 / 3000, 6
 PULL = np.array([-1.0, 1.0])  # the torques of the tendons on the joint, over R f
 
 
@@ -56,14 +56,17 @@ class Spring:
 
 @dataclass(frozen=True)
 class Gains:
-    """Of the joint: K [N m/rad] and D [N m s/rad]; of the motors: kp, kd; and what the motors feed forward."""
+    """Of the joint: K [N m/rad] and D [N m s/rad]; of the motors: kp, kd; and what the motors feed forward.
 
-    K: float
-    D: float
+    Each a number, or one for each run.
+    """
+
+    K: Any
+    D: Any
     kp: float = 10.0
     kd: float = 0.2
-    feed_forward: bool = True
-    compensation: float = 0.0  # share of the motors' friction
+    feed_forward: Any = 1.0  # share of the desired force
+    compensation: Any = 0.0  # share of the motors' friction
 
 
 @dataclass(frozen=True)
@@ -116,30 +119,33 @@ class Joint:
         """Tendon forces (..., 2) in states (..., 6)."""
         return self.spring.force(self.r * x[..., 2:4] - PULL * self.R * x[..., :1])
 
-    def at_rest(self, pretension: float) -> Array:
-        """State (q, q', theta1, theta2, theta1', theta2') at q = 0."""
-        theta = self.spring.elongation(np.full(2, pretension)) / self.r
-        return np.concatenate([[0.0, 0.0], theta, [0.0, 0.0]])
+    def at_rest(self, pretension: Array) -> Array:
+        """States (runs, 6), each (q, q', theta1, theta2, theta1', theta2'), at q = 0."""
+        states = np.zeros((len(pretension), 6))
+        states[:, 2:4] = self.spring.elongation(pretension)[:, None] / self.r
+        return states
 
     def rates(self, x: Array, tau: Array) -> Array:
-        """Of the state under motor torques (2)."""
+        """Of states (runs, 6) under motor torques (runs, 2)."""
         f = self.forces(x)
-        link = (self.R * PULL @ f - self.damping * x[1]) / self.inertia
-        return np.concatenate([[x[1], link], x[4:], (tau - self.rub(x[4:]) - self.r * f) / self.motor])
+        link = (self.R * f @ PULL - self.damping * x[:, 1]) / self.inertia
+        motors = (tau - self.rub(x[:, 4:]) - self.r * f) / self.motor
+        return np.concatenate([x[:, 1:2], link[:, None], x[:, 4:], motors], axis=1)
 
-    def law(self, x: Array, q_des: float, pretension: float, gains: Gains) -> Array:
-        """Motor torques of the two time scales: the joint's impedance, shared by the pair, then the compiled law."""
-        tau = gains.K * (q_des - x[0]) - gains.D * x[1]
-        f_des = np.clip(pretension + PULL * tau / (2 * self.R), self.spring.f[0], self.spring.f[-1])
-        theta_des = (self.spring.elongation(f_des) + PULL * self.R * x[0]) / self.r
+    def law(self, x: Array, q_des: Array, pretension: Array, gains: Gains) -> Array:
+        """Motor torques (runs, 2) of the two time scales: the joint's impedance shared by the pair, the compiled law."""
+        tau = gains.K * (q_des - x[:, 0]) - gains.D * x[:, 1]
+        wanted = pretension[:, None] + PULL * tau[:, None] / (2 * self.R)
+        f_des = np.clip(wanted, self.spring.f[0], self.spring.f[-1])
+        theta_des = (self.spring.elongation(f_des) + PULL * self.R * x[:, :1]) / self.r
+        fed, rubbed = np.reshape(gains.feed_forward, (-1, 1)), np.reshape(gains.compensation, (-1, 1))
         found: Array = self.library.motor_impedance(
-            x[2:4], x[4:], theta_des, f_des * gains.feed_forward, gains.compensation * self.rub(x[4:]), self.r,
-            gains.kp, gains.kd,
-        ).tau  # fmt: skip
+            x[:, 2:4], x[:, 4:], theta_des, f_des * fed, rubbed * self.rub(x[:, 4:]), self.r, gains.kp, gains.kd
+        ).tau
         return np.clip(found, -self.limit, self.limit)
 
     def run(self, q_des: Array, pretension: Array, gains: Gains) -> Array:
-        """States (ticks, 6) for desired angles and pretensions (ticks), from rest at the first pretension."""
+        """States (ticks, runs, 6) for desired angles and pretensions (ticks, runs), from rest at the first pretension."""
         x, found = self.at_rest(pretension[0]), []
         held = self.law(x, q_des[0], pretension[0], gains)
         step = PERIOD / SUBSTEPS
@@ -149,14 +155,3 @@ class Joint:
             for _ in range(SUBSTEPS):
                 x = x + step * self.rates(x + step / 2 * self.rates(x, tau), tau)
         return np.array(found)
-
-    def response(self, frequencies: Array, pretension: float, gains: Gains) -> Array:
-        """Amplitude of the angle per amplitude of a small desired one, without delay, at frequencies [rad/s]."""
-        rest, step = self.at_rest(pretension), 1e-6
-
-        def rates(x: Array, q_des: float) -> Array:
-            return self.rates(x, self.law(x, q_des, pretension, gains))
-
-        A = np.array([rates(rest + step * e, 0.0) - rates(rest - step * e, 0.0) for e in np.eye(6)]).T / (2 * step)
-        B = (rates(rest, step) - rates(rest, -step)) / (2 * step)
-        return np.array([abs(np.linalg.solve(1j * w * np.eye(6) - A, B)[0]) for w in frequencies])
