@@ -6,16 +6,19 @@ changed number recompiles the kernels it changes. The wrapper cffi makes depends
 
 from __future__ import annotations
 
+import ctypes
 import importlib.machinery
 import importlib.util
 import json
 import os
+import platform
 import re
 import shutil
 import subprocess
 import sys
 import sysconfig
 import tempfile
+from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache
@@ -33,6 +36,8 @@ if TYPE_CHECKING:
 WARNINGS = ("-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wdouble-promotion", "-Wshadow", "-Werror")
 FLAGS = ("-std=c99", "-O2", "-fPIC", "-ffp-contract=off", *WARNINGS)
 GLUE_FLAGS = ("-O1", "-fPIC", "-w")
+BATCH_FLAGS = ("-std=c99", "-O3", "-fPIC", "-w", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math")
+GCC_FLAGS = ("-fschedule-insns", "-fsched-pressure", "--param", "vect-epilogues-nomask=0")  # long straight-line loops
 
 
 @dataclass(frozen=True)
@@ -61,6 +66,17 @@ def compiler() -> Compiler:
     raise NoCompilerError(f"no C compiler: {wanted}; {MEND}")
 
 
+@cache
+def native() -> tuple[tuple[str, ...], str]:
+    """Flags for this very machine, and what they make of it: code for one machine must not be run on another."""
+    for flags in ("-march=native",), ("-mcpu=native",):
+        try:
+            return flags, compiler().run(*flags, "-E", "-dM", "-x", "c", os.devnull)
+        except BuildError:
+            continue
+    return (), platform.machine()
+
+
 MEND = "install one (Debian: apt-get install gcc) or set CC"
 
 
@@ -79,13 +95,18 @@ def headers(directory: Path) -> str:
     return "\0".join(re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL) for text in texts)
 
 
+def object_name(source: Path, shared: str) -> str:
+    """The digest of everything that decides an object."""
+    return key(source.read_text(encoding="utf-8"), shared, FLAGS, compiler().version) + ".o"
+
+
 def compile_objects(directory: Path, store: Cache) -> list[Path]:
     """Objects of all C files of a generated directory and of csrc; only those not in the cache are compiled."""
     cc, shared = compiler(), headers(directory)
     includes = (f"-I{directory}", f"-I{CSRC}")
 
     def compile_one(source: Path) -> Path:
-        digest = key(source.read_text(encoding="utf-8"), shared, FLAGS, cc.version) + ".o"
+        digest = object_name(source, shared)
         target = store.directory / "objects" / digest
         if not target.exists():
             with tempfile.TemporaryDirectory() as scratch:
@@ -122,7 +143,54 @@ def load(directory: Path, store: Cache | None = None) -> Library:
             compiler().run("-shared", *(str(o) for o in objects), str(wrapper), "-o", str(made), "-lm")
             target = store.put_bytes("libraries", digest, made.read_bytes())
     module = _import(name, target)
-    return Library(manifest, module.lib, module.ffi)
+    loaded = frozenset(path.name for path in objects)
+
+    def vectorised(entry: Mapping[str, Any]) -> Any:
+        return batch_function(entry, manifest, directory, store, loaded, module.ffi)
+
+    return Library(manifest, module.lib, module.ffi, vectorised)
+
+
+def batch_function(
+    entry: Mapping[str, Any],
+    manifest: Mapping[str, Any],
+    directory: Path,
+    store: Cache,
+    loaded: frozenset[str],
+    ffi: Any,
+) -> Any:
+    """A kernel's loop over samples, compiled for this machine's vectors; None where vectors do not help.
+
+    Raises BuildError when that fails, and when the directory is no longer what the library was ``loaded`` from.
+    """
+    from awiwi_gen.emit.batch import batch_file, worthwhile
+
+    source = directory / f"{entry['name']}.c"
+    text = source.read_text(encoding="utf-8")
+    if not worthwhile(entry, text):
+        return None
+    shared = headers(directory)
+    if object_name(source, shared) not in loaded:
+        raise BuildError(f"{directory} has changed since it was loaded; load it again")
+    prefix, scalar = manifest["prefix"], manifest["c_type"]
+    flags, machine = native()
+    flags += () if "clang" in compiler().version else GCC_FLAGS
+    written = batch_file(entry, prefix, scalar, text)
+    digest = key(written, text, shared, BATCH_FLAGS, flags, machine, compiler().version) + ".so"
+    target = store.directory / "batches" / digest
+    if not target.exists():
+        with tempfile.TemporaryDirectory() as scratch:
+            loop, made = Path(scratch) / f"{entry['name']}_batch.c", Path(scratch) / "batch.so"
+            loop.write_text(written, encoding="utf-8")
+            includes = (f"-I{directory}", f"-I{CSRC}")
+            compiler().run(*BATCH_FLAGS, *flags, *includes, "-shared", str(loop), "-o", str(made), "-lm")
+            target = store.put_bytes("batches", digest, made.read_bytes())
+    function = getattr(ctypes.CDLL(str(target)), f"{prefix}_{entry['name']}_batch")
+    pointer = f"{scalar} *"
+    types = ["ptrdiff_t", *[f"const {prefix}_params *"] * entry["params"]]
+    types += [f"const {pointer}", "ptrdiff_t"] * len(entry["inputs"]) + [pointer] * len(entry["outputs"])
+    types += ["int *"] * entry["status"]
+    return ffi.cast(f"void (*)({', '.join(types)})", ctypes.cast(function, ctypes.c_void_p).value)
 
 
 def _glue_source(manifest: dict[str, Any], declared: str) -> str:
