@@ -14,7 +14,7 @@ import pytest
 
 import awiwi_gen
 from awiwi_gen import library as library_module
-from awiwi_gen.build import BATCH_FLAGS, WARNINGS, compile_objects, compiler, load, native
+from awiwi_gen.build import BATCH_FLAGS, FUSED, UNFUSED, WARNINGS, compile_objects, compiler, load, native
 from awiwi_gen.cache import Cache
 from awiwi_gen.emit.batch import batch_file
 from awiwi_gen.emit.options import Options
@@ -129,11 +129,35 @@ def test_the_loop_is_vectorised_by_the_compiler(tmp_path):
     for entry in manifest["kernels"]:
         if entry["name"] not in ("jaw_mass_matrix", "jaw_inverse_dynamics", "jaw_forward_dynamics"):
             continue
-        assembly = compiled(entry, manifest, tree(), tmp_path, *BATCH_FLAGS, *native()[0], "-S").read_text()
+        assembly = compiled(
+            entry, manifest, tree(), tmp_path, *BATCH_FLAGS, *native()[0], *UNFUSED[0], "-S"
+        ).read_text()
         loops = re.findall(r"\bv(?:add|sub|mul|div)(pd|sd)\b", assembly)
 
         assert loops.count("pd") >= loops.count("sd") > 0, entry["name"]  # what is over is done one by one, once each
-        assert not re.search(r"\bv\w*fn?m(?:add|sub)\w*\b", assembly), "contracted to fused multiply-add"
+
+
+@pytest.mark.parametrize(
+    "instruction",
+    ["vfmadd132pd %ymm0", "vfmsubadd132pd %ymm9", "vfnmadd231sd", "fmla v0.2d", "fmsub d0", "vfmacc.vv v1"],
+)
+def test_instructions_that_multiply_and_add_at_once_are_known(instruction):
+    assert FUSED.search(f"\t{instruction}, %ymm1\n")
+    assert not FUSED.search(
+        "\tvmulpd %ymm0, %ymm1, %ymm2\n\tvaddsubpd %ymm0\n\tfmul d0, d1, d2\n\tcall claw_fmadd_batch\n"
+    )
+
+
+def test_a_compiler_that_fuses_them_all_the_same_is_not_used(monkeypatch):
+    build = sys.modules["awiwi_gen.build"]
+    loaded = vectorised(tree())
+    monkeypatch.setattr(build, "native", lambda: (("-march=native",), "__x86_64__"))
+    monkeypatch.setattr(build, "FUSED", re.compile("vaddpd"))
+    monkeypatch.setattr(build, "BATCH_FLAGS", (*BATCH_FLAGS, "-DANOTHER"))
+    with pytest.warns(RuntimeWarning, match="fuses multiplications with additions against its flags"):
+        assert same_bits(
+            loaded.jaw_gravity(np.zeros((9, 2)), np.ones(3)), load(tree()).jaw_gravity(np.zeros((9, 2)), np.ones(3))
+        )
 
 
 @pytest.mark.parametrize("options", VARIANTS.values(), ids=VARIANTS)
