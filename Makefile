@@ -1,6 +1,6 @@
 # make        set up .venv, then derive, emit, compile and verify the default hand
 # make test   all tests              make lint   ruff, mypy, layers
-# make check  is generated/ fresh?   make bench  timings and counts
+# make check  is generated/ fresh?   make bench  us and the peers, side by side
 # make report the figures of the source, computed again, with all proofs: build/report/index.html
 # make clean  remove what make made (generated/ stays: it is checked in)
 
@@ -33,11 +33,19 @@ check: .venv/installed
 report: .venv/installed
 	@$(BIN)/awiwi-gen report
 
-bench: .venv/installed
-	@$(BIN)/python bench/generation.py
+bench: .venv/installed .venv-bench/installed
+	@$(BIN)/python -m bench
+
+# The peers live in an environment of their own. Where one cannot be installed, the others are compared.
+.venv-bench/installed: bench/requirements.lock
+	$(PYTHON) -m venv .venv-bench
+	@.venv-bench/bin/pip install --quiet --disable-pip-version-check -r $< \
+	  || for peer in $$(cat $<); do .venv-bench/bin/pip install --quiet --disable-pip-version-check --no-deps $$peer \
+	  || echo "bench: $$peer cannot be installed here"; done
+	@touch $@
 
 clean:
-	rm -rf .venv .cache build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf .venv .venv-bench .cache build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 .PHONY: all test lint check report bench clean

@@ -9,6 +9,7 @@ import json
 import shlex
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from enum import StrEnum
 from functools import wraps
 from pathlib import Path
@@ -41,7 +42,7 @@ class Params(StrEnum):
     runtime = "runtime"
 
 
-class Trig(StrEnum):
+class Math(StrEnum):
     """Whose sine and cosine the C calls."""
 
     own = "own"
@@ -53,7 +54,7 @@ Output = Annotated[Path, typer.Option("--output", "-o", help="Directory of the g
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for programs.")]
 Only = Annotated[str, typer.Option("--only", metavar="GLOB", help="Only kernels whose name matches.")]
 ScalarOption = Annotated[Scalar, typer.Option("--scalar", help="Scalar type of the C.")]
-TrigOption = Annotated[Trig, typer.Option("--trig", help="Own sine and cosine, or the C library's.")]
+MathOption = Annotated[Math, typer.Option("--math", help="Own sine and cosine, or the C library's.")]
 ParamsOption = Annotated[Params, typer.Option("--params", help="Numbers as constants or in a struct.")]
 GENERATED = Path("generated")
 PAGE = Path("build/report/index.html")
@@ -85,7 +86,7 @@ def make_job(
     scalar: Scalar = Scalar.f64,
     params: Params = Params.baked,
     only: str = "*",
-    trig: Trig = Trig.libm,
+    math: Math = Math.own,
 ) -> Any:
     """A job from command-line options."""
     from awiwi_gen.emit.options import Options
@@ -93,24 +94,27 @@ def make_job(
     from awiwi_gen.pipeline import Job
     from awiwi_gen.report import Progress
 
-    return Job(Hand.load(hand), Options(scalar.value, params.value, trig.value), only, progress=Progress())
+    return Job(Hand.load(hand), Options(scalar.value, params.value, math.value), only, progress=Progress())
 
 
 @command
 def generate(
     hand: HandFile = None, output: Output = GENERATED, scalar: ScalarOption = Scalar.f64,
-    params: ParamsOption = Params.baked, trig: TrigOption = Trig.libm, only: Only = "*", as_json: Json = False,
+    params: ParamsOption = Params.baked, math: MathOption = Math.own, only: Only = "*", as_json: Json = False,
     verify: Annotated[bool, typer.Option("--verify", help="Verify what was generated.")] = False,
+    accept_cost: Annotated[bool, typer.Option("--accept-cost", help="Let kernels exceed their budget.")] = False,
 ) -> int:  # fmt: skip
     """Derive, compare the witnesses, optimise and write the C."""
     from awiwi_gen.pipeline import generate
     from awiwi_gen.report import print_json
 
-    job = make_job(hand, scalar, params, only, trig)
+    job = replace(make_job(hand, scalar, params, only, math), accept_cost=accept_cost)
     if verify:
         from awiwi_gen.build import compiler
 
         compiler()  # without one nothing can be verified: better told before anything is replaced
+    if job.hand.gains:
+        with_studies("the check of its gains").require_running_gains(job.hand, job.store)
     changed = generate(job, output)
     if verify:
         return prove(job, hand, output, as_json)
@@ -124,13 +128,13 @@ def generate(
 @command
 def check(
     hand: HandFile = None, output: Output = GENERATED, scalar: ScalarOption = Scalar.f64,
-    params: ParamsOption = Params.baked, trig: TrigOption = Trig.libm, only: Only = "*", as_json: Json = False,
+    params: ParamsOption = Params.baked, math: MathOption = Math.own, only: Only = "*", as_json: Json = False,
 ) -> int:  # fmt: skip
     """Check the hand file, and whether the generated C is fresh and unedited."""
     from awiwi_gen.pipeline import state
     from awiwi_gen.report import print_json, state_lines
 
-    job = make_job(hand, scalar, params, only, trig)
+    job = make_job(hand, scalar, params, only, math)
     found = state(job, output)
     if as_json:
         print_json({"hand": job.hand.name, "fresh": found.fresh, **vars(found)})
@@ -159,11 +163,11 @@ def build(hand: HandFile = None, output: Output = GENERATED, as_json: Json = Fal
 @command
 def verify(
     hand: HandFile = None, output: Output = GENERATED, scalar: ScalarOption = Scalar.f64,
-    params: ParamsOption = Params.baked, trig: TrigOption = Trig.libm, only: Only = "*", as_json: Json = False,
+    params: ParamsOption = Params.baked, math: MathOption = Math.own, only: Only = "*", as_json: Json = False,
 ) -> int:  # fmt: skip
     """Compile the generated C as it stands and compare every kernel with its reference."""
     require(output)
-    return prove(make_job(hand, scalar, params, only, trig), hand, output, as_json)
+    return prove(make_job(hand, scalar, params, only, math), hand, output, as_json)
 
 
 @command
@@ -245,18 +249,17 @@ def report(
     hand: HandFile = None, as_json: Json = False,
     page: Annotated[Path, typer.Option("--page", "-o", help="HTML file to write.")] = PAGE,
 ) -> int:  # fmt: skip
-    """Compute the source's figures again, and write them on one page with the proof of every kernel."""
+    """Compute the source's figures and numbers again, and write them on one page with the proof of every kernel."""
     from awiwi_gen.report import print_json
-    from awiwi_gen.studies.page import publish, verdict
+    from awiwi_gen.studies.page import publish, summary, verdict
 
-    figures, proof = publish(make_job(hand), page)
+    results = publish(make_job(hand), page)
     if as_json:
-        print_json([{"number": f.number, "title": f.title, "claim": f.claim, "holds": bool(f.holds)} for f in figures])
+        print_json(results.as_dict())
     else:
-        print("\n".join(f"figure {figure.number}: the claim {verdict(figure)}" for figure in figures))
-        proved = f"{sum(v.passed for v in proof.verdicts)} of {len(proof.verdicts)} kernels proved"
-        print(f"{page}: {len(figures)} figures, {proved}")
-    return 0 if proof.passed else 1
+        print("\n".join(f"figure {figure.number}: the claim {verdict(figure)}" for figure in results.figures))
+        print(f"{page}: {summary(results)}")
+    return 0 if results.proof.passed else 1
 
 
 @command
@@ -268,12 +271,9 @@ def tune(
     """Find gains of the backstepping law for every tendon, and write them for the hand file to take in."""
     from awiwi_gen.report import print_json
 
-    try:
-        from awiwi_gen.studies.tune import tune_hand, write_gains
-    except ModuleNotFoundError as error:
-        raise InputError(f"{error.name} needed for tuning; install it: pip install 'awiwi_gen[studies]'") from None
-    tuned = tune_hand(make_job(hand).hand, costs)
-    write_gains(output, tuned)
+    studies = with_studies("tuning", "tune")
+    tuned = studies.tune_hand(make_job(hand).hand, costs)
+    studies.write_gains(output, tuned)
     if as_json:
         print_json([each.as_dict() for each in tuned])
     else:
@@ -281,6 +281,33 @@ def tune(
         print(f"{output}: gains of {len(tuned)} tendons; spectral radius {radius:.4f} at most at 3 kHz and one sample")
         print(f"of delay, delay margin {margin * 1e6:.0f} us at least")
     return 0
+
+
+@command
+def simulate(
+    law: Annotated[str, typer.Argument(help="A law; all of them if left out.")] = "",
+    gains: Annotated[str, typer.Option("--gains", help="Gains such as K_p=0.5,K_d=0.003.")] = "",
+    scenario: Annotated[str, typer.Option("--scenario", help="Show one run: step, load or sine.")] = "",
+    force: Annotated[float, typer.Option("--force", help="Pretension of that run [N].")] = 10.0,
+    plant: Annotated[str, typer.Option("--plant", help="Plant of that run.")] = "as known",
+    hand: HandFile = None, as_json: Json = False,
+) -> int:  # fmt: skip
+    """Run laws on a joint between two tendons, on the hand's clock, and tell how they bear it."""
+    studies = with_studies("simulation", "benchmark.command")
+    one = scenario != ""
+    shown = studies.one_run(hand, law, gains, scenario, force, plant) if one else studies.benchmark(hand, law, gains)
+    shown.show(as_json)
+    return 0
+
+
+def with_studies(purpose: str, module: str = "hand_gains") -> Any:
+    """A module of the studies. Raises InputError where the libraries are missing that it needs."""
+    from importlib import import_module
+
+    try:
+        return import_module(f"awiwi_gen.studies.{module}")
+    except ModuleNotFoundError as error:
+        raise InputError(f"{error.name} needed for {purpose}; install it: pip install 'awiwi_gen[studies]'") from None
 
 
 def mend(job: Any, hand: Path | None, output: Path) -> str:

@@ -35,7 +35,8 @@ if TYPE_CHECKING:
 
 WARNINGS = ("-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wdouble-promotion", "-Wshadow", "-Werror")
 FLAGS = ("-std=c99", "-O2", "-fPIC", "-ffp-contract=off", *WARNINGS)
-GLUE_FLAGS = ("-O1", "-fPIC", "-w")
+GLUE_FLAGS = ("-O0", "-fPIC", "-w")  # what cffi writes is long and runs once a call; the loops are optimised
+OPTIMISED = '#pragma GCC push_options\n#pragma GCC optimize ("O1")\n{}\n#pragma GCC pop_options\n'
 BATCH_FLAGS = ("-std=c99", "-O3", "-fPIC", "-w", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math")
 GCC_FLAGS = ("-fschedule-insns", "-fsched-pressure", "--param", "vect-epilogues-nomask=0")  # long straight-line loops
 UNFUSED = (("-mno-fma",), ("-mno-fma", "-mno-avx512f"))  # x86 without the instructions, in AVX-512 they are built in
@@ -132,16 +133,18 @@ def load(directory: Path, store: Cache | None = None) -> Library:
 
     store = store or Cache()
     manifest = json.loads((directory / "manifest.json").read_text(encoding="utf-8"))
-    objects = compile_objects(directory, store)
     glue = _glue_source(manifest, declarations(directory))
     python = f"{sys.version} {sysconfig.get_config_var('EXT_SUFFIX')}"
-    name = "_awiwi_" + key(glue, python, compiler().version)[:16]
+    name = "_awiwi_" + key(glue, python, GLUE_FLAGS, compiler().version)[:16]
+    with ThreadPoolExecutor(1) as aside:  # the wrapper takes longest: the kernels are compiled meanwhile
+        wrapping = aside.submit(_glue_object, name, glue, directory, store)
+        objects = compile_objects(directory, store)
+        wrapper = wrapping.result()
     digest = key(name, *(path.name for path in objects)) + ".so"
     target = store.directory / "libraries" / digest
     if not target.exists():
         with tempfile.TemporaryDirectory() as scratch:
             made = Path(scratch) / "library.so"
-            wrapper = _glue_object(name, glue, directory, store)
             compiler().run("-shared", *(str(o) for o in objects), str(wrapper), "-o", str(made), "-lm")
             target = store.put_bytes("libraries", digest, made.read_bytes())
     module = _import(name, target)
@@ -262,7 +265,7 @@ def _glue_object(name: str, glue: str, directory: Path, store: Cache) -> Path:
     parts = json.loads(glue)
     ffi = cffi.FFI()
     ffi.cdef(re.sub(r"^#.*$", "", parts["declared"], flags=re.M) + "\n".join(parts["prototypes"]))
-    preamble = '#include "awiwi.h"\n' + "\n".join(parts["loops"])
+    preamble = '#include "awiwi.h"\n' + OPTIMISED.format("\n".join(parts["loops"]))
     with tempfile.TemporaryDirectory() as scratch:
         source, made = Path(scratch) / f"{name}.c", Path(scratch) / f"{name}.o"
         cffi.recompiler.make_c_source(ffi, name, preamble, str(source))

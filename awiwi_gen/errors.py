@@ -6,6 +6,7 @@
     ├── DimensionError        an expression adds metres to newtons: the physics, not the file, is wrong
     ├── BuildError            the C compiler refused the generated code
     │   └── NoCompilerError   there is none that works; exit code 2
+    ├── BudgetError           a kernel costs more than what is committed
     └── VerificationError     two independent routes to one number disagree
 
 Anything else that escapes is a bug of ours.
@@ -19,7 +20,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 __all__ = [
-    "AwiwiError", "BuildError", "DimensionError", "Fault", "InputError", "NoCompilerError", "OutputError",
+    "AwiwiError", "BudgetError", "BuildError", "DimensionError", "Fault", "InputError", "NoCompilerError", "OutputError",
     "VerificationError", "unknown",
 ]  # fmt: skip
 
@@ -70,10 +71,10 @@ class InputError(AwiwiError, ValueError):
         return "\n".join(lines + [f"... and {more} more"] * (more > 0))
 
 
-def unknown(kind: str, name: str, known: Iterable[str]) -> InputError:
-    """The exception for a name that is not known, with those that look like it."""
+def unknown(kind: str, name: str, known: Iterable[str], otherwise: str = "see awiwi-gen list") -> InputError:
+    """The exception for a name that is not known, with those that look like it, or else where to find names."""
     near = difflib.get_close_matches(name, list(known), 3)
-    return InputError(f"no {kind} {name!r}; {'did you mean ' + ', '.join(near) if near else 'see awiwi-gen list'}")
+    return InputError(f"no {kind} {name!r}; {'did you mean ' + ', '.join(near) if near else otherwise}")
 
 
 class OutputError(InputError):
@@ -92,6 +93,10 @@ class NoCompilerError(BuildError):
     """There is no C compiler, or none that works: the machine is to be mended, not the code."""
 
     exit_code = 2
+
+
+class BudgetError(AwiwiError):
+    """Kernels cost more than their committed budget."""
 
 
 class VerificationError(AwiwiError):

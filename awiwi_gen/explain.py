@@ -44,7 +44,10 @@ def explanation(job: Job, name: str) -> dict[str, Any]:
 def mathematics(definition: Graph) -> list[str]:
     """The definition with the hand's numbers by name, as assignments; long ones end in an ellipsis."""
     graph = optimise(definition)[-1][1]
-    lines = [line.removeprefix("const double ").rstrip(";") for line in Names(graph, Options(), "", "").statements()]
+    lines = [
+        line.removeprefix("const double ").rstrip(";")
+        for line in Names(graph, Options(math="libm"), "", "").statements()
+    ]
     return lines if len(lines) <= MOST_LINES else [*lines[:MOST_LINES], f"... and {len(lines) - MOST_LINES} more lines"]
 
 

@@ -1,4 +1,4 @@
-"""One kernel from its derivations to its C text: bound, compared, optimised, printed; a pure function.
+"""Kernels from their derivations to their C text: bound, compared, optimised, printed; pure functions.
 
 Its result, a `Record`, is kept by the digest of everything it depends on, so that a changed number costs the
 kernels that use it and no others.
@@ -28,7 +28,14 @@ from awiwi_gen.kernel import Kernel, Port, Solver
 from awiwi_gen.sources import code_of
 from awiwi_gen.verify.physics import Law, obey
 from awiwi_gen.verify.problems import PROBLEMS, Problem
-from awiwi_gen.verify.reference import BallArrays, Reference, ball_values, disagreement, reference
+from awiwi_gen.verify.reference import (
+    BallArrays,
+    Reference,
+    ball_values,
+    ball_values_together,
+    disagreement,
+    reference,
+)
 from awiwi_gen.verify.samples import SEED, draw
 from awiwi_gen.verify.verdict import Verdict, judge, judge_solver
 
@@ -41,7 +48,7 @@ HOPELESS = 2  # passes seldom halve a cost
 class Record:
     """What is known of a kernel before it is compiled; ``digest`` names what it was made from.
 
-    ``values`` are the numbers of the hand that its graph reads when it runs.
+    ``values`` are the numbers of the hand that its graph reads when it runs; ``costs`` is its weight after each pass.
     """
 
     digest: str
@@ -53,20 +60,23 @@ class Record:
     passes: float
     reference: Reference
     values: Mapping[str, Fraction] = field(default_factory=dict)
+    costs: tuple[tuple[str, int], ...] = ()
 
 
 def derivation_key(kernel: Kernel, route: str) -> str:
     """What a derivation depends on: the structure of the part, the ports, the code of the route; no number."""
     code = code_of(Deriver, check_dimensions, kernel.routes[route], type(kernel.part))
     ports = [(name, port.shape, port.unit) for side in (kernel.inputs, kernel.outputs) for name, port in side.items()]
-    return key(kernel.structure, kernel.family, route, ports, kernel.guards, code, libraries())
+    function = kernel.routes[route]
+    name = getattr(function, "__qualname__", kernel.family)
+    return key(kernel.structure, function.__module__, name, ports, kernel.guards, code, libraries())
 
 
 def record_key(kernel: Kernel, graphs: Mapping[str, Graph], prefix: str, options: Options) -> str:
     """What a record depends on: the derivations, the numbers in them, the ports, the compiler's own code."""
-    values = kernel.part.quantities()
-    used = {path: str(values[path].value) for graph in graphs.values() for path in graph.params}
-    code = code_of(make_solver_record if kernel.solver else make_record) + code_digest("templates")
+    values = _values(kernel)
+    used = {path: str(values[path]) for graph in graphs.values() for path in graph.params}
+    code = code_of(make_solver_record if kernel.solver else make_records) + code_digest("templates")
     digests = {route: graph.digest for route, graph in graphs.items()}
     ports = (dict(kernel.inputs), dict(kernel.outputs), kernel.doc, kernel.source, kernel.solver)
     return key(kernel.name, digests, json.dumps(used, sort_keys=True), ports, prefix, options, code, libraries())
@@ -97,25 +107,68 @@ def cheapest(bound: Mapping[str, Graph]) -> tuple[str, list[tuple[str, Graph]]]:
     return best, stages[best]
 
 
-def make_record(kernel: Kernel, graphs: Mapping[str, Graph], prefix: str, options: Options, digest: str) -> Record:
-    """Bind, compare the routes, optimise the cheaper one, print it.
+@dataclass(frozen=True)
+class Candidate:
+    """A kernel of which the graphs are known: bound, the best of them optimised, not compared yet."""
+
+    kernel: Kernel
+    digest: str
+    bound: Mapping[str, Graph]
+    route: str
+    stages: Sequence[tuple[str, Graph]]
+    inputs: Mapping[str, Any]
+
+    @property
+    def final(self) -> Graph:
+        """What is emitted."""
+        return self.stages[-1][1]
+
+
+def make_records(
+    tasks: Sequence[tuple[Kernel, Mapping[str, Graph], str]], prefix: str, options: Options
+) -> list[Record]:
+    """Bind, compare the routes, optimise the cheaper one, print it; for kernels (with graphs, digest) of one part.
 
     Raises VerificationError where two routes, or the graphs before and after a pass, differ.
     """
-    values = _values(kernel)
+    values = _values(tasks[0][0])
     numbers = values if options.params == "baked" else {}
-    bound = {route: bind(graph, numbers) for route, graph in graphs.items()}
-    route, optimised = cheapest(bound)
-    inputs = draw(kernel.inputs, kernel.path, options.dtype)
-    exact = {name: ball_values(graph, inputs, values) for name, graph in bound.items()}
+    known: dict[tuple[str, ...], tuple[Mapping[str, Graph], str, Sequence[tuple[str, Graph]]]] = {}
+    candidates = []
+    for kernel, graphs, digest in tasks:
+        alike = tuple(graph.digest for graph in graphs.values())
+        if alike not in known:
+            bound = {route: bind(graph, numbers) for route, graph in graphs.items()}
+            known[alike] = (bound, *cheapest(bound))
+        inputs = draw(kernel.inputs, kernel.path, options.dtype)
+        candidates.append(Candidate(kernel, digest, *known[alike], inputs))
+    cases = [(graph, c.inputs) for c in candidates for graph in (*c.bound.values(), c.final)]
+    found = iter(ball_values_together(cases, values))
+    made = []
+    for (_, graphs, _), candidate in zip(tasks, candidates, strict=True):
+        exact = {route: next(found) for route in candidate.bound}
+        made.append(_record(candidate, graphs, exact, next(found), values, prefix, options))
+    return made
+
+
+def _record(
+    candidate: Candidate,
+    graphs: Mapping[str, Graph],
+    exact: Mapping[str, BallArrays],
+    optimised: BallArrays,
+    values: Mapping[str, Fraction],
+    prefix: str,
+    options: Options,
+) -> Record:
+    """Compare, and print what agrees."""
+    kernel, route, final = candidate.kernel, candidate.route, candidate.final
     definition = next(iter(exact.values()))
     agreement = max(disagreement(definition, other) for other in exact.values())
     if not agreement <= ROUTES_AGREE:
         raise VerificationError(f"{kernel.name}: its derivations {', '.join(exact)} differ by {agreement:.1e}")
-    final = optimised[-1][1]
-    passes = disagreement(exact[route], ball_values(final, inputs, values))
+    passes = disagreement(exact[route], optimised)
     if not passes <= PASSES_AGREE:
-        raise VerificationError(f"{kernel.name}: {culprit(exact[route], optimised, inputs, values)}")
+        raise VerificationError(f"{kernel.name}: {culprit(exact[route], candidate.stages, candidate.inputs, values)}")
     function = c_function(
         kernel.name,
         prefix,
@@ -128,7 +181,11 @@ def make_record(kernel: Kernel, graphs: Mapping[str, Graph], prefix: str, option
     used = {f"{kernel.path}.{path}": str(values[path]) for graph in graphs.values() for path in graph.params}
     text = kernel_file(function, key(json.dumps(used, sort_keys=True)))
     left = {path: values[path] for path in final.params}
-    return Record(digest, final, function, text, route, agreement, passes, reference(definition), left)
+    steps = [("derivation", candidate.bound[route]), *candidate.stages]
+    costs = tuple((step, round(cost(graph).weight)) for step, graph in steps)
+    return Record(
+        candidate.digest, final, function, text, route, agreement, passes, reference(definition), left, costs
+    )  # fmt: skip
 
 
 def culprit(
@@ -145,7 +202,7 @@ def culprit(
 
 
 def make_solver_record(
-    kernel: Kernel, used: Mapping[str, Record], prefix: str, options: Options, digest: str
+    kernel: Kernel, used: Mapping[str, Record], digest: str, prefix: str, options: Options
 ) -> Record:
     """Bind a solver to the kernels it uses, and find the exact solutions it is to be held against."""
     solver = _solver(kernel)
@@ -154,7 +211,8 @@ def make_solver_record(
     function, text = solver_function(kernel, solver, prefix, options, functions, runtime)
     problem = _problem(kernel, used)
     exact = problem.solve(problem.sample(draw(kernel.inputs, kernel.path, options.dtype)))
-    return Record(digest, None, function, text, "solver", 0.0, 0.0, exact)
+    costs = (("solver", round(function.cost.weight)),)
+    return Record(digest, None, function, text, "solver", 0.0, 0.0, exact, costs=costs)
 
 
 def _problem(kernel: Kernel, used: Mapping[str, Record]) -> Problem:
@@ -170,8 +228,14 @@ def _solver(kernel: Kernel) -> Solver:
     return kernel.solver
 
 
-def _values(kernel: Kernel) -> dict[str, Fraction]:
-    return {path: quantity.value for path, quantity in kernel.part.quantities().items()}
+def _values(kernel: Kernel) -> Mapping[str, Fraction]:
+    part = kernel.part
+    if id(part) not in _VALUES:
+        _VALUES[id(part)] = part, {path: quantity.value for path, quantity in part.quantities().items()}
+    return _VALUES[id(part)][1]
+
+
+_VALUES: dict[int, tuple[Any, dict[str, Fraction]]] = {}  # many kernels share a part, which is kept with its numbers
 
 
 def verdict_key(record: Record, compiled: str) -> str:
@@ -191,7 +255,7 @@ def judge_record(
     if record.graph is None:
         problem, tolerance = _problem(kernel, used), _solver(kernel).tolerance[options.scalar]
         inputs = problem.sample(draw(kernel.inputs, kernel.path, options.dtype))
-        mirror = problem.mirror(inputs, options.trig == "own")
+        mirror = problem.mirror(inputs, options.math == "own")
         return judge_solver(kernel.name, record.reference, mirror, inputs, function, tolerance, SEED)
     return judge(
         kernel.name,
@@ -205,7 +269,7 @@ def judge_record(
         record.passes,
         SEED,
         options.dtype,
-        options.trig == "own",
+        options.math == "own",
     )
 
 

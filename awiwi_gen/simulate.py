@@ -302,17 +302,31 @@ class Machine:
             raise InputError(f"the loop cannot go on from there (status {status})")
         return after
 
+    def stand(self) -> None:
+        """Let no time pass in a tick: what is left of it is what the law does."""
+        self.c.period = 0
+
+    def kept(self) -> list[int]:
+        """Places of all that lasts from one period to the next: the plant's states, and what law and motors write."""
+        written = [b.wires.get(p["name"], p["name"]) for b in self.loop.law for p in self._kernel(b).outputs]
+        written += [sensor.seen for sensor in self.loop.sensors]
+        written += [wire for actuator in self.loop.actuators for wire in (actuator.wanted, actuator.applied)]
+        return sorted({*range(self.states), *(place for wire in written for place in self.where(wire))})
+
     def plant_slopes(self) -> Array:
         """Slopes (states, states) of the rates by the states, at the present signals [1/s]."""
-        return _slopes(self.rates, self.signals, np.arange(self.states))
+        return slopes(self.rates, self.signals, np.arange(self.states))
 
     def substeps(self) -> int:
         """How many steps a period needs so that the plant's fastest motion is followed closely."""
-        fastest = float(np.abs(np.linalg.eigvals(self.plant_slopes())).max(initial=0.0))
+        slopes_now = self.plant_slopes()
+        if not np.isfinite(slopes_now).all():
+            return 1  # the run ends before it begins
+        fastest = float(np.abs(np.linalg.eigvals(slopes_now)).max(initial=0.0))
         return max(1, ceil(fastest * self.loop.period / REACH))
 
 
-def _slopes(function: Any, at: Array, by: Array) -> Array:
+def slopes(function: Any, at: Array, by: Array) -> Array:
     """Central differences of a function of all signals by some of them, (outputs, len(by))."""
     columns = []
     for place in by:

@@ -1,11 +1,19 @@
 /* Small dense linear algebra: products, elimination with row exchanges. */
 #include "dense.h"
 
+awiwi_real awiwi_dot(const awiwi_real *a, const awiwi_real *b, int n)
+{
+    awiwi_real sum = 0;
+    for (int i = 0; i < n; i++)
+        sum += a[i] * b[i];
+    return sum;
+}
+
 awiwi_real awiwi_largest(const awiwi_real *x, int n)
 {
     awiwi_real found = 0;
     for (int i = 0; i < n; i++)
-        found = awiwi_size(x[i]) <= found ? found : awiwi_size(x[i]);
+        found = awiwi_size(x[i]) <= found || !(found <= AWIWI_REAL_MAX) ? found : awiwi_size(x[i]);
     return found;
 }
 
@@ -66,6 +74,28 @@ int awiwi_solve(int n, int m, awiwi_real *A, awiwi_real *B)
             subtract(m, A[i * n + k], B + k * m, B + i * m);
         for (int j = 0; j < m; j++)
             B[i * m + j] /= A[i * n + i];
+    }
+    return 1;
+}
+
+/* By elimination: a pivot that vanishes must have nothing beside it. */
+int awiwi_is_semidefinite(int n, const awiwi_real *Q)
+{
+    const awiwi_real rounding = 64 * AWIWI_REAL_EPSILON;
+    awiwi_real left[4][4];
+    for (int i = 0; i < n; i++)
+        for (int j = 0; j < n; j++)
+            left[i][j] = Q[i * n + j];
+    for (int k = 0; k < n; k++) {
+        if (!(left[k][k] >= -rounding * Q[k * n + k]))
+            return 0;
+        const int vanishes = left[k][k] <= rounding * Q[k * n + k];
+        for (int i = k + 1; i < n; i++) {
+            if (vanishes && left[i][k] * left[i][k] > rounding * Q[k * n + k] * Q[i * n + i])
+                return 0;
+            for (int j = k + 1; j < n && !vanishes; j++)
+                left[i][j] -= left[i][k] / left[k][k] * left[k][j];
+        }
     }
     return 1;
 }

@@ -2,14 +2,22 @@
 #ifndef AWIWI_DENSE_H
 #define AWIWI_DENSE_H
 
-#include "real.h"
+#include "twofold.h"
 
 static inline awiwi_real awiwi_size(awiwi_real x)
 {
     return x < 0 ? -x : x;
 }
 
-/* The largest magnitude among x[n]; NaN if one of them is. */
+static inline awiwi_real awiwi_clamp(awiwi_real x, awiwi_real low, awiwi_real high)
+{
+    return x < low ? low : x > high ? high : x;
+}
+
+/* a'b of n numbers, summed from the first on. */
+awiwi_real awiwi_dot(const awiwi_real *a, const awiwi_real *b, int n);
+
+/* The largest magnitude among x[n]; not finite if one of them is not. */
 awiwi_real awiwi_largest(const awiwi_real *x, int n);
 
 /* Whether x[n] are all numbers and none is infinite. */
@@ -21,13 +29,18 @@ void awiwi_product(int n, const awiwi_real *A, const awiwi_real *B, awiwi_real *
 /* Solve A X = B for the n x m matrix X, in place of B; A is used up. Returns 0 if A is singular. */
 int awiwi_solve(int n, int m, awiwi_real *A, awiwi_real *B);
 
+/* Whether x'Q x is nowhere negative but for rounding, of a symmetric Q with n up to 4. */
+int awiwi_is_semidefinite(int n, const awiwi_real *Q);
+
 /* Coefficients c[n] of det(s - A) = s^n + c[n-1] s^(n-1) + ... + c[0]. At most four states, here and below. */
-void awiwi_characteristic(int n, const awiwi_real *A, awiwi_real *c);
+void awiwi_characteristic(int n, const awiwi_twofold *A, awiwi_twofold *c);
 
 /* Whether all eigenvalues of A have negative real parts. */
-int awiwi_is_stable(int n, const awiwi_real *A);
+int awiwi_is_stable(int n, const awiwi_twofold *A);
 
-/* Whether some feedback u = -K x makes dx/dt = A x + b u stable. */
-int awiwi_is_stabilisable(int n, const awiwi_real *A, const awiwi_real *b);
+/* Whether all modes of A decay that the vectors start[starts][n], at most 4, have no part in: then some feedback
+   through b makes dx/dt = A x + b u stable, if they are b; or no motion costs nothing, if A is transposed and they are
+   the rows of the costs. */
+int awiwi_rest_decays(int n, const awiwi_real *A, int starts, const awiwi_real *start);
 
 #endif

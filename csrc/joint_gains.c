@@ -101,8 +101,8 @@ static int polish(const scaled *p, gains *x)
         const awiwi_real e = x->e, f = x->f, g = x->g, h = x->h, df = 1 / slope, c3 = d + p->drag + f;
         const awiwi_real lead = h - d * g;
         const awiwi_real P = e * e + 2 * wm * e - p->q3 - 2 * wl * (c3 * g - h);
-        const awiwi_real U = wl * (p->q2 - g * g + 2 * g * (c3 + d) - 2 * h) + 2 * d * (c3 * lead - e * g - wm * (f + g)) +
-                             2 * (h * (e + wm) - wm * e);
+        const awiwi_real U = wl * (p->q2 - g * g + 2 * g * (c3 + d) - 2 * h) +
+                             2 * d * (c3 * lead - e * g - wm * (f + g)) + 2 * (h * (e + wm) - wm * e);
         const awiwi_real Pe = 2 * (e + wm - wl * (df * g + 1)), Pg = -2 * wl * c3;
         const awiwi_real Ue = 2 * (wl * (g * df + 1) + d * (df * lead - c3 - g - wm * df) + h - e - 2 * wm);
         const awiwi_real Ug = 2 * (wl * (c3 + d - g) - d * (d * c3 + e + wm)), det = Pe * Ug - Pg * Ue;

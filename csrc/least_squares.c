@@ -1,18 +1,9 @@
 /* Bounded least squares: joint angles from measured tendon lengths, eq. 5.14 and 5.24. */
 #include "awiwi_solvers.h"
+#include "dense.h"
 
 typedef awiwi_real vector[AWIWI_MOST_UNKNOWNS];
 typedef awiwi_real matrix[AWIWI_MOST_UNKNOWNS][AWIWI_MOST_UNKNOWNS];
-
-static awiwi_real size(awiwi_real x)
-{
-    return x < 0 ? -x : x;
-}
-
-static awiwi_real clamp(awiwi_real x, awiwi_real low, awiwi_real high)
-{
-    return x < low ? low : x > high ? high : x;
-}
 
 /* Half the squared residual, its gradient, and J'J, at q; also how far rounding may move the result. */
 static awiwi_real cost(const awiwi_problem *p, const awiwi_real *measured, const awiwi_real *q, vector gradient,
@@ -30,7 +21,7 @@ static awiwi_real cost(const awiwi_problem *p, const awiwi_real *measured, const
         const awiwi_real *row = P + i * p->n;
         const awiwi_real residual = h[i] - measured[i];
         total += residual * residual;
-        terms += size(residual) * (size(h[i]) + size(measured[i]));
+        terms += awiwi_size(residual) * (awiwi_size(h[i]) + awiwi_size(measured[i]));
         for (int j = 0; j < p->n; j++) {
             gradient[j] += row[j] * residual;
             for (int k = 0; k <= j; k++)
@@ -65,20 +56,13 @@ static void damped_step(int n, matrix A, const vector b, const int *held, awiwi_
     }
 }
 
-static int all_finite(const awiwi_real *x, int n)
-{
-    for (int i = 0; i < n; i++)
-        if (!(size(x[i]) <= AWIWI_REAL_MAX))
-            return 0;
-    return 1;
-}
-
 /* Clamp the start into the box; a start that is not a number becomes the middle of the box. */
 static int begin(const awiwi_problem *p, const awiwi_real *measured, const awiwi_real *start, awiwi_real *q)
 {
-    const int finite = all_finite(measured, p->m) && all_finite(start, p->n);
+    const int finite = awiwi_all_finite(measured, p->m) && awiwi_all_finite(start, p->n);
     for (int j = 0; j < p->n; j++)
-        q[j] = all_finite(start + j, 1) ? clamp(start[j], p->low[j], p->high[j]) : (p->low[j] + p->high[j]) / 2;
+        q[j] = awiwi_all_finite(start + j, 1) ? awiwi_clamp(start[j], p->low[j], p->high[j])
+                                              : (p->low[j] + p->high[j]) / 2;
     return finite;
 }
 
@@ -98,8 +82,8 @@ int awiwi_least_squares(const awiwi_problem *p, const awiwi_real *measured, cons
             held[j] = (q[j] <= p->low[j] && gradient[j] >= 0) || (q[j] >= p->high[j] && gradient[j] <= 0);
         damped_step(p->n, normal, gradient, held, damping, step);
         for (int j = 0; j < p->n; j++) {
-            trial[j] = clamp(q[j] + step[j], p->low[j], p->high[j]);
-            longest = size(trial[j] - q[j]) > longest ? size(trial[j] - q[j]) : longest;
+            trial[j] = awiwi_clamp(q[j] + step[j], p->low[j], p->high[j]);
+            longest = awiwi_size(trial[j] - q[j]) > longest ? awiwi_size(trial[j] - q[j]) : longest;
         }
         const awiwi_real found = cost(p, measured, trial, trial_gradient, trial_normal, &blur);
         /* near the bottom rounding decides which cost is lower, and the step is still right */
@@ -113,7 +97,7 @@ int awiwi_least_squares(const awiwi_problem *p, const awiwi_real *measured, cons
                     normal[j][k] = trial_normal[j][k];
             }
             if (longest <= tolerance)
-                return all_finite(q, p->n) ? AWIWI_OK : AWIWI_NOT_FINITE;
+                return awiwi_all_finite(q, p->n) ? AWIWI_OK : AWIWI_NOT_FINITE;
         } else {
             damping = damping > 0 ? damping * 10 : (awiwi_real)0.001;
         }
@@ -136,7 +120,7 @@ int awiwi_gradient_search(const awiwi_problem *p, const awiwi_real *measured, co
         step = curvature > 0 ? 1 / curvature : 0;
     for (int i = 0; i < iterations; i++) {
         for (int j = 0; j < p->n; j++) /* the gradient of the whole square is twice that of half of it */
-            trial[j] = clamp(q[j] - 2 * step * gradient[j], p->low[j], p->high[j]);
+            trial[j] = awiwi_clamp(q[j] - 2 * step * gradient[j], p->low[j], p->high[j]);
         const awiwi_real found = cost(p, measured, trial, trial_gradient, normal, &blur);
         if (found < best) {
             best = found;

@@ -1,82 +1,143 @@
 /* What can be said of the poles of up to four states without finding them. */
+#include <tgmath.h>
+
 #include "dense.h"
 
 enum { N = 4 };
 
 /* After Faddeev and LeVerrier. */
-void awiwi_characteristic(int n, const awiwi_real *A, awiwi_real *c)
+void awiwi_characteristic(int n, const awiwi_twofold *A, awiwi_twofold *c)
 {
-    awiwi_real M[N * N] = {0}, AM[N * N];
+    awiwi_twofold M[N * N] = {{0, 0}}, AM[N * N];
     for (int k = 1; k <= n; k++) {
-        awiwi_real trace = 0;
+        awiwi_twofold trace = {0, 0};
         for (int i = 0; i < n; i++)
-            M[i * n + i] += k == 1 ? 1 : c[n - k + 1];
-        awiwi_product(n, A, M, AM);
+            M[i * n + i] = awiwi_twofold_add(M[i * n + i], k == 1 ? awiwi_twofold_of(1) : c[n - k + 1]);
         for (int i = 0; i < n; i++)
-            trace += AM[i * n + i];
-        c[n - k] = -trace / (awiwi_real)k;
+            for (int j = 0; j < n; j++) {
+                AM[i * n + j] = awiwi_twofold_of(0);
+                for (int l = 0; l < n; l++)
+                    AM[i * n + j] =
+                        awiwi_twofold_add(AM[i * n + j], awiwi_twofold_multiply(A[i * n + l], M[l * n + j]));
+            }
+        for (int i = 0; i < n; i++)
+            trace = awiwi_twofold_add(trace, AM[i * n + i]);
+        c[n - k] = awiwi_twofold_divide(awiwi_twofold_minus(trace), (awiwi_real)k);
         for (int i = 0; i < n * n; i++)
             M[i] = AM[i];
     }
 }
 
 /* By Hurwitz' determinants. */
-int awiwi_is_stable(int n, const awiwi_real *A)
+int awiwi_is_stable(int n, const awiwi_twofold *A)
 {
-    awiwi_real c[N];
+    awiwi_twofold c[N], left, right;
     awiwi_characteristic(n, A, c);
     for (int i = 0; i < n; i++)
-        if (!(c[i] > 0))
+        if (!(c[i].high > 0))
             return 0;
-    if (n == 3)
-        return c[2] * c[1] > c[0];
-    return n < 3 || c[3] * c[2] * c[1] > c[1] * c[1] + c[0] * c[3] * c[3];
+    if (n < 3)
+        return 1;
+    left = awiwi_twofold_multiply(c[n - 1], c[n - 2]); /* n = 3: c2 c1 > c0; n = 4: c3 c2 c1 > c1^2 + c0 c3^2 */
+    right = c[n - 3];
+    if (n == 4) {
+        left = awiwi_twofold_multiply(left, c[1]);
+        right = awiwi_twofold_add(awiwi_twofold_multiply(c[1], c[1]),
+                                  awiwi_twofold_multiply(c[0], awiwi_twofold_multiply(c[3], c[3])));
+    }
+    return awiwi_twofold_add(left, awiwi_twofold_minus(right)).high > 0;
 }
 
-/* Elimination brings (b, A) to Hessenberg form with the input on top. A pivot that vanishes but for rounding ends what
-   the input moves; the block below must be stable by itself. */
-int awiwi_is_stabilisable(int n, const awiwi_real *A, const awiwi_real *b)
+/* A vector, and how far rounding may have moved its elements. An element that is zero by itself has no error. */
+typedef struct known {
+    awiwi_real value[N], error[N];
+} known;
+
+static const awiwi_real ROUNDING = AWIWI_REAL_EPSILON; /* of a product, in parts of it */
+
+/* v'w, with its error. */
+static awiwi_real product(int n, const known *v, const known *w, awiwi_real *error)
 {
-    const awiwi_real nothing = 64 * AWIWI_REAL_EPSILON * awiwi_largest(A, n * n);
-    awiwi_real H[N][N], rest[N * N] = {0}, column[N];
-    int moved = 0;
+    *error = 0;
+    for (int i = 0; i < n; i++)
+        *error += v->error[i] * awiwi_size(w->value[i]) + awiwi_size(v->value[i]) * w->error[i] +
+                  ROUNDING * awiwi_size(v->value[i] * w->value[i]);
+    return awiwi_dot(v->value, w->value, n);
+}
+
+/* A v */
+static known image(int n, const awiwi_real *A, const known *v)
+{
+    known x = {{0}, {0}};
     for (int i = 0; i < n; i++) {
-        column[i] = b[i];
+        known row = {{0}, {0}};
         for (int j = 0; j < n; j++)
-            H[i][j] = A[i * n + j];
+            row.value[j] = A[i * n + j];
+        x.value[i] = product(n, &row, v, &x.error[i]);
     }
-    for (; moved < n; moved++) {
-        int pivot = moved;
-        for (int i = moved + 1; i < n; i++)
-            if (awiwi_size(column[i]) > awiwi_size(column[pivot]))
-                pivot = i;
-        const awiwi_real top = column[pivot];
-        if (!(awiwi_size(top) > (moved ? nothing : 0)))
-            break;
-        column[pivot] = column[moved];
-        for (int j = 0; j < n; j++) { /* exchange two states: rows, then columns */
-            const awiwi_real kept = H[moved][j];
-            H[moved][j] = H[pivot][j];
-            H[pivot][j] = kept;
-        }
+    return x;
+}
+
+/* Add to orthonormal directions what is new in v, twice orthogonal for the sake of rounding. It is new if more of it
+   remains than `least`, and some element is more than its error. Returns how many directions there are. */
+static int extend(int n, int count, known *directions, known v, awiwi_real least)
+{
+    awiwi_real error, unused;
+    int is_new = 0;
+    for (int k = 0; k < 2 * count; k++) {
+        const known *along = &directions[k % count];
+        const awiwi_real share = product(n, &v, along, k < count ? &error : &unused);
         for (int i = 0; i < n; i++) {
-            const awiwi_real kept = H[i][moved];
-            H[i][moved] = H[i][pivot];
-            H[i][pivot] = kept;
+            v.value[i] -= share * along->value[i];
+            if (k < count)
+                v.error[i] += error * awiwi_size(along->value[i]) + awiwi_size(share) * along->error[i] +
+                              ROUNDING * awiwi_size(share * along->value[i]);
         }
-        for (int i = moved + 1; i < n; i++) {
-            const awiwi_real f = column[i] / top;
-            for (int j = 0; j < n; j++)
-                H[i][j] -= f * H[moved][j];
-            for (int j = 0; j < n; j++)
-                H[j][moved] += f * H[j][i];
-        }
-        for (int i = 0; i < n; i++)
-            column[i] = H[i][moved];
     }
-    const int left = n - moved;
+    const awiwi_real length = sqrt(awiwi_dot(v.value, v.value, n));
+    for (int i = 0; i < n; i++)
+        is_new = is_new || awiwi_size(v.value[i]) > v.error[i];
+    if (count == n || !is_new || !(length > least))
+        return count;
+    for (int i = 0; i < n; i++) {
+        directions[count].value[i] = v.value[i] / length;
+        directions[count].error[i] = v.error[i] / length;
+    }
+    return count + 1;
+}
+
+/* A turns the starts into directions; the modes in what is left must decay by more than rounding. */
+int awiwi_rest_decays(int n, const awiwi_real *A, int starts, const awiwi_real *start)
+{
+    known directions[N];
+    awiwi_twofold rest[N * N];
+    awiwi_real margin = 0;
+    int found = 0;
+    for (int s = 0; s < starts; s++) {
+        known v = {{0}, {0}};
+        for (int i = 0; i < n; i++)
+            v.value[i] = start[s * n + i];
+        for (int i = 0; i < n && starts > 1; i++)
+            v.error[i] = ROUNDING * awiwi_size(v.value[i]);
+        found = extend(n, found, directions, v, 0);
+    }
+    for (int k = 0; k < found; k++)
+        found = extend(n, found, directions, image(n, A, &directions[k]), 0);
+    const int left = n - found;
+    for (int i = 0, count = found; i < n; i++) { /* fill up with unit vectors: some remainder is at least a half */
+        known unit = {{0}, {0}};
+        unit.value[i] = 1;
+        count = extend(n, count, directions, unit, (awiwi_real)0.25);
+    }
+    for (int j = 0; j < left; j++) {
+        const known moved = image(n, A, &directions[found + j]);
+        for (int i = 0; i < left; i++) {
+            awiwi_real error;
+            rest[i * left + j] = awiwi_twofold_of(product(n, &moved, &directions[found + i], &error));
+            margin = error > margin ? error : margin;
+        }
+    }
     for (int i = 0; i < left; i++)
-        for (int j = 0; j < left; j++)
-            rest[i * left + j] = H[moved + i][moved + j];
+        rest[i * (left + 1)] = awiwi_twofold_add(rest[i * (left + 1)], awiwi_twofold_of((awiwi_real)left * margin));
     return awiwi_is_stable(left, rest);
 }

@@ -1,5 +1,6 @@
 /* The algebraic Riccati equation S A + A'S - S b b'S/R + Q = 0 of one input (eq. 13.5), by structure-preserving
-   doubling: a Cayley transform makes it a discrete one, whose closed loop is squared until it vanishes. */
+   doubling: a Cayley transform makes it a discrete one, whose closed loop is squared until it vanishes. Then Newton's
+   method, after Kleinman, from residuals with twice the digits: so gains are right to the last one. */
 #include <tgmath.h>
 
 #include "awiwi_regulators.h"
@@ -9,7 +10,7 @@ enum {
     N = AWIWI_MOST_STATES,
     UNKNOWNS = N * (N + 1) / 2,
     SWEEPS = 4,     /* of balancing */
-    REFINEMENTS = 4 /* steps of Newton at the end, at most */
+    REFINEMENTS = 12 /* steps of Newton at the end, at most */
 };
 
 /* A plant and its costs in coordinates z with x = diag(d) z, whose entries are of like size. */
@@ -18,9 +19,11 @@ typedef struct plant {
     awiwi_real d[N], A[N * N], b[N], Q[N * N], R;
 } plant;
 
-/* A candidate: gains, closed loop A - b K, the equation's left side E, and how large that is against its terms. */
+/* A candidate with twice the digits: S, its gains, the closed loop A - b K of what is returned of them; the equation's
+   left side E, and how large that is against its terms. */
 typedef struct solution {
-    awiwi_real S[N * N], K[N], loop[N * N], E[N * N], residual;
+    awiwi_twofold S[N * N], K[N], loop[N * N];
+    awiwi_real E[N * N], residual;
 } solution;
 
 /* Scale every coordinate by a power of two, so that its row and its column of the Hamiltonian matrix weigh alike. */
@@ -54,32 +57,29 @@ static void balance(plant *p)
 }
 
 /* The geometric mean of the optimal loop's poles, to a power of two. The square of their product is known beforehand:
-   det(A)^2 + v'Q v/R with v = adj(A) b. Zero if one of them is zero. Where the square is out of range the norm will do,
-   for doubling succeeds with any number, only later. */
+   det(A)^2 + v'Q v/R with v = adj(A) b. Where that is out of range the norm will do, for doubling succeeds with any
+   number, only later. */
 static awiwi_real mean_pole(const plant *p)
 {
     const int n = p->n;
-    awiwi_real c[N], v[N], next[N], square;
+    awiwi_twofold A[N * N], c[N];
+    awiwi_real v[N], next[N], square;
     int exponent;
-    awiwi_characteristic(n, p->A, c);
+    for (int i = 0; i < n * n; i++)
+        A[i] = awiwi_twofold_of(p->A[i]);
+    awiwi_characteristic(n, A, c);
     for (int i = 0; i < n; i++)
         v[i] = p->b[i];
     for (int k = n - 1; k > 0; k--) {
-        for (int i = 0; i < n; i++) {
-            next[i] = c[k] * p->b[i];
-            for (int j = 0; j < n; j++)
-                next[i] += p->A[i * n + j] * v[j];
-        }
+        for (int i = 0; i < n; i++)
+            next[i] = c[k].high * p->b[i] + awiwi_dot(p->A + i * n, v, n);
         for (int i = 0; i < n; i++)
             v[i] = next[i];
     }
-    square = c[0] * c[0];
+    square = c[0].high * c[0].high;
     for (int i = 0; i < n; i++)
-        for (int j = 0; j < n; j++)
-            square += v[i] * p->Q[i * n + j] * v[j] / p->R;
-    if (!(square > 0))
-        return 0;
-    if (!(square <= AWIWI_REAL_MAX))
+        square += v[i] * awiwi_dot(p->Q + i * n, v, n) / p->R;
+    if (!(square > 0 && square <= AWIWI_REAL_MAX))
         return awiwi_largest(p->A, n * n);
     (void)frexp(square, &exponent);
     return ldexp((awiwi_real)1, exponent / (2 * n));
@@ -152,29 +152,37 @@ static int redouble(int n, awiwi_real *A, awiwi_real *G, awiwi_real *H)
     return awiwi_all_finite(A, n * n) && awiwi_all_finite(H, n * n);
 }
 
-/* Gains, loop, left side and residual of S. */
+/* Gains, loop, left side and residual of S: E almost cancels, so all of its terms have twice the digits. */
 static void weigh(const plant *p, solution *x)
 {
     const int n = p->n;
-    awiwi_real terms[N] = {0};
+    awiwi_real terms[N] = {0}, largest;
+    awiwi_twofold Sb[N];
     for (int j = 0; j < n; j++) {
-        x->K[j] = 0;
+        Sb[j] = awiwi_twofold_of(0);
         for (int i = 0; i < n; i++)
-            x->K[j] += p->b[i] * x->S[i * n + j] / p->R;
+            Sb[j] = awiwi_twofold_add(Sb[j], awiwi_twofold_multiply(x->S[i * n + j], awiwi_twofold_of(p->b[i])));
+        x->K[j] = awiwi_twofold_divide(Sb[j], p->R);
     }
     for (int i = 0; i < n; i++)
         for (int j = 0; j < n; j++) {
-            awiwi_real sum = p->Q[i * n + j] - x->K[i] * p->R * x->K[j];
+            awiwi_twofold sum = awiwi_twofold_minus(awiwi_twofold_multiply(x->K[i], Sb[j]));
+            sum = awiwi_twofold_add(sum, awiwi_twofold_of(p->Q[i * n + j]));
             for (int k = 0; k < n; k++) {
-                const awiwi_real SA = x->S[i * n + k] * p->A[k * n + j], AS = x->S[j * n + k] * p->A[k * n + i];
-                sum += SA + AS;
-                terms[i] += i == j ? awiwi_size(SA) + awiwi_size(AS) : 0;
+                const awiwi_twofold SA = awiwi_twofold_multiply(x->S[i * n + k], awiwi_twofold_of(p->A[k * n + j]));
+                const awiwi_twofold AS = awiwi_twofold_multiply(x->S[j * n + k], awiwi_twofold_of(p->A[k * n + i]));
+                sum = awiwi_twofold_add(sum, awiwi_twofold_add(SA, AS));
+                terms[i] += i == j ? awiwi_size(SA.high) + awiwi_size(AS.high) : 0;
             }
-            x->E[i * n + j] = sum;
-            x->loop[i * n + j] = p->A[i * n + j] - p->b[i] * x->K[j];
+            x->E[i * n + j] = sum.high;
+            x->loop[i * n + j] = awiwi_twofold_add(awiwi_twofold_of(p->A[i * n + j]),
+                                                   awiwi_exact_product(-p->b[i], x->K[j].high));
         }
     for (int i = 0; i < n; i++)
-        terms[i] = sqrt(terms[i] + awiwi_size(p->Q[i * n + i]) + x->K[i] * p->R * x->K[i]);
+        terms[i] += awiwi_size(p->Q[i * n + i]) + awiwi_size(x->K[i].high * Sb[i].high);
+    largest = awiwi_largest(terms, n);
+    for (int i = 0; i < n; i++) /* what costs nothing has no terms but rounding */
+        terms[i] = sqrt(terms[i] > AWIWI_REAL_EPSILON * largest ? terms[i] : AWIWI_REAL_EPSILON * largest);
     x->residual = 0;
     for (int i = 0; i < n * n; i++) {
         const awiwi_real part = awiwi_size(x->E[i]), whole = terms[i / n] * terms[i % n];
@@ -197,45 +205,91 @@ static int refine(int n, solution *s)
             awiwi_real *row = L + place(i, j) * unknowns;
             X[place(i, j)] = -s->E[i * n + j];
             for (int k = 0; k < n; k++) {
-                row[place(k, j)] += s->loop[k * n + i];
-                row[place(i, k)] += s->loop[k * n + j];
+                row[place(k, j)] += s->loop[k * n + i].high;
+                row[place(i, k)] += s->loop[k * n + j].high;
             }
         }
     if (!awiwi_solve(unknowns, 1, L, X) || !awiwi_all_finite(X, unknowns))
         return 0;
     for (int i = 0; i < n; i++)
         for (int j = 0; j < n; j++)
-            s->S[i * n + j] += X[place(i, j)];
+            s->S[i * n + j] = awiwi_twofold_add(s->S[i * n + j], awiwi_twofold_of(X[place(i, j)]));
     return 1;
+}
+
+/* Whether the costs are costs, some feedback stabilises the plant, and no motion that lasts is for nothing. */
+static int is_sound(const plant *p)
+{
+    const int n = p->n;
+    awiwi_real turned[N * N], seen[N * N]; /* by the costs: the rows of Q, in parts of their own */
+    for (int i = 0; i < n * n; i++) {
+        const awiwi_real own = p->Q[i / n * (n + 1)];
+        turned[i] = p->A[i % n * n + i / n];
+        seen[i] = own > 0 ? p->Q[i] / sqrt(own) : 0;
+    }
+    return awiwi_is_semidefinite(n, p->Q) && awiwi_rest_decays(n, p->A, 1, p->b) &&
+           awiwi_rest_decays(n, turned, n, seen);
+}
+
+/* Double until the closed loop vanishes; 0 where that leaves the numbers. */
+static int double_up(const plant *p, awiwi_real pole, int iterations, solution *x)
+{
+    const int n = p->n;
+    awiwi_real A[N * N], G[N * N], S[N * N], left = 1;
+    if (!begin(p, pole, A, G, S))
+        return 0;
+    for (int i = 0; i < iterations && left * left > AWIWI_REAL_EPSILON; i++) {
+        if (!redouble(n, A, G, S))
+            return 0;
+        left = awiwi_largest(A, n * n);
+    }
+    for (int i = 0; i < n * n; i++)
+        x->S[i] = awiwi_twofold_of(S[i]);
+    weigh(p, x);
+    return 1;
+}
+
+/* Newton's method for as long as it comes nearer. From a stable loop it does, but perhaps for its first step. */
+static void refine_all(const plant *p, solution *x)
+{
+    solution here = *x;
+    for (int k = 0; k < REFINEMENTS && refine(p->n, &here); k++) {
+        weigh(p, &here);
+        if (!(here.residual < x->residual) && k > 0)
+            break;
+        if (here.residual < x->residual)
+            *x = here;
+    }
+}
+
+static int holds(const plant *p, const solution *x)
+{
+    return x->residual <= 16 * AWIWI_REAL_EPSILON && awiwi_is_stable(p->n, x->loop);
 }
 
 static int search(plant *p, int iterations, solution *x)
 {
-    const int n = p->n;
-    awiwi_real A[N * N], G[N * N], left = 1;
+    static const int exponents[] = {0, 2, -2};
+    int found = 0;
     balance(p);
-    const awiwi_real pole = mean_pole(p);
-    if (!(pole > 0) || !awiwi_is_stabilisable(n, p->A, p->b))
+    if (!is_sound(p))
         return AWIWI_OUT_OF_DOMAIN;
-    if (!begin(p, pole, A, G, x->S))
-        return AWIWI_NOT_CONVERGED;
-    for (int i = 0; i < iterations && left * left > AWIWI_REAL_EPSILON; i++) {
-        if (!redouble(n, A, G, x->S))
-            return AWIWI_NOT_CONVERGED;
-        left = awiwi_largest(A, n * n);
+    const awiwi_real pole = mean_pole(p);
+    for (int k = 0; k < 3 && !found; k++) {
+        solution here;
+        if (!double_up(p, ldexp(pole, exponents[k]), iterations, &here))
+            continue;
+        refine_all(p, &here);
+        found = holds(p, &here);
+        if (found || here.residual < x->residual)
+            *x = here;
     }
-    weigh(p, x);
-    for (int k = 0; k < REFINEMENTS; k++) {
-        solution better = *x;
-        if (!refine(n, &better))
-            break;
-        weigh(p, &better);
-        if (!(better.residual < x->residual))
-            break;
-        *x = better;
-    }
-    return x->residual * x->residual <= AWIWI_REAL_EPSILON && awiwi_is_stable(n, x->loop) ? AWIWI_OK
-                                                                                          : AWIWI_NOT_CONVERGED;
+    solution rounded = *x;
+    for (int i = 0; i < p->n * p->n; i++)
+        rounded.S[i].low = 0;
+    weigh(p, &rounded);
+    x->residual = rounded.residual; /* of the S that is returned */
+    return found ? AWIWI_OK : AWIWI_NOT_CONVERGED;
 }
 
 int awiwi_riccati(int n, const awiwi_real *A, const awiwi_real *b, const awiwi_real *Q, awiwi_real R, int iterations,
@@ -258,9 +312,9 @@ int awiwi_riccati(int n, const awiwi_real *A, const awiwi_real *b, const awiwi_r
         status = search(&p, iterations, &x);
     const int known = status == AWIWI_OK || (status == AWIWI_NOT_CONVERGED && x.residual < 1);
     for (int i = 0; i < n; i++) { /* back to the caller's coordinates */
-        K[i] = known ? x.K[i] / p.d[i] : 0;
+        K[i] = known ? x.K[i].high / p.d[i] : 0;
         for (int j = 0; j < n; j++)
-            S[i * n + j] = known ? x.S[i * n + j] / (p.d[i] * p.d[j]) : 0;
+            S[i * n + j] = known ? x.S[i * n + j].high / (p.d[i] * p.d[j]) : 0;
     }
     *residual = known ? x.residual : 1;
     return status;

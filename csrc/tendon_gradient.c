@@ -3,6 +3,7 @@
    Printed, the gradient is that of the last trial, taken or not, while the search stands elsewhere. Here both move
    together. A step along the projected gradient is one of alpha in an orthonormal null space of P'. */
 #include "awiwi_distribution.h"
+#include "dense.h"
 
 typedef awiwi_real vector[AWIWI_MOST_TENDONS];
 
@@ -13,33 +14,12 @@ typedef struct columns {
     awiwi_real square[AWIWI_MOST_JOINTS];
 } columns;
 
-static awiwi_real dot(const awiwi_real *a, const awiwi_real *b, int n)
-{
-    awiwi_real sum = 0;
-    for (int i = 0; i < n; i++)
-        sum += a[i] * b[i];
-    return sum;
-}
-
-static awiwi_real size(awiwi_real x)
-{
-    return x < 0 ? -x : x;
-}
-
-static int all_finite(const awiwi_real *x, int n)
-{
-    for (int i = 0; i < n; i++)
-        if (!(size(x[i]) <= AWIWI_REAL_MAX))
-            return 0;
-    return 1;
-}
-
 /* Take from v what changes the torque. */
 static void project(const awiwi_tendons *t, const columns *c, awiwi_real *v)
 {
     for (int again = 0; again < 2; again++) {
         for (int k = 0; k < c->count; k++) {
-            const awiwi_real share = dot(v, c->along[k], t->m) / c->square[k];
+            const awiwi_real share = awiwi_dot(v, c->along[k], t->m) / c->square[k];
             for (int i = 0; i < t->m; i++)
                 v[i] -= share * c->along[k][i];
         }
@@ -60,7 +40,7 @@ static void span(const awiwi_tendons *t, const awiwi_real *tau, columns *c, awiw
             before += v[i] * v[i];
         }
         project(t, c, v);
-        c->square[c->count] = dot(v, v, t->m);
+        c->square[c->count] = awiwi_dot(v, v, t->m);
         if (c->square[c->count] > 64 * AWIWI_REAL_EPSILON * before) {
             for (int i = 0; i < t->m; i++)
                 f[i] -= missing / c->square[c->count] * v[i];
@@ -107,12 +87,12 @@ int awiwi_gradient_forces(const awiwi_tendons *t, const awiwi_real *tau, const a
     columns c;
     vector gradient, trial, trial_gradient;
     awiwi_real best, found;
-    const int usable = t->low <= t->high && all_finite(&t->low, 1) && all_finite(&t->high, 1);
+    const int usable = t->low <= t->high && awiwi_all_finite(&t->low, 1) && awiwi_all_finite(&t->high, 1);
     for (int i = 0; i < t->m; i++)
         f[i] = usable ? t->low + (t->high - t->low) / 2 : 0;
     if (!usable)
         return AWIWI_OUT_OF_DOMAIN;
-    if (!all_finite(tau, t->n) || !all_finite(K, t->n * t->n) || !all_finite(t->P, t->m * t->n))
+    if (!awiwi_all_finite(tau, t->n) || !awiwi_all_finite(K, t->n * t->n) || !awiwi_all_finite(t->P, t->m * t->n))
         return AWIWI_NOT_FINITE;
     span(t, tau, &c, f);
     if (cost(t, &c, K, weight, f, &best, gradient))

@@ -4,27 +4,10 @@
    tells all differences of forces; what is left is one number for each pair, on which k1 + k2 grows. The stiffness is
    linear in these sums and the limits are a box for them: a convex problem of two sums, for pairs that share joints. */
 #include "awiwi_distribution.h"
+#include "dense.h"
 
 typedef awiwi_real vector[AWIWI_MOST_TENDONS];
 typedef awiwi_real couple[2];
-
-static awiwi_real size(awiwi_real x)
-{
-    return x < 0 ? -x : x;
-}
-
-static awiwi_real clamp(awiwi_real x, awiwi_real low, awiwi_real high)
-{
-    return x < low ? low : x > high ? high : x;
-}
-
-static int all_finite(const awiwi_real *x, int n)
-{
-    for (int i = 0; i < n; i++)
-        if (!(size(x[i]) <= AWIWI_REAL_MAX))
-            return 0;
-    return 1;
-}
 
 /* The least of x' G x / 2 - c' x in a box, G = (a, b; b, d) positive definite. Where the least of all lies outside,
    one of the sides it lies beyond holds the answer; the other number is then the best for that side. */
@@ -39,9 +22,9 @@ static void nearest(awiwi_real a, awiwi_real b, awiwi_real d, const couple c, co
     for (int i = 0; i < 2; i++) {
         const int o = 1 - i;
         couple edge;
-        edge[i] = clamp(free[i], low[i], high[i]);
+        edge[i] = awiwi_clamp(free[i], low[i], high[i]);
         if (edge[i] < free[i] || edge[i] > free[i]) {
-            edge[o] = clamp((c[o] - b * edge[i]) / G[o], low[o], high[o]);
+            edge[o] = awiwi_clamp((c[o] - b * edge[i]) / G[o], low[o], high[o]);
             const awiwi_real y0 = edge[0] - free[0], y1 = edge[1] - free[1];
             const awiwi_real worse = a * y0 * y0 + 2 * b * y0 * y1 + d * y1 * y1;
             if (worse < best) {
@@ -76,7 +59,7 @@ static void nearest_of_all(const awiwi_tendons *t, int squared, const vector aim
             rr *= rr;
         }
         if (o == i) {
-            x[i] = clamp(aim[i] / pp, low[i], high[i]);
+            x[i] = awiwi_clamp(aim[i] / pp, low[i], high[i]);
         } else {
             const couple c = {aim[i], aim[o]}, least = {low[i], low[o]}, most = {high[i], high[o]};
             couple both;
@@ -91,8 +74,8 @@ static void nearest_of_all(const awiwi_tendons *t, int squared, const vector aim
 static void place(const awiwi_tendons *t, const vector d, const vector x, awiwi_real *f)
 {
     for (int i = 0; i < t->pairs; i++) {
-        f[t->pair[i].first] = clamp(t->low + x[i] + (d[i] > 0 ? d[i] : 0), t->low, t->high);
-        f[t->pair[i].second] = clamp(t->low + x[i] - (d[i] < 0 ? d[i] : 0), t->low, t->high);
+        f[t->pair[i].first] = awiwi_clamp(t->low + x[i] + (d[i] > 0 ? d[i] : 0), t->low, t->high);
+        f[t->pair[i].second] = awiwi_clamp(t->low + x[i] - (d[i] < 0 ? d[i] : 0), t->low, t->high);
     }
 }
 
@@ -134,13 +117,13 @@ static int invert(const awiwi_tendons *t, const vector d, const vector least, co
             else
                 above[i] = here;
             x[i] = slope[i] > 0 ? here - excess / slope[i] : above[i] + 2 * near;
-            if (size(x[i] - here) <= near
-                || (x[i] >= below[i] && x[i] <= above[i] && size(excess) <= missing[i] / 2))
-                x[i] = clamp(x[i], 0, most[i]);
+            if (awiwi_size(x[i] - here) <= near
+                || (x[i] >= below[i] && x[i] <= above[i] && awiwi_size(excess) <= missing[i] / 2))
+                x[i] = awiwi_clamp(x[i], 0, most[i]);
             else
                 x[i] = below[i] + (above[i] - below[i]) / 2;
-            missing[i] = size(excess);
-            longest = size(x[i] - here) > longest ? size(x[i] - here) : longest;
+            missing[i] = awiwi_size(excess);
+            longest = awiwi_size(x[i] - here) > longest ? awiwi_size(x[i] - here) : longest;
         }
         if (longest <= near) {
             place(t, d, x, f);
@@ -165,7 +148,7 @@ static int distribute_pairs(const awiwi_tendons *t, const awiwi_real *tau, const
     }
     nearest_of_all(t, 0, aim, low, high, d);
     for (int i = 0; i < t->pairs; i++)
-        most[i] = range - size(d[i]);
+        most[i] = range - awiwi_size(d[i]);
     if (sums(t, d, none, f, low, slope) || sums(t, d, most, f, high, slope))
         return AWIWI_OUT_OF_DOMAIN;
     for (int i = 0; i < t->pairs; i++) { /* the stiffness is sum of (k_i1 + k_i2) p_i p_i' */
@@ -183,12 +166,12 @@ static int distribute_pairs(const awiwi_tendons *t, const awiwi_real *tau, const
 static int gives(const awiwi_tendons *t, const awiwi_real *f, const awiwi_real *tau)
 {
     for (int j = 0; j < t->n; j++) {
-        awiwi_real missing = tau[j], terms = size(tau[j]);
+        awiwi_real missing = tau[j], terms = awiwi_size(tau[j]);
         for (int i = 0; i < t->m; i++) {
             missing += t->P[i * t->n + j] * f[i];
-            terms += size(t->P[i * t->n + j]) * t->high;
+            terms += awiwi_size(t->P[i * t->n + j]) * t->high;
         }
-        if (!(size(missing) <= 16 * AWIWI_REAL_EPSILON * terms))
+        if (!(awiwi_size(missing) <= 16 * AWIWI_REAL_EPSILON * terms))
             return 0;
     }
     return 1;
@@ -204,10 +187,11 @@ static void fall_back(const awiwi_tendons *t, int bounded, awiwi_real *f)
 int awiwi_distribute(const awiwi_tendons *t, const awiwi_real *tau, const awiwi_real *K, awiwi_real tolerance,
                      awiwi_real *f)
 {
-    const int bounded = all_finite(&t->low, 1) && all_finite(&t->high, 1);
+    const int bounded = awiwi_all_finite(&t->low, 1) && awiwi_all_finite(&t->high, 1);
     int status = AWIWI_OK;
     fall_back(t, bounded, f);
-    if (!bounded || !all_finite(tau, t->n) || !all_finite(K, t->n * t->n) || !all_finite(t->P, t->m * t->n))
+    if (!bounded || !awiwi_all_finite(tau, t->n) || !awiwi_all_finite(K, t->n * t->n) ||
+        !awiwi_all_finite(t->P, t->m * t->n))
         return AWIWI_NOT_FINITE;
     if (!(t->low <= t->high))
         return AWIWI_OUT_OF_DOMAIN;
@@ -215,7 +199,7 @@ int awiwi_distribute(const awiwi_tendons *t, const awiwi_real *tau, const awiwi_
         status = distribute_pairs(t, tau, K, tolerance, f);
     if (t->searched > 0 && status == AWIWI_OK)
         status = awiwi_search_forces(t, tau, K, tolerance, f);
-    if (!all_finite(f, t->m)) {
+    if (!awiwi_all_finite(f, t->m)) {
         fall_back(t, bounded, f);
         return AWIWI_NOT_FINITE;
     }

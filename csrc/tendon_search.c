@@ -4,6 +4,7 @@
    the torque. Tendons at a limit are held there until the slope of the cost says that they should leave; all others
    share a Newton step that is cut where the first of them reaches a limit. So every iterate keeps both. */
 #include "awiwi_distribution.h"
+#include "dense.h"
 
 typedef awiwi_real vector[AWIWI_MOST_TENDONS];
 typedef awiwi_real matrix[AWIWI_MOST_TENDONS][AWIWI_MOST_TENDONS];
@@ -43,40 +44,27 @@ enum { AT_LOW = -1, FREE = 0, AT_HIGH = 1 };
 static const awiwi_real LEAST_SHARE = (awiwi_real)1 / 32; /* of a unit move that is worth a direction: below 1 / 16 */
 static const awiwi_real DAMPING = (awiwi_real)1 / 4096;       /* of steps where the cost bends down */
 
-static awiwi_real size(awiwi_real x)
-{
-    return x < 0 ? -x : x;
-}
-
-static awiwi_real dot(const awiwi_real *a, const awiwi_real *b, int n)
-{
-    awiwi_real sum = 0;
-    for (int i = 0; i < n; i++)
-        sum += a[i] * b[i];
-    return sum;
-}
-
 /* Half of |tau + P' f|^2. */
 static int torque_cost(const task *s, const vector f, model *c)
 {
     awiwi_real missing[AWIWI_MOST_JOINTS], trace = 0;
     c->cost = c->blur = 0;
     for (int j = 0; j < s->t->n; j++) {
-        awiwi_real terms = size(s->tau[j]);
+        awiwi_real terms = awiwi_size(s->tau[j]);
         missing[j] = s->touched[j] ? s->tau[j] : 0;
         for (int i = 0; i < s->count; i++) {
             missing[j] += s->p[i][j] * f[i];
-            terms += size(s->p[i][j] * f[i]);
+            terms += awiwi_size(s->p[i][j] * f[i]);
         }
-        if (size(missing[j]) <= 4 * AWIWI_REAL_EPSILON * terms)
+        if (awiwi_size(missing[j]) <= 4 * AWIWI_REAL_EPSILON * terms)
             missing[j] = 0;
         c->cost += missing[j] * missing[j] / 2;
-        c->blur += 4 * AWIWI_REAL_EPSILON * size(missing[j]) * terms;
+        c->blur += 4 * AWIWI_REAL_EPSILON * awiwi_size(missing[j]) * terms;
     }
     for (int i = 0; i < s->count; i++) {
-        c->gradient[i] = dot(s->p[i], missing, s->t->n);
+        c->gradient[i] = awiwi_dot(s->p[i], missing, s->t->n);
         for (int l = 0; l <= i; l++)
-            c->hessian[i][l] = c->hessian[l][i] = dot(s->p[i], s->p[l], s->t->n);
+            c->hessian[i][l] = c->hessian[l][i] = awiwi_dot(s->p[i], s->p[l], s->t->n);
         trace += c->hessian[i][i];
     }
     for (int i = 0; i < s->count; i++)
@@ -106,7 +94,7 @@ static int stiffness_cost(const task *s, const vector f, model *c)
             awiwi_real excess = -(s->K[a * n + b] + s->K[b * n + a]) / 2, growth[AWIWI_MOST_TENDONS];
             if (!s->touched[a] || !s->touched[b])
                 continue;
-            terms += size(excess) * size(excess);
+            terms += awiwi_size(excess) * awiwi_size(excess);
             for (int i = 0; i < s->count; i++) {
                 const int tendon = s->t->searched_tendons[i];
                 const awiwi_real pp = s->p[i][a] * s->p[i][b];
@@ -142,7 +130,7 @@ static void project(const task *s, const moves *m, vector v, awiwi_real *taken)
 {
     for (int again = 0; again < 2; again++) {
         for (int k = 0; k < m->count; k++) {
-            const awiwi_real share = dot(v, m->along[k], s->count) / m->square[k];
+            const awiwi_real share = awiwi_dot(v, m->along[k], s->count) / m->square[k];
             for (int i = 0; i < s->count; i++)
                 v[i] -= share * m->along[k][i];
             if (taken)
@@ -168,9 +156,9 @@ static void split(const task *s, const int *held, moves *m)
         vector row;
         for (int i = 0; i < s->count; i++)
             row[i] = held[i] == FREE ? s->p[i][j] : 0;
-        before = dot(row, row, s->count);
+        before = awiwi_dot(row, row, s->count);
         project(s, m, row, taken);
-        const awiwi_real after = dot(row, row, s->count);
+        const awiwi_real after = awiwi_dot(row, row, s->count);
         if (after > 64 * AWIWI_REAL_EPSILON * before) {
             for (int k = 0; k < m->count; k++)
                 m->lower[m->count][k] = taken[k];
@@ -188,8 +176,8 @@ static void split(const task *s, const int *held, moves *m)
         if (held[i] != FREE)
             continue;
         project(s, m, unit, 0);
-        if (dot(unit, unit, s->count) > LEAST_SHARE)
-            keep(s, m, unit, dot(unit, unit, s->count));
+        if (awiwi_dot(unit, unit, s->count) > LEAST_SHARE)
+            keep(s, m, unit, awiwi_dot(unit, unit, s->count));
     }
 }
 
@@ -230,12 +218,12 @@ static awiwi_real newton(const task *s, const model *c, const moves *m, vector s
     awiwi_real trace = 0;
     for (int j = 0; j < n; j++) {
         const awiwi_real *v = m->along[m->rank + j];
-        b[j] = -dot(v, c->gradient, s->count);
+        b[j] = -awiwi_dot(v, c->gradient, s->count);
         for (int i = 0; i < s->count; i++)
-            turned[i] = dot(c->hessian[i], v, s->count);
+            turned[i] = awiwi_dot(c->hessian[i], v, s->count);
         for (int l = 0; l <= j; l++) {
             const awiwi_real *w = m->along[m->rank + l];
-            H[j][l] = full[j][l] = dot(w, turned, s->count);
+            H[j][l] = full[j][l] = awiwi_dot(w, turned, s->count);
             for (int i = 0; i < s->count; i++)
                 full[j][l] += v[i] * c->curvature[i] * w[i];
         }
@@ -252,26 +240,24 @@ static awiwi_real newton(const task *s, const model *c, const moves *m, vector s
     for (int j = 0; j < n; j++)
         for (int i = 0; i < s->count; i++)
             step[i] += x[j] * m->along[m->rank + j][i];
-    return dot(b, x, n) / 2;
+    return awiwi_dot(b, x, n) / 2;
 }
 
 /* The held tendon that most lowers the cost by leaving its limit, with the free ones making up for its torque; -1 if
    there is none. Slopes within rounding of their terms count as level. */
 static int leaving(const task *s, const model *c, const moves *m, const int *held)
 {
-    awiwi_real price[AWIWI_MOST_JOINTS] = {0}, most = 0, largest = 0;
+    awiwi_real price[AWIWI_MOST_JOINTS] = {0}, most;
     int found = -1;
     for (int k = m->rank - 1; k >= 0; k--) {
-        awiwi_real sum = -dot(m->along[k], c->gradient, s->count) / m->square[k];
+        awiwi_real sum = -awiwi_dot(m->along[k], c->gradient, s->count) / m->square[k];
         for (int l = k + 1; l < m->rank; l++)
             sum -= m->lower[l][k] * price[m->joint[l]];
         price[m->joint[k]] = sum;
     }
-    for (int i = 0; i < s->count; i++)
-        largest = size(c->gradient[i]) > largest ? size(c->gradient[i]) : largest;
-    most = 256 * AWIWI_REAL_EPSILON * largest;
+    most = 256 * AWIWI_REAL_EPSILON * awiwi_largest(c->gradient, s->count);
     for (int i = 0; i < s->count; i++) {
-        const awiwi_real gain = (awiwi_real)held[i] * (c->gradient[i] + dot(s->p[i], price, s->t->n));
+        const awiwi_real gain = (awiwi_real)held[i] * (c->gradient[i] + awiwi_dot(s->p[i], price, s->t->n));
         if (gain > most) {
             most = gain;
             found = i;
@@ -287,17 +273,12 @@ static awiwi_real reach(const task *s, const vector f, const vector step, int *s
     *stopped = -1;
     for (int i = 0; i < s->count; i++) {
         const awiwi_real room = step[i] < 0 ? s->t->low - f[i] : s->t->high - f[i];
-        if (size(step[i]) > 0 && room / step[i] < share) {
+        if (awiwi_size(step[i]) > 0 && room / step[i] < share) {
             share = room / step[i];
             *stopped = i;
         }
     }
     return share > 0 ? share : 0;
-}
-
-static awiwi_real inside(const task *s, awiwi_real x)
-{
-    return x < s->t->low ? s->t->low : x > s->t->high ? s->t->high : x;
 }
 
 /* From f down to where no free move and no leaving tendon lowers the cost. */
@@ -312,10 +293,7 @@ static int descend(const task *s, int steps, vector f, model *here)
     split(s, held, &m);
     while (steps-- > 0) {
         vector step, trial;
-        awiwi_real longest = 0;
-        const awiwi_real gain = newton(s, here, &m, step);
-        for (int i = 0; i < s->count; i++)
-            longest = size(step[i]) > longest ? size(step[i]) : longest;
+        const awiwi_real gain = newton(s, here, &m, step), longest = awiwi_largest(step, s->count);
         if (!(longest <= AWIWI_REAL_MAX))
             return AWIWI_NOT_FINITE;
         awiwi_real share = reach(s, f, step, &stopped);
@@ -323,7 +301,7 @@ static int descend(const task *s, int steps, vector f, model *here)
         last = longest;
         if (longest <= s->tolerance * s->t->high || rounding) {
             for (int i = 0; i < s->count; i++)
-                f[i] = inside(s, f[i] + share * step[i]);
+                f[i] = awiwi_clamp(f[i] + share * step[i], s->t->low, s->t->high);
             left = leaving(s, here, &m, held);
             if (left < 0)
                 return AWIWI_OK;
@@ -333,9 +311,9 @@ static int descend(const task *s, int steps, vector f, model *here)
             continue;
         }
         if (share > 0) {
-            for (int tried = 0;; tried++) {
+            for (;;) { /* each trial is one of the steps */
                 for (int i = 0; i < s->count; i++)
-                    trial[i] = inside(s, f[i] + share * step[i]);
+                    trial[i] = awiwi_clamp(f[i] + share * step[i], s->t->low, s->t->high);
                 if (cost(s, trial, &there))
                     return AWIWI_OUT_OF_DOMAIN;
                 if (there.cost <= here->cost + here->blur)
@@ -374,7 +352,7 @@ int awiwi_search_forces(const awiwi_tendons *t, const awiwi_real *tau, const awi
     for (int i = 0; i < s.count; i++) {
         s.p[i] = t->P + t->searched_tendons[i] * t->n;
         for (int j = 0; j < t->n; j++)
-            s.touched[j] = s.touched[j] || size(s.p[i][j]) > 0;
+            s.touched[j] = s.touched[j] || awiwi_size(s.p[i][j]) > 0;
     }
     for (int start = 0; start < 3; start++) {
         for (int i = 0; i < s.count; i++)

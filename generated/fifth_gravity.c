@@ -5,53 +5,46 @@
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  gravity[4] in N m
- * Cost: 44 add, 64 mul, 2 div, 1 neg, 1 sqrt, 5 sincos.
+ * Cost: 41 add, 55 mul, 2 div, 1 neg, 1 sqrt, 5 sincos.
  * Inputs: sha256 510cc29c516f948798433eb3b40aa4ff4fd7af8989efae96a8696b05c3c6c657.
  */
 #include <math.h>
+#include "trig.h"
 #include "kernels.h"
 
 void awiwi_fifth_gravity(const double q[restrict 4], const double g[restrict 3], double gravity[restrict 4])
 {
     const double t0 = q[0] + 1.0471975511965979;
-    const double t1 = sin(t0);
-    const double cos_q2 = cos(q[2]);
-    const double sin_q2 = sin(q[2]);
+    const double t1 = q[2] - 1.5667559447406272;
     const double t2 = q[2] + q[3];
-    const double t3 = cos(t2);
-    const double t4 = sin(t2);
-    const double t5 = t2 + 0.7692307692307693*q[3];
-    const double t6 = cos(t5);
-    const double t7 = sin(t5);
-    const double t8 = 6e-07*t6 + 2.4e-05*t7;
-    const double t9 = 8e-07*t3 + 0.0001092*t4 + t8;
-    const double t10 = 1.4e-06*cos_q2 + 0.0003465*sin_q2 + t9;
-    const double t11 = t10 - 0.0001068;
-    const double t12 = cos(t0);
-    const double t13 = 0.00024*t12 - 0.000244;
-    const double t14 = 1.0/t13;
-    const double t15 = t13 + 6.475e-05;
-    const double t16 = 0.01*t12;
-    const double t17 = t16 - 0.012;
-    const double t18 = sqrt(-(5.625e-05*t13) - 0.25*t15*t15);
-    const double t19 = t14*(0.005*t1*t15 + t17*t18);
-    const double t20 = 0.01*t1;
-    const double t21 = t14*(0.5*t17*t15 - t20*t18);
-    const double t22 = 115.1482661348124*t19 + 67.22093858258893*t21;
-    const double sin_q1 = sin(q[1]);
-    const double cos_q1 = cos(q[1]);
-    const double t23 = 2.4e-05*t6 - 6e-07*t7;
-    const double t24 = 0.0001092*t3 + t23 - 8e-07*t4;
-    const double t25 = 0.0003465*cos_q2 + t24 - 1.4e-06*sin_q2;
-    const double t26 = t25 + 8.79e-05;
-    const double t27 = 1.46e-05*sin_q1 - cos_q1*t26 - 7.12e-05;
-    const double t28 = 67.22093858258893*t19 - 115.1482661348124*t21;
-    const double t29 = g[0]*t22 + g[2]*t28;
-    const double t30 = g[0]*t28 - g[2]*t22;
-    const double t31 = g[0]*(0.000203*t1 + t11*t22 - t27*t28) + ((0.00012*t1 + t20*t21 - t16*t19)/t18 - 1.0)*(t11*t29 - t27*t30) - g[2]*(0.000203*t12 - t11*t28 - t27*t22);
-    const double t32 = g[1]*sin_q1 + cos_q1*t29;
-    gravity[0] = t31;
-    gravity[1] = 1.46e-05*t32 - t26*(g[1]*cos_q1 - sin_q1*t29);
-    gravity[2] = t25*t30 + t10*t32;
-    gravity[3] = t24*t30 + t9*t32 + 0.7692307692307693*(t23*t30 + t8*t32);
+    const double t3 = t2 - 1.563470450527876;
+    const double t4 = t2 + 0.7692307692307693*q[3] - 1.5458015331759765;
+    const awiwi_turn4 a0 = awiwi_sincos4(t0, t1, t3, t4);
+    const double t5 = 2.400749882849107e-05*a0.cos[3];
+    const double t6 = 0.0001092029303636125*a0.cos[2] + t5;
+    const double t7 = 0.00034650282827128554*a0.cos[1] + t6;
+    const double t8 = t7 - 0.0001068;
+    const double t9 = 0.00012*a0.cos[0] - 0.000122;
+    const double t10 = 1.0/t9;
+    const double t11 = t9 + 3.2375e-05;
+    const double t12 = a0.cos[0] - 1.2;
+    const double t13 = sqrt(-(0.0001125*t9) - t11*t11);
+    const double t14 = a0.sin[0]*t11 + t12*t13;
+    const double t15 = t12*t11 - a0.sin[0]*t13;
+    const double t16 = t10*(0.575741330674062*t14 + 0.33610469291294465*t15);
+    const awiwi_turn a1 = awiwi_sincos(q[1]);
+    const double t17 = 2.400749882849107e-05*a0.sin[3];
+    const double t18 = 0.0001092029303636125*a0.sin[2] + t17;
+    const double t19 = 0.00034650282827128554*a0.sin[1] + t18;
+    const double t20 = t19 - 8.79e-05;
+    const double t21 = 1.46e-05*a1.sin + a1.cos*t20 - 7.12e-05;
+    const double t22 = t10*(0.33610469291294465*t14 - 0.575741330674062*t15);
+    const double t23 = g[0]*t16 + g[2]*t22;
+    const double t24 = g[0]*t22 - g[2]*t16;
+    const double t25 = g[0]*(0.000203*a0.sin[0] + t8*t16 - t21*t22) + ((0.00012*a0.sin[0] - 5e-05*(t10*(a0.cos[0]*t14 - a0.sin[0]*t15)))/t13 - 1.0)*(t8*t23 - t21*t24) - g[2]*(0.000203*a0.cos[0] - t8*t22 - t21*t16);
+    const double t26 = g[1]*a1.sin + a1.cos*t23;
+    gravity[0] = t25;
+    gravity[1] = 1.46e-05*t26 + t20*(g[1]*a1.cos - a1.sin*t23);
+    gravity[2] = t7*t26 - t19*t24;
+    gravity[3] = t6*t26 - t18*t24 - 0.7692307692307693*(t17*t24 - t5*t26);
 }

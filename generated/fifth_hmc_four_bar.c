@@ -15,30 +15,30 @@
  * Inputs: sha256 d021538d8900d42317b84036df325beebaa6feecad7df8e1e869f0ec5a1f0d9f.
  */
 #include <math.h>
+#include "trig.h"
 #include "kernels.h"
 
 int awiwi_fifth_hmc_four_bar(const double q[restrict 1], double coupler[restrict 1], double rocker[restrict 1], double coupler_ratio[restrict 1], double rocker_ratio[restrict 1], double transmission[restrict 1])
 {
     const double t0 = q[0] + 1.0471975511965979;
-    const double t1 = cos(t0);
-    const double t2 = 0.00024*t1 - 0.000244;
-    const double t3 = 1.0/t2;
-    const double t4 = sin(t0);
-    const double t5 = t2 + 6.475e-05;
-    const double t6 = 0.01*t1;
-    const double t7 = t6 - 0.012;
-    const double t8 = sqrt(-(5.625e-05*t2) - 0.25*t5*t5);
-    const double t9 = t3*(0.005*t4*t5 + t7*t8);
-    const double t10 = 0.01*t4;
-    const double t11 = t3*(0.5*t7*t5 - t10*t8);
-    const double t12 = t10 - t9;
-    const double t13 = t7 - t11;
-    const double t14 = 1.0/t8;
-    const double t15 = t6*t9 - t10*t11;
-    coupler[0] = atan2(-133.33333333333334*t9, -133.33333333333334*t11);
-    rocker[0] = atan2(90.9090909090909*t12, 90.9090909090909*t13);
-    coupler_ratio[0] = t14*(0.00012*t4 - t15);
-    rocker_ratio[0] = -(t14*t15);
-    transmission[0] = -12121.212121212122*(t9*t13 - t11*t12);
-    return -36730945.82185491*(t2 + 1.225e-05)*(t2 + 0.00034225) > 0.0 ? 0 : 1;
+    const awiwi_turn a0 = awiwi_sincos(t0);
+    const double t1 = 0.00024*a0.cos - 0.000244;
+    const double t2 = 1.0/t1;
+    const double t3 = t1 + 6.475e-05;
+    const double t4 = 0.01*a0.cos;
+    const double t5 = t4 - 0.012;
+    const double t6 = sqrt(-(5.625e-05*t1) - 0.25*t3*t3);
+    const double t7 = t2*(0.005*a0.sin*t3 + t5*t6);
+    const double t8 = 0.01*a0.sin;
+    const double t9 = t2*(0.5*t5*t3 - t8*t6);
+    const double t10 = t8 - t7;
+    const double t11 = t5 - t9;
+    const double t12 = 1.0/t6;
+    const double t13 = t4*t7 - t8*t9;
+    coupler[0] = atan2(-133.33333333333334*t7, -133.33333333333334*t9);
+    rocker[0] = atan2(90.9090909090909*t10, 90.9090909090909*t11);
+    coupler_ratio[0] = t12*(0.00012*a0.sin - t13);
+    rocker_ratio[0] = -(t12*t13);
+    transmission[0] = -12121.212121212122*(t7*t11 - t9*t10);
+    return -36730945.82185491*(t1 + 1.225e-05)*(t1 + 0.00034225) > 0.0 ? 0 : 1;
 }

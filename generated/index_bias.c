@@ -6,64 +6,46 @@
  *   in   qd[4] in rad/s, -20 to 20
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  bias[4] in N m
- * Cost: 60 add, 84 mul, 4 sincos.
+ * Cost: 55 add, 75 mul, 4 sincos.
  * Inputs: sha256 e81c8580817eac8f68e2015b14a5b569106ad1f3f949b7d278d0a2f0f5760292.
  */
-#include <math.h>
+#include "trig.h"
 #include "kernels.h"
 
 void awiwi_index_bias(const double q[restrict 4], const double qd[restrict 4], const double g[restrict 3], double bias[restrict 4])
 {
-    const double cos_q0 = cos(q[0]);
-    const double sin_q0 = sin(q[0]);
-    const double t0 = g[0]*cos_q0 + g[1]*sin_q0;
-    const double t1 = g[0]*sin_q0 - g[1]*cos_q0;
-    const double cos_q1 = cos(q[1]);
-    const double sin_q1 = sin(q[1]);
-    const double t2 = 0.0006058*cos_q1 - 3e-06*sin_q1;
+    const double t0 = q[1] + q[2];
+    const double t1 = q[3] + t0 - 1.5458015331759765;
+    const awiwi_turn4 a0 = awiwi_sincos4(q[0], q[1], t0, t1);
+    const double t2 = g[0]*a0.cos[0] + g[1]*a0.sin[0];
     const double t3 = qd[1]*qd[1];
-    const double t4 = 2.0*qd[0];
-    const double t5 = qd[1]*t4;
-    const double t6 = sin_q1*(2.1654944e-05*cos_q1 - 7.72e-08*sin_q1) + 3.86e-08;
-    const double t7 = 0.04038*sin_q1;
-    const double t8 = t1 - t7*t5;
-    const double t9 = q[1] + q[2];
-    const double t10 = cos(t9);
-    const double t11 = sin(t9);
-    const double t12 = 0.0002062*t10 - 1.2e-06*t11;
-    const double t13 = qd[1] + qd[2];
-    const double t14 = t13*t13;
-    const double t15 = t13*t4;
-    const double t16 = t11*(5.22042e-06*t10 - 2.28e-08*t11) + 1.14e-08;
-    const double t17 = 0.0298*t11;
-    const double t18 = q[3] + t9;
-    const double t19 = cos(t18);
-    const double t20 = sin(t18);
-    const double t21 = 3.2e-05*t19 - 8e-07*t20;
-    const double t22 = qd[3] + t13;
-    const double t23 = t22*t22;
-    const double t24 = t4*t22;
-    const double t25 = t20*(3.7034e-07*t19 - 8.8e-09*t20) + 4.4e-09;
-    const double t26 = t8*t12 + (t14*(7.5326e-07*t10 - 5.8e-09*t11) - t15*t16) + ((t8 - t15*t17)*t21 + (t23*(1.666e-07*t19 - 5.24e-09*t20) - t24*t25));
-    const double t27 = 0.0298*t10;
-    const double t28 = 8e-07*t19 + 3.2e-05*t20;
-    const double t29 = t24*t28;
-    const double t30 = 0.04038*cos_q1;
-    const double t31 = 1.2e-06*t10 + 0.0002062*t11;
-    const double t32 = t15*t31 + t29;
-    const double t33 = 3.22e-05*t0 + 0.0001245*t1 + (t2*t1 + (t3*(1.244876e-06*cos_q1 - 9.6e-09*sin_q1) - t5*t6) + (t26 - t27*t29) - t30*t32);
-    const double t34 = 3e-06*cos_q1 + 0.0006058*sin_q1;
-    const double t35 = qd[0]*qd[0];
-    const double t36 = t35 + t14;
-    const double t37 = (t35 + t23)*t21;
-    const double t38 = t23*t28;
-    const double t39 = 0.006*t35 + t0;
-    const double t40 = (t35 + t3)*t30 + t39;
-    const double t41 = g[2] + t3*t7;
-    const double t42 = t28*(t36*t27 + t40) - (t41 + t14*t17)*t21 + t35*t25;
-    const double t43 = t17*t37 - t27*t38 + (t31*t40 - t41*t12 + t35*t16 + t42);
-    bias[0] = t33 - 0.006*(t5*t34 + t32);
-    bias[1] = t7*(t36*t12 + t37) - t30*(t14*t31 + t38) + (t34*t39 - g[2]*t2 + t35*t6 + t43);
-    bias[2] = t43;
-    bias[3] = t42;
+    const double t4 = qd[1] + qd[2];
+    const double t5 = t4*t4;
+    const double t6 = 0.0006058*a0.cos[1] - 3e-06*a0.sin[1];
+    const double t7 = 0.0002062*a0.cos[2] - 1.2e-06*a0.sin[2];
+    const double t8 = 3.2009998437988094e-05*a0.sin[3];
+    const double t9 = t7 - t8;
+    const double t10 = qd[3] + t4;
+    const double t11 = t10*t10;
+    const double t12 = 0.04038*a0.cos[1];
+    const double t13 = t12 + 0.006;
+    const double t14 = 1.2e-06*a0.cos[2] + 0.0002062*a0.sin[2];
+    const double t15 = 9.538979534520451e-07*a0.sin[3];
+    const double t16 = t13*t14 + a0.sin[2]*(5.22042e-06*a0.cos[2] - 2.28e-08*a0.sin[2] - t15) + 1.14e-08;
+    const double t17 = 0.0298*a0.cos[2];
+    const double t18 = 3.2009998437988094e-05*a0.cos[3];
+    const double t19 = (t13 + t17)*t18 + a0.cos[3]*(9.716427232979388e-09*a0.cos[3] - 3.7031708931917554e-07*a0.sin[3]) - 4.858213616489694e-09;
+    const double t20 = 3e-06*a0.cos[1] + 0.0006058*a0.sin[1];
+    const double t21 = 0.006*t20 + a0.sin[1]*(2.1654944e-05*a0.cos[1] + 0.04038*t9 - 7.72e-08*a0.sin[1]) + 3.86e-08;
+    const double t22 = 3.22e-05*t2 + t3*(1.244876e-06*a0.cos[1] - 9.6e-09*a0.sin[1]) + t5*(7.5326e-07*a0.cos[2] - 5.8e-09*a0.sin[2]) + (g[0]*a0.sin[0] - g[1]*a0.cos[0])*(t6 + t9 + 0.0001245) - t11*(1.0746642198887319e-09*a0.cos[3] + 1.666789209732727e-07*a0.sin[3]) - 2.0*qd[0]*(t4*t16 + t10*t19 + qd[1]*t21);
+    const double t23 = 0.04038*a0.sin[1];
+    const double t24 = t2 + t3*t12;
+    const double t25 = qd[0]*qd[0];
+    const double t26 = g[2] + t3*t23;
+    const double t27 = (0.0298*t5*a0.sin[2] + t26)*t8 + (t24 + t5*t17)*t18 + t25*t19;
+    const double t28 = t24*t14 + t25*t16 + t27 - t26*t7 - t11*(9.538979534520451e-07*a0.cos[2]*a0.cos[3] + a0.sin[2]*t15);
+    bias[0] = t22;
+    bias[1] = t20*t2 + t23*(t5*t7 - t11*t8) + t28 + t25*t21 - g[2]*t6 - t12*(t5*t14 + t11*t18);
+    bias[2] = t28;
+    bias[3] = t27;
 }

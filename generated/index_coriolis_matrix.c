@@ -5,79 +5,54 @@
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   qd[4] in rad/s, -20 to 20
  *   out  C[4][4] in N m s/rad
- * Cost: 64 add, 69 mul, 1 neg, 3 sincos.
- * Inputs: sha256 4a1df65b0c8638d215a4cf8272fbe31418399eaeed4f098ae5abb6462e91dd88.
+ * Cost: 46 add, 50 mul, 4 neg, 3 sincos.
+ * Inputs: sha256 282282bd680841d03234ba2709f06e709554a528cf56b8719c5e0b6114109589.
  */
-#include <math.h>
+#include "trig.h"
 #include "kernels.h"
 
 void awiwi_index_coriolis_matrix(const double q[restrict 4], const double qd[restrict 4], double C[restrict 16])
 {
     const double t0 = q[1] + q[2];
-    const double t1 = cos(t0);
-    const double t2 = 0.0298*t1;
-    const double t3 = qd[1] + qd[2];
-    const double t4 = qd[3] + t3;
-    const double t5 = q[3] + t0;
-    const double t6 = cos(t5);
-    const double t7 = sin(t5);
-    const double t8 = 8e-07*t6 + 3.2e-05*t7;
-    const double t9 = t4*t8;
-    const double t10 = t2*t9;
-    const double t11 = sin(t0);
-    const double t12 = t11*(5.22042e-06*t1 - 2.28e-08*t11) + 1.14e-08;
-    const double t13 = 0.0298*t11;
-    const double t14 = 3.2e-05*t6 - 8e-07*t7;
-    const double t15 = t13*t14;
-    const double t16 = t7*(3.7034e-07*t6 - 8.8e-09*t7) + 4.4e-09;
-    const double t17 = t4*t16;
-    const double t18 = -t10 - t3*(t12 + t15) - t17;
-    const double cos_q1 = cos(q[1]);
-    const double t19 = 0.04038*cos_q1;
-    const double t20 = 1.2e-06*t1 + 0.0002062*t11;
-    const double t21 = t3*t20 + t9;
-    const double t22 = t19*t21;
-    const double sin_q1 = sin(q[1]);
-    const double t23 = sin_q1*(2.1654944e-05*cos_q1 - 7.72e-08*sin_q1) + 3.86e-08;
-    const double t24 = 0.04038*sin_q1;
-    const double t25 = 0.0002062*t1 - 1.2e-06*t11;
-    const double t26 = t24*(t25 + t14);
-    const double t27 = t18 - t22 - qd[1]*(t23 + t26);
-    const double t28 = 3e-06*cos_q1 + 0.0006058*sin_q1;
-    const double t29 = t4*(1.666e-07*t6 - 5.24e-09*t7);
-    const double t30 = t3*(7.5326e-07*t1 - 5.8e-09*t11) + t29;
-    const double t31 = 0.006*qd[0];
-    const double t32 = t20 + t8;
-    const double t33 = t19*t32;
-    const double t34 = t23 + t33;
-    const double t35 = t2*t8;
-    const double t36 = t12 + t35;
-    const double t37 = t15 + t16 + t36;
-    const double t38 = t31*(t28 + t32) + qd[0]*(t26 + t34 + t37);
-    const double t39 = t31*t32 + qd[0]*t33 + qd[0]*t37;
-    const double t40 = qd[0]*t8;
-    const double t41 = t31*t8 + t19*t40 + (t2*t40 + qd[0]*t16);
-    const double t42 = t4*t14;
-    const double t43 = t24*(t3*t25 + t42);
-    const double t44 = t13*t42;
-    const double t45 = t44 + t3*t36 + t17;
-    const double t46 = t18 + t45;
-    const double t47 = t44 - t10;
-    const double t48 = t3*(t35 - t15);
-    C[0] = t27 - 0.006*(qd[1]*t28 + t21);
-    C[1] = qd[1]*(1.244876e-06*cos_q1 - 9.6e-09*sin_q1) + t30 - t38;
-    C[2] = t30 - t39;
-    C[3] = t29 - t41;
-    C[4] = t38;
-    C[5] = t27 + (t43 + t45 + qd[1]*t34);
-    C[6] = t43 + t46 - t22;
-    C[7] = t24*t42 + t47 - t19*t9;
-    C[8] = t39;
-    C[9] = qd[1]*(t33 - t26) + t46;
-    C[10] = t46;
-    C[11] = t47;
-    C[12] = t41;
-    C[13] = qd[1]*(t19*t8 - t24*t14) + t48;
-    C[14] = t48;
+    const double t1 = q[3] + t0 - 1.5458015331759765;
+    const awiwi_turn3 a0 = awiwi_sincos3(q[1], t0, t1);
+    const double t2 = a0.cos[0] + 0.1485884101040119;
+    const double t3 = 1.2925637369259591e-06*a0.cos[2];
+    const double t4 = (t2 + 0.7379891035165924*a0.cos[1])*t3 + a0.cos[2]*(9.716427232979388e-09*a0.cos[2] - 3.7031708931917554e-07*a0.sin[2]) - 4.858213616489694e-09;
+    const double t5 = 4.8456e-08*a0.cos[1] + 8.326356e-06*a0.sin[1];
+    const double t6 = t2*t5 + a0.sin[1]*(5.22042e-06*a0.cos[1] - 2.28e-08*a0.sin[1] - 9.538979534520451e-07*a0.sin[2]) + t4 + 1.14e-08;
+    const double t7 = 8.326356e-06*a0.cos[1] - 4.8456e-08*a0.sin[1] - 1.2925637369259591e-06*a0.sin[2];
+    const double t8 = 1.8e-08*(a0.cos[0] + 201.93333333333334*a0.sin[0]) + a0.sin[0]*(2.1654944e-05*a0.cos[0] + t7 - 7.72e-08*a0.sin[0]) + t6 + 3.86e-08;
+    const double t9 = qd[1] + qd[2];
+    const double t10 = qd[3] + t9;
+    const double t11 = t10*(1.0746642198887319e-09*a0.cos[2] + 1.666789209732727e-07*a0.sin[2]);
+    const double t12 = t9*(7.5326e-07*a0.cos[1] - 5.8e-09*a0.sin[1]) - t11;
+    const double t13 = qd[0]*t8;
+    const double t14 = qd[0]*t6;
+    const double t15 = qd[0]*t4;
+    const double t16 = a0.cos[0]*(t5 + t3) - a0.sin[0]*t7;
+    const double t17 = qd[1]*t16;
+    const double t18 = 9.538979534520451e-07*(a0.cos[1]*a0.cos[2] + a0.sin[1]*a0.sin[2]);
+    const double t19 = t9*t18;
+    const double t20 = t10*t18;
+    const double t21 = t19 - t20;
+    const double t22 = 1.2925637369259591e-06*(a0.cos[0]*a0.cos[2] + a0.sin[0]*a0.sin[2]);
+    const double t23 = t10*t22;
+    const double t24 = t21 + t9*(t22 - t16) - t23;
+    C[0] = -(qd[3]*t4) - qd[2]*t6 - qd[1]*t8;
+    C[1] = qd[1]*(1.244876e-06*a0.cos[0] - 9.6e-09*a0.sin[0]) + t12 - t13;
+    C[2] = t12 - t14;
+    C[3] = -t11 - t15;
+    C[4] = t13;
+    C[5] = t17 + t24;
+    C[6] = t24;
+    C[7] = -t23 - t20;
+    C[8] = t14;
+    C[9] = t21 + t17;
+    C[10] = t21;
+    C[11] = -t20;
+    C[12] = t15;
+    C[13] = qd[1]*t22 + t19;
+    C[14] = t19;
     C[15] = 0.0;
 }

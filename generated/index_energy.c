@@ -7,39 +7,32 @@
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  kinetic[1] in J
  *   out  potential[1] in J
- * Cost: 51 add, 67 mul, 4 sincos.
+ * Cost: 50 add, 60 mul, 4 sincos.
  * Inputs: sha256 c0e346d673217a3c0fa9e70826de7816197e0e1f7eac085721ef7fbf00222255.
  */
-#include <math.h>
+#include "trig.h"
 #include "kernels.h"
 
 void awiwi_index_energy(const double q[restrict 4], const double qd[restrict 4], const double g[restrict 3], double kinetic[restrict 1], double potential[restrict 1])
 {
     const double t0 = q[1] + q[2];
-    const double t1 = cos(t0);
-    const double t2 = q[3] + t0;
-    const double t3 = cos(t2);
-    const double t4 = sin(t2);
-    const double t5 = 3.2e-05*t3 - 8e-07*t4;
-    const double t6 = sin(t0);
-    const double t7 = 8e-07*t3 + 3.2e-05*t4;
-    const double t8 = t1*t5 + t6*t7;
-    const double t9 = 0.0596*t8 + 5.70706e-06;
-    const double t10 = 0.0298*t8 + 4.1116e-07;
-    const double cos_q1 = cos(q[1]);
-    const double t11 = 0.0002062*t1 - 1.2e-06*t6 + t5;
-    const double sin_q1 = sin(q[1]);
-    const double t12 = 1.2e-06*t1 + 0.0002062*t6 + t7;
-    const double t13 = cos_q1*t11 + sin_q1*t12;
-    const double t14 = t9 + 0.08076*t13 + 2.1836744e-05;
-    const double t15 = 5.24e-09*t3 + 1.666e-07*t4;
-    const double t16 = 5.8e-09*t1 + 7.5326e-07*t6 + t15;
-    const double t17 = 0.0006058*cos_q1 - 3e-06*sin_q1;
-    const double t18 = cos_q1*(2.1654944e-05*cos_q1 - 7.72e-08*sin_q1) + t1*(5.22042e-06*t1 - 2.28e-08*t6) + t3*(3.7034e-07*t3 - 8.8e-09*t4) + 0.012*(t17 + t11) + t14 - 0.0596*t6*t7 - 0.08076*sin_q1*t12 - 2.6359844e-05;
-    const double t19 = 2.0558e-07*qd[3]*qd[3] + qd[2]*(0.5*qd[2]*t9 + qd[3]*t10) + qd[1]*(0.5*qd[1]*t14 + qd[2]*(t9 + 0.04038*t13) + qd[3]*(0.04038*(cos_q1*t5 + sin_q1*t7) + t10)) + qd[0]*(qd[3]*t15 + qd[2]*t16 + qd[1]*(9.6e-09*cos_q1 + 1.244876e-06*sin_q1 + t16) + 0.5*qd[0]*t18);
-    const double sin_q0 = sin(q[0]);
-    const double cos_q0 = cos(q[0]);
-    const double t20 = 3.22e-05*(g[0]*sin_q0 - g[1]*cos_q0) - g[2]*(3e-06*cos_q1 + 0.0006058*sin_q1 + t12) - (g[0]*cos_q0 + g[1]*sin_q0)*(t17 + t11 + 0.0001245);
-    kinetic[0] = t19;
-    potential[0] = t20;
+    const double t1 = q[3] + t0 - 1.5458015331759765;
+    const awiwi_turn4 a0 = awiwi_sincos4(t1, t0, q[1], q[0]);
+    const double t2 = 1.666789209732727e-07*a0.cos[0] - 1.0746642198887319e-09*a0.sin[0];
+    const double t3 = 5.8e-09*a0.cos[1] + 7.5326e-07*a0.sin[1] + t2;
+    const double t4 = a0.cos[1]*(0.2410728931000699*a0.cos[1] - 0.0010528773475470543*a0.sin[1] - 0.08809978482992568*a0.sin[0]);
+    const double t5 = 0.0006058*a0.cos[2] - 3e-06*a0.sin[2];
+    const double t6 = 0.0002062*a0.cos[1] - 1.2e-06*a0.sin[1] - 3.2009998437988094e-05*a0.sin[0];
+    const double t7 = t4 + 554.1459723931865*(t5 + t6) + a0.cos[2]*(a0.cos[2] + 3729.4023942061453*t6 - 0.0035650057557295*a0.sin[2]) + 0.07177522807999816 - a0.cos[0]*(0.01710081029621575*a0.cos[0] + 0.00044869325143391677*a0.sin[0]);
+    const double t8 = qd[3]*t2 + qd[2]*t3 + qd[1]*(9.6e-09*a0.cos[2] + 1.244876e-06*a0.sin[2] + t3) + 1.0827472e-05*qd[0]*t7;
+    const double t9 = 9.538979534520451e-07*(a0.cos[1]*a0.sin[0] - a0.sin[1]*a0.cos[0]);
+    const double t10 = t9 - 4.1116e-07;
+    const double t11 = t9 + t10 - 5.2959e-06;
+    const double t12 = 1.2e-06*a0.cos[1] + 0.0002062*a0.sin[1] + 3.2009998437988094e-05*a0.cos[0];
+    const double t13 = 0.04038*(a0.cos[2]*t6 + a0.sin[2]*t12);
+    const double t14 = t11 - t13;
+    const double t15 = qd[3]*(1.2925637369259591e-06*(a0.cos[2]*a0.sin[0] - a0.sin[2]*a0.cos[0]) + t10) + qd[2]*t14 - 0.5*qd[1]*(t13 + 2.1836744e-05 - t14);
+    const double t16 = 3.22e-05*(g[0]*a0.sin[3] - g[1]*a0.cos[3]) - g[2]*(3e-06*a0.cos[2] + 0.0006058*a0.sin[2] + t12) - (g[0]*a0.cos[3] + g[1]*a0.sin[3])*(t5 + t6 + 0.0001245);
+    kinetic[0] = 2.0558e-07*qd[3]*qd[3] + qd[0]*t8 - qd[2]*(qd[3]*t10 + 0.5*qd[2]*t11) - qd[1]*t15;
+    potential[0] = t16;
 }

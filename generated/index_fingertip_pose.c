@@ -7,34 +7,27 @@
  * Cost: 9 add, 14 mul, 3 neg, 4 sincos.
  * Inputs: sha256 74fba3f0be68f5fb3d765efd077c013f6464ac472d1e0a918550978e139a5fa9.
  */
-#include <math.h>
+#include "trig.h"
 #include "kernels.h"
 
 void awiwi_index_fingertip_pose(const double q[restrict 4], double T[restrict 16])
 {
-    const double cos_q0 = cos(q[0]);
     const double t0 = q[1] + q[2];
     const double t1 = q[3] + t0;
-    const double t2 = cos(t1);
-    const double t3 = sin(t1);
-    const double sin_q0 = sin(q[0]);
-    const double cos_q1 = cos(q[1]);
-    const double t4 = cos(t0);
-    const double t5 = 0.04038*cos_q1 + 0.0298*t4 + 0.00201*t2 + 0.006;
-    const double sin_q1 = sin(q[1]);
-    const double t6 = sin(t0);
-    T[0] = cos_q0*t2;
-    T[1] = -(cos_q0*t3);
-    T[2] = sin_q0;
-    T[3] = cos_q0*t5 - 0.0057*sin_q0;
-    T[4] = sin_q0*t2;
-    T[5] = -(sin_q0*t3);
-    T[6] = -cos_q0;
-    T[7] = 0.0057*cos_q0 + sin_q0*t5;
-    T[8] = t3;
-    T[9] = t2;
+    const awiwi_turn4 a0 = awiwi_sincos4(q[0], t1, q[1], t0);
+    const double t2 = 0.04038*a0.cos[2] + 0.0298*a0.cos[3] + 0.00201*a0.cos[1] + 0.006;
+    T[0] = a0.cos[0]*a0.cos[1];
+    T[1] = -(a0.cos[0]*a0.sin[1]);
+    T[2] = a0.sin[0];
+    T[3] = a0.cos[0]*t2 - 0.0057*a0.sin[0];
+    T[4] = a0.sin[0]*a0.cos[1];
+    T[5] = -(a0.sin[0]*a0.sin[1]);
+    T[6] = -a0.cos[0];
+    T[7] = 0.0057*a0.cos[0] + a0.sin[0]*t2;
+    T[8] = a0.sin[1];
+    T[9] = a0.cos[1];
     T[10] = 0.0;
-    T[11] = 0.04038*sin_q1 + 0.0298*t6 + 0.00201*t3;
+    T[11] = 0.04038*a0.sin[2] + 0.0298*a0.sin[3] + 0.00201*a0.sin[1];
     T[12] = 0.0;
     T[13] = 0.0;
     T[14] = 0.0;

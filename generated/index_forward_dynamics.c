@@ -7,95 +7,72 @@
  *   in   tau[4] in N m, -1 to 1
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  qdd[4] in rad/s^2
- * Cost: 110 add, 141 mul, 3 div, 4 sincos.
- * Inputs: sha256 c0ef972f5545cb49fd7275e781cf58d35b661d7f7939853e31e0d6d89da3ade1.
+ * Cost: 95 add, 119 mul, 3 div, 2 neg, 4 sincos.
+ * Inputs: sha256 3111373cde589691558afe839d151a7b960ef034f13613b5010ff777ad2e903d.
  */
-#include <math.h>
+#include "trig.h"
 #include "kernels.h"
 
 void awiwi_index_forward_dynamics(const double q[restrict 4], const double qd[restrict 4], const double tau[restrict 4], const double g[restrict 3], double qdd[restrict 4])
 {
-    const double t0 = 2.0*qd[0];
-    const double t1 = qd[1]*t0;
-    const double sin_q1 = sin(q[1]);
-    const double cos_q1 = cos(q[1]);
-    const double t2 = 2.1654944e-05*cos_q1 - 7.72e-08*sin_q1;
-    const double t3 = sin_q1*t2 + 3.86e-08;
-    const double t4 = qd[1] + qd[2];
-    const double t5 = 0.0596*qd[0];
-    const double t6 = q[1] + q[2];
-    const double t7 = sin(t6);
-    const double sin_q0 = sin(q[0]);
-    const double cos_q0 = cos(q[0]);
-    const double t8 = g[0]*sin_q0 - g[1]*cos_q0;
-    const double t9 = 0.08076*sin_q1;
-    const double t10 = t8 - qd[0]*qd[1]*t9;
-    const double t11 = q[3] + t6;
-    const double t12 = cos(t11);
-    const double t13 = sin(t11);
-    const double t14 = 3.2e-05*t12 - 8e-07*t13;
-    const double t15 = t4*t0;
-    const double t16 = cos(t6);
-    const double t17 = 5.22042e-06*t16 - 2.28e-08*t7;
-    const double t18 = t7*t17 + 1.14e-08;
-    const double t19 = qd[3] + t4;
-    const double t20 = 8e-07*t12 + 3.2e-05*t13;
-    const double t21 = t19*t20;
-    const double t22 = 3.7034e-07*t12 - 8.8e-09*t13;
-    const double t23 = t13*t22 + 4.4e-09;
-    const double t24 = 0.04038*cos_q1;
-    const double t25 = 1.2e-06*t16 + 0.0002062*t7;
-    const double t26 = t15*t25 + t0*t21;
-    const double t27 = 3e-06*cos_q1 + 0.0006058*sin_q1;
-    const double t28 = g[0]*cos_q0 + g[1]*sin_q0;
-    const double t29 = qd[1]*qd[1];
-    const double t30 = t4*t4;
-    const double t31 = 0.0006058*cos_q1 - 3e-06*sin_q1;
-    const double t32 = 0.0002062*t16 - 1.2e-06*t7;
-    const double t33 = t19*t19;
-    const double t34 = 5.24e-09*t12 + 1.666e-07*t13;
-    const double t35 = 2432143.204591886*t34;
-    const double t36 = 0.04038*sin_q1;
-    const double t37 = g[2] + t29*t36;
-    const double t38 = 0.0298*t7;
-    const double t39 = qd[0]*qd[0];
-    const double t40 = t39 + t30;
-    const double t41 = 0.0298*t16;
-    const double t42 = 0.006*t39 + t28;
-    const double t43 = (t39 + t29)*t24 + t42;
-    const double t44 = (t37 + t30*t38)*t14 - t20*(t40*t41 + t43) - t39*t23;
-    const double t45 = tau[3] + t44;
-    const double t46 = t33*t20;
-    const double t47 = (t39 + t33)*t14;
-    const double t48 = t37*t32 + t41*t46 + t44 - t25*t43 - t39*t18 - t38*t47;
-    const double t49 = t41*t14 + t38*t20;
-    const double t50 = t49 + 4.1116e-07;
-    const double t51 = 2432143.204591886*t50;
-    const double t52 = tau[2] + t48 - t51*t45;
-    const double t53 = 5.8e-09*t16 + 7.5326e-07*t7 + t34;
-    const double t54 = t53 - t35*t50;
-    const double t55 = 2.0*t49 + 5.70706e-06;
-    const double t56 = 1.0/(t55 - t50*t51);
-    const double t57 = t54*t56;
-    const double t58 = t24*t14 + t36*t20 + t50;
-    const double t59 = 2432143.204591886*t58;
-    const double t60 = t32 + t14;
-    const double t61 = t25 + t20;
-    const double t62 = t24*t60 + t36*t61;
-    const double t63 = t62 + t55 - t58*t51;
-    const double t64 = t63*t56;
-    const double t65 = tau[1] + g[2]*t31 + t24*(t30*t25 + t46) + t48 - t27*t42 - t39*t3 - t36*(t40*t32 + t47) - t45*t59 - t52*t64;
-    const double t66 = 9.6e-09*cos_q1 + 1.244876e-06*sin_q1 + t53 - t35*t58 - t63*t57;
-    const double t67 = t55 + 2.0*t62 + 2.1836744e-05;
-    const double t68 = 1.0/(t67 - t58*t59 - t63*t64);
-    const double t69 = t66*t68;
-    const double t70 = tau[0] + t1*t3 + (t4*t5*t7 - t10)*t14 + t15*t18 + t5*t16*t21 + t0*t19*t23 + t24*t26 + 0.006*(t1*t27 + t26) - 3.22e-05*t28 - t29*(1.244876e-06*cos_q1 - 9.6e-09*sin_q1) - t30*(7.5326e-07*t16 - 5.8e-09*t7) - t8*(t31 + 0.0001245) - t10*t32 - t33*(1.666e-07*t12 - 5.24e-09*t13) - t35*t45 - t52*t57 - t65*t69;
-    const double t71 = cos_q1*t2 + t16*t17 + t12*t22 + 0.012*(t31 + t60) + t67 - 0.0596*t7*t20 - t9*t61 - t34*t35 - t54*t57 - t66*t69 - 2.6359844e-05;
-    const double t72 = t70/t71;
-    const double t73 = t65*t68 - t69*t72;
-    const double t74 = t52*t56 - t57*t72 - t64*t73;
-    qdd[0] = t72;
-    qdd[1] = t73;
-    qdd[2] = t74;
-    qdd[3] = 2432143.204591886*t45 - t35*t72 - t59*t73 - t51*t74;
+    const double t0 = q[1] + q[2];
+    const double t1 = q[3] + t0 - 1.539354111254972;
+    const double t2 = qd[1] + qd[2];
+    const double t3 = qd[3] + t2;
+    const double t4 = t3*t3;
+    const awiwi_turn4 a0 = awiwi_sincos4(t1, q[1], t0, q[0]);
+    const double t5 = 0.04038*a0.cos[1];
+    const double t6 = t5 + 0.006;
+    const double t7 = 0.0298*a0.cos[2];
+    const double t8 = 3.200933312448819e-05*a0.cos[0] + 2.063805357661431e-07*a0.sin[0];
+    const double t9 = 3.701610137991634e-07*a0.cos[0] + 1.4490668141102139e-08*a0.sin[0];
+    const double t10 = (t6 + t7)*t8 + 7.245334070551069e-09 - a0.sin[0]*t9;
+    const double t11 = 1.2e-06*a0.cos[2] + 0.0002062*a0.sin[2];
+    const double t12 = 2.063805357661431e-07*a0.cos[0] - 3.200933312448819e-05*a0.sin[0];
+    const double t13 = 0.0298*t12;
+    const double t14 = 5.22042e-06*a0.cos[2] + t13 - 2.28e-08*a0.sin[2];
+    const double t15 = t6*t11 + a0.sin[2]*t14 + 1.14e-08;
+    const double t16 = 3e-06*a0.cos[1] + 0.0006058*a0.sin[1];
+    const double t17 = 0.0002062*a0.cos[2] - 1.2e-06*a0.sin[2];
+    const double t18 = t17 + t12;
+    const double t19 = 0.04038*t18;
+    const double t20 = 2.1654944e-05*a0.cos[1] + t19 - 7.72e-08*a0.sin[1];
+    const double t21 = 0.006*t16 + a0.sin[1]*t20 + 3.86e-08;
+    const double t22 = qd[1]*qd[1];
+    const double t23 = 0.04038*a0.sin[1];
+    const double t24 = g[2] + t22*t23;
+    const double t25 = t4*t8;
+    const double t26 = g[0]*a0.cos[3] + g[1]*a0.sin[3];
+    const double t27 = t26 + t22*t5;
+    const double t28 = 0.0298*a0.sin[2];
+    const double t29 = t4*t12;
+    const double t30 = qd[0]*qd[0];
+    const double t31 = t7*t12 + t28*t8;
+    const double t32 = 2432143.204591886*t31;
+    const double t33 = t2*t2;
+    const double t34 = tau[3] + (t24 + t33*t28)*t12 - (t27 + t33*t7)*t8 - t30*t10;
+    const double t35 = tau[2] + t24*t17 + t7*t25 - tau[3] - t27*t11 - t28*t29 - t30*t15 - t32*t34;
+    const double t36 = 0.4053954309565579*a0.cos[0];
+    const double t37 = 5.8e-09*a0.cos[2] + 7.5326e-07*a0.sin[2] - t36*t31;
+    const double t38 = 1.0/(t31*t32 - 5.2959e-06);
+    const double t39 = t37*t38;
+    const double t40 = 0.0006058*a0.cos[1] - 3e-06*a0.sin[1];
+    const double t41 = t5*t12 + t23*t8;
+    const double t42 = 2432143.204591886*t41;
+    const double t43 = t5*t17 + t23*t11 - t31*t42;
+    const double t44 = t43*t38;
+    const double t45 = tau[1] + g[2]*t40 + t5*(t33*t11 + t25) + t35*t44 - tau[2] - t16*t26 - t23*(t33*t17 + t29) - t42*t34 - t30*t21;
+    const double t46 = 9.6e-09*a0.cos[1] + 1.244876e-06*a0.sin[1] + t43*t39 - t36*t41;
+    const double t47 = 1.0/(t41*t42 - t43*t44 - 2.1836744e-05);
+    const double t48 = t46*t47;
+    const double t49 = t40 + t18;
+    const double t50 = tau[0] + t4*(1.6668238539209836e-07*a0.sin[0]) + 2.0*qd[0]*(t3*t10 + t2*t15 + qd[1]*t21) + t35*t39 + t45*t48 - 3.22e-05*t26 - t22*(1.244876e-06*a0.cos[1] - 9.6e-09*a0.sin[1]) - t33*(7.5326e-07*a0.cos[2] - 5.8e-09*a0.sin[2]) - (g[0]*a0.sin[3] - g[1]*a0.cos[3])*(t49 + 0.0001245) - t36*t34;
+    const double t51 = a0.cos[0]*(6.757227745889678e-08*a0.cos[0] + t9) - 0.012*t49 - a0.cos[2]*(t13 + t14) - a0.cos[1]*(t19 + t20) - t37*t39 - t46*t48 - 1.5542105068995817e-06;
+    const double t52 = t50/t51;
+    const double t53 = t45*t47 + t48*t52;
+    const double t54 = t35*t38 + t39*t52 + t44*t53;
+    qdd[0] = -t52;
+    qdd[1] = -t53;
+    qdd[2] = t53 - t54;
+    qdd[3] = 2432143.204591886*t34 + t36*t52 + t42*t53 + (t32 + 1.0)*t54;
 }

@@ -7,48 +7,41 @@
  * Cost: 9 add, 16 mul, 10 neg, 4 sincos.
  * Inputs: sha256 cc479d3eaff2d23a1439c4046dc08cbbd6a22d642904ede3e49fae304d176b25.
  */
-#include <math.h>
+#include "trig.h"
 #include "kernels.h"
 
 void awiwi_index_jacobian(const double q[restrict 4], double J[restrict 24])
 {
-    const double cos_q0 = cos(q[0]);
-    const double sin_q0 = sin(q[0]);
-    const double cos_q1 = cos(q[1]);
     const double t0 = q[1] + q[2];
-    const double t1 = cos(t0);
-    const double t2 = q[3] + t0;
-    const double t3 = cos(t2);
-    const double t4 = 0.00201*t3;
-    const double t5 = 0.0298*t1 + t4;
-    const double t6 = 0.04038*cos_q1 + t5;
-    const double t7 = t6 + 0.006;
-    const double sin_q1 = sin(q[1]);
-    const double t8 = sin(t0);
-    const double t9 = sin(t2);
-    const double t10 = 0.00201*t9;
-    const double t11 = 0.0298*t8 + t10;
-    const double t12 = 0.04038*sin_q1 + t11;
-    J[0] = -(0.0057*cos_q0) - sin_q0*t7;
-    J[1] = -(cos_q0*t12);
-    J[2] = -(cos_q0*t11);
-    J[3] = -(cos_q0*t10);
-    J[4] = cos_q0*t7 - 0.0057*sin_q0;
-    J[5] = -(sin_q0*t12);
-    J[6] = -(sin_q0*t11);
-    J[7] = -(sin_q0*t10);
+    const double t1 = q[3] + t0;
+    const awiwi_turn4 a0 = awiwi_sincos4(q[0], q[1], t0, t1);
+    const double t2 = 0.00201*a0.cos[3];
+    const double t3 = 0.0298*a0.cos[2] + t2;
+    const double t4 = 0.04038*a0.cos[1] + t3;
+    const double t5 = t4 + 0.006;
+    const double t6 = 0.00201*a0.sin[3];
+    const double t7 = 0.0298*a0.sin[2] + t6;
+    const double t8 = 0.04038*a0.sin[1] + t7;
+    J[0] = -(0.0057*a0.cos[0]) - a0.sin[0]*t5;
+    J[1] = -(a0.cos[0]*t8);
+    J[2] = -(a0.cos[0]*t7);
+    J[3] = -(a0.cos[0]*t6);
+    J[4] = a0.cos[0]*t5 - 0.0057*a0.sin[0];
+    J[5] = -(a0.sin[0]*t8);
+    J[6] = -(a0.sin[0]*t7);
+    J[7] = -(a0.sin[0]*t6);
     J[8] = 0.0;
-    J[9] = t6;
-    J[10] = t5;
-    J[11] = t4;
+    J[9] = t4;
+    J[10] = t3;
+    J[11] = t2;
     J[12] = 0.0;
-    J[13] = sin_q0;
-    J[14] = sin_q0;
-    J[15] = sin_q0;
+    J[13] = a0.sin[0];
+    J[14] = a0.sin[0];
+    J[15] = a0.sin[0];
     J[16] = 0.0;
-    J[17] = -cos_q0;
-    J[18] = -cos_q0;
-    J[19] = -cos_q0;
+    J[17] = -a0.cos[0];
+    J[18] = -a0.cos[0];
+    J[19] = -a0.cos[0];
     J[20] = 1.0;
     J[21] = 0.0;
     J[22] = 0.0;

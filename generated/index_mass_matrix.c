@@ -4,53 +4,42 @@
  * Source: eq. 2.17, 5.4.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   out  M[4][4] in kg m^2
- * Cost: 34 add, 41 mul, 3 sincos.
- * Inputs: sha256 c0ef972f5545cb49fd7275e781cf58d35b661d7f7939853e31e0d6d89da3ade1.
+ * Cost: 33 add, 33 mul, 3 sincos.
+ * Inputs: sha256 3111373cde589691558afe839d151a7b960ef034f13613b5010ff777ad2e903d.
  */
-#include <math.h>
+#include "trig.h"
 #include "kernels.h"
 
 void awiwi_index_mass_matrix(const double q[restrict 4], double M[restrict 16])
 {
-    const double cos_q1 = cos(q[1]);
-    const double sin_q1 = sin(q[1]);
     const double t0 = q[1] + q[2];
-    const double t1 = cos(t0);
-    const double t2 = sin(t0);
-    const double t3 = q[3] + t0;
-    const double t4 = cos(t3);
-    const double t5 = sin(t3);
-    const double t6 = 3.2e-05*t4 - 8e-07*t5;
-    const double t7 = 0.0002062*t1 + t6 - 1.2e-06*t2;
-    const double t8 = 8e-07*t4 + 3.2e-05*t5;
-    const double t9 = t1*t6 + t2*t8;
-    const double t10 = 0.0596*t9 + 5.70706e-06;
-    const double t11 = 0.04038*cos_q1;
-    const double t12 = 0.04038*sin_q1;
-    const double t13 = 1.2e-06*t1 + 0.0002062*t2 + t8;
-    const double t14 = t11*t7 + t12*t13;
-    const double t15 = t10 + 2.0*t14 + 2.1836744e-05;
-    const double t16 = cos_q1*(2.1654944e-05*cos_q1 - 7.72e-08*sin_q1) + t1*(5.22042e-06*t1 - 2.28e-08*t2) + t4*(3.7034e-07*t4 - 8.8e-09*t5) + 0.012*(0.0006058*cos_q1 + t7 - 3e-06*sin_q1) + t15 - 0.0596*t2*t8 - 0.08076*sin_q1*t13 - 2.6359844e-05;
-    const double t17 = 5.24e-09*t4 + 1.666e-07*t5;
-    const double t18 = 5.8e-09*t1 + 7.5326e-07*t2 + t17;
-    const double t19 = 9.6e-09*cos_q1 + 1.244876e-06*sin_q1 + t18;
-    const double t20 = t14 + t10;
-    const double t21 = 0.0298*t9 + 4.1116e-07;
-    const double t22 = t11*t6 + t12*t8 + t21;
-    M[0] = t16;
-    M[1] = t19;
-    M[2] = t18;
-    M[3] = t17;
-    M[4] = t19;
-    M[5] = t15;
-    M[6] = t20;
-    M[7] = t22;
-    M[8] = t18;
-    M[9] = t20;
-    M[10] = t10;
-    M[11] = t21;
-    M[12] = t17;
-    M[13] = t22;
-    M[14] = t21;
+    const double t1 = q[3] + t0 - 1.5458015331759765;
+    const awiwi_turn3 a0 = awiwi_sincos3(t0, t1, q[1]);
+    const double t2 = a0.sin[0] + 26.67499869832341*a0.sin[1] - 171.83333333333334*a0.cos[0];
+    const double t3 = a0.cos[0]*(5.22042e-06*a0.cos[0] - 2.28e-08*a0.sin[0] - 1.9077959069040903e-06*a0.sin[1]) + 1.44e-08*(504.8333333333333*a0.cos[2] - 2.5*a0.sin[2] - t2) + a0.cos[2]*(2.1654944e-05*a0.cos[2] - 7.72e-08*a0.sin[2] - 9.6912e-08*t2) + 1.5542885446595878e-06 - a0.cos[1]*(3.7031708931917554e-07*a0.cos[1] + 9.716427232979388e-09*a0.sin[1]);
+    const double t4 = 1.666789209732727e-07*a0.cos[1] - 1.0746642198887319e-09*a0.sin[1];
+    const double t5 = 5.8e-09*a0.cos[0] + 7.5326e-07*a0.sin[0] + t4;
+    const double t6 = 9.6e-09*a0.cos[2] + 1.244876e-06*a0.sin[2] + t5;
+    const double t7 = 9.538979534520451e-07*(a0.cos[0]*a0.sin[1] - a0.sin[0]*a0.cos[1]);
+    const double t8 = 4.1116e-07 - t7;
+    const double t9 = t8 + 5.2959e-06 - t7;
+    const double t10 = 4.8456e-08*(a0.cos[2]*t2 - a0.sin[2]*(a0.cos[0] + 171.83333333333334*a0.sin[0] + 26.67499869832341*a0.cos[1]));
+    const double t11 = t9 - t10;
+    const double t12 = t8 - 1.2925637369259591e-06*(a0.cos[2]*a0.sin[1] - a0.sin[2]*a0.cos[1]);
+    M[0] = t3;
+    M[1] = t6;
+    M[2] = t5;
+    M[3] = t4;
+    M[4] = t6;
+    M[5] = t11 + 2.1836744e-05 - t10;
+    M[6] = t11;
+    M[7] = t12;
+    M[8] = t5;
+    M[9] = t11;
+    M[10] = t9;
+    M[11] = t8;
+    M[12] = t4;
+    M[13] = t12;
+    M[14] = t8;
     M[15] = 4.1116e-07;
 }

@@ -52,11 +52,21 @@ void awiwi_thumb_link_poses(const double q[4], double T[64]);
 void awiwi_thumb_jacobian(const double q[4], double J[24]);
 
 /*
+ * Pose of the fingertip and its Jacobian, both in base axes, in one call that shares their work.
+ * Source: eq. 5.2, 5.3, table 5.1, differentiated.
+ *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
+ *   out  T[4][4] in 1, m
+ *   out  J[6][4] in m/rad, 1
+ * Cost: 13 add, 34 mul, 15 neg, 4 sincos.
+ */
+void awiwi_thumb_pose_and_jacobian(const double q[4], double T[16], double J[24]);
+
+/*
  * Mass matrix: the kinetic energy is half qd' M qd.
  * Source: eq. 2.17, 5.4.
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   out  M[4][4] in kg m^2
- * Cost: 49 add, 54 mul, 4 neg, 3 sincos.
+ * Cost: 48 add, 49 mul, 4 neg, 3 sincos.
  */
 void awiwi_thumb_mass_matrix(const double q[4], double M[16]);
 
@@ -66,7 +76,7 @@ void awiwi_thumb_mass_matrix(const double q[4], double M[16]);
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   in   qd[4] in rad/s, -20 to 20
  *   out  C[4][4] in N m s/rad
- * Cost: 134 add, 148 mul, 5 neg, 3 sincos.
+ * Cost: 134 add, 142 mul, 5 neg, 3 sincos.
  */
 void awiwi_thumb_coriolis_matrix(const double q[4], const double qd[4], double C[16]);
 
@@ -76,7 +86,7 @@ void awiwi_thumb_coriolis_matrix(const double q[4], const double qd[4], double C
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  gravity[4] in N m
- * Cost: 19 add, 26 mul, 4 sincos.
+ * Cost: 17 add, 22 mul, 4 sincos.
  */
 void awiwi_thumb_gravity(const double q[4], const double g[3], double gravity[4]);
 
@@ -87,7 +97,7 @@ void awiwi_thumb_gravity(const double q[4], const double g[3], double gravity[4]
  *   in   qd[4] in rad/s, -20 to 20
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  bias[4] in N m
- * Cost: 109 add, 135 mul, 4 sincos.
+ * Cost: 108 add, 134 mul, 4 sincos.
  */
 void awiwi_thumb_bias(const double q[4], const double qd[4], const double g[3], double bias[4]);
 
@@ -99,7 +109,7 @@ void awiwi_thumb_bias(const double q[4], const double qd[4], const double g[3], 
  *   in   qdd[4] in rad/s^2, -2000 to 2000
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  tau[4] in N m
- * Cost: 136 add, 146 mul, 2 neg, 4 sincos.
+ * Cost: 135 add, 144 mul, 2 neg, 4 sincos.
  */
 void awiwi_thumb_inverse_dynamics(const double q[4], const double qd[4], const double qdd[4], const double g[3], double tau[4]);
 
@@ -112,7 +122,7 @@ void awiwi_thumb_inverse_dynamics(const double q[4], const double qd[4], const d
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  dtau_dq[4][4] in N m/rad
  *   out  dtau_dqd[4][4] in N m s/rad
- * Cost: 388 add, 435 mul, 9 neg, 4 sincos.
+ * Cost: 388 add, 435 mul, 10 neg, 4 sincos.
  */
 void awiwi_thumb_inverse_dynamics_derivatives(const double q[4], const double qd[4], const double qdd[4], const double g[3], double dtau_dq[16], double dtau_dqd[16]);
 
@@ -124,7 +134,7 @@ void awiwi_thumb_inverse_dynamics_derivatives(const double q[4], const double qd
  *   in   tau[4] in N m, -1 to 1
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  qdd[4] in rad/s^2
- * Cost: 172 add, 191 mul, 3 div, 1 neg, 4 sincos.
+ * Cost: 172 add, 191 mul, 3 div, 3 neg, 4 sincos.
  */
 void awiwi_thumb_forward_dynamics(const double q[4], const double qd[4], const double tau[4], const double g[3], double qdd[4]);
 
@@ -137,7 +147,7 @@ void awiwi_thumb_forward_dynamics(const double q[4], const double qd[4], const d
  *   out  M[4][4] in kg m^2
  *   out  C[4][4] in N m s/rad
  *   out  gravity[4] in N m
- * Cost: 157 add, 176 mul, 9 neg, 4 sincos.
+ * Cost: 156 add, 174 mul, 8 neg, 4 sincos.
  */
 void awiwi_thumb_dynamics(const double q[4], const double qd[4], const double g[3], double M[16], double C[16], double gravity[4]);
 
@@ -149,7 +159,7 @@ void awiwi_thumb_dynamics(const double q[4], const double qd[4], const double g[
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  kinetic[1] in J
  *   out  potential[1] in J
- * Cost: 66 add, 83 mul, 1 neg, 4 sincos.
+ * Cost: 65 add, 81 mul, 4 sincos.
  */
 void awiwi_thumb_energy(const double q[4], const double qd[4], const double g[3], double kinetic[1], double potential[1]);
 
@@ -158,7 +168,7 @@ void awiwi_thumb_energy(const double q[4], const double qd[4], const double g[3]
  * Source: eq. 5.5, 5.18, 5.22.
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   out  h[8] in m
- * Cost: 26 add, 22 mul, 2 neg, 4 sqrt, 2 sincos.
+ * Cost: 28 add, 23 mul, 2 neg, 4 sqrt, 2 sincos.
  */
 void awiwi_thumb_tendon_lengths(const double q[4], double h[8]);
 
@@ -167,7 +177,7 @@ void awiwi_thumb_tendon_lengths(const double q[4], double h[8]);
  * Source: eq. 5.6, 5.9, 5.21.
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   out  P[8][4] in m/rad
- * Cost: 44 add, 58 mul, 4 div, 4 sqrt, 2 sincos.
+ * Cost: 43 add, 54 mul, 4 div, 1 neg, 4 sqrt, 2 sincos.
  */
 void awiwi_thumb_coupling(const double q[4], double P[32]);
 
@@ -176,7 +186,7 @@ void awiwi_thumb_coupling(const double q[4], double P[32]);
  * Source: eq. 5.11.
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   out  dP[8][4][4] in m/rad^2
- * Cost: 101 add, 140 mul, 4 div, 1 neg, 4 sqrt, 2 sincos.
+ * Cost: 101 add, 112 mul, 4 div, 1 neg, 4 sqrt, 2 sincos.
  */
 void awiwi_thumb_coupling_derivative(const double q[4], double dP[128]);
 
@@ -186,7 +196,7 @@ void awiwi_thumb_coupling_derivative(const double q[4], double dP[128]);
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   in   f[8] in N, 0 to 100
  *   out  tau[4] in N m
- * Cost: 62 add, 61 mul, 4 div, 4 sqrt, 2 sincos.
+ * Cost: 62 add, 57 mul, 4 div, 4 sqrt, 2 sincos.
  */
 void awiwi_thumb_joint_torque(const double q[4], const double f[8], double tau[4]);
 
@@ -197,9 +207,21 @@ void awiwi_thumb_joint_torque(const double q[4], const double f[8], double tau[4
  *   in   f[8] in N, 0 to 100
  *   in   k[8] in N/m, 1000 to 50000
  *   out  K[4][4] in N m/rad
- * Cost: 125 add, 173 mul, 4 div, 4 sqrt, 2 sincos.
+ * Cost: 125 add, 143 mul, 4 div, 4 sqrt, 2 sincos.
  */
 void awiwi_thumb_joint_stiffness(const double q[4], const double f[8], const double k[8], double K[16]);
+
+/*
+ * Joint torques and joint stiffness of the tendons in one call that shares their work.
+ * Source: eq. 5.8, 5.12, 5.23.
+ *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
+ *   in   f[8] in N, 0 to 100
+ *   in   k[8] in N/m, 1000 to 50000
+ *   out  tau[4] in N m
+ *   out  K[4][4] in N m/rad
+ * Cost: 134 add, 157 mul, 4 div, 1 neg, 4 sqrt, 2 sincos.
+ */
+void awiwi_thumb_joint_torque_and_stiffness(const double q[4], const double f[8], const double k[8], double tau[4], double K[16]);
 
 /*
  * Joint angles whose tendon lengths are nearest to the measured h; start is the last estimate.
@@ -220,9 +242,26 @@ int awiwi_thumb_joint_estimate(const double h[8], const double start[4], double 
  *   in   noise[1] in m, 0 to 0.001
  *   out  covariance[4][4] in rad^2
  *   out  worst[4] in rad
- * Cost: 68 add, 115 mul, 6 div, 2 neg, 6 sqrt, 2 sincos, 8 calls.
+ * Cost: 67 add, 109 mul, 6 div, 6 sqrt, 2 sincos, 8 calls.
  */
 void awiwi_thumb_joint_estimate_error(const double q[4], const double noise[1], double covariance[16], double worst[4]);
+
+/*
+ * Tendon forces from f_min to f_max that give the joint torque tau and come nearest to the joint
+ * stiffness K. The torque is exact where the limits allow it, else the nearest (AWIWI_INFEASIBLE). The
+ * stiffness is the nearest of all with that torque, by the sum of the squares of the errors of all
+ * entries (the squared Frobenius norm).
+ * Source: eq. 7.2, 7.6, mended.
+ *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
+ *   in   tau[4] in N m, -1 to 1
+ *   in   K[4][4] in N m/rad, -50 to 50
+ *   in   f_min[1] in N, 3.87595 to 27.9443
+ *   in   f_max[1] in N, 76.0811 to 100.149
+ *   out  f[8] in N
+ * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
+ * Cost: at most 357 times that of thumb_coupling and thumb_tendon_stiffness and thumb_coupling_derivative, and the solver's own.
+ */
+int awiwi_thumb_tendon_distribution(const double q[4], const double tau[4], const double K[16], const double f_min[1], const double f_max[1], double f[8]);
 
 /*
  * Base joint angles whose span lengths are nearest to the measured h, by gradient search from start.
@@ -277,11 +316,21 @@ void awiwi_index_link_poses(const double q[4], double T[64]);
 void awiwi_index_jacobian(const double q[4], double J[24]);
 
 /*
+ * Pose of the fingertip and its Jacobian, both in base axes, in one call that shares their work.
+ * Source: eq. 5.2, 5.3, table 5.1, differentiated.
+ *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
+ *   out  T[4][4] in 1, m
+ *   out  J[6][4] in m/rad, 1
+ * Cost: 9 add, 20 mul, 13 neg, 4 sincos.
+ */
+void awiwi_index_pose_and_jacobian(const double q[4], double T[16], double J[24]);
+
+/*
  * Mass matrix: the kinetic energy is half qd' M qd.
  * Source: eq. 2.17, 5.4.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   out  M[4][4] in kg m^2
- * Cost: 34 add, 41 mul, 3 sincos.
+ * Cost: 33 add, 33 mul, 3 sincos.
  */
 void awiwi_index_mass_matrix(const double q[4], double M[16]);
 
@@ -291,7 +340,7 @@ void awiwi_index_mass_matrix(const double q[4], double M[16]);
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   qd[4] in rad/s, -20 to 20
  *   out  C[4][4] in N m s/rad
- * Cost: 64 add, 69 mul, 1 neg, 3 sincos.
+ * Cost: 46 add, 50 mul, 4 neg, 3 sincos.
  */
 void awiwi_index_coriolis_matrix(const double q[4], const double qd[4], double C[16]);
 
@@ -301,7 +350,7 @@ void awiwi_index_coriolis_matrix(const double q[4], const double qd[4], double C
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  gravity[4] in N m
- * Cost: 19 add, 24 mul, 4 sincos.
+ * Cost: 16 add, 18 mul, 4 sincos.
  */
 void awiwi_index_gravity(const double q[4], const double g[3], double gravity[4]);
 
@@ -312,7 +361,7 @@ void awiwi_index_gravity(const double q[4], const double g[3], double gravity[4]
  *   in   qd[4] in rad/s, -20 to 20
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  bias[4] in N m
- * Cost: 60 add, 84 mul, 4 sincos.
+ * Cost: 55 add, 75 mul, 4 sincos.
  */
 void awiwi_index_bias(const double q[4], const double qd[4], const double g[3], double bias[4]);
 
@@ -324,7 +373,7 @@ void awiwi_index_bias(const double q[4], const double qd[4], const double g[3], 
  *   in   qdd[4] in rad/s^2, -2000 to 2000
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  tau[4] in N m
- * Cost: 95 add, 120 mul, 4 sincos.
+ * Cost: 82 add, 101 mul, 4 sincos.
  */
 void awiwi_index_inverse_dynamics(const double q[4], const double qd[4], const double qdd[4], const double g[3], double tau[4]);
 
@@ -337,7 +386,7 @@ void awiwi_index_inverse_dynamics(const double q[4], const double qd[4], const d
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  dtau_dq[4][4] in N m/rad
  *   out  dtau_dqd[4][4] in N m s/rad
- * Cost: 193 add, 229 mul, 4 neg, 4 sincos.
+ * Cost: 165 add, 197 mul, 4 neg, 4 sincos.
  */
 void awiwi_index_inverse_dynamics_derivatives(const double q[4], const double qd[4], const double qdd[4], const double g[3], double dtau_dq[16], double dtau_dqd[16]);
 
@@ -349,7 +398,7 @@ void awiwi_index_inverse_dynamics_derivatives(const double q[4], const double qd
  *   in   tau[4] in N m, -1 to 1
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  qdd[4] in rad/s^2
- * Cost: 110 add, 141 mul, 3 div, 4 sincos.
+ * Cost: 95 add, 119 mul, 3 div, 2 neg, 4 sincos.
  */
 void awiwi_index_forward_dynamics(const double q[4], const double qd[4], const double tau[4], const double g[3], double qdd[4]);
 
@@ -362,7 +411,7 @@ void awiwi_index_forward_dynamics(const double q[4], const double qd[4], const d
  *   out  M[4][4] in kg m^2
  *   out  C[4][4] in N m s/rad
  *   out  gravity[4] in N m
- * Cost: 94 add, 105 mul, 1 neg, 4 sincos.
+ * Cost: 77 add, 83 mul, 4 neg, 4 sincos.
  */
 void awiwi_index_dynamics(const double q[4], const double qd[4], const double g[3], double M[16], double C[16], double gravity[4]);
 
@@ -374,7 +423,7 @@ void awiwi_index_dynamics(const double q[4], const double qd[4], const double g[
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  kinetic[1] in J
  *   out  potential[1] in J
- * Cost: 51 add, 67 mul, 4 sincos.
+ * Cost: 50 add, 60 mul, 4 sincos.
  */
 void awiwi_index_energy(const double q[4], const double qd[4], const double g[3], double kinetic[1], double potential[1]);
 
@@ -427,6 +476,18 @@ void awiwi_index_joint_torque(const double q[4], const double f[8], double tau[4
 void awiwi_index_joint_stiffness(const double q[4], const double f[8], const double k[8], double K[16]);
 
 /*
+ * Joint torques and joint stiffness of the tendons in one call that shares their work.
+ * Source: eq. 5.8, 5.12, 5.23.
+ *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
+ *   in   f[8] in N, 0 to 100
+ *   in   k[8] in N/m, 1000 to 50000
+ *   out  tau[4] in N m
+ *   out  K[4][4] in N m/rad
+ * Cost: 14 add, 10 mul.
+ */
+void awiwi_index_joint_torque_and_stiffness(const double q[4], const double f[8], const double k[8], double tau[4], double K[16]);
+
+/*
  * Joint angles whose tendon lengths are nearest to the measured h; start is the last estimate.
  * Source: eq. 5.14, 5.15, 5.24.
  *   in   h[8] in m, from [-0.01278, -0.01278, -0.01278, -0.01278, -0.009425, -0.009425, -0.01571, -0.01571] to [0.01278, 0.01278, 0.01278, 0.01278, 0.009425, 0.009425, 0.01571, 0.01571]
@@ -447,6 +508,23 @@ void awiwi_index_joint_estimate(const double h[8], const double start[4], double
  * Cost: 10 mul.
  */
 void awiwi_index_joint_estimate_error(const double q[4], const double noise[1], double covariance[16], double worst[4]);
+
+/*
+ * Tendon forces from f_min to f_max that give the joint torque tau and come nearest to the joint
+ * stiffness K. The torque is exact where the limits allow it, else the nearest (AWIWI_INFEASIBLE). The
+ * stiffness is the nearest of all with that torque, by the sum of the squares of the errors of all
+ * entries (the squared Frobenius norm).
+ * Source: eq. 7.2, 7.6, mended.
+ *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
+ *   in   tau[4] in N m, -1 to 1
+ *   in   K[4][4] in N m/rad, -50 to 50
+ *   in   f_min[1] in N, 3.87595 to 27.9443
+ *   in   f_max[1] in N, 76.0811 to 100.149
+ *   out  f[8] in N
+ * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
+ * Cost: at most 66 times that of index_coupling and index_tendon_stiffness, and the solver's own.
+ */
+int awiwi_index_tendon_distribution(const double q[4], const double tau[4], const double K[16], const double f_min[1], const double f_max[1], double f[8]);
 
 /*
  * Stiffness of every tendon that is pulled with a tension: spring and fibre in series, and its
@@ -490,11 +568,21 @@ void awiwi_middle_link_poses(const double q[4], double T[64]);
 void awiwi_middle_jacobian(const double q[4], double J[24]);
 
 /*
+ * Pose of the fingertip and its Jacobian, both in base axes, in one call that shares their work.
+ * Source: eq. 5.2, 5.3, table 5.1, differentiated.
+ *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
+ *   out  T[4][4] in 1, m
+ *   out  J[6][4] in m/rad, 1
+ * Cost: 9 add, 20 mul, 13 neg, 4 sincos.
+ */
+void awiwi_middle_pose_and_jacobian(const double q[4], double T[16], double J[24]);
+
+/*
  * Mass matrix: the kinetic energy is half qd' M qd.
  * Source: eq. 2.17, 5.4.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   out  M[4][4] in kg m^2
- * Cost: 34 add, 41 mul, 3 sincos.
+ * Cost: 33 add, 33 mul, 3 sincos.
  */
 void awiwi_middle_mass_matrix(const double q[4], double M[16]);
 
@@ -504,7 +592,7 @@ void awiwi_middle_mass_matrix(const double q[4], double M[16]);
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   qd[4] in rad/s, -20 to 20
  *   out  C[4][4] in N m s/rad
- * Cost: 64 add, 69 mul, 1 neg, 3 sincos.
+ * Cost: 46 add, 50 mul, 4 neg, 3 sincos.
  */
 void awiwi_middle_coriolis_matrix(const double q[4], const double qd[4], double C[16]);
 
@@ -514,7 +602,7 @@ void awiwi_middle_coriolis_matrix(const double q[4], const double qd[4], double 
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  gravity[4] in N m
- * Cost: 19 add, 24 mul, 4 sincos.
+ * Cost: 16 add, 18 mul, 4 sincos.
  */
 void awiwi_middle_gravity(const double q[4], const double g[3], double gravity[4]);
 
@@ -525,7 +613,7 @@ void awiwi_middle_gravity(const double q[4], const double g[3], double gravity[4
  *   in   qd[4] in rad/s, -20 to 20
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  bias[4] in N m
- * Cost: 60 add, 84 mul, 4 sincos.
+ * Cost: 55 add, 75 mul, 4 sincos.
  */
 void awiwi_middle_bias(const double q[4], const double qd[4], const double g[3], double bias[4]);
 
@@ -537,7 +625,7 @@ void awiwi_middle_bias(const double q[4], const double qd[4], const double g[3],
  *   in   qdd[4] in rad/s^2, -2000 to 2000
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  tau[4] in N m
- * Cost: 95 add, 120 mul, 4 sincos.
+ * Cost: 82 add, 101 mul, 4 sincos.
  */
 void awiwi_middle_inverse_dynamics(const double q[4], const double qd[4], const double qdd[4], const double g[3], double tau[4]);
 
@@ -550,7 +638,7 @@ void awiwi_middle_inverse_dynamics(const double q[4], const double qd[4], const 
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  dtau_dq[4][4] in N m/rad
  *   out  dtau_dqd[4][4] in N m s/rad
- * Cost: 193 add, 229 mul, 4 neg, 4 sincos.
+ * Cost: 165 add, 197 mul, 4 neg, 4 sincos.
  */
 void awiwi_middle_inverse_dynamics_derivatives(const double q[4], const double qd[4], const double qdd[4], const double g[3], double dtau_dq[16], double dtau_dqd[16]);
 
@@ -562,7 +650,7 @@ void awiwi_middle_inverse_dynamics_derivatives(const double q[4], const double q
  *   in   tau[4] in N m, -1 to 1
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  qdd[4] in rad/s^2
- * Cost: 110 add, 141 mul, 3 div, 4 sincos.
+ * Cost: 95 add, 119 mul, 3 div, 2 neg, 4 sincos.
  */
 void awiwi_middle_forward_dynamics(const double q[4], const double qd[4], const double tau[4], const double g[3], double qdd[4]);
 
@@ -575,7 +663,7 @@ void awiwi_middle_forward_dynamics(const double q[4], const double qd[4], const 
  *   out  M[4][4] in kg m^2
  *   out  C[4][4] in N m s/rad
  *   out  gravity[4] in N m
- * Cost: 94 add, 105 mul, 1 neg, 4 sincos.
+ * Cost: 77 add, 83 mul, 4 neg, 4 sincos.
  */
 void awiwi_middle_dynamics(const double q[4], const double qd[4], const double g[3], double M[16], double C[16], double gravity[4]);
 
@@ -587,7 +675,7 @@ void awiwi_middle_dynamics(const double q[4], const double qd[4], const double g
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  kinetic[1] in J
  *   out  potential[1] in J
- * Cost: 51 add, 67 mul, 4 sincos.
+ * Cost: 50 add, 60 mul, 4 sincos.
  */
 void awiwi_middle_energy(const double q[4], const double qd[4], const double g[3], double kinetic[1], double potential[1]);
 
@@ -640,6 +728,18 @@ void awiwi_middle_joint_torque(const double q[4], const double f[8], double tau[
 void awiwi_middle_joint_stiffness(const double q[4], const double f[8], const double k[8], double K[16]);
 
 /*
+ * Joint torques and joint stiffness of the tendons in one call that shares their work.
+ * Source: eq. 5.8, 5.12, 5.23.
+ *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
+ *   in   f[8] in N, 0 to 100
+ *   in   k[8] in N/m, 1000 to 50000
+ *   out  tau[4] in N m
+ *   out  K[4][4] in N m/rad
+ * Cost: 14 add, 10 mul.
+ */
+void awiwi_middle_joint_torque_and_stiffness(const double q[4], const double f[8], const double k[8], double tau[4], double K[16]);
+
+/*
  * Joint angles whose tendon lengths are nearest to the measured h; start is the last estimate.
  * Source: eq. 5.14, 5.15, 5.24.
  *   in   h[8] in m, from [-0.01278, -0.01278, -0.01278, -0.01278, -0.009425, -0.009425, -0.01571, -0.01571] to [0.01278, 0.01278, 0.01278, 0.01278, 0.009425, 0.009425, 0.01571, 0.01571]
@@ -660,6 +760,23 @@ void awiwi_middle_joint_estimate(const double h[8], const double start[4], doubl
  * Cost: 10 mul.
  */
 void awiwi_middle_joint_estimate_error(const double q[4], const double noise[1], double covariance[16], double worst[4]);
+
+/*
+ * Tendon forces from f_min to f_max that give the joint torque tau and come nearest to the joint
+ * stiffness K. The torque is exact where the limits allow it, else the nearest (AWIWI_INFEASIBLE). The
+ * stiffness is the nearest of all with that torque, by the sum of the squares of the errors of all
+ * entries (the squared Frobenius norm).
+ * Source: eq. 7.2, 7.6, mended.
+ *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
+ *   in   tau[4] in N m, -1 to 1
+ *   in   K[4][4] in N m/rad, -50 to 50
+ *   in   f_min[1] in N, 3.87595 to 27.9443
+ *   in   f_max[1] in N, 76.0811 to 100.149
+ *   out  f[8] in N
+ * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
+ * Cost: at most 66 times that of middle_coupling and middle_tendon_stiffness, and the solver's own.
+ */
+int awiwi_middle_tendon_distribution(const double q[4], const double tau[4], const double K[16], const double f_min[1], const double f_max[1], double f[8]);
 
 /*
  * Stiffness of every tendon that is pulled with a tension: spring and fibre in series, and its
@@ -703,11 +820,21 @@ void awiwi_ring_link_poses(const double q[3], double T[64]);
 void awiwi_ring_jacobian(const double q[3], double J[18]);
 
 /*
+ * Pose of the fingertip and its Jacobian, both in base axes, in one call that shares their work.
+ * Source: eq. 5.2, 5.3, table 5.1, differentiated.
+ *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
+ *   out  T[4][4] in 1, m
+ *   out  J[6][3] in m/rad, 1
+ * Cost: 11 add, 23 mul, 9 neg, 4 sincos.
+ */
+void awiwi_ring_pose_and_jacobian(const double q[3], double T[16], double J[18]);
+
+/*
  * Mass matrix: the kinetic energy is half qd' M qd.
  * Source: eq. 2.17, 5.4.
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   out  M[3][3] in kg m^2
- * Cost: 39 add, 45 mul, 3 sincos.
+ * Cost: 38 add, 37 mul, 3 sincos.
  */
 void awiwi_ring_mass_matrix(const double q[3], double M[9]);
 
@@ -717,7 +844,7 @@ void awiwi_ring_mass_matrix(const double q[3], double M[9]);
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   in   qd[3] in rad/s, -20 to 20
  *   out  C[3][3] in N m s/rad
- * Cost: 69 add, 79 mul, 1 neg, 3 sincos.
+ * Cost: 52 add, 58 mul, 1 neg, 3 sincos.
  */
 void awiwi_ring_coriolis_matrix(const double q[3], const double qd[3], double C[9]);
 
@@ -727,7 +854,7 @@ void awiwi_ring_coriolis_matrix(const double q[3], const double qd[3], double C[
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  gravity[3] in N m
- * Cost: 20 add, 26 mul, 4 sincos.
+ * Cost: 17 add, 20 mul, 4 sincos.
  */
 void awiwi_ring_gravity(const double q[3], const double g[3], double gravity[3]);
 
@@ -738,7 +865,7 @@ void awiwi_ring_gravity(const double q[3], const double g[3], double gravity[3])
  *   in   qd[3] in rad/s, -20 to 20
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  bias[3] in N m
- * Cost: 61 add, 87 mul, 4 sincos.
+ * Cost: 56 add, 78 mul, 4 sincos.
  */
 void awiwi_ring_bias(const double q[3], const double qd[3], const double g[3], double bias[3]);
 
@@ -750,7 +877,7 @@ void awiwi_ring_bias(const double q[3], const double qd[3], const double g[3], d
  *   in   qdd[3] in rad/s^2, -2000 to 2000
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  tau[3] in N m
- * Cost: 96 add, 124 mul, 4 sincos.
+ * Cost: 83 add, 105 mul, 4 sincos.
  */
 void awiwi_ring_inverse_dynamics(const double q[3], const double qd[3], const double qdd[3], const double g[3], double tau[3]);
 
@@ -763,7 +890,7 @@ void awiwi_ring_inverse_dynamics(const double q[3], const double qd[3], const do
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  dtau_dq[3][3] in N m/rad
  *   out  dtau_dqd[3][3] in N m s/rad
- * Cost: 223 add, 275 mul, 4 neg, 4 sincos.
+ * Cost: 180 add, 219 mul, 2 neg, 4 sincos.
  */
 void awiwi_ring_inverse_dynamics_derivatives(const double q[3], const double qd[3], const double qdd[3], const double g[3], double dtau_dq[9], double dtau_dqd[9]);
 
@@ -775,7 +902,7 @@ void awiwi_ring_inverse_dynamics_derivatives(const double q[3], const double qd[
  *   in   tau[3] in N m, -1 to 1
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  qdd[3] in rad/s^2
- * Cost: 111 add, 125 mul, 3 div, 1 neg, 4 sincos.
+ * Cost: 96 add, 110 mul, 3 div, 1 neg, 4 sincos.
  */
 void awiwi_ring_forward_dynamics(const double q[3], const double qd[3], const double tau[3], const double g[3], double qdd[3]);
 
@@ -788,7 +915,7 @@ void awiwi_ring_forward_dynamics(const double q[3], const double qd[3], const do
  *   out  M[3][3] in kg m^2
  *   out  C[3][3] in N m s/rad
  *   out  gravity[3] in N m
- * Cost: 101 add, 123 mul, 1 neg, 4 sincos.
+ * Cost: 89 add, 95 mul, 1 neg, 4 sincos.
  */
 void awiwi_ring_dynamics(const double q[3], const double qd[3], const double g[3], double M[9], double C[9], double gravity[3]);
 
@@ -800,7 +927,7 @@ void awiwi_ring_dynamics(const double q[3], const double qd[3], const double g[3
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  kinetic[1] in J
  *   out  potential[1] in J
- * Cost: 52 add, 66 mul, 4 sincos.
+ * Cost: 51 add, 59 mul, 4 sincos.
  */
 void awiwi_ring_energy(const double q[3], const double qd[3], const double g[3], double kinetic[1], double potential[1]);
 
@@ -853,6 +980,18 @@ void awiwi_ring_joint_torque(const double q[3], const double f[6], double tau[3]
 void awiwi_ring_joint_stiffness(const double q[3], const double f[6], const double k[6], double K[9]);
 
 /*
+ * Joint torques and joint stiffness of the tendons in one call that shares their work.
+ * Source: eq. 5.8, 5.12, 5.23.
+ *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
+ *   in   f[6] in N, 0 to 100
+ *   in   k[6] in N/m, 1000 to 50000
+ *   out  tau[3] in N m
+ *   out  K[3][3] in N m/rad
+ * Cost: 10 add, 7 mul.
+ */
+void awiwi_ring_joint_torque_and_stiffness(const double q[3], const double f[6], const double k[6], double tau[3], double K[9]);
+
+/*
  * Joint angles whose tendon lengths are nearest to the measured h; start is the last estimate.
  * Source: eq. 5.14, 5.15, 5.24.
  *   in   h[6] in m, from [-0.01278, -0.01278, -0.01278, -0.01278, -0.008639, -0.008639] to [0.01278, 0.01278, 0.01278, 0.01278, 0.008639, 0.008639]
@@ -875,6 +1014,23 @@ void awiwi_ring_joint_estimate(const double h[6], const double start[3], double 
 void awiwi_ring_joint_estimate_error(const double q[3], const double noise[1], double covariance[9], double worst[3]);
 
 /*
+ * Tendon forces from f_min to f_max that give the joint torque tau and come nearest to the joint
+ * stiffness K. The torque is exact where the limits allow it, else the nearest (AWIWI_INFEASIBLE). The
+ * stiffness is the nearest of all with that torque, by the sum of the squares of the errors of all
+ * entries (the squared Frobenius norm).
+ * Source: eq. 7.2, 7.6, mended.
+ *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
+ *   in   tau[3] in N m, -1 to 1
+ *   in   K[3][3] in N m/rad, -50 to 50
+ *   in   f_min[1] in N, 3.87595 to 27.9443
+ *   in   f_max[1] in N, 76.0811 to 100.149
+ *   out  f[6] in N
+ * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
+ * Cost: at most 66 times that of ring_coupling and ring_tendon_stiffness, and the solver's own.
+ */
+int awiwi_ring_tendon_distribution(const double q[3], const double tau[3], const double K[9], const double f_min[1], const double f_max[1], double f[6]);
+
+/*
  * Stiffness of every tendon that is pulled with a tension: spring and fibre in series, and its
  * derivatives. slope and curvature are dk/df and d2k/df2.
  * Source: figure 4.7, section 4.3.
@@ -893,7 +1049,7 @@ int awiwi_fifth_tendon_stiffness(const double tension[8], double k[8], double sl
  * Source: eq. 5.2, 5.3, table 5.1.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   out  T[4][4] in 1, m
- * Cost: 28 add, 47 mul, 1 div, 4 neg, 1 sqrt, 5 sincos.
+ * Cost: 28 add, 46 mul, 1 div, 4 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_fingertip_pose(const double q[4], double T[16]);
 
@@ -902,7 +1058,7 @@ void awiwi_fifth_fingertip_pose(const double q[4], double T[16]);
  * Source: eq. 5.2.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   out  T[5][4][4] in 1, m
- * Cost: 38 add, 70 mul, 1 div, 16 neg, 1 sqrt, 5 sincos.
+ * Cost: 38 add, 69 mul, 1 div, 16 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_link_poses(const double q[4], double T[80]);
 
@@ -911,16 +1067,26 @@ void awiwi_fifth_link_poses(const double q[4], double T[80]);
  * Source: eq. 5.3, differentiated.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   out  J[6][4] in m/rad, 1
- * Cost: 38 add, 64 mul, 2 div, 12 neg, 1 sqrt, 5 sincos.
+ * Cost: 37 add, 64 mul, 2 div, 12 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_jacobian(const double q[4], double J[24]);
+
+/*
+ * Pose of the fingertip and its Jacobian, both in base axes, in one call that shares their work.
+ * Source: eq. 5.2, 5.3, table 5.1, differentiated.
+ *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
+ *   out  T[4][4] in 1, m
+ *   out  J[6][4] in m/rad, 1
+ * Cost: 41 add, 70 mul, 2 div, 15 neg, 1 sqrt, 5 sincos.
+ */
+void awiwi_fifth_pose_and_jacobian(const double q[4], double T[16], double J[24]);
 
 /*
  * Mass matrix: the kinetic energy is half qd' M qd.
  * Source: eq. 2.17, 5.4.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   out  M[4][4] in kg m^2
- * Cost: 115 add, 142 mul, 2 div, 1 neg, 1 sqrt, 5 sincos.
+ * Cost: 114 add, 134 mul, 2 div, 2 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_mass_matrix(const double q[4], double M[16]);
 
@@ -930,7 +1096,7 @@ void awiwi_fifth_mass_matrix(const double q[4], double M[16]);
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   in   qd[4] in rad/s, -20 to 20
  *   out  C[4][4] in N m s/rad
- * Cost: 325 add, 381 mul, 2 div, 9 neg, 1 sqrt, 5 sincos.
+ * Cost: 324 add, 379 mul, 2 div, 8 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_coriolis_matrix(const double q[4], const double qd[4], double C[16]);
 
@@ -940,7 +1106,7 @@ void awiwi_fifth_coriolis_matrix(const double q[4], const double qd[4], double C
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  gravity[4] in N m
- * Cost: 44 add, 64 mul, 2 div, 1 neg, 1 sqrt, 5 sincos.
+ * Cost: 41 add, 55 mul, 2 div, 1 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_gravity(const double q[4], const double g[3], double gravity[4]);
 
@@ -951,7 +1117,7 @@ void awiwi_fifth_gravity(const double q[4], const double g[3], double gravity[4]
  *   in   qd[4] in rad/s, -20 to 20
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  bias[4] in N m
- * Cost: 224 add, 251 mul, 2 div, 3 neg, 1 sqrt, 5 sincos.
+ * Cost: 223 add, 249 mul, 2 div, 3 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_bias(const double q[4], const double qd[4], const double g[3], double bias[4]);
 
@@ -963,7 +1129,7 @@ void awiwi_fifth_bias(const double q[4], const double qd[4], const double g[3], 
  *   in   qdd[4] in rad/s^2, -2000 to 2000
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  tau[4] in N m
- * Cost: 239 add, 263 mul, 2 div, 3 neg, 1 sqrt, 5 sincos.
+ * Cost: 238 add, 261 mul, 2 div, 2 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_inverse_dynamics(const double q[4], const double qd[4], const double qdd[4], const double g[3], double tau[4]);
 
@@ -976,7 +1142,7 @@ void awiwi_fifth_inverse_dynamics(const double q[4], const double qd[4], const d
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  dtau_dq[4][4] in N m/rad
  *   out  dtau_dqd[4][4] in N m s/rad
- * Cost: 970 add, 1076 mul, 2 div, 13 neg, 1 sqrt, 5 sincos.
+ * Cost: 968 add, 1075 mul, 2 div, 13 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_inverse_dynamics_derivatives(const double q[4], const double qd[4], const double qdd[4], const double g[3], double dtau_dq[16], double dtau_dqd[16]);
 
@@ -988,7 +1154,7 @@ void awiwi_fifth_inverse_dynamics_derivatives(const double q[4], const double qd
  *   in   tau[4] in N m, -1 to 1
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  qdd[4] in rad/s^2
- * Cost: 337 add, 364 mul, 6 div, 2 neg, 1 sqrt, 5 sincos.
+ * Cost: 336 add, 362 mul, 6 div, 2 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_forward_dynamics(const double q[4], const double qd[4], const double tau[4], const double g[3], double qdd[4]);
 
@@ -1001,7 +1167,7 @@ void awiwi_fifth_forward_dynamics(const double q[4], const double qd[4], const d
  *   out  M[4][4] in kg m^2
  *   out  C[4][4] in N m s/rad
  *   out  gravity[4] in N m
- * Cost: 358 add, 425 mul, 2 div, 8 neg, 1 sqrt, 5 sincos.
+ * Cost: 357 add, 423 mul, 2 div, 7 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_dynamics(const double q[4], const double qd[4], const double g[3], double M[16], double C[16], double gravity[4]);
 
@@ -1013,7 +1179,7 @@ void awiwi_fifth_dynamics(const double q[4], const double qd[4], const double g[
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  kinetic[1] in J
  *   out  potential[1] in J
- * Cost: 140 add, 176 mul, 2 div, 1 neg, 1 sqrt, 5 sincos.
+ * Cost: 139 add, 174 mul, 2 div, 1 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_energy(const double q[4], const double qd[4], const double g[3], double kinetic[1], double potential[1]);
 
@@ -1066,6 +1232,18 @@ void awiwi_fifth_joint_torque(const double q[4], const double f[8], double tau[4
 void awiwi_fifth_joint_stiffness(const double q[4], const double f[8], const double k[8], double K[16]);
 
 /*
+ * Joint torques and joint stiffness of the tendons in one call that shares their work.
+ * Source: eq. 5.8, 5.12, 5.23.
+ *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
+ *   in   f[8] in N, 0 to 100
+ *   in   k[8] in N/m, 1000 to 50000
+ *   out  tau[4] in N m
+ *   out  K[4][4] in N m/rad
+ * Cost: 12 add, 9 mul.
+ */
+void awiwi_fifth_joint_torque_and_stiffness(const double q[4], const double f[8], const double k[8], double tau[4], double K[16]);
+
+/*
  * Joint angles whose tendon lengths are nearest to the measured h; start is the last estimate.
  * Source: eq. 5.14, 5.15, 5.24.
  *   in   h[8] in m, from [-0.005585, -0.005585, -0.01169, -0.01169, -0.01169, -0.01169, -0.007854, -0.007854] to [0.005585, 0.005585, 0.01169, 0.01169, 0.01169, 0.01169, 0.007854, 0.007854]
@@ -1086,6 +1264,23 @@ void awiwi_fifth_joint_estimate(const double h[8], const double start[4], double
  * Cost: 8 mul.
  */
 void awiwi_fifth_joint_estimate_error(const double q[4], const double noise[1], double covariance[16], double worst[4]);
+
+/*
+ * Tendon forces from f_min to f_max that give the joint torque tau and come nearest to the joint
+ * stiffness K. The torque is exact where the limits allow it, else the nearest (AWIWI_INFEASIBLE). The
+ * stiffness is the nearest of all with that torque, by the sum of the squares of the errors of all
+ * entries (the squared Frobenius norm).
+ * Source: eq. 7.2, 7.6, mended.
+ *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
+ *   in   tau[4] in N m, -1 to 1
+ *   in   K[4][4] in N m/rad, -50 to 50
+ *   in   f_min[1] in N, 3.87595 to 27.9443
+ *   in   f_max[1] in N, 76.0811 to 100.149
+ *   out  f[8] in N
+ * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
+ * Cost: at most 66 times that of fifth_coupling and fifth_tendon_stiffness, and the solver's own.
+ */
+int awiwi_fifth_tendon_distribution(const double q[4], const double tau[4], const double K[16], const double f_min[1], const double f_max[1], double f[8]);
 
 /*
  * Angles of coupler and rocker at a joint angle, and their turns per turn of the joint. The
@@ -1137,7 +1332,7 @@ int awiwi_wrist_palm_pose(const double q71[1], const double q73[1], double T[16]
  *   out  h[38] in m
  * Returns 0 where the side bars are short of the line B0C0 (q73 between 0 and pi) and their plane is
  * short of A0 and bar AA0 reaches; elsewhere 1, and what is not defined is NaN.
- * Cost: 180 add, 144 mul, 2 div, 1 neg, 39 sqrt, 2 sincos.
+ * Cost: 180 add, 145 mul, 2 div, 2 neg, 39 sqrt, 2 sincos.
  */
 int awiwi_wrist_tendon_lengths(const double q71[1], const double q73[1], double h[38]);
 
@@ -1149,7 +1344,7 @@ int awiwi_wrist_tendon_lengths(const double q71[1], const double q73[1], double 
  *   out  dh[38][2] in m/rad
  * Returns 0 where the side bars are short of the line B0C0 (q73 between 0 and pi) and their plane is
  * short of A0 and bar AA0 reaches; elsewhere 1, and what is not defined is NaN.
- * Cost: 438 add, 490 mul, 41 div, 2 neg, 39 sqrt, 2 sincos.
+ * Cost: 436 add, 478 mul, 41 div, 1 neg, 39 sqrt, 2 sincos.
  */
 int awiwi_wrist_coupling(const double q71[1], const double q73[1], double dh[76]);
 
@@ -1162,7 +1357,7 @@ int awiwi_wrist_coupling(const double q71[1], const double q73[1], double dh[76]
  *   out  h[38] in m
  * Returns 0 where the side bars are short of the line B0C0 (q73 between 0 and pi) and their plane is
  * short of A0 and bar AA0 reaches; elsewhere 1, and what is not defined is NaN.
- * Cost: 254 add, 181 mul, 2 div, 1 neg, 43 sqrt, 4 sincos.
+ * Cost: 255 add, 184 mul, 2 div, 2 neg, 43 sqrt, 4 sincos.
  */
 int awiwi_hand_tendon_lengths(const double q[19], const double wrist[2], double h[38]);
 
@@ -1171,7 +1366,7 @@ int awiwi_hand_tendon_lengths(const double q[19], const double wrist[2], double 
  * Source: eq. 5.6, 5.9, 5.21.
  *   in   q[19] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727, -0.3491, -0.1745, -0.08727, -0.08727, -0.3491, -0.1745, -0.08727, -0.08727, -0.3491, -0.1745, -0.08727, -0.5236, -0.3491, -0.1745, -0.08727] to [0.6109, 0.6109, 1.396, 1.396, 0.3491, 1.484, 1.571, 1.396, 0.3491, 1.484, 1.571, 1.396, 0.3491, 1.484, 1.571, 0.6981, 0.3491, 1.484, 1.571]
  *   out  P[38][19] in m/rad
- * Cost: 44 add, 58 mul, 4 div, 4 sqrt, 2 sincos.
+ * Cost: 43 add, 54 mul, 4 div, 1 neg, 4 sqrt, 2 sincos.
  */
 void awiwi_hand_coupling(const double q[19], double P[722]);
 
@@ -1181,7 +1376,7 @@ void awiwi_hand_coupling(const double q[19], double P[722]);
  *   in   q[19] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727, -0.3491, -0.1745, -0.08727, -0.08727, -0.3491, -0.1745, -0.08727, -0.08727, -0.3491, -0.1745, -0.08727, -0.5236, -0.3491, -0.1745, -0.08727] to [0.6109, 0.6109, 1.396, 1.396, 0.3491, 1.484, 1.571, 1.396, 0.3491, 1.484, 1.571, 1.396, 0.3491, 1.484, 1.571, 0.6981, 0.3491, 1.484, 1.571]
  *   in   f[38] in N, 0 to 100
  *   out  tau[19] in N m
- * Cost: 87 add, 76 mul, 4 div, 4 sqrt, 2 sincos.
+ * Cost: 87 add, 72 mul, 4 div, 4 sqrt, 2 sincos.
  */
 void awiwi_hand_joint_torque(const double q[19], const double f[38], double tau[19]);
 
@@ -1193,7 +1388,7 @@ void awiwi_hand_joint_torque(const double q[19], const double f[38], double tau[
  *   in   f[38] in N, 0 to 100
  *   in   k[38] in N/m, 1000 to 50000
  *   out  K[19][19] in N m/rad
- * Cost: 150 add, 194 mul, 4 div, 4 sqrt, 2 sincos.
+ * Cost: 150 add, 164 mul, 4 div, 4 sqrt, 2 sincos.
  */
 void awiwi_hand_joint_stiffness(const double q[19], const double f[38], const double k[38], double K[361]);
 
@@ -1286,7 +1481,7 @@ void awiwi_motor_friction(const double thd[1], double tau[1]);
  * Source: eq. 3.8, differentiated.
  *   in   thd[1] in rad/s, -20 to 20
  *   out  damping[1] in N m s/rad
- * Cost: 2 add, 2 mul, 1 div.
+ * Cost: 2 add, 1 mul, 1 div.
  */
 void awiwi_motor_damping(const double thd[1], double damping[1]);
 
@@ -1295,7 +1490,7 @@ void awiwi_motor_damping(const double thd[1], double damping[1]);
  * Source: eq. 3.4, 3.5.
  *   in   theta[1] in rad, -5 to 5
  *   out  tau[1] in N m
- * Cost: 11 add, 17 mul, 2 sincos.
+ * Cost: 11 add, 14 mul, 2 sincos.
  */
 void awiwi_motor_ripple(const double theta[1], double tau[1]);
 
@@ -1306,7 +1501,7 @@ void awiwi_motor_ripple(const double theta[1], double tau[1]);
  *   in   theta[1] in rad, -5 to 5
  *   in   thd[1] in rad/s, -20 to 20
  *   out  tau[1] in N m
- * Cost: 13 add, 21 mul, 2 sincos, 1 calls.
+ * Cost: 13 add, 17 mul, 2 sincos, 1 calls.
  */
 void awiwi_motor_compensation(const double theta[1], const double thd[1], double tau[1]);
 
@@ -1318,7 +1513,7 @@ void awiwi_motor_compensation(const double theta[1], const double thd[1], double
  *   in   tau[1] in N m, -3 to 3
  *   in   f[1] in N, 0 to 100
  *   out  thdd[1] in rad/s^2
- * Cost: 15 add, 22 mul, 2 sincos, 1 calls.
+ * Cost: 15 add, 19 mul, 2 sincos, 1 calls.
  */
 void awiwi_motor_acceleration(const double theta[1], const double thd[1], const double tau[1], const double f[1], double thdd[1]);
 
@@ -1330,7 +1525,7 @@ void awiwi_motor_acceleration(const double theta[1], const double thd[1], const 
  *   in   thdd[1] in rad/s^2, -1000 to 1000
  *   in   f[1] in N, 0 to 100
  *   out  tau[1] in N m
- * Cost: 15 add, 22 mul, 2 sincos, 1 calls.
+ * Cost: 15 add, 19 mul, 2 sincos, 1 calls.
  */
 void awiwi_motor_torque(const double theta[1], const double thd[1], const double thdd[1], const double f[1], double tau[1]);
 
@@ -1576,9 +1771,11 @@ int awiwi_cascade(const double f[1], const double xd[1], const double stiffness[
  *   in   omega[1] in rad/s, 10 to 1000
  *   out  margin[1] in 1
  *   out  S[8][3] in m/N, m s/N, m s^2/N
- * Cost: 166 add, 209 mul, 23 div, 19 calls.
+ * Returns 0 where the weight is positive and the frequency omega is positive; elsewhere 1, and what is
+ * not defined is NaN.
+ * Cost: 166 add, 210 mul, 23 div, 20 calls.
  */
-void awiwi_cascade_certificate(const double D[16], const double P[32], const double kp[8], const double kd[8], const double weight[1], const double omega[1], double margin[1], double S[24]);
+int awiwi_cascade_certificate(const double D[16], const double P[32], const double kp[8], const double kd[8], const double weight[1], const double omega[1], double margin[1], double S[24]);
 
 /*
  * Motor torque that brings the tendon force f to f_des: kp and kd on its error, estimates cancel the
@@ -2207,6 +2404,37 @@ void awiwi_plant_antagonistic(const double x[6], const double u[2], const double
  * Cost: 12 add, 18 mul, 2 calls.
  */
 void awiwi_antagonistic_springs(const double stretches[2], const double speeds[2], const double tendons[6], double torques[4], double springs[4]);
+
+/*
+ * Forces of a finger's tendons: path is what its joints take of each, slack where it begins to pull.
+ * The first half of a finger's plant. Joint torques and the joints' acceleration follow from the
+ * finger's own kernels.
+ * Source: section 5.1, eq. 10.1.
+ *   in   thetas[8] in rad, -5 to 5
+ *   in   path[8] in m, -0.03 to 0.03
+ *   in   slack[8] in m, -0.03 to 0.03
+ *   in   motor[2] in kg m^2, m, from [0.0001, 0.002] to [0.01, 0.02]
+ *   in   line[3] in N/m, N/m^2, N/m^3, from [1000, 0, 0] to [2e+04, 1e+06, 1e+08]
+ *   out  f[8] in N
+ * Cost: 40 add, 40 mul, 8 calls.
+ */
+void awiwi_plant_finger_forces(const double thetas[8], const double path[8], const double slack[8], const double motor[2], const double line[3], double f[8]);
+
+/*
+ * The other half: rates of (q, q', theta, theta') of four joints, which accelerate with qdd, and eight
+ * motors.
+ * Source: eq. 10.1, mended.
+ *   in   qd[4] in rad/s, -50 to 50
+ *   in   qdd[4] in rad/s^2, -10000 to 10000
+ *   in   thds[8] in rad/s, -50 to 50
+ *   in   f[8] in N, 0 to 120
+ *   in   u[8] in N m, -3 to 3
+ *   in   motor[2] in kg m^2, m, from [0.0001, 0.002] to [0.01, 0.02]
+ *   in   friction[3] in s/rad, N m, N m s/rad, from [0.1, 0, 0] to [100, 2, 0.2]
+ *   out  xd[24] in rad/s, rad/s^2
+ * Cost: 24 add, 40 mul, 1 div, 8 calls.
+ */
+void awiwi_plant_finger(const double qd[4], const double qdd[4], const double thds[8], const double f[8], const double u[8], const double motor[2], const double friction[3], double xd[24]);
 
 #ifdef __cplusplus
 }

@@ -5,79 +5,54 @@
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   qd[4] in rad/s, -20 to 20
  *   out  C[4][4] in N m s/rad
- * Cost: 64 add, 69 mul, 1 neg, 3 sincos.
- * Inputs: sha256 82f1a2954b1337940e5a4135c7ad9a719de196ff29c0ab506ba7d8f3fb9ff68a.
+ * Cost: 46 add, 50 mul, 4 neg, 3 sincos.
+ * Inputs: sha256 27e22bc7c4ee6e86004522d8f50690fdd8de460926c911ade00c68bec4af2ee2.
  */
-#include <math.h>
+#include "trig.h"
 #include "kernels.h"
 
 void awiwi_middle_coriolis_matrix(const double q[restrict 4], const double qd[restrict 4], double C[restrict 16])
 {
     const double t0 = q[1] + q[2];
-    const double t1 = cos(t0);
-    const double t2 = 0.033*t1;
-    const double t3 = qd[1] + qd[2];
-    const double t4 = qd[3] + t3;
-    const double t5 = q[3] + t0;
-    const double t6 = cos(t5);
-    const double t7 = sin(t5);
-    const double t8 = 8.4e-07*t6 + 3.78e-05*t7;
-    const double t9 = t4*t8;
-    const double t10 = t2*t9;
-    const double t11 = sin(t0);
-    const double t12 = t11*(6.78634e-06*t1 - 2.56e-08*t11) + 1.28e-08;
-    const double t13 = 0.033*t11;
-    const double t14 = 3.78e-05*t6 - 8.4e-07*t7;
-    const double t15 = t13*t14;
-    const double t16 = t7*(4.73532e-07*t6 - 1.012e-08*t7) + 5.06e-09;
-    const double t17 = t4*t16;
-    const double t18 = -t10 - t3*(t12 + t15) - t17;
-    const double cos_q1 = cos(q[1]);
-    const double t19 = 0.044*cos_q1;
-    const double t20 = 1.3e-06*t1 + 0.0002426*t11;
-    const double t21 = t3*t20 + t9;
-    const double t22 = t19*t21;
-    const double sin_q1 = sin(q[1]);
-    const double t23 = sin_q1*(2.771021e-05*cos_q1 - 8.92e-08*sin_q1) + 4.46e-08;
-    const double t24 = 0.044*sin_q1;
-    const double t25 = 0.0002426*t1 - 1.3e-06*t11;
-    const double t26 = t24*(t25 + t14);
-    const double t27 = t18 - t22 - qd[1]*(t23 + t26);
-    const double t28 = 3.3e-06*cos_q1 + 0.0007128*sin_q1;
-    const double t29 = t4*(1.5954e-07*t6 - 4.612e-09*t7);
-    const double t30 = t3*(7.1078e-07*t1 - 6.56e-09*t11) + t29;
-    const double t31 = 0.006*qd[0];
-    const double t32 = t20 + t8;
-    const double t33 = t19*t32;
-    const double t34 = t23 + t33;
-    const double t35 = t2*t8;
-    const double t36 = t12 + t35;
-    const double t37 = t15 + t16 + t36;
-    const double t38 = t31*(t28 + t32) + qd[0]*(t26 + t34 + t37);
-    const double t39 = t31*t32 + qd[0]*t33 + qd[0]*t37;
-    const double t40 = qd[0]*t8;
-    const double t41 = t31*t8 + t19*t40 + (t2*t40 + qd[0]*t16);
-    const double t42 = t4*t14;
-    const double t43 = t24*(t3*t25 + t42);
-    const double t44 = t13*t42;
-    const double t45 = t44 + t3*t36 + t17;
-    const double t46 = t18 + t45;
-    const double t47 = t44 - t10;
-    const double t48 = t3*(t35 - t15);
-    C[0] = t27 - 0.006*(qd[1]*t28 + t21);
-    C[1] = qd[1]*(1.16724e-06*cos_q1 - 1.166e-08*sin_q1) + t30 - t38;
-    C[2] = t30 - t39;
-    C[3] = t29 - t41;
-    C[4] = t38;
-    C[5] = t27 + (t43 + t45 + qd[1]*t34);
-    C[6] = t43 + t46 - t22;
-    C[7] = t24*t42 + t47 - t19*t9;
-    C[8] = t39;
-    C[9] = qd[1]*(t33 - t26) + t46;
-    C[10] = t46;
-    C[11] = t47;
-    C[12] = t41;
-    C[13] = qd[1]*(t19*t8 - t24*t14) + t48;
-    C[14] = t48;
+    const double t1 = q[3] + t0 - 1.5485777614681775;
+    const awiwi_turn3 a0 = awiwi_sincos3(q[1], t0, t1);
+    const double t2 = a0.cos[0] + 0.13636363636363635;
+    const double t3 = 1.6636106159795927e-06*a0.cos[2];
+    const double t4 = (t2 + 0.75*a0.cos[1])*t3 + a0.cos[2]*(1.0925468904244817e-08*a0.cos[2] - 4.735141006910168e-07*a0.sin[2]) - 5.4627344521224085e-09;
+    const double t5 = 5.72e-08*a0.cos[1] + 1.06744e-05*a0.sin[1];
+    const double t6 = t2*t5 + a0.sin[1]*(6.78634e-06*a0.cos[1] - 2.56e-08*a0.sin[1] - 1.2477079619846946e-06*a0.sin[2]) + t4 + 1.28e-08;
+    const double t7 = 1.06744e-05*a0.cos[1] - 5.72e-08*a0.sin[1] - 1.6636106159795927e-06*a0.sin[2];
+    const double t8 = 1.98e-08*(a0.cos[0] + 216.0*a0.sin[0]) + a0.sin[0]*(2.771021e-05*a0.cos[0] + t7 - 8.92e-08*a0.sin[0]) + t6 + 4.46e-08;
+    const double t9 = qd[1] + qd[2];
+    const double t10 = qd[3] + t9;
+    const double t11 = t10*(1.0664033896870507e-09*a0.cos[2] + 1.5960308558361416e-07*a0.sin[2]);
+    const double t12 = t9*(7.1078e-07*a0.cos[1] - 6.56e-09*a0.sin[1]) - t11;
+    const double t13 = qd[0]*t8;
+    const double t14 = qd[0]*t6;
+    const double t15 = qd[0]*t4;
+    const double t16 = a0.cos[0]*(t5 + t3) - a0.sin[0]*t7;
+    const double t17 = qd[1]*t16;
+    const double t18 = 1.2477079619846946e-06*(a0.cos[1]*a0.cos[2] + a0.sin[1]*a0.sin[2]);
+    const double t19 = t9*t18;
+    const double t20 = t10*t18;
+    const double t21 = t19 - t20;
+    const double t22 = 1.6636106159795927e-06*(a0.cos[0]*a0.cos[2] + a0.sin[0]*a0.sin[2]);
+    const double t23 = t10*t22;
+    const double t24 = t21 + t9*(t22 - t16) - t23;
+    C[0] = -(qd[3]*t4) - qd[2]*t6 - qd[1]*t8;
+    C[1] = qd[1]*(1.16724e-06*a0.cos[0] - 1.166e-08*a0.sin[0]) + t12 - t13;
+    C[2] = t12 - t14;
+    C[3] = -t11 - t15;
+    C[4] = t13;
+    C[5] = t17 + t24;
+    C[6] = t24;
+    C[7] = -t23 - t20;
+    C[8] = t14;
+    C[9] = t21 + t17;
+    C[10] = t21;
+    C[11] = -t20;
+    C[12] = t15;
+    C[13] = qd[1]*t22 + t19;
+    C[14] = t19;
     C[15] = 0.0;
 }

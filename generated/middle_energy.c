@@ -7,39 +7,32 @@
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  kinetic[1] in J
  *   out  potential[1] in J
- * Cost: 51 add, 67 mul, 4 sincos.
+ * Cost: 50 add, 60 mul, 4 sincos.
  * Inputs: sha256 6dc3171fbd7a3bb4e8ba1b2ad4c5197dcf6b595756784e4b6b74a397a420a135.
  */
-#include <math.h>
+#include "trig.h"
 #include "kernels.h"
 
 void awiwi_middle_energy(const double q[restrict 4], const double qd[restrict 4], const double g[restrict 3], double kinetic[restrict 1], double potential[restrict 1])
 {
     const double t0 = q[1] + q[2];
-    const double t1 = cos(t0);
-    const double t2 = q[3] + t0;
-    const double t3 = cos(t2);
-    const double t4 = sin(t2);
-    const double t5 = 3.78e-05*t3 - 8.4e-07*t4;
-    const double t6 = sin(t0);
-    const double t7 = 8.4e-07*t3 + 3.78e-05*t4;
-    const double t8 = t1*t5 + t6*t7;
-    const double t9 = 0.066*t8 + 7.384428e-06;
-    const double t10 = 0.033*t8 + 5.16368e-07;
-    const double cos_q1 = cos(q[1]);
-    const double t11 = 0.0002426*t1 - 1.3e-06*t6 + t5;
-    const double sin_q1 = sin(q[1]);
-    const double t12 = 1.3e-06*t1 + 0.0002426*t6 + t7;
-    const double t13 = cos_q1*t11 + sin_q1*t12;
-    const double t14 = t9 + 0.088*t13 + 2.791019e-05;
-    const double t15 = 4.612e-09*t3 + 1.5954e-07*t4;
-    const double t16 = 6.56e-09*t1 + 7.1078e-07*t6 + t15;
-    const double t17 = 0.0007128*cos_q1 - 3.3e-06*sin_q1;
-    const double t18 = cos_q1*(2.771021e-05*cos_q1 - 8.92e-08*sin_q1) + t1*(6.78634e-06*t1 - 2.56e-08*t6) + t3*(4.73532e-07*t3 - 1.012e-08*t4) + 0.012*(t17 + t11) + t14 - 0.066*t6*t7 - 0.088*sin_q1*t12 - 3.4061942e-05;
-    const double t19 = 2.58184e-07*qd[3]*qd[3] + qd[2]*(0.5*qd[2]*t9 + qd[3]*t10) + qd[1]*(0.5*qd[1]*t14 + qd[2]*(t9 + 0.044*t13) + qd[3]*(0.044*(cos_q1*t5 + sin_q1*t7) + t10)) + qd[0]*(qd[3]*t15 + qd[2]*t16 + qd[1]*(1.166e-08*cos_q1 + 1.16724e-06*sin_q1 + t16) + 0.5*qd[0]*t18);
-    const double sin_q0 = sin(q[0]);
-    const double cos_q0 = cos(q[0]);
-    const double t20 = 2.806e-05*(g[0]*sin_q0 - g[1]*cos_q0) - g[2]*(3.3e-06*cos_q1 + 0.0007128*sin_q1 + t12) - (g[0]*cos_q0 + g[1]*sin_q0)*(t17 + t11 + 0.0001347);
-    kinetic[0] = t19;
-    potential[0] = t20;
+    const double t1 = q[3] + t0 - 1.5485777614681775;
+    const awiwi_turn4 a0 = awiwi_sincos4(t1, t0, q[1], q[0]);
+    const double t2 = 1.5960308558361416e-07*a0.cos[0] - 1.0664033896870507e-09*a0.sin[0];
+    const double t3 = 6.56e-09*a0.cos[1] + 7.1078e-07*a0.sin[1] + t2;
+    const double t4 = a0.cos[1]*(0.24490395417429173*a0.cos[1] - 0.0009238472028901982*a0.sin[1] - 0.09005402427370233*a0.sin[0]);
+    const double t5 = 0.0007128*a0.cos[2] - 3.3e-06*a0.sin[2];
+    const double t6 = 0.0002426*a0.cos[1] - 1.3e-06*a0.sin[1] - 3.780933218135438e-05*a0.sin[0];
+    const double t7 = t4 + 433.0533763547804*(t5 + t6) + a0.cos[2]*(a0.cos[2] + 3175.724759935056*t6 - 0.0032190300975705344*a0.sin[2]) + 0.06157293829045353 - a0.cos[0]*(0.017088073337986856*a0.cos[0] + 0.00039427593310353175*a0.sin[0]);
+    const double t8 = qd[3]*t2 + qd[2]*t3 + qd[1]*(1.166e-08*a0.cos[2] + 1.16724e-06*a0.sin[2] + t3) + 1.3855105e-05*qd[0]*t7;
+    const double t9 = 1.2477079619846946e-06*(a0.cos[1]*a0.sin[0] - a0.sin[1]*a0.cos[0]);
+    const double t10 = t9 - 5.16368e-07;
+    const double t11 = t9 + t10 - 6.86806e-06;
+    const double t12 = 1.3e-06*a0.cos[1] + 0.0002426*a0.sin[1] + 3.780933218135438e-05*a0.cos[0];
+    const double t13 = 0.044*(a0.cos[2]*t6 + a0.sin[2]*t12);
+    const double t14 = t11 - t13;
+    const double t15 = qd[3]*(1.6636106159795927e-06*(a0.cos[2]*a0.sin[0] - a0.sin[2]*a0.cos[0]) + t10) + qd[2]*t14 - 0.5*qd[1]*(t13 + 2.791019e-05 - t14);
+    const double t16 = 2.806e-05*(g[0]*a0.sin[3] - g[1]*a0.cos[3]) - g[2]*(3.3e-06*a0.cos[2] + 0.0007128*a0.sin[2] + t12) - (g[0]*a0.cos[3] + g[1]*a0.sin[3])*(t5 + t6 + 0.0001347);
+    kinetic[0] = 2.58184e-07*qd[3]*qd[3] + qd[0]*t8 - qd[2]*(qd[3]*t10 + 0.5*qd[2]*t11) - qd[1]*t15;
+    potential[0] = t16;
 }

@@ -7,95 +7,72 @@
  *   in   tau[4] in N m, -1 to 1
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  qdd[4] in rad/s^2
- * Cost: 110 add, 141 mul, 3 div, 4 sincos.
- * Inputs: sha256 e62e10a0c5f174abe387898095f5e44e9b4bd4c4d0e8ad5e213f8ec3d580acd9.
+ * Cost: 95 add, 119 mul, 3 div, 2 neg, 4 sincos.
+ * Inputs: sha256 ae4a85ce0785917635eb44a968958b9f879dffad6da58c0336320b942386f084.
  */
-#include <math.h>
+#include "trig.h"
 #include "kernels.h"
 
 void awiwi_middle_forward_dynamics(const double q[restrict 4], const double qd[restrict 4], const double tau[restrict 4], const double g[restrict 3], double qdd[restrict 4])
 {
-    const double t0 = 2.0*qd[0];
-    const double t1 = qd[1]*t0;
-    const double sin_q1 = sin(q[1]);
-    const double cos_q1 = cos(q[1]);
-    const double t2 = 2.771021e-05*cos_q1 - 8.92e-08*sin_q1;
-    const double t3 = sin_q1*t2 + 4.46e-08;
-    const double t4 = qd[1] + qd[2];
-    const double t5 = 0.066*qd[0];
-    const double t6 = q[1] + q[2];
-    const double t7 = sin(t6);
-    const double sin_q0 = sin(q[0]);
-    const double cos_q0 = cos(q[0]);
-    const double t8 = g[0]*sin_q0 - g[1]*cos_q0;
-    const double t9 = 0.088*sin_q1;
-    const double t10 = t8 - qd[0]*qd[1]*t9;
-    const double t11 = q[3] + t6;
-    const double t12 = cos(t11);
-    const double t13 = sin(t11);
-    const double t14 = 3.78e-05*t12 - 8.4e-07*t13;
-    const double t15 = t4*t0;
-    const double t16 = cos(t6);
-    const double t17 = 6.78634e-06*t16 - 2.56e-08*t7;
-    const double t18 = t7*t17 + 1.28e-08;
-    const double t19 = qd[3] + t4;
-    const double t20 = 8.4e-07*t12 + 3.78e-05*t13;
-    const double t21 = t19*t20;
-    const double t22 = 4.73532e-07*t12 - 1.012e-08*t13;
-    const double t23 = t13*t22 + 5.06e-09;
-    const double t24 = 0.044*cos_q1;
-    const double t25 = 1.3e-06*t16 + 0.0002426*t7;
-    const double t26 = t15*t25 + t0*t21;
-    const double t27 = 3.3e-06*cos_q1 + 0.0007128*sin_q1;
-    const double t28 = g[0]*cos_q0 + g[1]*sin_q0;
-    const double t29 = qd[1]*qd[1];
-    const double t30 = t4*t4;
-    const double t31 = 0.0007128*cos_q1 - 3.3e-06*sin_q1;
-    const double t32 = 0.0002426*t16 - 1.3e-06*t7;
-    const double t33 = t19*t19;
-    const double t34 = 4.612e-09*t12 + 1.5954e-07*t13;
-    const double t35 = 1936603.352647724*t34;
-    const double t36 = 0.044*sin_q1;
-    const double t37 = g[2] + t29*t36;
-    const double t38 = 0.033*t7;
-    const double t39 = qd[0]*qd[0];
-    const double t40 = t39 + t30;
-    const double t41 = 0.033*t16;
-    const double t42 = 0.006*t39 + t28;
-    const double t43 = (t39 + t29)*t24 + t42;
-    const double t44 = (t37 + t30*t38)*t14 - t20*(t40*t41 + t43) - t39*t23;
-    const double t45 = tau[3] + t44;
-    const double t46 = t33*t20;
-    const double t47 = (t39 + t33)*t14;
-    const double t48 = t37*t32 + t41*t46 + t44 - t25*t43 - t39*t18 - t38*t47;
-    const double t49 = t41*t14 + t38*t20;
-    const double t50 = t49 + 5.16368e-07;
-    const double t51 = 1936603.352647724*t50;
-    const double t52 = tau[2] + t48 - t51*t45;
-    const double t53 = 6.56e-09*t16 + 7.1078e-07*t7 + t34;
-    const double t54 = t53 - t35*t50;
-    const double t55 = 2.0*t49 + 7.384428e-06;
-    const double t56 = 1.0/(t55 - t50*t51);
-    const double t57 = t54*t56;
-    const double t58 = t24*t14 + t36*t20 + t50;
-    const double t59 = 1936603.352647724*t58;
-    const double t60 = t32 + t14;
-    const double t61 = t25 + t20;
-    const double t62 = t24*t60 + t36*t61;
-    const double t63 = t62 + t55 - t58*t51;
-    const double t64 = t63*t56;
-    const double t65 = tau[1] + g[2]*t31 + t24*(t30*t25 + t46) + t48 - t27*t42 - t39*t3 - t36*(t40*t32 + t47) - t45*t59 - t52*t64;
-    const double t66 = 1.166e-08*cos_q1 + 1.16724e-06*sin_q1 + t53 - t35*t58 - t63*t57;
-    const double t67 = t55 + 2.0*t62 + 2.791019e-05;
-    const double t68 = 1.0/(t67 - t58*t59 - t63*t64);
-    const double t69 = t66*t68;
-    const double t70 = tau[0] + t1*t3 + (t4*t5*t7 - t10)*t14 + t15*t18 + t5*t16*t21 + t0*t19*t23 + t24*t26 + 0.006*(t1*t27 + t26) - 2.806e-05*t28 - t29*(1.16724e-06*cos_q1 - 1.166e-08*sin_q1) - t30*(7.1078e-07*t16 - 6.56e-09*t7) - t8*(t31 + 0.0001347) - t10*t32 - t33*(1.5954e-07*t12 - 4.612e-09*t13) - t35*t45 - t52*t57 - t65*t69;
-    const double t71 = cos_q1*t2 + t16*t17 + t12*t22 + 0.012*(t31 + t60) + t67 - 0.066*t7*t20 - t9*t61 - t34*t35 - t54*t57 - t66*t69 - 3.4061942e-05;
-    const double t72 = t70/t71;
-    const double t73 = t65*t68 - t69*t72;
-    const double t74 = t52*t56 - t57*t72 - t64*t73;
-    qdd[0] = t72;
-    qdd[1] = t73;
-    qdd[2] = t74;
-    qdd[3] = 1936603.352647724*t45 - t35*t72 - t59*t73 - t51*t74;
+    const double t0 = q[1] + q[2];
+    const double t1 = q[3] + t0 - 1.5418962645735244;
+    const double t2 = qd[1] + qd[2];
+    const double t3 = qd[3] + t2;
+    const double t4 = t3*t3;
+    const awiwi_turn4 a0 = awiwi_sincos4(t1, q[1], t0, q[0]);
+    const double t5 = 0.044*a0.cos[1];
+    const double t6 = t5 + 0.006;
+    const double t7 = 0.033*a0.cos[2];
+    const double t8 = 3.7808488234814314e-05*a0.cos[0] + 2.526210559471061e-07*a0.sin[0];
+    const double t9 = 4.733258310795991e-07*a0.cos[0] + 1.725187111031159e-08*a0.sin[0];
+    const double t10 = (t6 + t7)*t8 + 8.625935555155794e-09 - a0.sin[0]*t9;
+    const double t11 = 1.3e-06*a0.cos[2] + 0.0002426*a0.sin[2];
+    const double t12 = 2.526210559471061e-07*a0.cos[0] - 3.7808488234814314e-05*a0.sin[0];
+    const double t13 = 0.033*t12;
+    const double t14 = 6.78634e-06*a0.cos[2] + t13 - 2.56e-08*a0.sin[2];
+    const double t15 = t6*t11 + a0.sin[2]*t14 + 1.28e-08;
+    const double t16 = 3.3e-06*a0.cos[1] + 0.0007128*a0.sin[1];
+    const double t17 = 0.0002426*a0.cos[2] - 1.3e-06*a0.sin[2];
+    const double t18 = t17 + t12;
+    const double t19 = 0.044*t18;
+    const double t20 = 2.771021e-05*a0.cos[1] + t19 - 8.92e-08*a0.sin[1];
+    const double t21 = 0.006*t16 + a0.sin[1]*t20 + 4.46e-08;
+    const double t22 = qd[1]*qd[1];
+    const double t23 = 0.044*a0.sin[1];
+    const double t24 = g[2] + t22*t23;
+    const double t25 = t4*t8;
+    const double t26 = g[0]*a0.cos[3] + g[1]*a0.sin[3];
+    const double t27 = t26 + t22*t5;
+    const double t28 = 0.033*a0.sin[2];
+    const double t29 = t4*t12;
+    const double t30 = qd[0]*qd[0];
+    const double t31 = t7*t12 + t28*t8;
+    const double t32 = 1936603.352647724*t31;
+    const double t33 = t2*t2;
+    const double t34 = tau[3] + (t24 + t33*t28)*t12 - (t27 + t33*t7)*t8 - t30*t10;
+    const double t35 = tau[2] + t24*t17 + t7*t25 - tau[3] - t27*t11 - t28*t29 - t30*t15 - t32*t34;
+    const double t36 = 0.3090947699747778*a0.cos[0];
+    const double t37 = 6.56e-09*a0.cos[2] + 7.1078e-07*a0.sin[2] - t36*t31;
+    const double t38 = 1.0/(t31*t32 - 6.86806e-06);
+    const double t39 = t37*t38;
+    const double t40 = 0.0007128*a0.cos[1] - 3.3e-06*a0.sin[1];
+    const double t41 = t5*t12 + t23*t8;
+    const double t42 = 1936603.352647724*t41;
+    const double t43 = t5*t17 + t23*t11 - t31*t42;
+    const double t44 = t43*t38;
+    const double t45 = tau[1] + g[2]*t40 + t5*(t33*t11 + t25) + t35*t44 - tau[2] - t16*t26 - t23*(t33*t17 + t29) - t42*t34 - t30*t21;
+    const double t46 = 1.166e-08*a0.cos[1] + 1.16724e-06*a0.sin[1] + t43*t39 - t36*t41;
+    const double t47 = 1.0/(t41*t42 - t43*t44 - 2.791019e-05);
+    const double t48 = t46*t47;
+    const double t49 = t40 + t18;
+    const double t50 = tau[0] + t4*(1.5960664818233607e-07*a0.sin[0]) + 2.0*qd[0]*(t3*t10 + t2*t15 + qd[1]*t21) + t35*t39 + t45*t48 - 2.806e-05*t26 - t22*(1.16724e-06*a0.cos[1] - 1.166e-08*a0.sin[1]) - t33*(7.1078e-07*a0.cos[2] - 6.56e-09*a0.sin[2]) - (g[0]*a0.sin[3] - g[1]*a0.cos[3])*(t49 + 0.0001347) - t36*t34;
+    const double t51 = a0.cos[0]*(4.933358020636445e-08*a0.cos[0] + t9) - 0.012*t49 - a0.cos[2]*(t13 + t14) - a0.cos[1]*(t19 + t20) - t37*t39 - t46*t48 - 1.7061049155397995e-06;
+    const double t52 = t50/t51;
+    const double t53 = t45*t47 + t48*t52;
+    const double t54 = t35*t38 + t39*t52 + t44*t53;
+    qdd[0] = -t52;
+    qdd[1] = -t53;
+    qdd[2] = t53 - t54;
+    qdd[3] = 1936603.352647724*t34 + t36*t52 + t42*t53 + (t32 + 1.0)*t54;
 }

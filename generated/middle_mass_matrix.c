@@ -4,53 +4,42 @@
  * Source: eq. 2.17, 5.4.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   out  M[4][4] in kg m^2
- * Cost: 34 add, 41 mul, 3 sincos.
- * Inputs: sha256 e62e10a0c5f174abe387898095f5e44e9b4bd4c4d0e8ad5e213f8ec3d580acd9.
+ * Cost: 33 add, 33 mul, 3 sincos.
+ * Inputs: sha256 ae4a85ce0785917635eb44a968958b9f879dffad6da58c0336320b942386f084.
  */
-#include <math.h>
+#include "trig.h"
 #include "kernels.h"
 
 void awiwi_middle_mass_matrix(const double q[restrict 4], double M[restrict 16])
 {
-    const double cos_q1 = cos(q[1]);
-    const double sin_q1 = sin(q[1]);
     const double t0 = q[1] + q[2];
-    const double t1 = cos(t0);
-    const double t2 = sin(t0);
-    const double t3 = q[3] + t0;
-    const double t4 = cos(t3);
-    const double t5 = sin(t3);
-    const double t6 = 3.78e-05*t4 - 8.4e-07*t5;
-    const double t7 = 0.0002426*t1 + t6 - 1.3e-06*t2;
-    const double t8 = 8.4e-07*t4 + 3.78e-05*t5;
-    const double t9 = t1*t6 + t2*t8;
-    const double t10 = 0.066*t9 + 7.384428e-06;
-    const double t11 = 0.044*cos_q1;
-    const double t12 = 0.044*sin_q1;
-    const double t13 = 1.3e-06*t1 + 0.0002426*t2 + t8;
-    const double t14 = t11*t7 + t12*t13;
-    const double t15 = t10 + 2.0*t14 + 2.791019e-05;
-    const double t16 = cos_q1*(2.771021e-05*cos_q1 - 8.92e-08*sin_q1) + t1*(6.78634e-06*t1 - 2.56e-08*t2) + t4*(4.73532e-07*t4 - 1.012e-08*t5) + 0.012*(0.0007128*cos_q1 + t7 - 3.3e-06*sin_q1) + t15 - 0.066*t2*t8 - 0.088*sin_q1*t13 - 3.4061942e-05;
-    const double t17 = 4.612e-09*t4 + 1.5954e-07*t5;
-    const double t18 = 6.56e-09*t1 + 7.1078e-07*t2 + t17;
-    const double t19 = 1.166e-08*cos_q1 + 1.16724e-06*sin_q1 + t18;
-    const double t20 = t14 + t10;
-    const double t21 = 0.033*t9 + 5.16368e-07;
-    const double t22 = t11*t6 + t12*t8 + t21;
-    M[0] = t16;
-    M[1] = t19;
-    M[2] = t18;
-    M[3] = t17;
-    M[4] = t19;
-    M[5] = t15;
-    M[6] = t20;
-    M[7] = t22;
-    M[8] = t18;
-    M[9] = t20;
-    M[10] = t10;
-    M[11] = t21;
-    M[12] = t17;
-    M[13] = t22;
-    M[14] = t21;
+    const double t1 = q[3] + t0 - 1.5485777614681775;
+    const awiwi_turn3 a0 = awiwi_sincos3(t0, t1, q[1]);
+    const double t2 = a0.sin[0] + 29.08410167796491*a0.sin[1] - 186.6153846153846*a0.cos[0];
+    const double t3 = a0.cos[0]*(6.78634e-06*a0.cos[0] - 2.56e-08*a0.sin[0] - 2.495415923969389e-06*a0.sin[1]) + 1.56e-08*(548.3076923076923*a0.cos[2] - 2.5384615384615383*a0.sin[2] - t2) + a0.cos[2]*(2.771021e-05*a0.cos[2] - 8.92e-08*a0.sin[2] - 1.144e-07*t2) + 1.7061990503455084e-06 - a0.cos[1]*(4.735141006910168e-07*a0.cos[1] + 1.0925468904244817e-08*a0.sin[1]);
+    const double t4 = 1.5960308558361416e-07*a0.cos[1] - 1.0664033896870507e-09*a0.sin[1];
+    const double t5 = 6.56e-09*a0.cos[0] + 7.1078e-07*a0.sin[0] + t4;
+    const double t6 = 1.166e-08*a0.cos[2] + 1.16724e-06*a0.sin[2] + t5;
+    const double t7 = 1.2477079619846946e-06*(a0.cos[0]*a0.sin[1] - a0.sin[0]*a0.cos[1]);
+    const double t8 = 5.16368e-07 - t7;
+    const double t9 = t8 + 6.86806e-06 - t7;
+    const double t10 = 5.72e-08*(a0.cos[2]*t2 - a0.sin[2]*(a0.cos[0] + 186.6153846153846*a0.sin[0] + 29.08410167796491*a0.cos[1]));
+    const double t11 = t9 - t10;
+    const double t12 = t8 - 1.6636106159795927e-06*(a0.cos[2]*a0.sin[1] - a0.sin[2]*a0.cos[1]);
+    M[0] = t3;
+    M[1] = t6;
+    M[2] = t5;
+    M[3] = t4;
+    M[4] = t6;
+    M[5] = t11 + 2.791019e-05 - t10;
+    M[6] = t11;
+    M[7] = t12;
+    M[8] = t5;
+    M[9] = t11;
+    M[10] = t9;
+    M[11] = t8;
+    M[12] = t4;
+    M[13] = t12;
+    M[14] = t8;
     M[15] = 5.16368e-07;
 }

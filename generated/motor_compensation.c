@@ -6,21 +6,19 @@
  *   in   theta[1] in rad, -5 to 5
  *   in   thd[1] in rad/s, -20 to 20
  *   out  tau[1] in N m
- * Cost: 13 add, 21 mul, 2 sincos, 1 calls.
+ * Cost: 13 add, 17 mul, 2 sincos, 1 calls.
  * Inputs: sha256 4ac7c242f09df3b78e0f5c0776a7286d65f6e0b1d3d9afc8e4e505e87a15808c.
  */
 #include <math.h>
+#include "trig.h"
 #include "kernels.h"
 
 void awiwi_motor_compensation(const double theta[restrict 1], const double thd[restrict 1], double tau[restrict 1])
 {
-    const double cos_theta0 = cos(theta[0]);
-    const double sin_theta0 = sin(theta[0]);
     const double t0 = 100.0*theta[0];
-    const double t1 = sin(t0);
-    const double t2 = cos(t0);
-    const double t3 = 2.0*sin_theta0*sin_theta0;
-    const double t4 = t3 - 1.0;
-    const double t5 = 0.005209445330007911*cos_theta0 + 0.029544232590366242*sin_theta0 + 0.045962666587138684*t1 + 0.024148145657226706*(2.0*t1*t1 - 1.0) + t2*(0.012940952255126039*t1 + 0.03856725658119236) - 0.010392304845413263*(cos_theta0*(t3 + t4)) - 0.006*(sin_theta0*(2.0*cos_theta0*cos_theta0 - t4));
-    tau[0] = 0.9*(0.0356*thd[0] + 0.5586*atan(10.0*thd[0]) + t5);
+    const awiwi_turn2 a0 = awiwi_sincos2(theta[0], t0);
+    const double t1 = a0.sin[0]*a0.sin[0];
+    const double t2 = t1 - 0.5;
+    const double t3 = 0.14633273398898625*a0.cos[0] + 0.8298941738866922*a0.sin[0] + 1.2910861400881652*a0.sin[1] + 1.3566373964734104*(a0.sin[1]*a0.sin[1] - 0.5) + a0.cos[1]*(0.3635098948069112*a0.sin[1] + 1.0833499039660774) - 0.5838373508659137*(a0.cos[0]*(t1 + t2)) - 0.33707865168539325*(a0.sin[0]*(a0.cos[0]*a0.cos[0] - t2));
+    tau[0] = 0.03204*(thd[0] + 15.691011235955056*atan(10.0*thd[0]) + t3);
 }

@@ -4,12 +4,12 @@
  * Source: eq. 3.8, differentiated.
  *   in   thd[1] in rad/s, -20 to 20
  *   out  damping[1] in N m s/rad
- * Cost: 2 add, 2 mul, 1 div.
+ * Cost: 2 add, 1 mul, 1 div.
  * Inputs: sha256 441d8317e70b645c8505a3a59d6454fafebc7990caf19f705f4dd61b7a81acb8.
  */
 #include "kernels.h"
 
 void awiwi_motor_damping(const double thd[restrict 1], double damping[restrict 1])
 {
-    damping[0] = 5.586/(100.0*thd[0]*thd[0] + 1.0) + 0.0356;
+    damping[0] = 0.05586/(thd[0]*thd[0] + 0.01) + 0.0356;
 }

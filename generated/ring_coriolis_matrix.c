@@ -5,71 +5,48 @@
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   in   qd[3] in rad/s, -20 to 20
  *   out  C[3][3] in N m s/rad
- * Cost: 69 add, 79 mul, 1 neg, 3 sincos.
- * Inputs: sha256 bd8b39edf0c326c692ad61b5af6c0fc4e8d7a58d1260e50a706973fc5a47c5f8.
+ * Cost: 52 add, 58 mul, 1 neg, 3 sincos.
+ * Inputs: sha256 ed3232564f274d4be5483571e47101a84f2df0a316cf4e98203aa0bde8d76c89.
  */
-#include <math.h>
+#include "trig.h"
 #include "kernels.h"
 
 void awiwi_ring_coriolis_matrix(const double q[restrict 3], const double qd[restrict 3], double C[restrict 9])
 {
-    const double t0 = qd[1] + qd[2];
-    const double t1 = q[1] + q[2];
-    const double t2 = sin(t1);
-    const double t3 = cos(t1);
-    const double t4 = t2*(5.463e-06*t3 - 2.352e-08*t2) + 1.176e-08;
-    const double t5 = 0.0305*t2;
-    const double t6 = t1 + 0.7857142857142857*q[2];
-    const double t7 = cos(t6);
-    const double t8 = sin(t6);
-    const double t9 = 3.6e-05*t7 - 8e-07*t8;
-    const double t10 = t4 + t5*t9;
-    const double t11 = t0 + 0.7857142857142857*qd[2];
-    const double t12 = t8*(4.4334e-07*t7 - 1.04e-08*t8) + 5.2e-09;
-    const double t13 = t11*t12;
-    const double t14 = 8e-07*t7 + 3.6e-05*t8;
-    const double t15 = t3*t14;
-    const double t16 = 0.0305*t15;
-    const double t17 = -(t0*t10) - t13 - t11*t16;
-    const double cos_q1 = cos(q[1]);
-    const double t18 = 0.041*cos_q1;
-    const double t19 = 1.2e-06*t3 + 0.0002108*t2;
-    const double t20 = t0*t19 + t11*t14;
-    const double sin_q1 = sin(q[1]);
-    const double t21 = sin_q1*(2.23216e-05*cos_q1 - 7.9e-08*sin_q1) + 3.95e-08;
-    const double t22 = 0.041*sin_q1;
-    const double t23 = 0.0002108*t3 - 1.2e-06*t2;
-    const double t24 = t23 + t9;
-    const double t25 = t22*t24;
-    const double t26 = t17 - t18*t20 - qd[1]*(t21 + t25);
-    const double t27 = 3e-06*cos_q1 + 0.000615*sin_q1;
-    const double t28 = t11*(1.518e-07*t7 - 4.44e-09*t8);
-    const double t29 = t0*(6.2216e-07*t3 - 5.44e-09*t2) + t28;
-    const double t30 = 0.006*qd[0];
-    const double t31 = t19 + t14;
-    const double t32 = t21 + t18*t31;
-    const double t33 = t12 + t10 + t16;
-    const double t34 = t30*(t27 + t31) + qd[0]*(t25 + t32 + t33);
-    const double t35 = qd[0]*t12;
-    const double t36 = 0.7857142857142857*t14;
-    const double t37 = t31 + t36;
-    const double t38 = 0.023964285714285716*t15;
-    const double t39 = qd[0]*(t38 + t33);
-    const double t40 = t11*t9;
-    const double t41 = t0*t23 + t40;
-    const double t42 = t5*t40 + t13 + t0*(t4 + t16);
-    const double t43 = 0.023964285714285716*t2;
-    const double t44 = t17 + t42;
-    const double t45 = t43*t40 - t11*t38 + t44;
-    const double t46 = t18*t37;
-    const double t47 = t0*(t43*t9 - t38);
-    C[0] = t26 - 0.006*(qd[1]*t27 + t20);
-    C[1] = qd[1]*(1.0264e-06*cos_q1 - 9.6e-09*sin_q1) + t29 - t34;
-    C[2] = t29 + 0.7857142857142857*(t28 - t35) - (t18 + 0.006)*(qd[0]*t37) - t39;
-    C[3] = t34;
-    C[4] = t26 + (t22*t41 + qd[1]*t32 + t42);
-    C[5] = t22*(t41 + 0.7857142857142857*t40) + t45 - t18*(t20 + t11*t36);
-    C[6] = t30*t37 + 0.7857142857142857*t35 + qd[0]*t46 + t39;
-    C[7] = qd[1]*(t46 - t22*(t24 + 0.7857142857142857*t9)) + t44 - t47;
-    C[8] = t45 - t47;
+    const double t0 = q[1] + q[2];
+    const double t1 = t0 + 0.7857142857142857*q[2] - 1.5485777614681775;
+    const awiwi_turn3 a0 = awiwi_sincos3(q[1], t0, t1);
+    const double t2 = 8.6428e-06*a0.cos[1] - 4.92e-08*a0.sin[1] - 1.4763643994624091e-06*a0.sin[2];
+    const double t3 = a0.cos[0] + 0.14634146341463414;
+    const double t4 = 4.92e-08*a0.cos[1] + 8.6428e-06*a0.sin[1];
+    const double t5 = 1.4763643994624091e-06*a0.cos[2];
+    const double t6 = (t3 + 0.7439024390243902*a0.cos[1])*t5 + a0.cos[2]*(9.304540967423494e-09*a0.cos[2] - 4.4336434353405724e-07*a0.sin[2]) - 4.652270483711747e-09;
+    const double t7 = t3*t4 + a0.sin[1]*(5.463e-06*a0.cos[1] - 2.352e-08*a0.sin[1] - 1.0982710776488653e-06*a0.sin[2]) + t6 + 1.176e-08;
+    const double t8 = 1.8e-08*(a0.cos[0] + 205.0*a0.sin[0]) + a0.sin[0]*(2.23216e-05*a0.cos[0] + t2 - 7.9e-08*a0.sin[0]) + t7 + 3.95e-08;
+    const double t9 = 0.7857142857142857*t6;
+    const double t10 = qd[1] + qd[2];
+    const double t11 = t10 + 0.7857142857142857*qd[2];
+    const double t12 = t11*(1.0664033896870507e-09*a0.cos[2] + 1.5186117470838444e-07*a0.sin[2]);
+    const double t13 = t10*(6.2216e-07*a0.cos[1] - 5.44e-09*a0.sin[1]) - t12;
+    const double t14 = qd[0]*t8;
+    const double t15 = qd[0]*t7;
+    const double t16 = a0.cos[0]*(t4 + t5) - a0.sin[0]*t2;
+    const double t17 = qd[1]*t16;
+    const double t18 = a0.cos[1]*a0.cos[2] + a0.sin[1]*a0.sin[2];
+    const double t19 = 1.0982710776488653e-06*t18;
+    const double t20 = t10*t19;
+    const double t21 = t11*t19;
+    const double t22 = t20 - t21;
+    const double t23 = 1.4763643994624091e-06*(a0.cos[0]*a0.cos[2] + a0.sin[0]*a0.sin[2]);
+    const double t24 = t11*t23;
+    const double t25 = t22 + t10*(t23 - t16) - t24;
+    C[0] = -(qd[1]*t8) - qd[2]*(t7 + t9);
+    C[1] = qd[1]*(1.0264e-06*a0.cos[0] - 9.6e-09*a0.sin[0]) + t13 - t14;
+    C[2] = t13 - t15 - 0.7857142857142857*(t12 + qd[0]*t6);
+    C[3] = t14;
+    C[4] = t17 + t25;
+    C[5] = t25 - 0.7857142857142857*(t24 + t21);
+    C[6] = t15 + qd[0]*t9;
+    C[7] = t22 + t17 + 0.7857142857142857*(qd[1]*t23 + t20);
+    C[8] = 8.629272752955371e-07*(t10 - t11)*t18 + t22;
 }

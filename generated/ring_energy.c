@@ -7,39 +7,33 @@
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  kinetic[1] in J
  *   out  potential[1] in J
- * Cost: 52 add, 66 mul, 4 sincos.
+ * Cost: 51 add, 59 mul, 4 sincos.
  * Inputs: sha256 002a38e3700c4633fdb4a7f5f3af58489ec3ef1c8d6654b8a99f77e3122edefa.
  */
-#include <math.h>
+#include "trig.h"
 #include "kernels.h"
 
 void awiwi_ring_energy(const double q[restrict 3], const double qd[restrict 3], const double g[restrict 3], double kinetic[restrict 1], double potential[restrict 1])
 {
     const double t0 = q[1] + q[2];
-    const double t1 = cos(t0);
-    const double t2 = t0 + 0.7857142857142857*q[2];
-    const double t3 = cos(t2);
-    const double t4 = sin(t2);
-    const double t5 = 3.6e-05*t3 - 8e-07*t4;
-    const double t6 = sin(t0);
-    const double t7 = 8e-07*t3 + 3.6e-05*t4;
-    const double t8 = t1*t5 + t6*t7;
-    const double t9 = 0.061*t8 + 6.02264e-06;
-    const double t10 = 0.023964285714285716*t8 + 3.804114285714286e-07;
-    const double cos_q1 = cos(q[1]);
-    const double sin_q1 = sin(q[1]);
-    const double t11 = 4.44e-09*t3 + 1.518e-07*t4;
-    const double t12 = 5.44e-09*t1 + 6.2216e-07*t6 + t11;
-    const double t13 = 0.000615*cos_q1 - 3e-06*sin_q1;
-    const double t14 = 0.0002108*t1 - 1.2e-06*t6 + t5;
-    const double t15 = 1.2e-06*t1 + 0.0002108*t6 + t7;
-    const double t16 = t9 + 0.082*(cos_q1*t14 + sin_q1*t15) + 2.25034e-05;
-    const double t17 = cos_q1*(2.23216e-05*cos_q1 - 7.9e-08*sin_q1) + t1*(5.463e-06*t1 - 2.352e-08*t6) + t3*(4.4334e-07*t3 - 1.04e-08*t4) + 0.012*(t13 + t14) + t16 - 0.061*t6*t7 - 0.082*sin_q1*t15 - 2.738534e-05;
-    const double t18 = qd[1]*(9.6e-09*cos_q1 + 1.0264e-06*sin_q1 + t12) + qd[2]*(t12 + 0.7857142857142857*t11) + 0.5*qd[0]*t17;
-    const double t19 = qd[2]*(t10 + t9 + 0.041*(cos_q1*(t14 + 0.7857142857142857*t5) + sin_q1*(t15 + 0.7857142857142857*t7)));
-    const double sin_q0 = sin(q[0]);
-    const double cos_q0 = cos(q[0]);
-    const double t20 = 2.64e-05*(g[0]*sin_q0 - g[1]*cos_q0) - g[2]*(3e-06*cos_q1 + 0.000615*sin_q1 + t15) - (g[0]*cos_q0 + g[1]*sin_q0)*(t13 + t14 + 0.0001245);
-    kinetic[0] = 0.5*qd[2]*qd[2]*(t9 + 2.0*t10 + 2.9889469387755104e-07) + qd[0]*t18 + qd[1]*(0.5*qd[1]*t16 + t19);
-    potential[0] = t20;
+    const double t1 = t0 + 0.7857142857142857*q[2] - 1.5485777614681775;
+    const awiwi_turn4 a0 = awiwi_sincos4(q[1], t0, t1, q[0]);
+    const double t2 = 1.5186117470838444e-07*a0.cos[2] - 1.0664033896870507e-09*a0.sin[2];
+    const double t3 = 5.44e-09*a0.cos[1] + 6.2216e-07*a0.sin[1] + t2;
+    const double t4 = a0.cos[1]*(0.2447405203928034*a0.cos[1] - 0.001053687907676869*a0.sin[1] - 0.09840433281206233*a0.sin[2]);
+    const double t5 = 0.000615*a0.cos[0] - 3e-06*a0.sin[0];
+    const double t6 = 0.0002108*a0.cos[1] - 1.2e-06*a0.sin[1] - 3.600888779176608e-05*a0.sin[2];
+    const double t7 = t4 + 537.5958712637087*(t5 + t6) + a0.cos[0]*(a0.cos[0] + 3673.571786968676*t6 - 0.003539172819152749*a0.sin[0]) + 0.07096499228402214 - a0.cos[2]*(0.019862570045787814*a0.cos[2] + 0.0004168402340075754*a0.sin[2]);
+    const double t8 = qd[1]*(9.6e-09*a0.cos[0] + 1.0264e-06*a0.sin[0] + t3) + qd[2]*(t3 + 0.7857142857142857*t2) + 1.11608e-05*qd[0]*t7;
+    const double t9 = 1.2e-06*a0.cos[1] + 0.0002108*a0.sin[1] + 3.600888779176608e-05*a0.cos[2];
+    const double t10 = 0.041*(a0.cos[0]*t6 + a0.sin[0]*t9);
+    const double t11 = 1.0982710776488653e-06*(a0.cos[1]*a0.sin[2] - a0.sin[1]*a0.cos[2]);
+    const double t12 = t11 - 4.8416e-07;
+    const double t13 = t11 + t12 - 5.53848e-06;
+    const double t14 = t13 - t10;
+    const double t15 = qd[2]*(t14 + 0.7857142857142857*(1.4763643994624091e-06*(a0.cos[0]*a0.sin[2] - a0.sin[0]*a0.cos[2]) + t12));
+    const double t16 = qd[0]*t8 + qd[1]*(0.5*qd[1]*(t10 + 2.25034e-05 - t14) - t15) - 0.5*qd[2]*qd[2]*(t13 + 0.7857142857142857*(t12 + (t12 - 3.804114285714286e-07)));
+    const double t17 = 2.64e-05*(g[0]*a0.sin[3] - g[1]*a0.cos[3]) - g[2]*(3e-06*a0.cos[0] + 0.000615*a0.sin[0] + t9) - (g[0]*a0.cos[3] + g[1]*a0.sin[3])*(t5 + t6 + 0.0001245);
+    kinetic[0] = t16;
+    potential[0] = t17;
 }

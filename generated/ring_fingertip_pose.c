@@ -7,34 +7,27 @@
  * Cost: 9 add, 15 mul, 3 neg, 4 sincos.
  * Inputs: sha256 8b1e4049e08ada68fc0fffe59ae1b436246736a5f349d22efb157c0e2c972c0c.
  */
-#include <math.h>
+#include "trig.h"
 #include "kernels.h"
 
 void awiwi_ring_fingertip_pose(const double q[restrict 3], double T[restrict 16])
 {
-    const double cos_q0 = cos(q[0]);
     const double t0 = q[1] + 1.7857142857142858*q[2];
-    const double t1 = cos(t0);
-    const double t2 = sin(t0);
-    const double sin_q0 = sin(q[0]);
-    const double cos_q1 = cos(q[1]);
-    const double t3 = q[1] + q[2];
-    const double t4 = cos(t3);
-    const double t5 = 0.041*cos_q1 + 0.0305*t4 + 0.0205*t1 + 0.006;
-    const double sin_q1 = sin(q[1]);
-    const double t6 = sin(t3);
-    T[0] = cos_q0*t1;
-    T[1] = -(cos_q0*t2);
-    T[2] = sin_q0;
-    T[3] = cos_q0*t5 - 0.0047*sin_q0;
-    T[4] = sin_q0*t1;
-    T[5] = -(sin_q0*t2);
-    T[6] = -cos_q0;
-    T[7] = 0.0047*cos_q0 + sin_q0*t5;
-    T[8] = t2;
-    T[9] = t1;
+    const double t1 = q[1] + q[2];
+    const awiwi_turn4 a0 = awiwi_sincos4(q[0], t0, q[1], t1);
+    const double t2 = 0.041*a0.cos[2] + 0.0305*a0.cos[3] + 0.0205*a0.cos[1] + 0.006;
+    T[0] = a0.cos[0]*a0.cos[1];
+    T[1] = -(a0.cos[0]*a0.sin[1]);
+    T[2] = a0.sin[0];
+    T[3] = a0.cos[0]*t2 - 0.0047*a0.sin[0];
+    T[4] = a0.sin[0]*a0.cos[1];
+    T[5] = -(a0.sin[0]*a0.sin[1]);
+    T[6] = -a0.cos[0];
+    T[7] = 0.0047*a0.cos[0] + a0.sin[0]*t2;
+    T[8] = a0.sin[1];
+    T[9] = a0.cos[1];
     T[10] = 0.0;
-    T[11] = 0.041*sin_q1 + 0.0305*t6 + 0.0205*t2;
+    T[11] = 0.041*a0.sin[2] + 0.0305*a0.sin[3] + 0.0205*a0.sin[1];
     T[12] = 0.0;
     T[13] = 0.0;
     T[14] = 0.0;

@@ -7,90 +7,72 @@
  *   in   tau[3] in N m, -1 to 1
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  qdd[3] in rad/s^2
- * Cost: 111 add, 125 mul, 3 div, 1 neg, 4 sincos.
- * Inputs: sha256 d58f38e02f25804f1cbc849cf9a3a2f485a8ffffebf33c0f77b384b71638e328.
+ * Cost: 96 add, 110 mul, 3 div, 1 neg, 4 sincos.
+ * Inputs: sha256 d2fd8ea8122210c370a876d04ecdbc1ca49df3b198ba198458bb7b3639479b1a.
  */
-#include <math.h>
+#include "trig.h"
 #include "kernels.h"
 
 void awiwi_ring_forward_dynamics(const double q[restrict 3], const double qd[restrict 3], const double tau[restrict 3], const double g[restrict 3], double qdd[restrict 3])
 {
-    const double t0 = qd[1]*qd[1];
-    const double sin_q1 = sin(q[1]);
-    const double t1 = 0.041*sin_q1;
-    const double t2 = g[2] + t0*t1;
-    const double t3 = qd[1] + qd[2];
+    const double t0 = q[1] + q[2];
+    const double t1 = t0 + 0.7857142857142857*q[2] - 1.5415556515473878;
+    const double t2 = qd[1] + qd[2];
+    const double t3 = t2 + 0.7857142857142857*qd[2];
     const double t4 = t3*t3;
-    const double t5 = q[1] + q[2];
-    const double t6 = sin(t5);
-    const double t7 = 0.0305*t6;
-    const double t8 = t5 + 0.7857142857142857*q[2];
-    const double t9 = cos(t8);
-    const double t10 = sin(t8);
-    const double t11 = 3.6e-05*t9 - 8e-07*t10;
-    const double t12 = 8e-07*t9 + 3.6e-05*t10;
-    const double t13 = qd[0]*qd[0];
-    const double t14 = t13 + t4;
-    const double t15 = cos(t5);
-    const double t16 = 0.0305*t15;
-    const double cos_q1 = cos(q[1]);
-    const double t17 = 0.041*cos_q1;
-    const double cos_q0 = cos(q[0]);
-    const double sin_q0 = sin(q[0]);
-    const double t18 = g[0]*cos_q0 + g[1]*sin_q0;
-    const double t19 = 0.006*t13 + t18;
-    const double t20 = (t13 + t0)*t17 + t19;
-    const double t21 = 4.4334e-07*t9 - 1.04e-08*t10;
-    const double t22 = t10*t21 + 5.2e-09;
-    const double t23 = (t2 + t4*t7)*t11 - t12*(t14*t16 + t20) - t13*t22;
-    const double t24 = t3 + 0.7857142857142857*qd[2];
-    const double t25 = t24*t24;
-    const double t26 = t25*t12;
-    const double t27 = (t13 + t25)*t11;
-    const double t28 = 0.0002108*t15 - 1.2e-06*t6;
-    const double t29 = 1.2e-06*t15 + 0.0002108*t6;
-    const double t30 = 5.463e-06*t15 - 2.352e-08*t6;
-    const double t31 = t6*t30 + 1.176e-08;
-    const double t32 = t16*t26 - t7*t27 + (t2*t28 - t29*t20 - t13*t31 + t23);
-    const double t33 = tau[2] + (0.7857142857142857*t23 + t32);
-    const double t34 = 4.44e-09*t9 + 1.518e-07*t10;
-    const double t35 = 5.44e-09*t15 + 6.2216e-07*t6 + t34;
-    const double t36 = t35 + 0.7857142857142857*t34;
-    const double t37 = t7*t12;
-    const double t38 = 2.0*(t16*t11 + t37) + 4.8416e-07 + 5.53848e-06;
-    const double t39 = 0.7857142857142857*t11;
-    const double t40 = 0.7857142857142857*t12;
-    const double t41 = t16*t39 + t7*t40 + 3.804114285714286e-07;
-    const double t42 = 1.0/(t38 + (t41 + (t41 + 2.9889469387755104e-07)));
-    const double t43 = t36*t42;
-    const double t44 = g[0]*sin_q0 - g[1]*cos_q0;
-    const double t45 = 0.000615*cos_q1 - 3e-06*sin_q1;
-    const double t46 = 2.0*qd[0];
-    const double t47 = qd[1]*t46;
-    const double t48 = 2.23216e-05*cos_q1 - 7.9e-08*sin_q1;
-    const double t49 = sin_q1*t48 + 3.95e-08;
-    const double t50 = t44 - t1*t47;
-    const double t51 = t3*t46;
-    const double t52 = t46*t24;
-    const double t53 = t50*t28 + (t4*(6.2216e-07*t15 - 5.44e-09*t6) - t51*t31) + ((t50 - t51*t7)*t11 + (t25*(1.518e-07*t9 - 4.44e-09*t10) - t52*t22));
-    const double t54 = t52*t12;
-    const double t55 = t51*t29 + t54;
-    const double t56 = 2.64e-05*t18 + 0.0001245*t44 + (t45*t44 + (t0*(1.0264e-06*cos_q1 - 9.6e-09*sin_q1) - t47*t49) + (t53 - t16*t54) - t17*t55);
-    const double t57 = 3e-06*cos_q1 + 0.000615*sin_q1;
-    const double t58 = t28 + t11;
-    const double t59 = t29 + t12;
-    const double t60 = t17*(t58 + t39) + t1*(t59 + t40) + (t41 + t38);
-    const double t61 = t60*t42;
-    const double t62 = tau[1] + (t17*(t4*t29 + t26) - t1*(t14*t28 + t27) + (g[2]*t45 - t57*t19 - t13*t49 + t32)) - t33*t61;
-    const double t63 = 9.6e-09*cos_q1 + 1.0264e-06*sin_q1 + t35 - t60*t43;
-    const double t64 = t1*t59;
-    const double t65 = 2.0*(t17*t58 + t64) + t38 + 2.25034e-05;
-    const double t66 = 1.0/(t65 - t60*t61);
-    const double t67 = t63*t66;
-    const double t68 = cos_q1*t48 - 2.24125e-05 + (t15*t30 - 5.50074e-06 + (t9*t21 - 4.6375e-07 - t37 - t37) - t64 - t64) + (0.012*(t45 + t58) + t65 + 9.9165e-07);
-    const double t69 = (t33*t43 + (t56 - 0.006*(t47*t57 + t55) - tau[0]) + t62*t67)/(t68 - t36*t43 - t63*t67);
-    const double t70 = t62*t66 + t67*t69;
-    qdd[0] = -t69;
-    qdd[1] = t70;
-    qdd[2] = t33*t42 + t43*t69 - t61*t70;
+    const awiwi_turn4 a0 = awiwi_sincos4(t1, q[1], t0, q[0]);
+    const double t5 = 0.041*a0.cos[1];
+    const double t6 = t5 + 0.006;
+    const double t7 = 0.0305*a0.cos[2];
+    const double t8 = 3.6007999995786246e-05*a0.cos[0] + 2.5285629012876123e-07*a0.sin[0];
+    const double t9 = 4.43189948913395e-07*a0.cos[0] + 1.5530124987980726e-08*a0.sin[0];
+    const double t10 = (t6 + t7)*t8 + 7.765062493990363e-09 - a0.sin[0]*t9;
+    const double t11 = 1.2e-06*a0.cos[2] + 0.0002108*a0.sin[2];
+    const double t12 = 2.5285629012876123e-07*a0.cos[0] - 3.6007999995786246e-05*a0.sin[0];
+    const double t13 = 0.0305*t12;
+    const double t14 = 5.463e-06*a0.cos[2] + t13 - 2.352e-08*a0.sin[2];
+    const double t15 = t6*t11 + a0.sin[2]*t14 + 1.176e-08;
+    const double t16 = 3e-06*a0.cos[1] + 0.000615*a0.sin[1];
+    const double t17 = 0.0002108*a0.cos[2] - 1.2e-06*a0.sin[2];
+    const double t18 = t17 + t12;
+    const double t19 = 0.041*t18;
+    const double t20 = 2.23216e-05*a0.cos[1] + t19 - 7.9e-08*a0.sin[1];
+    const double t21 = 0.006*t16 + a0.sin[1]*t20 + 3.95e-08;
+    const double t22 = g[0]*a0.cos[3] + g[1]*a0.sin[3];
+    const double t23 = qd[1]*qd[1];
+    const double t24 = t2*t2;
+    const double t25 = 0.000615*a0.cos[1] - 3e-06*a0.sin[1];
+    const double t26 = t25 + t18;
+    const double t27 = 0.041*a0.sin[1];
+    const double t28 = g[2] + t23*t27;
+    const double t29 = 0.0305*a0.sin[2];
+    const double t30 = t22 + t23*t5;
+    const double t31 = qd[0]*qd[0];
+    const double t32 = (t28 + t24*t29)*t12 - (t30 + t24*t7)*t8 - t31*t10;
+    const double t33 = t4*t8;
+    const double t34 = t4*t12;
+    const double t35 = t28*t17 + t7*t33 + t32 - t30*t11 - t29*t34 - t31*t15;
+    const double t36 = tau[2] + 0.7857142857142857*t32 + t35;
+    const double t37 = 5.44e-09*a0.cos[2] + 6.2216e-07*a0.sin[2] + 1.518649189246812e-07*a0.cos[0];
+    const double t38 = 1.193224362979638e-07*a0.cos[0] + t37;
+    const double t39 = t7*t12 + t29*t8;
+    const double t40 = t39 + 4.8416e-07;
+    const double t41 = t39 + t40 + 5.53848e-06;
+    const double t42 = 1.0/(t41 + 0.7857142857142857*(t40 + (t40 + 3.804114285714286e-07)));
+    const double t43 = t38*t42;
+    const double t44 = t5*t18 + t27*(t11 + t8);
+    const double t45 = t44 + t41;
+    const double t46 = t45 + 0.7857142857142857*(t5*t12 + t27*t8 + t40);
+    const double t47 = t46*t42;
+    const double t48 = tau[1] + g[2]*t25 + t5*(t24*t11 + t33) + t35 - t16*t22 - t27*(t24*t17 + t34) - t31*t21 - t36*t47;
+    const double t49 = 9.6e-09*a0.cos[1] + 1.0264e-06*a0.sin[1] + t37 - t46*t43;
+    const double t50 = 1.0/(t44 + t45 + 2.25034e-05 - t46*t47);
+    const double t51 = t49*t50;
+    const double t52 = tau[0] + t4*(1.518649189246812e-07*a0.sin[0]) + 2.0*qd[0]*(t3*t10 + t2*t15 + qd[1]*t21) - 2.64e-05*t22 - t23*(1.0264e-06*a0.cos[1] - 9.6e-09*a0.sin[1]) - t24*(6.2216e-07*a0.cos[2] - 5.44e-09*a0.sin[2]) - (g[0]*a0.sin[3] - g[1]*a0.cos[3])*(t26 + 0.0001245) - t36*t43 - t48*t51;
+    const double t53 = a0.cos[0]*t9 + t38*t43 + t49*t51 - 0.012*t26 - a0.cos[2]*(t13 + t14) - a0.cos[1]*(t19 + t20) - 1.5839649744566975e-06;
+    const double t54 = t52/t53;
+    const double t55 = t48*t50 + t51*t54;
+    qdd[0] = -t54;
+    qdd[1] = t55;
+    qdd[2] = t36*t42 + t43*t54 - t47*t55;
 }

@@ -5,31 +5,26 @@
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  gravity[3] in N m
- * Cost: 20 add, 26 mul, 4 sincos.
+ * Cost: 17 add, 20 mul, 4 sincos.
  * Inputs: sha256 bdbf3d4216ddd0986e54534ddc122a2523b4a4b40b48d386707d2a96cc08c710.
  */
-#include <math.h>
+#include "trig.h"
 #include "kernels.h"
 
 void awiwi_ring_gravity(const double q[restrict 3], const double g[restrict 3], double gravity[restrict 3])
 {
-    const double cos_q0 = cos(q[0]);
-    const double sin_q0 = sin(q[0]);
-    const double t0 = g[0]*cos_q0 + g[1]*sin_q0;
-    const double cos_q1 = cos(q[1]);
+    const double t0 = q[1] - 1.5659183167054986;
     const double t1 = q[1] + q[2];
-    const double t2 = cos(t1);
-    const double t3 = t1 + 0.7857142857142857*q[2];
-    const double t4 = cos(t3);
-    const double t5 = sin(t3);
-    const double t6 = 3.6e-05*t4 - 8e-07*t5;
-    const double t7 = sin(t1);
-    const double t8 = 0.0002108*t2 + t6 - 1.2e-06*t7;
-    const double sin_q1 = sin(q[1]);
-    const double t9 = 0.000615*cos_q1 + t8 - 3e-06*sin_q1;
-    const double t10 = 8e-07*t4 + 3.6e-05*t5;
-    const double t11 = 1.2e-06*t2 + 0.0002108*t7 + t10;
-    gravity[0] = 2.64e-05*t0 + (g[0]*sin_q0 - g[1]*cos_q0)*(t9 + 0.0001245);
-    gravity[1] = t0*(3e-06*cos_q1 + 0.000615*sin_q1 + t11) - g[2]*t9;
-    gravity[2] = t0*t11 - g[2]*t8 - 0.7857142857142857*(g[2]*t6 - t0*t10);
+    const double t2 = t1 - 1.5651037886640813;
+    const double t3 = t1 + 0.7857142857142857*q[2] - 1.5485777614681775;
+    const awiwi_turn4 a0 = awiwi_sincos4(q[0], t0, t2, t3);
+    const double t4 = g[0]*a0.cos[0] + g[1]*a0.sin[0];
+    const double t5 = 3.600888779176608e-05*a0.sin[3];
+    const double t6 = 0.00021080341553210186*a0.sin[2] + t5;
+    const double t7 = 0.0006150073170296432*a0.sin[1] + t6;
+    const double t8 = 3.600888779176608e-05*a0.cos[3];
+    const double t9 = 0.00021080341553210186*a0.cos[2] + t8;
+    gravity[0] = 2.64e-05*t4 - (g[0]*a0.sin[0] - g[1]*a0.cos[0])*(t7 - 0.0001245);
+    gravity[1] = g[2]*t7 + t4*(0.0006150073170296432*a0.cos[1] + t9);
+    gravity[2] = g[2]*t6 + t4*t9 + 0.7857142857142857*(g[2]*t5 + t4*t8);
 }

@@ -7,75 +7,60 @@
  *   in   qdd[3] in rad/s^2, -2000 to 2000
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  tau[3] in N m
- * Cost: 96 add, 124 mul, 4 sincos.
+ * Cost: 83 add, 105 mul, 4 sincos.
  * Inputs: sha256 d2fd8ea8122210c370a876d04ecdbc1ca49df3b198ba198458bb7b3639479b1a.
  */
-#include <math.h>
+#include "trig.h"
 #include "kernels.h"
 
 void awiwi_ring_inverse_dynamics(const double q[restrict 3], const double qd[restrict 3], const double qdd[restrict 3], const double g[restrict 3], double tau[restrict 3])
 {
-    const double cos_q1 = cos(q[1]);
-    const double sin_q1 = sin(q[1]);
-    const double t0 = 0.000615*cos_q1 - 3e-06*sin_q1;
-    const double t1 = 2.0*qd[0];
-    const double t2 = qd[1]*t1;
-    const double t3 = 3e-06*cos_q1 + 0.000615*sin_q1;
-    const double t4 = q[1] + q[2];
-    const double t5 = cos(t4);
-    const double t6 = sin(t4);
-    const double t7 = 0.0002108*t5 - 1.2e-06*t6;
-    const double t8 = qd[1] + qd[2];
-    const double t9 = t8*t1;
-    const double t10 = 1.2e-06*t5 + 0.0002108*t6;
-    const double t11 = t4 + 0.7857142857142857*q[2];
-    const double t12 = cos(t11);
-    const double t13 = sin(t11);
-    const double t14 = 3.6e-05*t12 - 8e-07*t13;
-    const double t15 = t8 + 0.7857142857142857*qd[2];
-    const double t16 = t1*t15;
-    const double t17 = 8e-07*t12 + 3.6e-05*t13;
-    const double t18 = qdd[0]*t14 - t16*t17;
-    const double t19 = qdd[0]*t7 - t9*t10 + t18;
-    const double cos_q0 = cos(q[0]);
-    const double sin_q0 = sin(q[0]);
-    const double t20 = g[0]*cos_q0 + g[1]*sin_q0;
-    const double t21 = g[0]*sin_q0 - g[1]*cos_q0;
-    const double t22 = 0.041*cos_q1;
-    const double t23 = 0.006*qdd[0] + t21;
-    const double t24 = 9.6e-09*cos_q1 + 1.0264e-06*sin_q1;
-    const double t25 = qd[1]*qd[1];
-    const double t26 = 2.23216e-05*cos_q1 - 7.9e-08*sin_q1;
-    const double t27 = sin_q1*t26 + 3.95e-08;
-    const double t28 = t0*t23 + (qdd[1]*t24 + (t25*(1.0264e-06*cos_q1 - 9.6e-09*sin_q1) + qdd[0]*(cos_q1*t26 + 9.09e-08)) - t2*t27);
-    const double t29 = 0.0305*t5;
-    const double t30 = 0.041*sin_q1;
-    const double t31 = t23 + (qdd[0]*t22 - t30*t2);
-    const double t32 = qdd[1] + qdd[2];
-    const double t33 = 5.44e-09*t5 + 6.2216e-07*t6;
-    const double t34 = t8*t8;
-    const double t35 = 5.463e-06*t5 - 2.352e-08*t6;
-    const double t36 = t6*t35 + 1.176e-08;
-    const double t37 = 0.0305*t6;
-    const double t38 = t32 + 0.7857142857142857*qdd[2];
-    const double t39 = 4.44e-09*t12 + 1.518e-07*t13;
-    const double t40 = t15*t15;
-    const double t41 = 4.4334e-07*t12 - 1.04e-08*t13;
-    const double t42 = t13*t41 + 5.2e-09;
-    const double t43 = t14*(t31 + (qdd[0]*t29 - t9*t37)) + (t38*t39 + (t40*(1.518e-07*t12 - 4.44e-09*t13) + qdd[0]*(t12*t41 + 2.041e-08)) - t16*t42);
-    const double t44 = t7*t31 + (t32*t33 + (t34*(6.2216e-07*t5 - 5.44e-09*t6) + qdd[0]*(t5*t35 + 3.774e-08)) - t9*t36) + t43;
-    const double t45 = 0.006*(qdd[0]*t0 - t2*t3 + t19) + (9.9165e-07*qdd[0] + (2.64e-05*t20 + 0.0001245*t21) + (t22*t19 + (t28 + (t29*t18 + t44))));
-    const double t46 = t38*t14 - t40*t17;
-    const double t47 = qd[0]*qd[0];
-    const double t48 = t47 + t34;
-    const double t49 = t38*t17 + (t47 + t40)*t14;
-    const double t50 = 0.006*t47 + t20;
-    const double t51 = t50 + (qdd[1]*t30 + (t47 + t25)*t22);
-    const double t52 = g[2] + (t25*t30 - qdd[1]*t22);
-    const double t53 = t17*(t51 + (t32*t37 + t48*t29)) - t14*(t52 + (t34*t37 - t32*t29)) + (qdd[0]*t39 + (4.8416e-07*t38 + t47*t42));
-    const double t54 = t29*t46 + t37*t49 + (t10*t51 - t7*t52 + (qdd[0]*t33 + (5.53848e-06*t32 + t47*t36)) + t53);
-    const double t55 = t22*(t32*t7 - t34*t10 + t46) + t30*(t32*t10 + t48*t7 + t49) + (t3*t50 - g[2]*t0 + (qdd[0]*t24 + (2.25034e-05*qdd[1] + t47*t27)) + t54);
-    tau[0] = t45;
-    tau[1] = t55;
-    tau[2] = 0.7857142857142857*t53 + t54;
+    const double t0 = q[1] + q[2];
+    const double t1 = t0 + 0.7857142857142857*q[2] - 1.5415556515473878;
+    const awiwi_turn4 a0 = awiwi_sincos4(q[0], q[1], t0, t1);
+    const double t2 = g[0]*a0.cos[0] + g[1]*a0.sin[0];
+    const double t3 = qd[1]*qd[1];
+    const double t4 = qdd[1]*a0.cos[1] - t3*a0.sin[1];
+    const double t5 = qdd[1]*a0.sin[1] + a0.cos[1]*t3;
+    const double t6 = qdd[1] + qdd[2];
+    const double t7 = qd[1] + qd[2];
+    const double t8 = t7*t7;
+    const double t9 = t6*a0.cos[2] - t8*a0.sin[2];
+    const double t10 = t6*a0.sin[2] + a0.cos[2]*t8;
+    const double t11 = t6 + 0.7857142857142857*qdd[2];
+    const double t12 = 1.518649189246812e-07*a0.cos[3];
+    const double t13 = 0.000615*a0.cos[1] - 3e-06*a0.sin[1];
+    const double t14 = 0.0002108*a0.cos[2] - 1.2e-06*a0.sin[2];
+    const double t15 = 2.5285629012876123e-07*a0.cos[3] - 3.6007999995786246e-05*a0.sin[3];
+    const double t16 = t14 + t15;
+    const double t17 = t13 + t16;
+    const double t18 = t7 + 0.7857142857142857*qd[2];
+    const double t19 = t18*t18;
+    const double t20 = 4.43189948913395e-07*a0.cos[3] + 1.5530124987980726e-08*a0.sin[3];
+    const double t21 = 0.0305*t15;
+    const double t22 = 5.463e-06*a0.cos[2] + t21 - 2.352e-08*a0.sin[2];
+    const double t23 = 0.041*t16;
+    const double t24 = 2.23216e-05*a0.cos[1] + t23 - 7.9e-08*a0.sin[1];
+    const double t25 = qdd[0]*(a0.cos[3]*t20 - 0.012*t17 - a0.cos[2]*(t21 + t22) - a0.cos[1]*(t23 + t24) - 1.5839649744566975e-06);
+    const double t26 = 0.041*a0.cos[1];
+    const double t27 = t26 + 0.006;
+    const double t28 = 0.0305*a0.cos[2];
+    const double t29 = 3.6007999995786246e-05*a0.cos[3] + 2.5285629012876123e-07*a0.sin[3];
+    const double t30 = (t27 + t28)*t29 + 7.765062493990363e-09 - a0.sin[3]*t20;
+    const double t31 = 1.2e-06*a0.cos[2] + 0.0002108*a0.sin[2];
+    const double t32 = t27*t31 + a0.sin[2]*t22 + 1.176e-08;
+    const double t33 = 3e-06*a0.cos[1] + 0.000615*a0.sin[1];
+    const double t34 = 0.006*t33 + a0.sin[1]*t24 + 3.95e-08;
+    const double t35 = 2.64e-05*t2 + 9.6e-09*t4 + 1.0264e-06*t5 + 5.44e-09*t9 + 6.2216e-07*t10 + t11*t12 + (g[0]*a0.sin[0] - g[1]*a0.cos[0])*(t17 + 0.0001245) - t19*(1.518649189246812e-07*a0.sin[3]) - t25 - 2.0*qd[0]*(t18*t30 + t7*t32 + qd[1]*t34);
+    const double t36 = t11*t29 + t19*t15;
+    const double t37 = t11*t15 - t19*t29;
+    const double t38 = t2 + 0.041*t5;
+    const double t39 = qd[0]*qd[0];
+    const double t40 = g[2] - 0.041*t4;
+    const double t41 = 4.8416e-07*t11 + qdd[0]*t12 + (t38 + 0.0305*t10)*t29 + t39*t30 - (t40 - 0.0305*t9)*t15;
+    const double t42 = 5.53848e-06*t6 + qdd[0]*(5.44e-09*a0.cos[2] + 6.2216e-07*a0.sin[2]) + t31*t38 + 0.0305*a0.sin[2]*t36 + t28*t37 + t41 + t39*t32 - t14*t40;
+    const double t43 = 2.25034e-05*qdd[1] + qdd[0]*(9.6e-09*a0.cos[1] + 1.0264e-06*a0.sin[1]) + t33*t2 + 0.041*a0.sin[1]*(1.2e-06*t9 + 0.0002108*t10 + t36) + t26*(0.0002108*t9 + t37 - 1.2e-06*t10) + t42 + t39*t34 - g[2]*t13;
+    tau[0] = t35;
+    tau[1] = t43;
+    tau[2] = 0.7857142857142857*t41 + t42;
 }

@@ -7,42 +7,35 @@
  * Cost: 11 add, 19 mul, 6 neg, 4 sincos.
  * Inputs: sha256 090304d03fe3bc2a4f7fd1fcdca40644c253e343cce00255c91570f1ebc31845.
  */
-#include <math.h>
+#include "trig.h"
 #include "kernels.h"
 
 void awiwi_ring_jacobian(const double q[restrict 3], double J[restrict 18])
 {
-    const double cos_q0 = cos(q[0]);
-    const double sin_q0 = sin(q[0]);
-    const double cos_q1 = cos(q[1]);
     const double t0 = q[1] + q[2];
-    const double t1 = cos(t0);
-    const double t2 = t0 + 0.7857142857142857*q[2];
-    const double t3 = cos(t2);
-    const double t4 = 0.0305*t1 + 0.0205*t3;
-    const double t5 = 0.041*cos_q1 + t4;
-    const double t6 = t5 + 0.006;
-    const double sin_q1 = sin(q[1]);
-    const double t7 = sin(t0);
-    const double t8 = sin(t2);
-    const double t9 = 0.0305*t7 + 0.0205*t8;
-    const double t10 = 0.041*sin_q1 + t9;
-    const double t11 = 0.016107142857142858*t8 + t9;
-    J[0] = -(0.0047*cos_q0) - sin_q0*t6;
-    J[1] = -(cos_q0*t10);
-    J[2] = -(cos_q0*t11);
-    J[3] = cos_q0*t6 - 0.0047*sin_q0;
-    J[4] = -(sin_q0*t10);
-    J[5] = -(sin_q0*t11);
+    const double t1 = t0 + 0.7857142857142857*q[2];
+    const awiwi_turn4 a0 = awiwi_sincos4(q[0], q[1], t0, t1);
+    const double t2 = 0.0305*a0.cos[2] + 0.0205*a0.cos[3];
+    const double t3 = 0.041*a0.cos[1] + t2;
+    const double t4 = t3 + 0.006;
+    const double t5 = 0.0305*a0.sin[2] + 0.0205*a0.sin[3];
+    const double t6 = 0.041*a0.sin[1] + t5;
+    const double t7 = 0.016107142857142858*a0.sin[3] + t5;
+    J[0] = -(0.0047*a0.cos[0]) - a0.sin[0]*t4;
+    J[1] = -(a0.cos[0]*t6);
+    J[2] = -(a0.cos[0]*t7);
+    J[3] = a0.cos[0]*t4 - 0.0047*a0.sin[0];
+    J[4] = -(a0.sin[0]*t6);
+    J[5] = -(a0.sin[0]*t7);
     J[6] = 0.0;
-    J[7] = t5;
-    J[8] = 0.016107142857142858*t3 + t4;
+    J[7] = t3;
+    J[8] = 0.016107142857142858*a0.cos[3] + t2;
     J[9] = 0.0;
-    J[10] = sin_q0;
-    J[11] = 1.7857142857142858*sin_q0;
+    J[10] = a0.sin[0];
+    J[11] = 1.7857142857142858*a0.sin[0];
     J[12] = 0.0;
-    J[13] = -cos_q0;
-    J[14] = -1.7857142857142858*cos_q0;
+    J[13] = -a0.cos[0];
+    J[14] = -1.7857142857142858*a0.cos[0];
     J[15] = 1.0;
     J[16] = 0.0;
     J[17] = 0.0;

@@ -4,43 +4,36 @@
  * Source: eq. 2.17, 5.4.
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   out  M[3][3] in kg m^2
- * Cost: 39 add, 45 mul, 3 sincos.
- * Inputs: sha256 d58f38e02f25804f1cbc849cf9a3a2f485a8ffffebf33c0f77b384b71638e328.
+ * Cost: 38 add, 37 mul, 3 sincos.
+ * Inputs: sha256 d2fd8ea8122210c370a876d04ecdbc1ca49df3b198ba198458bb7b3639479b1a.
  */
-#include <math.h>
+#include "trig.h"
 #include "kernels.h"
 
 void awiwi_ring_mass_matrix(const double q[restrict 3], double M[restrict 9])
 {
-    const double cos_q1 = cos(q[1]);
-    const double sin_q1 = sin(q[1]);
     const double t0 = q[1] + q[2];
-    const double t1 = cos(t0);
-    const double t2 = sin(t0);
-    const double t3 = t0 + 0.7857142857142857*q[2];
-    const double t4 = cos(t3);
-    const double t5 = sin(t3);
-    const double t6 = 3.6e-05*t4 - 8e-07*t5;
-    const double t7 = 0.0002108*t1 + t6 - 1.2e-06*t2;
-    const double t8 = 8e-07*t4 + 3.6e-05*t5;
-    const double t9 = t1*t6 + t2*t8;
-    const double t10 = 0.061*t9 + 6.02264e-06;
-    const double t11 = 1.2e-06*t1 + 0.0002108*t2 + t8;
-    const double t12 = t10 + 0.082*(cos_q1*t7 + sin_q1*t11) + 2.25034e-05;
-    const double t13 = cos_q1*(2.23216e-05*cos_q1 - 7.9e-08*sin_q1) + t1*(5.463e-06*t1 - 2.352e-08*t2) + t4*(4.4334e-07*t4 - 1.04e-08*t5) + 0.012*(0.000615*cos_q1 + t7 - 3e-06*sin_q1) + t12 - 0.061*t2*t8 - 0.082*sin_q1*t11 - 2.738534e-05;
-    const double t14 = 4.44e-09*t4 + 1.518e-07*t5;
-    const double t15 = 5.44e-09*t1 + 6.2216e-07*t2 + t14;
-    const double t16 = 9.6e-09*cos_q1 + 1.0264e-06*sin_q1 + t15;
-    const double t17 = t15 + 0.7857142857142857*t14;
-    const double t18 = 0.023964285714285716*t9 + 3.804114285714286e-07;
-    const double t19 = t18 + t10 + 0.041*(cos_q1*(t7 + 0.7857142857142857*t6) + sin_q1*(t11 + 0.7857142857142857*t8));
-    M[0] = t13;
-    M[1] = t16;
-    M[2] = t17;
-    M[3] = t16;
-    M[4] = t12;
-    M[5] = t19;
-    M[6] = t17;
-    M[7] = t19;
-    M[8] = t10 + 2.0*t18 + 2.9889469387755104e-07;
+    const double t1 = t0 + 0.7857142857142857*q[2] - 1.5485777614681775;
+    const awiwi_turn3 a0 = awiwi_sincos3(t0, t1, q[1]);
+    const double t2 = a0.sin[0] + 30.007406493138397*a0.sin[1] - 175.66666666666666*a0.cos[0];
+    const double t3 = a0.cos[0]*(5.463e-06*a0.cos[0] - 2.352e-08*a0.sin[0] - 2.1965421552977306e-06*a0.sin[1]) + 1.44e-08*(512.5*a0.cos[2] - 2.5*a0.sin[2] - t2) + a0.cos[2]*(2.23216e-05*a0.cos[2] - 7.9e-08*a0.sin[2] - 9.84e-08*t2) + 1.5840521717670286e-06 - a0.cos[1]*(4.4336434353405724e-07*a0.cos[1] + 9.304540967423494e-09*a0.sin[1]);
+    const double t4 = 1.5186117470838444e-07*a0.cos[1] - 1.0664033896870507e-09*a0.sin[1];
+    const double t5 = 5.44e-09*a0.cos[0] + 6.2216e-07*a0.sin[0] + t4;
+    const double t6 = 9.6e-09*a0.cos[2] + 1.0264e-06*a0.sin[2] + t5;
+    const double t7 = t5 + 0.7857142857142857*t4;
+    const double t8 = 1.0982710776488653e-06*(a0.cos[0]*a0.sin[1] - a0.sin[0]*a0.cos[1]);
+    const double t9 = t8 - 4.8416e-07;
+    const double t10 = 5.53848e-06 - t8 - t9;
+    const double t11 = 4.92e-08*(a0.cos[2]*t2 - a0.sin[2]*(a0.cos[0] + 175.66666666666666*a0.sin[0] + 30.007406493138397*a0.cos[1]));
+    const double t12 = t10 - t11;
+    const double t13 = t12 - 0.7857142857142857*(1.4763643994624091e-06*(a0.cos[2]*a0.sin[1] - a0.sin[2]*a0.cos[1]) + t9);
+    M[0] = t3;
+    M[1] = t6;
+    M[2] = t7;
+    M[3] = t6;
+    M[4] = t12 + 2.25034e-05 - t11;
+    M[5] = t13;
+    M[6] = t7;
+    M[7] = t13;
+    M[8] = t10 - 0.7857142857142857*(t9 + (t9 - 3.804114285714286e-07));
 }

@@ -13,16 +13,16 @@
  * Inputs: sha256 6a5695bb7e492700563a99433621bd21f8005fce81d41ed26a0365bf35bb62e3.
  */
 #include <math.h>
+#include "trig.h"
 #include "kernels.h"
 
 int awiwi_spring_lever(const double theta[restrict 1], double dL[restrict 1], double force[restrict 1], double stiffness[restrict 1])
 {
-    const double sin_theta0 = sin(theta[0]);
-    const double t0 = 0.018*sin_theta0;
+    const awiwi_turn a0 = awiwi_sincos(theta[0]);
+    const double t0 = 0.018*a0.sin;
     const double t1 = t0 + 0.008;
     const double t2 = t1*t1;
-    const double cos_theta0 = cos(theta[0]);
-    const double t3 = 0.018*cos_theta0;
+    const double t3 = 0.018*a0.cos;
     const double t4 = t3 + 0.018;
     const double t5 = t4 - 0.01;
     const double t6 = t2 + t5*t5;
@@ -40,9 +40,9 @@ int awiwi_spring_lever(const double theta[restrict 1], double dL[restrict 1], do
     const double t18 = t17*(0.006*t5 - t1*t8);
     const double t19 = t17*(0.006*t1 + t5*t8);
     const double t20 = atan2(0.4601093262074292*t18 - 0.8878622685624981*t19, -(0.4601093262074292*t19) - 0.8878622685624981*t18);
-    const double t21 = 0.03*cos_theta0;
+    const double t21 = 0.03*a0.cos;
     const double t22 = t21 + 0.024;
-    const double t23 = 0.03*sin_theta0;
+    const double t23 = 0.03*a0.sin;
     const double t24 = t23 - 0.032;
     const double t25 = sqrt(t22*t22 + t24*t24);
     const double t26 = t25 - 0.0351;

@@ -7,47 +7,40 @@
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  kinetic[1] in J
  *   out  potential[1] in J
- * Cost: 66 add, 83 mul, 1 neg, 4 sincos.
+ * Cost: 65 add, 81 mul, 4 sincos.
  * Inputs: sha256 46e4c11520cb35f8c8b39b4a5f744de13eafc538dda122a909bd753de6881cc0.
  */
-#include <math.h>
+#include "trig.h"
 #include "kernels.h"
 
 void awiwi_thumb_energy(const double q[restrict 4], const double qd[restrict 4], const double g[restrict 3], double kinetic[restrict 1], double potential[restrict 1])
 {
-    const double cos_q2 = cos(q[2]);
-    const double t0 = q[2] + q[3];
-    const double t1 = cos(t0);
-    const double t2 = sin(t0);
-    const double t3 = 6.6e-05*t1 - 1.2e-06*t2;
-    const double sin_q2 = sin(q[2]);
-    const double t4 = 1.2e-06*t1 + 6.6e-05*t2;
-    const double t5 = cos_q2*t3 + sin_q2*t4;
-    const double t6 = 0.064*t5 + 1.02773e-05;
-    const double t7 = 0.032*t5 + 1.09224e-06;
-    const double t8 = 2e-09*t1 - 3e-09*t2;
-    const double t9 = 4.46e-09*cos_q2 + t8 - 3.59e-08*sin_q2;
-    const double t10 = 0.0003315*cos_q2 - 2.7e-06*sin_q2 + t3;
-    const double t11 = 0.09*t10;
-    const double t12 = -t11 - t6 - 4.258586e-05;
-    const double t13 = 8.96344e-06*cos_q2 - 5.97e-08*sin_q2;
-    const double t14 = 9.8376e-07*t1 - 1.84e-08*t2;
-    const double t15 = cos_q2*t13 + t1*t14;
-    const double cos_q1 = cos(q[1]);
-    const double sin_q1 = sin(q[1]);
-    const double t16 = 2.7e-06*cos_q2 + 0.0003315*sin_q2 + t4;
-    const double t17 = cos_q1*(t9 - 2.95e-08) - sin_q1*(sin_q2*t13 + t2*t14 + 0.045*t16 + 0.032*(cos_q2*t4 + sin_q2*t3) + 1.9705e-07);
-    const double t18 = 0.064*cos_q2*t3 + t15 + t11 + 4.229405e-05;
-    const double t19 = t10 + 0.001071;
-    const double t20 = 3e-09*t1 + 2e-09*t2;
-    const double t21 = 3.59e-08*cos_q2 + 4.46e-09*sin_q2 + t20;
-    const double t22 = t18 + t12 + 0.012*(1.08e-05*sin_q1 - cos_q1*t19) + cos_q1*(2.0*sin_q1*(t21 + 2.19e-07) - cos_q1*(t18 - 4.5686e-07)) - 1.5405e-06;
-    const double t23 = qd[1]*t17 + 0.5*qd[0]*t22 - qd[2]*(0.006*t10 + cos_q1*(0.045*t10 + t6) - sin_q1*t21) - qd[3]*(0.006*t3 + cos_q1*(0.045*t3 + t7) - sin_q1*t20);
-    const double t24 = 5.4612e-07*qd[3]*qd[3] + qd[2]*(0.5*qd[2]*t6 + qd[3]*t7) - qd[1]*(qd[3]*t8 + qd[2]*t9 + 0.5*qd[1]*(0.064*sin_q2*t4 + t12 + 1.011225e-05 - t15)) - qd[0]*t23;
-    const double sin_q0 = sin(q[0]);
-    const double cos_q0 = cos(q[0]);
-    const double t25 = g[0]*cos_q0 + g[1]*sin_q0;
-    const double t26 = (g[0]*sin_q0 - g[1]*cos_q0)*(t16 + 9e-06) - 0.000204*t25 - 1.08e-05*(g[2]*cos_q1 - sin_q1*t25) - (g[2]*sin_q1 + cos_q1*t25)*t19;
-    kinetic[0] = t24;
-    potential[0] = t26;
+    const double t0 = q[2] + q[3] + 0.982793723247329;
+    const awiwi_turn4 a0 = awiwi_sincos4(q[2], t0, q[1], q[0]);
+    const double t1 = 3.7608673304070534e-05*a0.cos[1] + 5.424967919082741e-05*a0.sin[1];
+    const double t2 = 5.424967919082741e-05*a0.cos[1] - 3.7608673304070534e-05*a0.sin[1];
+    const double t3 = a0.cos[0]*t1 - a0.sin[0]*t2;
+    const double t4 = 0.064*t3 + 1.02773e-05;
+    const double t5 = 0.032*t3 + 1.09224e-06;
+    const double t6 = 3.6055512754639894e-09*a0.cos[1];
+    const double t7 = 4.46e-09*a0.cos[0] + t6 - 3.59e-08*a0.sin[0];
+    const double t8 = 8.96344e-06*a0.cos[0] - 5.97e-08*a0.sin[0];
+    const double t9 = 3.613846153846154e-07*a0.cos[1] - 9.15163076923077e-07*a0.sin[1];
+    const double t10 = a0.cos[0]*t8 - a0.cos[1]*t9;
+    const double t11 = 0.0003315*a0.cos[0] - 2.7e-06*a0.sin[0] + t1;
+    const double t12 = 0.09*t11;
+    const double t13 = t12 + t4 + 4.258586e-05;
+    const double t14 = 2.7e-06*a0.cos[0] + 0.0003315*a0.sin[0] - t2;
+    const double t15 = a0.sin[0]*t8 + 0.045*t14 - a0.sin[1]*t9 - 0.032*(a0.cos[0]*t2 - a0.sin[0]*t1) - 2.6973153846153845e-07;
+    const double t16 = 3.6055512754639894e-09*a0.sin[1];
+    const double t17 = 3.59e-08*a0.cos[0] + 4.46e-09*a0.sin[0] + t16;
+    const double t18 = 0.064*a0.cos[0]*t1 + t10 + t12 + 4.296662230769231e-05;
+    const double t19 = t11 + 0.001071;
+    const double t20 = t18 + 0.012*(1.08e-05*a0.sin[2] - a0.cos[2]*t19) + a0.cos[2]*(2.0*a0.sin[2]*(t17 + 2.19e-07) - a0.cos[2]*(t18 - 4.5686e-07)) - t13 - 1.5405e-06;
+    const double t21 = qd[1]*(a0.cos[2]*(t7 - 2.95e-08) - a0.sin[2]*t15) + qd[2]*(a0.sin[2]*t17 - 0.006*t11 - a0.cos[2]*(0.045*t11 + t4)) + qd[3]*(a0.sin[2]*t16 - 0.006*t1 - a0.cos[2]*(0.045*t1 + t5)) + 0.5*qd[0]*t20;
+    const double t22 = 5.4612e-07*qd[3]*qd[3] + qd[2]*(0.5*qd[2]*t4 + qd[3]*t5) - qd[1]*(qd[3]*t6 + qd[2]*t7 - 0.5*qd[1]*(0.064*a0.sin[0]*t2 + t10 + t13 - 9.439677692307693e-06)) - qd[0]*t21;
+    const double t23 = g[0]*a0.cos[3] + g[1]*a0.sin[3];
+    const double t24 = (g[0]*a0.sin[3] - g[1]*a0.cos[3])*(t14 + 9e-06) - 0.000204*t23 - 1.08e-05*(g[2]*a0.cos[2] - a0.sin[2]*t23) - (g[2]*a0.sin[2] + a0.cos[2]*t23)*t19;
+    kinetic[0] = t22;
+    potential[0] = t24;
 }

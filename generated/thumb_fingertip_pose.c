@@ -7,37 +7,30 @@
  * Cost: 11 add, 24 mul, 4 neg, 4 sincos.
  * Inputs: sha256 e56e526ea40970104fe9bee780b2560b3c841e631e95f0e1cea4522e61111cae.
  */
-#include <math.h>
+#include "trig.h"
 #include "kernels.h"
 
 void awiwi_thumb_fingertip_pose(const double q[restrict 4], double T[restrict 16])
 {
     const double t0 = q[2] + q[3];
-    const double t1 = cos(t0);
-    const double cos_q0 = cos(q[0]);
-    const double cos_q1 = cos(q[1]);
-    const double t2 = cos_q0*cos_q1;
-    const double sin_q0 = sin(q[0]);
-    const double t3 = sin(t0);
-    const double sin_q1 = sin(q[1]);
-    const double cos_q2 = cos(q[2]);
-    const double t4 = 0.032*cos_q2 + 0.025*t1 + 0.045;
-    const double t5 = cos_q1*t4 + 0.006;
-    const double sin_q2 = sin(q[2]);
-    const double t6 = 0.032*sin_q2 + 0.025*t3;
-    const double t7 = cos_q1*sin_q0;
-    T[0] = t1*t2 - sin_q0*t3;
-    T[1] = -(sin_q0*t1) - t2*t3;
-    T[2] = -(cos_q0*sin_q1);
-    T[3] = cos_q0*t5 - sin_q0*t6;
-    T[4] = cos_q0*t3 + t1*t7;
-    T[5] = cos_q0*t1 - t7*t3;
-    T[6] = -(sin_q0*sin_q1);
-    T[7] = cos_q0*t6 + sin_q0*t5;
-    T[8] = sin_q1*t1;
-    T[9] = -(sin_q1*t3);
-    T[10] = cos_q1;
-    T[11] = sin_q1*t4;
+    const awiwi_turn4 a0 = awiwi_sincos4(t0, q[0], q[1], q[2]);
+    const double t1 = a0.cos[1]*a0.cos[2];
+    const double t2 = 0.032*a0.cos[3] + 0.025*a0.cos[0] + 0.045;
+    const double t3 = a0.cos[2]*t2 + 0.006;
+    const double t4 = 0.032*a0.sin[3] + 0.025*a0.sin[0];
+    const double t5 = a0.cos[2]*a0.sin[1];
+    T[0] = a0.cos[0]*t1 - a0.sin[1]*a0.sin[0];
+    T[1] = -(a0.sin[1]*a0.cos[0]) - t1*a0.sin[0];
+    T[2] = -(a0.cos[1]*a0.sin[2]);
+    T[3] = a0.cos[1]*t3 - a0.sin[1]*t4;
+    T[4] = a0.cos[1]*a0.sin[0] + a0.cos[0]*t5;
+    T[5] = a0.cos[1]*a0.cos[0] - t5*a0.sin[0];
+    T[6] = -(a0.sin[1]*a0.sin[2]);
+    T[7] = a0.cos[1]*t4 + a0.sin[1]*t3;
+    T[8] = a0.sin[2]*a0.cos[0];
+    T[9] = -(a0.sin[2]*a0.sin[0]);
+    T[10] = a0.cos[2];
+    T[11] = a0.sin[2]*t2;
     T[12] = 0.0;
     T[13] = 0.0;
     T[14] = 0.0;

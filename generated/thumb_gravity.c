@@ -5,33 +5,27 @@
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  gravity[4] in N m
- * Cost: 19 add, 26 mul, 4 sincos.
+ * Cost: 17 add, 22 mul, 4 sincos.
  * Inputs: sha256 8fd21702b73cf8d9819e1c8e44a914a3c6a94a7985cff85e13ce63e1e2992754.
  */
-#include <math.h>
+#include "trig.h"
 #include "kernels.h"
 
 void awiwi_thumb_gravity(const double q[restrict 4], const double g[restrict 3], double gravity[restrict 4])
 {
-    const double cos_q0 = cos(q[0]);
-    const double sin_q0 = sin(q[0]);
-    const double t0 = g[0]*cos_q0 + g[1]*sin_q0;
-    const double cos_q2 = cos(q[2]);
-    const double sin_q2 = sin(q[2]);
-    const double t1 = q[2] + q[3];
-    const double t2 = cos(t1);
-    const double t3 = sin(t1);
-    const double t4 = 1.2e-06*t2 + 6.6e-05*t3;
-    const double t5 = 2.7e-06*cos_q2 + 0.0003315*sin_q2 + t4;
-    const double t6 = g[0]*sin_q0 - g[1]*cos_q0;
-    const double sin_q1 = sin(q[1]);
-    const double cos_q1 = cos(q[1]);
-    const double t7 = 6.6e-05*t2 - 1.2e-06*t3;
-    const double t8 = 0.0003315*cos_q2 + t7 - 2.7e-06*sin_q2;
-    const double t9 = t8 + 0.001071;
-    const double t10 = g[2]*sin_q1 + cos_q1*t0;
-    gravity[0] = t0*(t5 + 9e-06) - t6*(1.08e-05*sin_q1 - cos_q1*t9 - 0.000204);
-    gravity[1] = 1.08e-05*t10 - (g[2]*cos_q1 - sin_q1*t0)*t9;
-    gravity[2] = t6*t8 + t10*t5;
-    gravity[3] = t6*t7 + t4*t10;
+    const double t0 = q[2] - 1.5626517105100128;
+    const double t1 = q[2] + q[3] - 1.5526165117219184;
+    const awiwi_turn4 a0 = awiwi_sincos4(q[0], t0, t1, q[1]);
+    const double t2 = g[0]*a0.cos[0] + g[1]*a0.sin[0];
+    const double t3 = 6.601090818948033e-05*a0.cos[2];
+    const double t4 = 0.0003315109952927655*a0.cos[1] + t3;
+    const double t5 = g[0]*a0.sin[0] - g[1]*a0.cos[0];
+    const double t6 = 6.601090818948033e-05*a0.sin[2];
+    const double t7 = 0.0003315109952927655*a0.sin[1] + t6;
+    const double t8 = t7 - 0.001071;
+    const double t9 = g[2]*a0.sin[3] + a0.cos[3]*t2;
+    gravity[0] = t2*(t4 + 9e-06) - t5*(1.08e-05*a0.sin[3] + a0.cos[3]*t8 - 0.000204);
+    gravity[1] = 1.08e-05*t9 + (g[2]*a0.cos[3] - a0.sin[3]*t2)*t8;
+    gravity[2] = t9*t4 - t5*t7;
+    gravity[3] = t3*t9 - t5*t6;
 }

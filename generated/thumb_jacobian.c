@@ -7,53 +7,46 @@
  * Cost: 11 add, 25 mul, 12 neg, 4 sincos.
  * Inputs: sha256 a7bb8ff1f782a8790c9bbc77b4aba27af39200e96fd5ea71f5378ce3f4c99cdf.
  */
-#include <math.h>
+#include "trig.h"
 #include "kernels.h"
 
 void awiwi_thumb_jacobian(const double q[restrict 4], double J[restrict 24])
 {
-    const double cos_q0 = cos(q[0]);
-    const double sin_q2 = sin(q[2]);
     const double t0 = q[2] + q[3];
-    const double t1 = sin(t0);
-    const double t2 = 0.025*t1;
-    const double t3 = 0.032*sin_q2 + t2;
-    const double sin_q0 = sin(q[0]);
-    const double cos_q1 = cos(q[1]);
-    const double cos_q2 = cos(q[2]);
-    const double t4 = cos(t0);
-    const double t5 = 0.025*t4;
-    const double t6 = 0.032*cos_q2 + t5;
-    const double t7 = t6 + 0.045;
-    const double t8 = cos_q1*t7;
-    const double t9 = t8 + 0.006;
-    const double sin_q1 = sin(q[1]);
-    const double t10 = cos_q0*sin_q1;
-    const double t11 = cos_q0*cos_q1;
-    const double t12 = sin_q0*sin_q1;
-    const double t13 = cos_q1*sin_q0;
-    J[0] = -(cos_q0*t3) - sin_q0*t9;
-    J[1] = -(t10*t7);
-    J[2] = -(sin_q0*t6) - t11*t3;
-    J[3] = -(sin_q0*t5) - t11*t2;
-    J[4] = cos_q0*t9 - sin_q0*t3;
-    J[5] = -(t12*t7);
-    J[6] = cos_q0*t6 - t13*t3;
-    J[7] = cos_q0*t5 - t13*t2;
+    const awiwi_turn4 a0 = awiwi_sincos4(q[0], q[2], t0, q[1]);
+    const double t1 = 0.025*a0.sin[2];
+    const double t2 = 0.032*a0.sin[1] + t1;
+    const double t3 = 0.025*a0.cos[2];
+    const double t4 = 0.032*a0.cos[1] + t3;
+    const double t5 = t4 + 0.045;
+    const double t6 = a0.cos[3]*t5;
+    const double t7 = t6 + 0.006;
+    const double t8 = a0.cos[0]*a0.sin[3];
+    const double t9 = a0.cos[0]*a0.cos[3];
+    const double t10 = a0.sin[0]*a0.sin[3];
+    const double t11 = a0.cos[3]*a0.sin[0];
+    J[0] = -(a0.cos[0]*t2) - a0.sin[0]*t7;
+    J[1] = -(t8*t5);
+    J[2] = -(a0.sin[0]*t4) - t9*t2;
+    J[3] = -(a0.sin[0]*t3) - t9*t1;
+    J[4] = a0.cos[0]*t7 - a0.sin[0]*t2;
+    J[5] = -(t10*t5);
+    J[6] = a0.cos[0]*t4 - t11*t2;
+    J[7] = a0.cos[0]*t3 - t11*t1;
     J[8] = 0.0;
-    J[9] = t8;
-    J[10] = -(sin_q1*t3);
-    J[11] = -(sin_q1*t2);
+    J[9] = t6;
+    J[10] = -(a0.sin[3]*t2);
+    J[11] = -(a0.sin[3]*t1);
     J[12] = 0.0;
-    J[13] = sin_q0;
-    J[14] = -t10;
-    J[15] = -t10;
+    J[13] = a0.sin[0];
+    J[14] = -t8;
+    J[15] = -t8;
     J[16] = 0.0;
-    J[17] = -cos_q0;
-    J[18] = -t12;
-    J[19] = -t12;
+    J[17] = -a0.cos[0];
+    J[18] = -t10;
+    J[19] = -t10;
     J[20] = 1.0;
     J[21] = 0.0;
-    J[22] = cos_q1;
-    J[23] = cos_q1;
+    J[22] = a0.cos[3];
+    J[23] = a0.cos[3];
 }

@@ -6,39 +6,37 @@
  *   in   f[8] in N, 0 to 100
  *   in   k[8] in N/m, 1000 to 50000
  *   out  K[4][4] in N m/rad
- * Cost: 125 add, 173 mul, 4 div, 4 sqrt, 2 sincos.
+ * Cost: 125 add, 143 mul, 4 div, 4 sqrt, 2 sincos.
  * Inputs: sha256 587a65bca3163563dc3b07fe3ba2c07934dd21d567d7f82f1bc6b0fb691a7376.
  */
 #include <math.h>
+#include "trig.h"
 #include "kernels.h"
 
 void awiwi_thumb_joint_stiffness(const double q[restrict 4], const double f[restrict 8], const double k[restrict 8], double K[restrict 16])
 {
-    const double cos_q0 = cos(q[0]);
-    const double cos_q1 = cos(q[1]);
-    const double t0 = 0.047*cos_q1;
-    const double t1 = cos_q0*t0;
-    const double t2 = 0.006*cos_q0 + t1;
-    const double sin_q0 = sin(q[0]);
-    const double t3 = 0.003*sin_q0;
-    const double sin_q1 = sin(q[1]);
-    const double t4 = 0.0025*sin_q1;
-    const double t5 = cos_q0*t4;
+    const awiwi_turn2 a0 = awiwi_sincos2(q[0], q[1]);
+    const double t0 = 0.047*a0.cos[1];
+    const double t1 = a0.cos[0]*t0;
+    const double t2 = 0.006*a0.cos[0] + t1;
+    const double t3 = 0.003*a0.sin[0];
+    const double t4 = 0.0025*a0.sin[1];
+    const double t5 = a0.cos[0]*t4;
     const double t6 = t3 - t5;
     const double t7 = t2 - t6;
-    const double t8 = 0.003*cos_q0;
+    const double t8 = 0.003*a0.cos[0];
     const double t9 = t8 - 0.03;
-    const double t10 = sin_q0*t4;
-    const double t11 = sin_q0*t0;
-    const double t12 = 0.006*sin_q0 + t11;
+    const double t10 = a0.sin[0]*t4;
+    const double t11 = a0.sin[0]*t0;
+    const double t12 = 0.006*a0.sin[0] + t11;
     const double t13 = t10 + t12;
     const double t14 = t9 + t13;
     const double t15 = t8 + t13;
     const double t16 = t2 - 0.002;
     const double t17 = t6 - t16;
     const double t18 = t7*t14 + t15*t17;
-    const double t19 = 0.047*sin_q1;
-    const double t20 = 0.0025*cos_q1;
+    const double t19 = 0.047*a0.sin[1];
+    const double t20 = 0.0025*a0.cos[1];
     const double t21 = t20 - 0.025;
     const double t22 = t19 - t21;
     const double t23 = t22*t22;
@@ -87,55 +85,53 @@ void awiwi_thumb_joint_stiffness(const double q[restrict 4], const double f[rest
     const double t66 = t52 - t51;
     const double t67 = k[0]*t27 + k[1]*t40 + k[2]*t49 + k[3]*t58 + f[0]*(t24*(t7*t59 + t15*t60 - t27)) + f[1]*(t37*(t29*t61 + t32*t62 - t40)) + f[2]*(t46*(t41*t63 + t43*t64 - t49)) + f[3]*(t55*(t50*t65 + t52*t66 - t58));
     const double t68 = t0 + t4;
-    const double t69 = 2.0*t22;
-    const double t70 = t68*t69;
-    const double t71 = cos_q0*t20;
-    const double t72 = cos_q0*t19;
-    const double t73 = t71 - t72;
-    const double t74 = sin_q0*t20;
-    const double t75 = sin_q0*t19;
-    const double t76 = t74 - t75;
-    const double t77 = t70 - 2.0*(t73*t17 - t76*t14);
-    const double t78 = k[0]*t77;
-    const double t79 = t0 - t4;
-    const double t80 = 2.0*t35;
-    const double t81 = t79*t80;
-    const double t82 = t71 + t72;
-    const double t83 = t74 + t75;
-    const double t84 = t81 + 2.0*(t82*t33 - t83*t31);
-    const double t85 = k[1]*t84;
-    const double t86 = t70 + 2.0*(t73*t44 - t76*t42);
-    const double t87 = k[2]*t86;
-    const double t88 = t81 - 2.0*(t82*t53 - t83*t51);
-    const double t89 = k[3]*t88;
-    const double t90 = 0.5*(t78*t26 + t85*t39 - t87*t48 - t89*t57) + f[1]*(t37*(t82*t62 - t83*t61 - 0.5*t84*t39)) + f[2]*(t46*(t73*t64 + t76*t63 + 0.5*t86*t48)) - f[0]*(t24*(t73*t60 - t76*t59 + 0.5*t77*t26)) - f[3]*(t55*(t82*t66 + t83*t65 - 0.5*t88*t57));
-    const double t91 = t77*t25;
-    const double t92 = t84*t38;
-    const double t93 = t86*t47;
-    const double t94 = t88*t56;
-    const double t95 = 2.0*t73*t73 + 2.0*t76*t76 + (2.0*t68*t68 + (t20 - t19)*t69);
-    const double t96 = t1 + t5;
-    const double t97 = t11 + t10;
-    const double t98 = 2.0*t82*t82 + 2.0*t83*t83 + (2.0*t79*t79 - (t20 + t19)*t80);
-    const double t99 = t1 - t5;
-    const double t100 = t11 - t10;
-    const double t101 = 0.25*(t78*t91 + t85*t92 + t87*t93 + t89*t94) + f[0]*(t24*(0.5*(t95 + 2.0*(t96*t17 - t97*t14)) - 0.25*t77*t91)) + f[1]*(t37*(0.5*(t98 + 2.0*(t99*t33 - t100*t31)) - 0.25*t84*t92)) + f[2]*(t46*(0.5*(t95 - 2.0*(t96*t44 - t97*t42)) - 0.25*t86*t93)) + f[3]*(t55*(0.5*(t98 - 2.0*(t99*t53 - t100*t51)) - 0.25*t88*t94));
-    const double t102 = k[6] + k[7];
-    const double t103 = -4.8e-05*t102;
+    const double t69 = t68*t22;
+    const double t70 = a0.sin[0]*t20;
+    const double t71 = a0.sin[0]*t19;
+    const double t72 = t70 - t71;
+    const double t73 = a0.cos[0]*t20;
+    const double t74 = a0.cos[0]*t19;
+    const double t75 = t73 - t74;
+    const double t76 = t69 + (t72*t14 - t75*t17);
+    const double t77 = k[0]*t76;
+    const double t78 = t0 - t4;
+    const double t79 = t78*t35;
+    const double t80 = t73 + t74;
+    const double t81 = t70 + t71;
+    const double t82 = t79 + (t80*t33 - t81*t31);
+    const double t83 = k[1]*t82;
+    const double t84 = t69 + (t75*t44 - t72*t42);
+    const double t85 = k[2]*t84;
+    const double t86 = t79 + (t81*t51 - t80*t53);
+    const double t87 = k[3]*t86;
+    const double t88 = t77*t26 + t83*t39 - t85*t48 - t87*t57 + f[1]*(t37*(t80*t62 - t81*t61 - t82*t39)) + f[2]*(t46*(t75*t64 + t72*t63 + t84*t48)) - f[0]*(t24*(t75*t60 - t72*t59 + t76*t26)) - f[3]*(t55*(t80*t66 + t81*t65 - t86*t57));
+    const double t89 = t76*t25;
+    const double t90 = t82*t38;
+    const double t91 = t84*t47;
+    const double t92 = t86*t56;
+    const double t93 = t75*t75 + (t68*t68 + ((t20 - t19)*t22 + t72*t72));
+    const double t94 = t1 + t5;
+    const double t95 = t11 + t10;
+    const double t96 = t80*t80 + (t78*t78 + (t81*t81 - (t20 + t19)*t35));
+    const double t97 = t1 - t5;
+    const double t98 = t11 - t10;
+    const double t99 = t77*t89 + t83*t90 + t85*t91 + t87*t92 + f[0]*(t24*(t93 + (t94*t17 - t95*t14) - t76*t89)) + f[1]*(t37*(t96 + (t97*t33 - t98*t31) - t82*t90)) + f[2]*(t46*(t93 + (t95*t42 - t94*t44) - t84*t91)) + f[3]*(t55*(t96 + (t98*t51 - t97*t53) - t86*t92));
+    const double t100 = k[6] + k[7];
+    const double t101 = -4.8e-05*t100;
     K[0] = t67;
-    K[1] = t90;
+    K[1] = t88;
     K[2] = 0.0;
     K[3] = 0.0;
-    K[4] = t90;
-    K[5] = t101;
+    K[4] = t88;
+    K[5] = t99;
     K[6] = 0.0;
     K[7] = 0.0;
     K[8] = 0.0;
     K[9] = 0.0;
-    K[10] = 6.4e-05*(k[4] + k[5] + t102);
-    K[11] = t103;
+    K[10] = 6.4e-05*(k[4] + k[5] + t100);
+    K[11] = t101;
     K[12] = 0.0;
     K[13] = 0.0;
-    K[14] = t103;
-    K[15] = 3.6e-05*t102;
+    K[14] = t101;
+    K[15] = 3.6e-05*t100;
 }

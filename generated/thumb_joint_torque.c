@@ -5,66 +5,65 @@
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   in   f[8] in N, 0 to 100
  *   out  tau[4] in N m
- * Cost: 62 add, 61 mul, 4 div, 4 sqrt, 2 sincos.
+ * Cost: 62 add, 57 mul, 4 div, 4 sqrt, 2 sincos.
  * Inputs: sha256 587a65bca3163563dc3b07fe3ba2c07934dd21d567d7f82f1bc6b0fb691a7376.
  */
 #include <math.h>
+#include "trig.h"
 #include "kernels.h"
 
 void awiwi_thumb_joint_torque(const double q[restrict 4], const double f[restrict 8], double tau[restrict 4])
 {
-    const double cos_q0 = cos(q[0]);
-    const double cos_q1 = cos(q[1]);
-    const double t0 = 0.047*cos_q1;
-    const double t1 = 0.006*cos_q0 + cos_q0*t0;
-    const double sin_q0 = sin(q[0]);
-    const double t2 = 0.003*sin_q0;
-    const double sin_q1 = sin(q[1]);
-    const double t3 = 0.0025*sin_q1;
-    const double t4 = cos_q0*t3;
+    const awiwi_turn2 a0 = awiwi_sincos2(q[0], q[1]);
+    const double t0 = 0.047*a0.cos[1];
+    const double t1 = 0.006*a0.cos[0] + a0.cos[0]*t0;
+    const double t2 = 0.003*a0.sin[0];
+    const double t3 = 0.0025*a0.sin[1];
+    const double t4 = a0.cos[0]*t3;
     const double t5 = t2 - t4;
-    const double t6 = 0.003*cos_q0;
+    const double t6 = 0.003*a0.cos[0];
     const double t7 = t6 - 0.03;
-    const double t8 = sin_q0*t3;
-    const double t9 = 0.006*sin_q0 + sin_q0*t0;
+    const double t8 = a0.sin[0]*t3;
+    const double t9 = 0.006*a0.sin[0] + a0.sin[0]*t0;
     const double t10 = t8 - t9;
     const double t11 = t7 + t10;
     const double t12 = t1 - 0.002;
     const double t13 = t5 + t12;
-    const double t14 = 0.047*sin_q1;
-    const double t15 = 0.0025*cos_q1;
-    const double t16 = t15 - 0.025;
-    const double t17 = t14 + t16;
-    const double t18 = t17*t17;
-    const double t19 = f[3]/sqrt(t18 + t11*t11 + t13*t13);
-    const double t20 = t2 + t4;
-    const double t21 = t8 + t9;
-    const double t22 = t7 - t21;
-    const double t23 = t20 + t12;
-    const double t24 = t14 - t16;
-    const double t25 = t24*t24;
-    const double t26 = f[2]/sqrt(t25 + t22*t22 + t23*t23);
-    const double t27 = t7 + t21;
-    const double t28 = t5 - t12;
-    const double t29 = f[0]/sqrt(t25 + t27*t27 + t28*t28);
-    const double t30 = t7 - t10;
-    const double t31 = t20 - t12;
-    const double t32 = f[1]/sqrt(t18 + t30*t30 + t31*t31);
-    const double t33 = ((t1 + t5)*t11 - (t6 + t10)*t13)*t19 + ((t1 + t20)*t22 - (t6 - t21)*t23)*t26 - ((t1 - t5)*t27 + (t6 + t21)*t28)*t29 - ((t1 - t20)*t30 + (t6 - t10)*t31)*t32;
-    const double t34 = 2.0*(t0 - t3)*t17;
-    const double t35 = cos_q0*t15;
-    const double t36 = cos_q0*t14;
-    const double t37 = t35 + t36;
-    const double t38 = sin_q0*t15;
-    const double t39 = sin_q0*t14;
-    const double t40 = t38 + t39;
-    const double t41 = 2.0*(t0 + t3)*t24;
-    const double t42 = t35 - t36;
-    const double t43 = t38 - t39;
-    const double t44 = (t34 - 2.0*(t37*t13 - t40*t11))*t19 + (t34 + 2.0*(t37*t31 - t40*t30))*t32 + (t41 - 2.0*(t42*t28 - t43*t27))*t29 + (t41 + 2.0*(t42*t23 - t43*t22))*t26;
-    const double t45 = f[6] - f[7];
-    tau[0] = t33;
-    tau[1] = -0.5*t44;
-    tau[2] = -0.008*(f[4] - f[5] - t45);
-    tau[3] = -0.006*t45;
+    const double t14 = 0.047*a0.sin[1];
+    const double t15 = 0.0025*a0.cos[1] - 0.025;
+    const double t16 = t14 + t15;
+    const double t17 = t16*t16;
+    const double t18 = f[3]/sqrt(t17 + t11*t11 + t13*t13);
+    const double t19 = t2 + t4;
+    const double t20 = t8 + t9;
+    const double t21 = t7 - t20;
+    const double t22 = t19 + t12;
+    const double t23 = t14 - t15;
+    const double t24 = t23*t23;
+    const double t25 = f[2]/sqrt(t24 + t21*t21 + t22*t22);
+    const double t26 = t7 + t20;
+    const double t27 = t5 - t12;
+    const double t28 = f[0]/sqrt(t24 + t26*t26 + t27*t27);
+    const double t29 = t7 - t10;
+    const double t30 = t19 - t12;
+    const double t31 = f[1]/sqrt(t17 + t29*t29 + t30*t30);
+    const double t32 = ((t1 + t5)*t11 - (t6 + t10)*t13)*t18 + ((t1 + t19)*t21 - (t6 - t20)*t22)*t25 - ((t1 - t5)*t26 + (t6 + t20)*t27)*t28 - ((t1 - t19)*t29 + (t6 - t10)*t30)*t31;
+    const double t33 = 18.8*a0.cos[1];
+    const double t34 = (a0.sin[1] - t33)*t16;
+    const double t35 = a0.cos[0]*a0.cos[1];
+    const double t36 = 18.8*a0.sin[1];
+    const double t37 = a0.cos[0]*t36;
+    const double t38 = t35 + t37;
+    const double t39 = a0.cos[1]*a0.sin[0];
+    const double t40 = a0.sin[0]*t36;
+    const double t41 = t39 + t40;
+    const double t42 = (a0.sin[1] + t33)*t23;
+    const double t43 = t39 - t40;
+    const double t44 = t35 - t37;
+    const double t45 = (t34 + (t38*t13 - t41*t11))*t18 + (t34 + (t41*t29 - t38*t30))*t31 - (t42 + (t43*t26 - t44*t27))*t28 - (t42 + (t44*t22 - t43*t21))*t25;
+    const double t46 = f[6] - f[7];
+    tau[0] = t32;
+    tau[1] = 0.0025*t45;
+    tau[2] = -0.008*(f[4] - f[5] - t46);
+    tau[3] = -0.006*t46;
 }

@@ -11,26 +11,24 @@
  * Inputs: sha256 f3c3c5f8b9f1a1e1c692bd3c2cc78649d46a5699c6bfe9fac97394eae1cedb18.
  */
 #include <math.h>
+#include "trig.h"
 #include "kernels.h"
 
 int awiwi_wrist_palm_pose(const double q71[restrict 1], const double q73[restrict 1], double T[restrict 16])
 {
-    const double sin_q710 = sin(q71[0]);
-    const double cos_q710 = cos(q71[0]);
-    const double t0 = 0.005184*cos_q710*cos_q710;
-    const double cos_q730 = cos(q73[0]);
-    const double t1 = 0.074565407529229*cos_q730;
-    const double t2 = 1.0/(1.650024824145215*cos_q730 - 1.9293993677555321);
+    const awiwi_turn2 a0 = awiwi_sincos2(q71[0], q73[0]);
+    const double t0 = 0.005184*a0.cos[0]*a0.cos[0];
+    const double t1 = 0.074565407529229*a0.cos[1];
+    const double t2 = 1.0/(1.650024824145215*a0.cos[1] - 1.9293993677555321);
     const double t3 = (t1 - 0.042)*t2;
     const double t4 = t1 - t3;
     const double t5 = t4 - 0.042;
-    const double sin_q730 = sin(q73[0]);
-    const double t6 = 0.074565407529229*sin_q730;
+    const double t6 = 0.074565407529229*a0.sin[1];
     const double t7 = t6*t2;
     const double t8 = t6 + t7;
     const double t9 = 23.80952380952381*t8;
     const double t10 = t6 - t7;
-    const double t11 = 0.072*sin_q710 - t10;
+    const double t11 = 0.072*a0.sin[0] - t10;
     const double t12 = t1 + t3;
     const double t13 = 23.80952380952381*t12;
     const double t14 = t5*t9 + t11*t13;
@@ -39,29 +37,29 @@ int awiwi_wrist_palm_pose(const double q71[restrict 1], const double q73[restric
     const double t17 = t0 + t5*t5 + t11*t11 - 0.01;
     const double t18 = t15 - 48.22530864197531*t17*t17;
     const double t19 = sqrt(t18);
-    const double t20 = t16*(6.944444444444445*t14*t17 - 0.072*cos_q710*t19);
-    const double t21 = sin_q710*t20;
-    const double t22 = t16*(0.5*cos_q710*t17 + t14*t19);
-    const double t23 = cos_q710*t22;
-    const double t24 = sin_q710*t22;
-    const double t25 = cos_q710*t20;
+    const double t20 = t16*(6.944444444444445*t14*t17 - 0.072*a0.cos[0]*t19);
+    const double t21 = a0.sin[0]*t20;
+    const double t22 = t16*(0.5*a0.cos[0]*t17 + t14*t19);
+    const double t23 = a0.cos[0]*t22;
+    const double t24 = a0.sin[0]*t22;
+    const double t25 = a0.cos[0]*t20;
     const double t26 = 0.42857142857142855*t20;
     const double t27 = 0.5*t10 + t12*t26;
     T[0] = -t21 - t13*t23;
-    T[1] = cos_q710*t9;
+    T[1] = a0.cos[0]*t9;
     T[2] = t24 - t13*t25;
-    T[3] = cos_q710*t27 - 0.018*t24;
+    T[3] = a0.cos[0]*t27 - 0.018*t24;
     T[4] = t9*t22;
     T[5] = t13;
     T[6] = t9*t20;
     T[7] = 0.5*t4 - t8*t26;
     T[8] = t25 - t13*t24;
-    T[9] = sin_q710*t9;
+    T[9] = a0.sin[0]*t9;
     T[10] = -t23 - t13*t21;
-    T[11] = 0.018*t23 + sin_q710*t27;
+    T[11] = 0.018*t23 + a0.sin[0]*t27;
     T[12] = 0.0;
     T[13] = 0.0;
     T[14] = 0.0;
     T[15] = 1.0;
-    return sin_q730 > 0.0 && 0.002592*cos_q710 > 0.0 && t18 > 0.0 ? 0 : 1;
+    return a0.sin[1] > 0.0 && 0.002592*a0.cos[0] > 0.0 && t18 > 0.0 ? 0 : 1;
 }

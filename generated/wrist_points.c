@@ -13,27 +13,25 @@
  * Inputs: sha256 db74b2a34f56c6ccad41684846d922ba049b7832368c63b234f7fba0d2100dce.
  */
 #include <math.h>
+#include "trig.h"
 #include "kernels.h"
 
 int awiwi_wrist_points(const double q71[restrict 1], const double q73[restrict 1], double A[restrict 3], double B[restrict 3], double C[restrict 3])
 {
-    const double cos_q710 = cos(q71[0]);
-    const double sin_q730 = sin(q73[0]);
-    const double t0 = 0.074565407529229*sin_q730;
-    const double cos_q730 = cos(q73[0]);
-    const double t1 = 1.0/(1.650024824145215*cos_q730 - 1.9293993677555321);
+    const awiwi_turn2 a0 = awiwi_sincos2(q71[0], q73[0]);
+    const double t0 = 0.074565407529229*a0.sin[1];
+    const double t1 = 1.0/(1.650024824145215*a0.cos[1] - 1.9293993677555321);
     const double t2 = t0*t1;
     const double t3 = t0 - t2;
-    const double t4 = 0.074565407529229*cos_q730;
+    const double t4 = 0.074565407529229*a0.cos[1];
     const double t5 = (t4 - 0.042)*t1;
     const double t6 = 23.80952380952381*(t4 + t5);
-    const double t7 = 0.072*cos_q710;
+    const double t7 = 0.072*a0.cos[0];
     const double t8 = t7*t7;
     const double t9 = t4 - t5;
     const double t10 = t9 - 0.042;
     const double t11 = 23.80952380952381*(t0 + t2);
-    const double sin_q710 = sin(q71[0]);
-    const double t12 = 0.072*sin_q710 - t3;
+    const double t12 = 0.072*a0.sin[0] - t3;
     const double t13 = t10*t11 + t12*t6;
     const double t14 = t8 + t13*t13;
     const double t15 = 1.0/t14;
@@ -43,14 +41,14 @@ int awiwi_wrist_points(const double q71[restrict 1], const double q73[restrict 1
     const double t19 = t15*(t13*t16 - t7*t18);
     const double t20 = 0.5*t3 + 0.036*(t6*t19);
     const double t21 = 0.036*(t15*(t7*t16 + t13*t18));
-    A[0] = cos_q710*t20 - sin_q710*t21;
+    A[0] = a0.cos[0]*t20 - a0.sin[0]*t21;
     A[1] = 0.5*t9 - 0.036*(t11*t19);
-    A[2] = cos_q710*t21 + sin_q710*t20;
-    B[0] = cos_q710*t0;
+    A[2] = a0.cos[0]*t21 + a0.sin[0]*t20;
+    B[0] = a0.cos[0]*t0;
     B[1] = t4;
-    B[2] = sin_q710*t0;
-    C[0] = -(cos_q710*t2);
+    B[2] = a0.sin[0]*t0;
+    C[0] = -(a0.cos[0]*t2);
     C[1] = -t5;
-    C[2] = -(sin_q710*t2);
-    return sin_q730 > 0.0 && 0.002592*cos_q710 > 0.0 && t17 > 0.0 ? 0 : 1;
+    C[2] = -(a0.sin[0]*t2);
+    return a0.sin[1] > 0.0 && 0.002592*a0.cos[0] > 0.0 && t17 > 0.0 ? 0 : 1;
 }

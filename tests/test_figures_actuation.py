@@ -6,7 +6,7 @@ import pytest
 from actuators import compiled, hand_text
 
 from awiwi_gen.hand import Hand
-from awiwi_gen.studies.figures_actuation import figures
+from awiwi_gen.studies.figures.actuation import figures
 
 
 @pytest.fixture(scope="module")
@@ -25,7 +25,7 @@ def test_a_timid_compensation_does_not_pass_for_one(shown):
 
     assert not timid["3.6"].holds
     assert timid["3.4"].holds
-    assert "70% of it is left" in timid["3.6"].claim
+    assert "70% is left" in timid["3.6"].found
 
 
 def test_a_hand_without_ripple_or_spring_has_fewer_figures():

@@ -132,7 +132,7 @@ def single(request, hand, tmp_path_factory) -> tuple[Path, list[Path]]:
 
     directory = tmp_path_factory.mktemp("single") / "generated"
     pattern = {"libm": "thumb_*", "own": "[msw][opr]*"}[request.param]
-    generate(Job(hand, Options("f32", trig=request.param), only=pattern), directory)
+    generate(Job(hand, Options("f32", math=request.param), only=pattern), directory)
     return directory, compile_objects(directory, Cache())
 
 
@@ -196,7 +196,15 @@ int main(void)
 """
 
 
-CALLED = ("index_dynamics", "thumb_tendon_lengths", "thumb_coupling", "thumb_joint_estimate", "wrist_points", "model")
+CALLED = (
+    "index_dynamics",
+    "thumb_tendon_lengths",
+    "thumb_coupling",
+    "thumb_joint_estimate",
+    "wrist_points",
+    "model",
+    "trig",
+)
 
 
 @pytest.mark.parametrize("level", ["-O0", "-O3"])

@@ -16,10 +16,12 @@ from awiwi_gen.ir.passes.bind import bind
 from awiwi_gen.ir.passes.factor import factor
 from awiwi_gen.ir.passes.finish import orient, quotients, schedule
 from awiwi_gen.ir.passes.flatten import flatten
+from awiwi_gen.ir.passes.scale import scale
 from awiwi_gen.ir.passes.share import share_products, share_sums
+from awiwi_gen.ir.passes.turn import turn
 from awiwi_gen.verify.reference import ball_values, disagreement
 
-PASSES = (flatten, share_products, share_sums, factor, quotients, orient, schedule)
+PASSES = (flatten, turn, share_products, share_sums, factor, scale, quotients, orient, schedule)
 STEPS = st.lists(
     st.tuples(
         st.sampled_from(["add", "sub", "mul", "div", "neg", "sin", "cos", "sqrt"]),

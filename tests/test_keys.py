@@ -11,7 +11,7 @@ from awiwi_gen import sources
 from awiwi_gen.derive import Deriver, check_dimensions
 from awiwi_gen.ir import from_casadi, from_sympy
 from awiwi_gen.kernels import catalog
-from awiwi_gen.records import derivation_key, make_record, make_solver_record, physics
+from awiwi_gen.records import derivation_key, make_records, make_solver_record, physics
 from awiwi_gen.resources import PACKAGE
 
 # Of every room of the physics; small enough to be derived under a tracer.
@@ -112,8 +112,8 @@ def test_all_that_runs_in_a_derivation_is_in_its_key(kernels, name):
 def test_what_makes_records_does_not_depend_on_the_laws_of_physics_nor_they_on_it():
     law, passes = ("awiwi_gen.verify.physics", "obey"), ("awiwi_gen.ir.passes.share", "share_sums")
 
-    assert passes in sources.reached(make_record)
-    assert law not in sources.reached(make_record) | sources.reached(make_solver_record)
+    assert passes in sources.reached(make_records)
+    assert law not in sources.reached(make_records) | sources.reached(make_solver_record)
     assert law in sources.reached(physics)
     assert passes not in sources.reached(physics)
 

@@ -20,7 +20,13 @@ COMPILER = [
     ["build"],
     ["verify"],
 ]
-TOP = [["derive", "records"], ["pipeline"], ["report", "explain", "simulate", "studies"], ["__init__"], ["__main__"]]
+TOP = [
+    ["derive", "records", "budget"],
+    ["pipeline"],
+    ["report", "explain", "simulate", "studies"],
+    ["__init__"],
+    ["__main__"],
+]
 HOMES = {
     "sympy": {"models", "ir/from_sympy.py", "derive.py", "control"},
     "casadi": {"models", "ir/from_casadi.py", "derive.py", "control"},

@@ -46,6 +46,13 @@ STRUCTURES: dict[str, dict[str, Any]] = {
         "spans": ["pip", "pip", "dip", "abduction", "flexion"],
     },
     "short": {"joints": {"a": "y+90", "b": "y-90"}, "routes": [["+a", "-b"]], "spans": ["b"]},
+    "jaw": {"joints": {"root": "x-90", "end": "none"}, "routes": [["+root", "-end"]]},
+    "winch": {
+        "joints": {"lead": "none", "loop": "y-90", "tip": "none"},
+        "couplings": {"tip": "lead"},
+        "four_bar": "loop",
+        "routes": [["+loop"]],
+    },
     # What no finger of the hand has: a four-bar in mid-chain, a parallel joint behind it, a follower elsewhere.
     "odd": {
         "joints": {"a": "z-90", "loop": "y+90", "b": "none", "c": "x+180", "d": "y-90"},

@@ -17,13 +17,21 @@ from awiwi_gen.emit.tree import read_manifest
 from awiwi_gen.errors import InputError
 from awiwi_gen.hand import Hand
 from awiwi_gen.pipeline import Job, Proof, cached_tree, verify
-from awiwi_gen.studies import figures_fingers, page
-from awiwi_gen.studies.figures_fingers import coriolis, released
+from awiwi_gen.studies import page
+from awiwi_gen.studies.figures import all_figures
+from awiwi_gen.studies.figures import fingers as figures_fingers
+from awiwi_gen.studies.figures.fingers import coriolis, released
+from awiwi_gen.studies.printed.number import compared
 
 
 @pytest.fixture(scope="module")
 def figures(lib, hand):
-    return page.all_figures(lib, hand)
+    return all_figures(lib, hand)
+
+
+@pytest.fixture(scope="module")
+def results(figures, some_proof):
+    return page.Results(figures, NUMBERS, some_proof[0])
 
 
 @pytest.fixture(scope="module")
@@ -32,6 +40,9 @@ def some_proof(hand):
     job = Job(hand, only="thumb_base*")
     directory = cached_tree(job)
     return verify(job, directory), read_manifest(directory)
+
+
+NUMBERS = [compared("eq. 9.9", "2.5", 2.4999, "a < b"), compared("eq. 9.10", "2.5", 2.6, "a slip")]
 
 
 class Tags(HTMLParser):
@@ -55,9 +66,9 @@ class Tags(HTMLParser):
 
 
 @pytest.fixture(scope="module")
-def text(tmp_path_factory, hand, figures, some_proof):
+def text(tmp_path_factory, hand, results, some_proof):
     path = tmp_path_factory.mktemp("page") / "report" / "index.html"
-    page.write_page(path, hand, figures, *some_proof)
+    page.write_page(path, hand, results, some_proof[1])
     return path.read_text(encoding="utf-8")
 
 
@@ -67,8 +78,8 @@ def test_every_figure_of_the_source_is_there_and_says_whether_its_claim_holds(te
     assert {"5.7", "5.16", "5.17", "6.9", "6.10"} <= set(numbers)
     assert numbers.index("5.7") < numbers.index("5.16") < numbers.index("6.9") < numbers.index("6.10")
     for figure in figures:
-        heading = f"Figure {figure.number}: {escape(figure.title)}</h2>"
-        own = text.partition(heading)[2].partition("<h2")[0]
+        heading = f"Figure {figure.number}: {escape(figure.title)}</h3>"
+        own = text.partition(heading)[2].partition("<h3")[0]
         assert f"The claim {'holds' if figure.holds else 'does not hold'}." in own
         assert "<svg" in own
         assert "<path" in own
@@ -83,18 +94,23 @@ def test_the_page_is_whole_and_needs_no_other_file(text, figures):
     assert len([name for name in tags.ids if name.startswith("figure-")]) == len(figures)
 
 
+def test_the_page_shows_every_printed_number_beside_ours(text):
+    assert '<td>eq. 9.9</td><td>2.5</td><td>2.4999</td><td class="agrees">agrees</td><td>a &lt; b</td>' in text
+    assert '<td class="misprint">misprint</td>' in text
+
+
 def test_the_page_shows_the_proof_of_every_kernel(text, some_proof):
     proof, _ = some_proof
 
     assert len(proof.verdicts) == 3
     for verdict in proof.verdicts:
-        assert re.search(rf"<tr><td>{verdict.name}</td>.*<td>proved</td></tr>", text)
+        assert re.search(rf"<tr><td>{verdict.name}</td>.*<td class=\"proved\">proved</td></tr>", text)
     for law in proof.laws:
         assert f"<td>{law.statement}</td>" in text
 
 
-def test_equal_results_give_equal_bytes_without_dates(tmp_path, hand, figures, text, some_proof):
-    page.write_page(tmp_path / "again.html", hand, figures, *some_proof)
+def test_equal_results_give_equal_bytes_without_dates(tmp_path, hand, results, text, some_proof):
+    page.write_page(tmp_path / "again.html", hand, results, some_proof[1])
 
     assert (tmp_path / "again.html").read_text(encoding="utf-8") == text
     assert not re.search(r"20\d\d-\d\d|Matplotlib", text)
@@ -102,17 +118,17 @@ def test_equal_results_give_equal_bytes_without_dates(tmp_path, hand, figures, t
 
 def test_text_of_a_figure_cannot_become_markup(tmp_path, hand, figures):
     bad = replace(figures[0], title="<script>", claim="a < b & c", holds=False)
-    page.write_page(tmp_path / "bad.html", hand, [bad], Proof([], []), {"kernels": []})
+    page.write_page(tmp_path / "bad.html", hand, page.Results([bad], [], Proof([], [])), {"kernels": []})
     written = (tmp_path / "bad.html").read_text(encoding="utf-8")
 
     assert "<script>" not in written
     assert "a &lt; b &amp; c" in written
 
 
-def test_the_command_writes_the_page_and_tells_each_verdict(tmp_path, monkeypatch, figures, some_proof, hand):
+def test_the_command_writes_the_page_and_tells_each_verdict(tmp_path, monkeypatch, results, some_proof, hand):
     def publish(job, path):
-        page.write_page(path, hand, figures, *some_proof)
-        return figures, some_proof[0]
+        page.write_page(path, hand, results, some_proof[1])
+        return results
 
     monkeypatch.setattr(page, "publish", publish)
     target = tmp_path / "index.html"
@@ -121,7 +137,9 @@ def test_the_command_writes_the_page_and_tells_each_verdict(tmp_path, monkeypatc
 
     assert told.exit_code == as_json.exit_code == 0
     assert target.exists()
-    assert [f["number"] for f in json.loads(as_json.stdout)] == [figure.number for figure in figures]
+    written = json.loads(as_json.stdout)
+    assert [figure["number"] for figure in written["figures"]] == [figure.number for figure in results.figures]
+    assert [number["verdict"] for number in written["numbers"]] == ["agrees", "misprint"]
     assert "figure 5.7: the claim does not hold" in told.stdout
 
 

@@ -161,3 +161,84 @@ def test_gains_that_are_not_positive_are_refused(lib, gains):
     shared = {name: SCHEDULED[name] for name in ("f", "fd", "f_des", "fd_des", "f_hat", "friction", "r")}
 
     assert lib.tendon_force_pd(**shared, kp=gains[0], kd=gains[1]).status == 1
+
+
+# -- steps at every working point (figures 10.2, 10.3) -----------------------------------------------------
+
+POINTS = np.array([10.0, 20.0, 30.0, 45.0, 60.0])  # N, where each step of 5 N ends
+MOTOR, LINE = (2e-3, 0.004), np.array([3000.0, 1.2e5, 2e7])  # a spring that is three times as stiff at 60 N as at 10 N
+FREQUENCY, TICK, SUBSTEPS = 150.0, 1 / 3000, 10
+
+
+def stretch(force):
+    """Elongation [m] under a force, by Newton's method."""
+    x = force / LINE[0]
+    for _ in range(30):
+        x = x - (x * (LINE[0] + x * (LINE[1] + x * LINE[2])) - force) / slope_at(x)
+    return x
+
+
+def slope_at(x):
+    return LINE[0] + 2 * LINE[1] * x + 3 * LINE[2] * x**2
+
+
+def stepped(lib, gains):
+    """Forces (ticks, points) of all steps at once, with a torque one sample late; gains as a function of the slope."""
+    x = np.stack([stretch(POINTS - 5) / MOTOR[1], np.zeros(len(POINTS))], axis=-1)
+    u, seen = MOTOR[1] * (POINTS - 5), []
+    for _ in range(400):
+        f, slope = lib.plant_tendon(x, u, 0.0, MOTOR, LINE, (10.0, 0.0, 0.0)).f, slope_at(MOTOR[1] * x[:, 0])
+        wanted = gains(f, slope * MOTOR[1] * x[:, 1])
+        seen.append(f)
+        for _ in range(SUBSTEPS):
+            xd = lib.plant_tendon(x, u, 0.0, MOTOR, LINE, (10.0, 0.0, 0.0)).xd
+            x[:, 1] += TICK / SUBSTEPS * xd[:, 1]
+            x[:, 0] += TICK / SUBSTEPS * x[:, 1]
+        u = wanted
+    return np.array(seen)
+
+
+def overshoots(forces):
+    return (forces.max(axis=0) - POINTS) / 5
+
+
+def settlings(forces):
+    off = np.abs(forces - POINTS) > 0.1
+    return TICK * (len(off) - np.argmax(off[::-1], axis=0))
+
+
+def with_scheduled_gains(lib):
+    def gains(f, fd):
+        return lib.tendon_force_scheduled(
+            f, fd, POINTS, 0.0, f, 0.0, MOTOR[1], MOTOR[0], slope_at(stretch(POINTS)), 0.0, FREQUENCY, 1.0
+        ).tau  # fmt: skip
+
+    return gains
+
+
+def with_gains_for_30_newton(lib):
+    slope = MOTOR[1] * slope_at(stretch(30.0))
+    kp, kd = MOTOR[0] * FREQUENCY**2 / slope, 2 * MOTOR[0] * FREQUENCY / slope
+
+    def gains(f, fd):
+        return lib.tendon_force_pd(f, fd, POINTS, 0.0, f, 0.0, MOTOR[1], kp, kd).tau
+
+    return gains
+
+
+def test_scheduled_gains_step_alike_at_every_working_point(lib):
+    forces = stepped(lib, with_scheduled_gains(lib))
+
+    assert forces[-1] == pytest.approx(POINTS, abs=1e-3)
+    assert overshoots(forces).max() < 0.03
+    assert np.ptp(settlings(forces)) < 0.2 * settlings(forces).min()
+
+
+def test_gains_for_30_newton_ring_where_the_tendon_is_softer_and_creep_where_it_is_stiffer(lib):
+    forces = stepped(lib, with_gains_for_30_newton(lib))
+    over, settled = overshoots(forces), settlings(forces)
+
+    assert forces[-1] == pytest.approx(POINTS, abs=0.02)
+    assert (np.diff(over) <= 1e-9).all()
+    assert over[0] > 0.02 > over[2]
+    assert np.ptp(settled) > 0.4 * settled.min()

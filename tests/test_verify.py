@@ -23,7 +23,7 @@ from awiwi_gen.ir.builder import Builder, copy_node, rebuild
 from awiwi_gen.ir.graph import Graph, Node, Ref
 from awiwi_gen.kernels import catalog
 from awiwi_gen.pipeline import Job, generate, verify
-from awiwi_gen.records import make_record
+from awiwi_gen.records import make_records
 from awiwi_gen.units import N, kg
 
 ONE_FINGER = Path(__file__).with_name("one_finger.toml")
@@ -178,7 +178,7 @@ def test_a_broken_pass_is_found_and_named(small, monkeypatch, broken):
     kernel = kernel_named(small, "jaw_mass_matrix")
 
     with pytest.raises(VerificationError, match=rf"jaw_mass_matrix: pass {broken.__name__} changes its value by"):
-        make_record(kernel, derived(kernel), "claw", Options(), "digest")
+        make_records([(kernel, derived(kernel), "digest")], "claw", Options())
 
 
 # ------------------------------------------------------------------------------------------------- level 4: witnesses
@@ -191,7 +191,7 @@ def test_a_wrong_witness_is_found(small, factor):
     lying = replace(kernel, routes={**kernel.routes, "casadi": lambda *arguments: factor * right(*arguments)})
 
     with pytest.raises(VerificationError, match="jaw_mass_matrix: its derivations sympy, casadi differ by"):
-        make_record(lying, derived(lying), "claw", Options(), "digest")
+        make_records([(lying, derived(lying), "digest")], "claw", Options())
 
 
 # ------------------------------------------------------------------------------------------------- units

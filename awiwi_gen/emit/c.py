@@ -15,6 +15,7 @@ from math import prod
 from awiwi_gen.emit.options import Options
 from awiwi_gen.ir.cost import Cost, cost
 from awiwi_gen.ir.graph import LEAVES, Graph, Node, Ref, node_of, operands
+from awiwi_gen.ir.passes.gather import angle_groups
 from awiwi_gen.kernel import GUARDS
 
 LINE = 100  # longer expressions are cut into named parts
@@ -58,7 +59,7 @@ def c_function(
     prototype, definition = signature(f"{result} {prefix}_{name}", inputs, outputs, options, graph.params and prefix)
     read = {node[1] for node in graph.nodes if node[0] == "input"}
     functions = {node[0] for node in graph.nodes} - LEAVES - {"add", "mul", "div", "inv"}
-    turns = functions & {"sin", "cos"} if options.trig == "own" else set()
+    turns = functions & {"sin", "cos"} if options.math == "own" else set()
     unused = tuple(f"(void){port};" for port in inputs if port not in read)
     return CFunction(
         name=name,
@@ -91,18 +92,19 @@ class Printer:
 
     def __init__(self, graph: Graph, options: Options, prefix: str, params: str) -> None:
         self.graph, self.options, self.prefix, self.params = graph, options, prefix, params
-        self.turns: dict[Ref, str] = {}
+        self.turns: dict[Ref, str] = {}  # what the sine and the cosine of an angle are called
+        self.groups = angle_groups(graph) if options.math == "own" else {}
         self.texts: list[Text] = []
         self.lines: list[str] = []
-        self.count = 0
+        self.count = self.calls = 0
 
     def statements(self) -> list[str]:
         """Declarations in order of evaluation, then the assignments to the outputs."""
         uses = self.graph.uses
         argument = {node_of(r) for node in self.graph.nodes if node[0] in ("sin", "cos") for r in node[1:]}
         for index, node in enumerate(self.graph.nodes):
-            if node[0] in ("sin", "cos") and self.options.trig == "own":
-                self.texts.append((f"{self.turn(node[1])}.{node[0]}", ATOM))
+            if node[0] in ("sin", "cos") and self.options.math == "own":
+                self.texts.append((self.turn(node[1], node[0]), ATOM))
                 continue
             text = self.expression(node)
             named = node[0] not in LEAVES and (
@@ -120,15 +122,17 @@ class Printer:
                 self.lines.append(f"{output.name}[{position}] = {self.operand(ref, SUM)};")
         return self.lines
 
-    def turn(self, angle: Ref) -> str:
-        """The name of an angle's sine and cosine, declared when first asked for."""
+    def turn(self, angle: Ref, function: str) -> str:
+        """A sine or cosine; those of all angles of its group are computed when the first is asked for."""
         if angle not in self.turns:
-            leaf = self.graph.nodes[node_of(angle)]
-            name = f"{leaf[1]}{leaf[2]}" if leaf[0] == "input" and angle >= 0 else f"a{len(self.turns)}"
-            self.turns[angle] = name
-            call = f"{self.prefix}_sincos({self.operand(angle, SUM)})"
-            self.lines.append(f"const {self.prefix}_turn {name} = {call};")
-        return self.turns[angle]
+            group = self.groups[angle]
+            name, count = f"a{self.calls}", len(group)
+            self.calls += 1
+            lanes = str(count) if count > 1 else ""
+            call = f"{self.prefix}_sincos{lanes}({', '.join(self.operand(each, SUM) for each in group)})"
+            self.lines.append(f"const {self.prefix}_turn{lanes} {name} = {call};")
+            self.turns |= {each: f"{name}.%s[{lane}]" if lanes else f"{name}.%s" for lane, each in enumerate(group)}
+        return self.turns[angle] % function
 
     def declare(self, node: Node, text: str) -> Text:
         """Give a value a name."""

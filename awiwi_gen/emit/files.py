@@ -107,8 +107,7 @@ def shared_files(
         f".{identifier(path)} = {options.literal(quantity.value)}, /* {quantity.text} */"
         for path, quantity in quantities.items()
     ]
-    trig = {"trig.h": trig_header(prefix, options)} if options.trig == "own" else {}
-    return trig | {
+    return (trig_files(prefix, options) if options.math == "own" else {}) | {
         "real.h": render(
             "real.h.j2",
             banner=banner(),
@@ -130,23 +129,35 @@ def shared_files(
     }
 
 
-NUMERALS = {"zero": 0.0, "quarter": 0.25, "below": 0.375, "half": 0.5, "one": 1.0, "middle": 1.5, "four": 4.0}
-
-
-def trig_header(prefix: str, options: Options) -> str:
+def trig_files(prefix: str, options: Options) -> dict[str, str]:
     """Sine and cosine in the scalar type of this build."""
     trig = constants(options.dtype)
 
-    def literal(value: float) -> str:
-        return options.literal(Fraction(value))
+    def four(value: float) -> str:
+        return f"FOUR({options.literal(Fraction(value))})"
 
-    def polynomial(coefficients: tuple[float, ...]) -> str:
-        first, *others = coefficients
-        return f"{literal(first)} + z * ({polynomial(tuple(others))})" if others else literal(first)
+    def member(name: str, value: Any) -> tuple[str, str, str]:
+        if isinstance(value, tuple):
+            return name, f"[{len(value)}]", f"{{{', '.join(map(four, value))}}}"
+        return name, "", four(value)
 
-    k: dict[str, object] = {name: literal(value) for name, value in vars(trig).items() if isinstance(value, float)}
-    k |= {name: literal(value) for name, value in NUMERALS.items()}
-    k["half_pi"] = [literal(part) for part in trig.half_pi]
-    k |= {"sine": polynomial(trig.sine), "cosine": polynomial(trig.cosine)}
-    guard = f"{prefix.upper()}_TRIG_H"
-    return render("trig.h.j2", banner=banner(), guard=guard, prefix=prefix, c_type=options.c_type, k=k)
+    def polynomial(name: str, first: int = 0) -> str:
+        left = len(getattr(trig, name)) - first
+        pair = f"k->{name}[{first}][i]" + (f" + z * k->{name}[{first + 1}][i]" if left > 1 else "")
+        return f"({pair}) + zz * ({polynomial(name, first + 2)})" if left > 2 else pair
+
+    bits = 64 if options.scalar == "f64" else 32
+    header = render(
+        "trig.h.j2",
+        banner=banner(),
+        guard=f"{prefix.upper()}_TRIG_H",
+        prefix=prefix,
+        c_type=options.c_type,
+        bits=f"uint{bits}_t",
+        top=bits - 1,
+        numbers=[member(name, value) for name, value in vars(trig).items()],
+        limit=f"{trig.limit:.0f}",
+        sine=polynomial("sine"),
+        cosine=polynomial("cosine"),
+    )
+    return {"trig.h": header, "trig.c": render("trig.c.j2", banner=banner(), prefix=prefix)}

@@ -11,11 +11,11 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Options:
-    """Scalar type of the C, whether the hand's numbers are constants in it or come in a struct, whose sine it calls."""
+    """Scalar type, whether the hand's numbers are constants or come in a struct, whose functions the C calls."""
 
     scalar: Literal["f64", "f32"] = "f64"
     params: Literal["baked", "runtime"] = "baked"
-    trig: Literal["libm", "own"] = "libm"
+    math: Literal["own", "libm"] = "own"
 
     @property
     def c_type(self) -> str:

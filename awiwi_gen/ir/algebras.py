@@ -17,7 +17,7 @@ import numpy as np
 from flint import arb, ctx, fmpq
 
 from awiwi_gen.errors import DimensionError
-from awiwi_gen.ir.trig import sincos
+from awiwi_gen.ir.trig import ULPS, sincos
 from awiwi_gen.units import Unit, one
 
 PRECISION_BITS = 256  # working precision of balls: the checks ask for 200
@@ -109,6 +109,7 @@ def ball(value: Fraction | float | int) -> arb:
 
 UNIT_ROUNDOFF: dict[type, float] = {np.float64: 2.0**-53, np.float32: 2.0**-24}
 LIBM_ULPS = 4.0  # what is granted to a C library's function, in units of roundoff of its result
+EXACT = {"sqrt": 1.0, "fabs": 1.0}  # and to those that are rounded once; an ulp is at most two of these units
 
 
 class Bounded:
@@ -118,8 +119,9 @@ class Bounded:
     whose error exceeds it computes something else than its graph.
     """
 
-    def __init__(self, dtype: type = np.float64) -> None:
+    def __init__(self, dtype: type = np.float64, own_trig: bool = False) -> None:
         self.u = UNIT_ROUNDOFF[dtype]
+        self.granted = EXACT | dict.fromkeys(("sin", "cos"), 2 * ULPS) if own_trig else EXACT
         self.tiny = float(np.finfo(dtype).smallest_subnormal)
 
     def _rounded(self, value: Any, error: Any) -> tuple[Any, Any]:
@@ -148,7 +150,7 @@ class Bounded:
     def call(self, operation: str, *args: Any) -> Any:
         value = getattr(np, NUMPY_NAMES.get(operation, operation))(*(a[0] for a in args))
         error = sum(slope * a[1] for slope, a in zip(_slopes(operation, args), args, strict=True))
-        roundoff = self.u if operation in ("sqrt", "fabs") else LIBM_ULPS * self.u
+        roundoff = self.granted.get(operation, LIBM_ULPS) * self.u
         return value, error * (1 + 4 * self.u) + roundoff * np.abs(value) + self.tiny
 
 
@@ -182,6 +184,9 @@ def _slopes(operation: str, args: tuple[Any, ...]) -> tuple[Any, ...]:
 class Dimensions:
     """Dimension checking: a value is a unit. Zero, which fits any unit, is None."""
 
+    def __init__(self) -> None:
+        self._products: dict[tuple[Unit, Unit], Unit] = {}
+
     def const(self, value: Fraction) -> Unit | None:
         return one if value else None
 
@@ -191,14 +196,18 @@ class Dimensions:
     def add(self, a: Unit | None, b: Unit | None) -> Unit | None:
         if a is None or b is None:
             return b if a is None else a
-        if a != b:
+        if a is not b and a != b:
             raise DimensionError(f"adds {a} and {b}")
         return a
 
     sub = add
 
     def mul(self, a: Unit | None, b: Unit | None) -> Unit | None:
-        return None if a is None or b is None else a * b
+        if a is None or b is None:
+            return None
+        if (a, b) not in self._products:
+            self._products[a, b] = a * b
+        return self._products[a, b]
 
     def div(self, a: Unit | None, b: Unit | None) -> Unit | None:
         return None if a is None or b is None else a / b

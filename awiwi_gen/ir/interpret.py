@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from fractions import Fraction
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
-from awiwi_gen.ir.graph import LEAVES, Graph, Node, Ref
+from awiwi_gen.ir.graph import LEAVES, Graph, Node, Ref, node_of, operands
 
 T = TypeVar("T")
 
@@ -33,13 +33,29 @@ def evaluate(graph: Graph, algebra: Algebra[T], leaf: Callable[[Node], T]) -> di
     ``leaf`` gives the value of an ``("input", port, element)`` or ``("param", path)`` node.
     """
     values: list[T] = []
+    last = _last_uses(graph)
+    gone: Any = None
 
     def at(ref: Ref) -> T:
         return values[ref] if ref >= 0 else algebra.neg(values[~ref])
 
-    for node in graph.nodes:
+    for index, node in enumerate(graph.nodes):
         values.append(_node(node, algebra, leaf, values, at))
+        for ref in operands(node):  # batches are large: what nobody reads any more is let go
+            if last[node_of(ref)] == index:
+                values[node_of(ref)] = gone
     return {output.name: [at(ref) for ref in output.elements] for output in graph.outputs}
+
+
+def _last_uses(graph: Graph) -> list[int]:
+    """The last node that reads each node; beyond all for what is an output."""
+    last = [-1] * len(graph.nodes)
+    for index, node in enumerate(graph.nodes):
+        for ref in operands(node):
+            last[node_of(ref)] = index
+    for ref in graph.roots:
+        last[node_of(ref)] = len(graph.nodes)
+    return last
 
 
 def _node(node: Node, algebra: Algebra[T], leaf: Callable[[Node], T], values: list[T], at: Callable[[Ref], T]) -> T:

@@ -21,9 +21,6 @@ from awiwi_gen.kernels.springs import spring_kernels
 from awiwi_gen.kernels.whole_hand import hand_kernels
 from awiwi_gen.kernels.wrist import wrist_kernels
 
-# Proved on the Awiwi hand, but not on every other: where several distributions are equally near, it must say which.
-WITHHELD = frozenset({"distribution"})
-
 
 def catalog(hand: Hand) -> list[Kernel]:
     """All kernels of a hand, in the order of its parts."""
@@ -31,7 +28,7 @@ def catalog(hand: Hand) -> list[Kernel]:
         kernel
         for name, finger in hand.fingers.items()
         for kernel in [
-            *(elastic_kernels(hand, name, finger) if hand.spring else []),
+            *elastic_kernels(hand, name, finger),
             *finger_kernels(hand, name, finger),
             *base_kernels(hand, name, finger),
             *four_bar_kernels(name, finger),
@@ -44,5 +41,4 @@ def catalog(hand: Hand) -> list[Kernel]:
         *(fibre_kernels(hand, hand.tendon) if hand.tendon else []),
     ]
     laws = [*joint_laws(), *linear_laws(), *backstepping_laws(), *optimal_laws(), *antagonistic_laws()]
-    known = fingers + wrist + hand_kernels(hand) + measured_kernels(hand) + actuators + laws + plant_kernels()
-    return [kernel for kernel in known if kernel.solver is None or kernel.solver.problem not in WITHHELD]
+    return fingers + wrist + hand_kernels(hand) + measured_kernels(hand) + actuators + laws + plant_kernels()

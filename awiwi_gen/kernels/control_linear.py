@@ -179,7 +179,7 @@ def doubling(_: Any, doublings: int = 32) -> Solver:
         arrays={},
         strings={"doublings": str(doublings)},
         iterations=0,
-        tolerance={"f64": 1e-13, "f32": 1e-4},
+        tolerance={"f64": 1e-15, "f32": 5e-7},
     )
 
 
@@ -206,7 +206,8 @@ def descent(_: Any, steps: int = 32) -> Solver:
 def lqr(_: Any, A: Any, B: Any, Q: Any, R: Any) -> Any:
     """Gains of u = -K x that minimise the integral of x'Q x + R u^2, and the least cost x'S x; in coherent units.
 
-    The residual is that of the Riccati equation for S, relative to its terms.
+    The residual is that of the Riccati equation for S, relative to its terms. Refused are a plant that B cannot
+    stabilise, costs that reward a motion, and costs that leave one for nothing that does not decay by itself.
     """
 
 

@@ -96,6 +96,11 @@ def length_range(finger: Finger, tendon: Tendon) -> tuple[float, float]:
 POSE = (one, one, one, m) * 3 + (one,) * 4
 
 
+def jacobian_port(size: Size) -> Port:
+    """Velocity and angular velocity of a tip per unit velocity of each joint."""
+    return Port((6, size.joints), (m / rad,) * (3 * size.joints) + (rad / rad,) * (3 * size.joints))
+
+
 def torque(size: Size) -> Port:
     """A generalised force for every joint."""
     return Port((size.joints,), N * m)
@@ -132,13 +137,23 @@ def link_poses(finger: Any, q: Any) -> Any:
 
 
 @per_finger(
-    lambda z: {"J": Port((6, z.joints), (m / rad,) * (3 * z.joints) + (rad / rad,) * (3 * z.joints))},
+    lambda z: {"J": jacobian_port(z)},
     "eq. 5.3, differentiated",
     witness=recursive.jacobian,
 )
 def jacobian(finger: Any, q: Any) -> Any:
     """Fingertip Jacobian in base axes: velocity of the tip (rows 0-2) and angular velocity (rows 3-5)."""
     return chain.jacobian(finger, q)
+
+
+@per_finger(
+    lambda z: {"T": Port((4, 4), POSE), "J": jacobian_port(z)},
+    "eq. 5.2, 5.3, table 5.1, differentiated",
+    witness=recursive.pose_and_jacobian,
+)
+def pose_and_jacobian(finger: Any, q: Any) -> Any:
+    """Pose of the fingertip and its Jacobian, both in base axes, in one call that shares their work."""
+    return chain.fingertip_pose(finger, q), chain.jacobian(finger, q)
 
 
 # -- dynamics ---------------------------------------------------------------------------------------------
@@ -240,6 +255,16 @@ def joint_torque(finger: Any, q: Any, f: Any) -> Any:
 def joint_stiffness(finger: Any, q: Any, f: Any, k: Any) -> Any:
     """Joint stiffness -d tau/dq felt through tendons of stiffness k that pull with forces f."""
     return tendons.joint_stiffness(finger, q, f, k)
+
+
+@per_finger(
+    lambda z: {"tau": torque(z), "K": stiffness(z)},
+    "eq. 5.8, 5.12, 5.23",
+    witness=tendons_ad.joint_torque_and_stiffness,
+)
+def joint_torque_and_stiffness(finger: Any, q: Any, f: Any, k: Any) -> Any:
+    """Joint torques and joint stiffness of the tendons in one call that shares their work."""
+    return tendons.joint_torque_and_stiffness(finger, q, f, k)
 
 
 # -- where the joints are ---------------------------------------------------------------------------------

@@ -59,8 +59,9 @@ class Elastic:
 
     def structure(self) -> dict[str, Any]:
         """All that is not a number."""
-        spring = self.hand.spring and self.hand.spring.structure()
-        return {"spring": spring, "fibre": bool(self.fibre), "tendons": [self.tendons.start, self.tendons.stop]}
+        spring = self.hand.spring
+        own = [tendon if spring and tendon in spring.calibrated else None for tendon in self.tendons]
+        return {"spring": spring and spring.structure(), "fibre": bool(self.fibre), "own springs of tendons": own}
 
     def range(self) -> tuple[float, float]:
         """Forces [N] between which the stiffness of every tendon is known."""

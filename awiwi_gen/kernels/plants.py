@@ -18,7 +18,7 @@ def plant_kernels() -> list[Kernel]:
     """All plants; they need no hand."""
     return [
         kernel
-        for family, ports in ((of_tendon, TENDON), (of_joint, JOINT), (of_pair, PAIR))
+        for family, ports in ((of_tendon, TENDON), (of_joint, JOINT), (of_pair, PAIR), (of_finger, FINGER))
         for kernel in family.kernels("", Parameterless(), "plants", {}, ports, None)
     ]
 
@@ -26,6 +26,7 @@ def plant_kernels() -> list[Kernel]:
 of_tendon: Family[None] = Family()
 of_joint: Family[None] = Family()
 of_pair: Family[None] = Family()
+of_finger: Family[None] = Family()
 
 TORQUE, INERTIA, STIFFNESS, DAMPING = N * m, kg * m**2, N * m / rad, N * m * s / rad
 MOTION, RATES = (rad, rad / s), (rad / s, rad / s**2)
@@ -74,6 +75,19 @@ PAIR = FRICTION | {
     "stretches": Port((2,), rad, -1.0, 2.0),
     "speeds": Port((2,), rad / s, -50.0, 50.0),
 }
+JOINTS, TENDONS = 4, 8  # of the fingers that the last plant is for
+FINGER = FRICTION | {
+    **{name: TENDON[name] for name in ("motor", "line")},
+    "thetas": Port((TENDONS,), rad, -5.0, 5.0),
+    "path": Port((TENDONS,), m, -0.03, 0.03),
+    "slack": Port((TENDONS,), m, -0.03, 0.03),
+    "qd": Port((JOINTS,), rad / s, -50.0, 50.0),
+    "qdd": Port((JOINTS,), rad / s**2, -1e4, 1e4),
+    "thds": Port((TENDONS,), rad / s, -50.0, 50.0),
+    "f": Port((TENDONS,), N, 0.0, 120.0),
+    "u": Port((TENDONS,), TORQUE, -3.0, 3.0),
+}
+FINGER_RATES = (rad / s,) * JOINTS + (rad / s**2,) * JOINTS + (rad / s,) * TENDONS + (rad / s**2,) * TENDONS
 TORQUES, LOCAL = (TORQUE, TORQUE / s), (STIFFNESS, TORQUE / rad**2)
 
 
@@ -136,3 +150,20 @@ def plant_antagonistic(
 def antagonistic_springs(_: Any, stretches: Any, speeds: Any, tendons: Any) -> Any:
     """What both springs of such a joint do at given elongations: a row (tau, tau') and a row (phi', phi'') for each."""
     return plants.antagonistic_springs(_, stretches, speeds, tendons)
+
+
+@of_finger(lambda _: {"f": Port((TENDONS,), N)}, "section 5.1, eq. 10.1", witness=plants_energy.plant_finger_forces)
+def plant_finger_forces(_: Any, thetas: Any, path: Any, slack: Any, motor: Any, line: Any) -> Any:
+    """Forces of a finger's tendons: path is what its joints take of each, slack where it begins to pull.
+
+    The first half of a finger's plant. Joint torques and the joints' acceleration follow from the finger's own kernels.
+    """
+    return plants.plant_finger_forces(_, thetas, path, slack, motor, line)
+
+
+@of_finger(
+    lambda _: {"xd": Port((len(FINGER_RATES),), FINGER_RATES)}, "eq. 10.1, mended", witness=plants_energy.plant_finger
+)
+def plant_finger(_: Any, qd: Any, qdd: Any, thds: Any, f: Any, u: Any, motor: Any, friction: Any) -> Any:
+    """The other half: rates of (q, q', theta, theta') of four joints, which accelerate with qdd, and eight motors."""
+    return plants.plant_finger(_, qd, qdd, thds, f, u, motor, friction)

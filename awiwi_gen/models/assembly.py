@@ -91,8 +91,8 @@ class Joint:
     next joint turns about another axis, the working axes turn with this joint, by the angle with cosine and sine
     `spin`, and then by the `turn` (3 x 3) of the next; otherwise they are those before the joint, and `turn` is
     None. In them, `axis` (3) is the joint's, `offset` (3) [m] leads to the next joint, and `rotation` (3 x 3) takes
-    the body's own axes to them. The body is link number `link`, or its crank. Its frame lies on the axis, `slid` [m]
-    beyond the joint.
+    the body's own axes to them; in its own, these are `own_offset` and `own_body`. The body is link number `link`, or
+    its crank. Its frame lies on the axis, `slid` [m] beyond the joint.
     """
 
     coordinate: int
@@ -106,6 +106,8 @@ class Joint:
     rotation: SX
     link: int
     slid: SX
+    own_offset: SX
+    own_body: Moments
 
     def forth(self, vectors: SX) -> SX:
         """Vectors (columns) in the axes before the joint, in working axes."""
@@ -180,12 +182,12 @@ def assemble(finger: Finger, q: SX) -> Assembly:
             start, angle = part.direction, SX(0)
         spin = _sum_of_angles(start, (ca.cos(angle), ca.sin(angle)))
         turn = following.turn if following is not None else None
+        place = (part.link, part.slid, part.offset, body)
         if turn is None:
             rotation, axis, body = _about_z(spin), _Z, body.turned_about_z(*spin)
         else:
             rotation, axis, body = turn.T, turn.T @ _Z, body.turned(turn.T)
         offset = rotation @ part.offset
-        place = (part.link, part.slid)
         joints.append(Joint(part.coordinate, part.rate, part.bend, spin, turn, axis, offset, body, rotation, *place))
     first = parts[0].turn
     return Assembly(SX.eye(3) if first is None else first.T, joints, ballast)

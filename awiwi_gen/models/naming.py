@@ -39,7 +39,7 @@ class Derivation:
 
     def name(self, expr: Expr) -> Expr:
         """A symbol standing for `expr`; atoms and negative atoms stand for themselves."""
-        if expr.is_Atom or (-expr).is_Atom:
+        if expr.is_Atom or (expr.is_Mul and len(expr.args) == 2 and expr.args[0] == -1 and expr.args[1].is_Atom):
             return expr
         if expr not in self._names:
             self._names[expr] = Named(f"{self._prefix}{len(self._names):05d}", expr)

@@ -77,6 +77,21 @@ def antagonistic_springs(_: Any, stretches: Matrix, speeds: Matrix, tendons: Mat
     return Matrix(torques), Matrix(local)
 
 
+def plant_finger_forces(_: Any, thetas: Matrix, path: Matrix, slack: Matrix, motor: Matrix, line: Matrix) -> Matrix:
+    """Forces [N] of a finger's tendons between its motors and its joints."""
+    names = Derivation()
+    stretches = motor[1] * thetas + path - slack
+    return Matrix([pull(line, names.name(taut(stretch))) for stretch in stretches])
+
+
+def plant_finger(
+    _: Any, qd: Matrix, qdd: Matrix, thds: Matrix, f: Matrix, u: Matrix, motor: Matrix, friction: Matrix
+) -> Matrix:
+    """Rates of (q, q', theta, theta') of a finger whose joints accelerate with qdd."""
+    wound = [(u[i] - resistance(friction, thds[i]) - motor[1] * f[i]) / motor[0] for i in range(len(u))]
+    return Matrix([*qd, *qdd, *thds, *wound])
+
+
 def resistance(friction: Matrix, speed: Expr) -> Expr:
     """Friction torque [N m] at a speed [rad/s]; friction is (steepness, level, viscosity) (eq. 3.8)."""
     return sympy.atan(friction[0] * speed) * friction[1] + friction[2] * speed

@@ -59,6 +59,20 @@ def antagonistic_springs(_: Any, stretches: SX, speeds: SX, tendons: SX) -> tupl
     return ca.vertcat(*torques), ca.vertcat(*local)
 
 
+def plant_finger_forces(_: Any, thetas: SX, path: SX, slack: SX, motor: SX, line: SX) -> SX:
+    """Forces [N] of a finger's tendons between its motors and its joints."""
+    stretches = ca.jtimes(motor[1] * thetas + path, thetas, thetas) + path - slack
+    return ca.vertcat(*(gradients(pulling(line), taut(stretch))[0] for stretch in ca.vertsplit(stretches)))
+
+
+def plant_finger(_: Any, qd: SX, qdd: SX, thds: SX, f: SX, u: SX, motor: SX, friction: SX) -> SX:
+    """Rates of (q, q', theta, theta') of a finger whose joints accelerate with qdd."""
+    dissipated = sum(dry(friction, speed) for speed in ca.vertsplit(thds))
+    momentum = ca.gradient(motor[0] * ca.sumsqr(thds) / 2, thds)
+    forces = ca.gradient(ca.dot(u - motor[1] * f, thds), thds) - ca.gradient(dissipated, thds)
+    return ca.vertcat(qd, qdd, thds, ca.solve(ca.jacobian(momentum, thds), forces))
+
+
 def _rates(speed: SX, inertias: SX, dissipated: SX, outside: SX) -> SX:
     """Each place's rate and its speed's, one after the other."""
     kinetic = ca.dot(inertias, speed**2) / 2

@@ -23,7 +23,9 @@ def tendon_stiffness(elastic: Any, tension: Matrix) -> tuple[Matrix, Matrix, Mat
     curves: dict[int, _Curve] = {}
     rows, farthest = [], Rational(0)
     for force, spring in zip(tension, elastic.springs, strict=True):
-        curve = curves.setdefault(id(spring), _Curve(spring, elastic.fibre, derivation))
+        if id(spring) not in curves:
+            curves[id(spring)] = _Curve(spring, elastic.fibre, derivation)
+        curve = curves[id(spring)]
         rows.append(curve.at(force))
         place = curve.place(force)
         farthest = derivation.name((farthest + place**2 + abs(farthest - place**2)) / 2)  # the larger of the two

@@ -35,10 +35,15 @@ def joint_torque(finger: Finger, q: Matrix, f: Matrix) -> Matrix:
 
 def joint_stiffness(finger: Finger, q: Matrix, f: Matrix, k: Matrix) -> Matrix:
     """-d tau/dq (n x n) [N m/rad]: P' diag(k) P + sum of f_i d2h_i/dq2, with k (m) [N/m] (eq. 5.12, 5.23)."""
+    return joint_torque_and_stiffness(finger, q, f, k)[1]
+
+
+def joint_torque_and_stiffness(finger: Finger, q: Matrix, f: Matrix, k: Matrix) -> tuple[Matrix, Matrix]:
+    """Joint torques (n) [N m] and -d tau/dq (n x n) [N m/rad], from one derivation of P."""
     derivation = Derivation()
     p = _coupling(finger, q, derivation)
     bends = _second_derivatives(p, q, derivation)
-    return sum((force * bend for force, bend in zip(f, bends, strict=True)), p.T * sympy.diag(*k) * p)
+    return -p.T * f, sum((force * bend for force, bend in zip(f, bends, strict=True)), p.T * sympy.diag(*k) * p)
 
 
 def _lengths(finger: Finger, q: Matrix, derivation: Derivation) -> Matrix:

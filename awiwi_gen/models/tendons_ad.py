@@ -53,3 +53,8 @@ def joint_stiffness(finger: Finger, q: SX, f: SX, k: SX) -> SX:
     # The stretch is zero here, but only a second reading of the shared expression sees it.
     arguments = ca.symvar(stiffness)
     return ca.densify(ca.Function("stiffness", arguments, [ca.cse(stiffness)])(*arguments))
+
+
+def joint_torque_and_stiffness(finger: Finger, q: SX, f: SX, k: SX) -> tuple[SX, SX]:
+    """Joint torques (n) [N m] and stiffness (n x n) [N m/rad]: gradient and Hessian of the same energy."""
+    return joint_torque(finger, q, f), joint_stiffness(finger, q, f, k)

@@ -51,8 +51,10 @@ def _cost_matrix(value: object) -> Rows:
         given = np.array(value, dtype=float)
     except (TypeError, ValueError):
         given = np.empty(0)
-    if given.shape not in ((4,), (4, 4)) or not np.isfinite(given).all():
+    if given.shape not in ((4,), (4, 4)):
         raise ValueError("is neither 4 numbers nor 4 rows of 4")
+    if not np.isfinite(given).all():
+        raise ValueError("has entries that are not finite")
     rows = np.diag(given) if given.ndim == 1 else given
     if not np.array_equal(rows, rows.T):
         raise ValueError("is not symmetric")
@@ -63,8 +65,15 @@ def _cost_matrix(value: object) -> Rows:
     return tuple(map(tuple, rows.tolist()))
 
 
+def _weight(value: object) -> float:
+    """A positive number."""
+    if not isinstance(value, int | float) or not 0 < value < float("inf"):
+        raise ValueError("is not a positive number")
+    return float(value)
+
+
 Matrix = Annotated[Rows, PlainValidator(_cost_matrix), Field(examples=["[100.0, 0.01, 0.01, 0.01]"])]
-Weight = Annotated[float, Field(gt=0, allow_inf_nan=False, examples=["0.1"])]
+Weight = Annotated[float, PlainValidator(_weight), Field(examples=["0.1"])]
 Force = Annotated[Quantity, Measure("10 N", "0", "10 kN")]
 
 

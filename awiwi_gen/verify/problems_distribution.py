@@ -17,12 +17,15 @@ from awiwi_gen.kernel import Solver
 from awiwi_gen.verify.reference import Reference, reference
 
 Array = np.ndarray[Any, Any]
+Ends = tuple[float, float]  # limits of every force [N]
 
 INFEASIBLE = 4  # AWIWI_INFEASIBLE
 HELD = 0.3  # share of the tendons that are at a limit, in the demands that have such
 IN_HAND = 0.05  # least torque of free tendons by unit forces, in parts of the largest
 UNREACHABLE = 0.05  # how far a stiffness is from what the tendons can do, in parts of its largest entry
 UNREACHABLE_TORQUE = 0.2  # [N m]
+MILDEST = 12  # halvings of a miss
+RAYS, POINTS = 48, 24  # along which it is looked for forces that are as near, and how many on each
 ROUNDS = 8  # of Newton's method with a derivative in floats: each gains ten digits at least
 
 
@@ -43,6 +46,7 @@ class Distribution:
 
     By the sample's number modulo 4: forces inside the limits that give just what is asked for; the same with some at
     their limits; a stiffness out of reach, in a direction in which no move of the forces helps; a torque out of reach.
+    That no other forces are as near is made sure of by looking, so that the answer is the only one.
     """
 
     solver: Solver
@@ -64,32 +68,75 @@ class Distribution:
 
     def answers(self, q: Array, low: Array, high: Array) -> Iterator[Answer]:
         """One for every sample; the same for the same arguments."""
-        samples, m = len(q), len(self.solver.equations)
+        samples = len(q)
         random = np.random.default_rng(samples)
         P, dP = self.tendons(q)
         for s in range(samples):
-            ends = (float(low[s]), float(high[s]))
-            held, push = np.zeros(m, int), np.zeros(P.shape[2])
-            share = random.uniform(size=m)
-            if s % 4 in (1, 2):
-                held = _some_held(P[s], random)
-            elif s % 4 == 3:
-                push = _push(P[s], random)
-                held = -np.sign(np.where(np.abs(P[s] @ push) > 1e-9, P[s] @ push, 0)).astype(int)
+            yield self._answer(s % 4, P[s], dP[s], (float(low[s]), float(high[s])), random)
+
+    def _answer(self, kind: int, P: Array, dP: Array, ends: Ends, random: Any) -> Answer:
+        """Forces, and the demand that they answer best.
+
+        The stiffness is moved out of reach as far as nothing else comes as near: the distance is not convex in the
+        forces, so that beyond some miss others are nearer.
+        """
+        held, push = np.zeros(len(P), int), np.zeros(P.shape[1])
+        share = random.uniform(size=len(P))
+        if kind in (1, 2):
+            held = _some_held(P, random)
+        elif kind == 3:
+            push = _push(P, random)
+            held = -np.sign(np.where(np.abs(P @ push) > 1e-9, P @ push, 0)).astype(int)
+        miss = random.normal(size=dP.shape[1:])
+        miss = (miss + miss.T) * UNREACHABLE
+        for milder in 0.5 ** np.arange(MILDEST) * (kind > 1):
+            f, at, excess = self._out_of_reach(share, held, P, dP, ends, miss * milder, bool(push.any()))
+            answer = Answer(f, at, push - P.T @ f, self._stiffness(f, P, dP) - excess, not push.any())
+            if self._is_nearest(answer, P, dP, ends):
+                return answer
+        raise ValueError("no demand is answered best by the forces it was made from")
+
+    def _out_of_reach(
+        self, share: Array, held: Array, P: Array, dP: Array, ends: Ends, miss: Array, pushed: bool
+    ) -> tuple[Array, Array, Array]:
+        """Forces, which of them are at a limit, and a miss of the stiffness that no small move makes less."""
+        f = _forces(share, held, ends)
+        miss = miss * np.abs(self._stiffness(f, P, dP)).max()
+        for _ in range(2):  # which limit a held tendon is at depends on where the stiffness is out of reach
+            slope = self.curve(f[:, None])[1]
+            growth = slope[:, 0, None, None] * np.einsum("ia,ib->iab", P, P) + dP
+            excess = _out_of_reach(P, growth, held, miss)
+            prices = np.where(held != 0, _prices(P, growth, held, excess), 0)
+            if pushed or not np.any(held * prices > 0):
+                return f, held, excess
+            held = -np.sign(prices).astype(int)
             f = _forces(share, held, ends)
-            miss = random.normal(size=(dP.shape[2],) * 2) * (UNREACHABLE if s % 4 > 1 else 0)
-            for _ in range(2):  # which limit a held tendon is at depends on where the stiffness is out of reach
-                k, slope, _ = self.curve(f[:, None])
-                stiffness = np.einsum("i,ia,ib->ab", k[:, 0], P[s], P[s]) + np.tensordot(f, dP[s], 1)
-                growth = slope[:, 0, None, None] * np.einsum("ia,ib->iab", P[s], P[s]) + dP[s]
-                excess = _out_of_reach(P[s], growth, held, (miss + miss.T) * np.abs(stiffness).max())
-                prices = np.where(held != 0, _prices(P[s], growth, held, excess), 0)
-                settled = bool(push.any()) or not np.any(held * prices > 0)
-                if settled:
-                    break
-                held = -np.sign(prices).astype(int)
-                f = _forces(share, held, ends)
-            yield Answer(f, held, push - P[s].T @ f, stiffness - excess * settled, not push.any())
+        return f, held, excess * 0
+
+    def _is_nearest(self, answer: Answer, P: Array, dP: Array, ends: Ends) -> bool:
+        """Whether no forces along rays from the answer, through all that gives the same torque, are as near.
+
+        Of pairs this is known: their stiffness is linear in sums that grow with the forces.
+        """
+        group = [int(i) for i in self.solver.strings["searched"].split(",") if i]
+        if not group:
+            return True
+        rays = _rays(P[group])
+        room = np.where(rays > 0, ends[1] - answer.f[group], ends[0] - answer.f[group])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            length = np.where(np.abs(rays) > 1e-12, room / rays, np.inf).min(axis=1)
+        away = np.outer(length, np.arange(1, POINTS + 1) / POINTS)[..., None] * rays[:, None]
+        f = np.broadcast_to(answer.f, (*away.shape[:2], len(P))).copy()
+        f[..., group] = np.clip(f[..., group] + away, *ends)
+        distance = ((self._stiffness(f, P, dP) - answer.K) ** 2).sum(axis=(-2, -1))
+        moved = np.abs(f - answer.f).max(axis=-1) > 1e-6 * ends[1]
+        here = ((self._stiffness(answer.f, P, dP) - answer.K) ** 2).sum()
+        return not np.any(distance[moved] <= here)
+
+    def _stiffness(self, f: Array, P: Array, dP: Array) -> Array:
+        """Joint stiffness (..., n, n) of forces (..., m)."""
+        k = self.curve(f.reshape(-1, len(P)).T)[0].T.reshape(f.shape)
+        return np.asarray(np.einsum("...i,ia,ib->...ab", k, P, P) + np.tensordot(f, dP, 1))
 
     def tendons(self, q: Array) -> tuple[Array, Array]:
         """Coupling (samples, m, n) and its derivatives (samples, m, n, n) in floats."""
@@ -194,7 +241,7 @@ class _System:
         return [(force - moved[i]).mid() if i in moved else force for i, force in enumerate(f)]
 
 
-def _forces(share: Array, held: Array, ends: tuple[float, float]) -> Array:
+def _forces(share: Array, held: Array, ends: Ends) -> Array:
     low, high = ends
     return np.where(held < 0, low, np.where(held > 0, high, low + share * (high - low)))
 
@@ -227,6 +274,18 @@ def _null_space(P: Array) -> Array:
     """Orthonormal moves (tendons, ...) that give no torque."""
     u, sizes, _ = np.linalg.svd(P)
     return u[:, int(np.sum(sizes > 1e-9 * sizes[0])) :] if len(P) else np.zeros((0, 0))
+
+
+def _rays(P: Array) -> Array:
+    """Directions (rays, tendons) all around in which forces change and the torque does not."""
+    moves = _null_space(P)
+    if moves.shape[1] == 1:
+        return np.concatenate([moves.T, -moves.T])
+    around = np.random.default_rng(RAYS).normal(size=(RAYS, moves.shape[1]))
+    if moves.shape[1] == 2:
+        turn = 2 * np.pi * np.arange(RAYS) / RAYS
+        around = np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    return np.asarray(around @ moves.T)
 
 
 def _out_of_reach(P: Array, growth: Array, held: Array, miss: Array) -> Array:

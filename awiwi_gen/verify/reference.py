@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from math import inf, isfinite
@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 from flint import arb
 
-from awiwi_gen.ir.algebras import Balls, ball
-from awiwi_gen.ir.graph import Graph, Node
+from awiwi_gen.ir.algebras import Balls
+from awiwi_gen.ir.graph import Graph, Node, Output, Ref
 from awiwi_gen.ir.interpret import evaluate
+from awiwi_gen.ir.passes.finish import schedule
 
 Array = np.ndarray[Any, Any]
 BallArrays = dict[str, list[list[arb]]]
@@ -34,14 +35,54 @@ class Reference:
 
 def ball_values(graph: Graph, inputs: Mapping[str, Array], values: Mapping[str, Fraction]) -> BallArrays:
     """A graph in ball arithmetic at all samples: per output, per element, a list over the samples."""
-    samples = len(next(iter(inputs.values())))
+    return ball_values_together([(graph, inputs)], values)[0]
+
+
+def ball_values_together(
+    cases: Sequence[tuple[Graph, Mapping[str, Array]]], values: Mapping[str, Fraction]
+) -> list[BallArrays]:
+    """`ball_values` of several graphs, each at its own inputs; what they have in common is computed once."""
+    columns: dict[bytes, Array] = {}
+    joint, outputs = _joined(cases, values, columns)
 
     def leaf(node: Node) -> list[arb]:
-        if node[0] == "param":
-            return [ball(values[node[1]])] * samples
-        return [arb(x) for x in inputs[node[1]][:, node[2]].astype(np.float64).tolist()]
+        return [arb(x) for x in columns[node[1]].astype(np.float64).tolist()]
 
-    return evaluate(graph, Balls(samples), leaf)
+    samples = len(next(iter(cases[0][1].values())))
+    found = evaluate(joint, Balls(samples), leaf)
+    return [{name: found[key] for name, key in names.items()} for names in outputs]
+
+
+def _joined(
+    cases: Sequence[tuple[Graph, Mapping[str, Array]]], values: Mapping[str, Fraction], columns: dict[bytes, Array]
+) -> tuple[Graph, list[dict[str, str]]]:
+    """One graph of all, depth first so that few values live at a time, and its names for each one's outputs.
+
+    An input is named by its values at the samples, which are put into `columns`; a parameter is its value.
+    """
+    numbers: dict[Node, int] = {}
+    outputs: list[Output] = []
+    names: list[dict[str, str]] = []
+    for number, (given, inputs) in enumerate(cases):
+        graph = schedule(given)
+        renamed: list[int] = []
+
+        def new(ref: Ref, renamed: list[int] = renamed) -> Ref:
+            return renamed[ref] if ref >= 0 else ~renamed[~ref]
+
+        for node in graph.nodes:
+            if node[0] == "input":
+                column = inputs[node[1]][:, node[2]]
+                node = ("input", column.tobytes())
+                columns[node[1]] = column
+            elif node[0] == "param":
+                node = ("const", values[node[1]])
+            elif node[0] != "const":
+                node = (node[0], *map(new, node[1:]))
+            renamed.append(numbers.setdefault(node, len(numbers)))
+        names.append({output.name: f"{number} {output.name}" for output in graph.outputs})
+        outputs += [Output(f"{number} {o.name}", o.shape, tuple(map(new, o.elements))) for o in graph.outputs]
+    return Graph(tuple(numbers), tuple(outputs)), names
 
 
 def reference(values: BallArrays) -> Reference:

@@ -137,7 +137,7 @@ def judge(
     computed = dict(zip(outputs, raw if len(outputs) + guarded > 1 else (raw,), strict=False))
     computed = {port: np.asarray(a).reshape(samples, -1) for port, a in computed.items()}
     mirrored = float_values(graph, inputs, params, Floats(dtype, own_trig))
-    bounds = float_values(graph, inputs, params, Bounded(dtype))
+    bounds = float_values(graph, inputs, params, Bounded(dtype, own_trig))
     exact = True
     worst_ulp = worst_scaled = bound_use = 0.0
     reasons = []

@@ -9,15 +9,18 @@ from awiwi_gen.ir.graph import Graph
 from awiwi_gen.ir.passes.factor import factor
 from awiwi_gen.ir.passes.finish import orient, quotients, schedule
 from awiwi_gen.ir.passes.flatten import flatten
+from awiwi_gen.ir.passes.gather import gather
+from awiwi_gen.ir.passes.scale import scale
 from awiwi_gen.ir.passes.share import share_products, share_sums
+from awiwi_gen.ir.passes.turn import turn
 
 Pass = Callable[[Graph], Graph]
 
 # Tried in turn, the cheapest result wins: whether brackets pay depends on what products share.
 PIPELINES: tuple[tuple[Pass, ...], ...] = (
-    (flatten, share_products, share_sums, factor, quotients, orient, schedule),
-    (flatten, factor, share_products, share_sums, quotients, orient, schedule),
-    (quotients, orient, schedule),
+    (flatten, turn, share_products, share_sums, factor, scale, quotients, orient, schedule, gather),
+    (flatten, turn, factor, scale, share_products, share_sums, quotients, orient, schedule, gather),
+    (quotients, orient, schedule, gather),
 )
 
 

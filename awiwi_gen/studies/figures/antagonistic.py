@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from awiwi_gen.hand import Hand
-from awiwi_gen.studies.figure import Figure
+from awiwi_gen.studies.figures.figure import Figure
 from awiwi_gen.studies.joint_loops import TABLE_16_1, Array, Plant
 from awiwi_gen.studies.optimal_gains import cancelling, exact_gains, regulator
 from awiwi_gen.studies.pair_loops import TABLE_PAIR, at_rest, pair_loop
@@ -70,7 +70,8 @@ def deflexion(library: Any) -> Figure:
     return Figure(
         number="15.23",
         title="A step and a torque on the link, exact law",
-        claim=f"The link arrives, then yields by torque over stiffness: to {q[-1]:.6f} rad; wanted {end:.6f}.",
+        claim="The link arrives, then yields to the torque as its impedance says.",
+        found=f"It ends at {q[-1]:.6f} rad; the step and torque over stiffness make {end:.6f}.",
         holds=bool(abs(q[-1] - end) < 1e-3 and (np.diff(q) > -1e-9).all()),
         draw=draw,
     )
@@ -96,9 +97,10 @@ def pretension(library: Any) -> Figure:
     return Figure(
         number="15.23 (pretension)",
         title="The pretension under the printed decoupling",
-        claim=(
-            "Motors that are treated independently keep the pretension. Of "
-            f"{PRETENSION:g} N m the decoupling leaves {left['decoupled']:.2g}, the exact law {left['exact']:.4g}."
+        claim="Motors can be treated as not aware of one another, and the pretension be added.",
+        found=(
+            f"Of {PRETENSION:g} N m the printed decoupling leaves {left['decoupled']:.2g}, the law of the whole system of "
+            f"order six {left['exact']:.4g}."
         ),
         holds=left["decoupled"] > 0.9 * PRETENSION,
         draw=draw,
@@ -123,9 +125,10 @@ def step(library: Any, setting: Setting) -> Figure:
     return Figure(
         number="15.24 (simulated)",
         title=f"A step of {STEP:g} rad at 3 kHz",
-        claim=(
-            f"The law is fast and accurate: settled after {settled * 1e3:.0f} ms, {over:.1%} overshoot; V falls; the "
-            f"slacker tendon keeps {run.torques.min():.2g} N m."
+        claim="The backstepping law is fast and accurate.",
+        found=(
+            f"Settled after {settled * 1e3:.0f} ms with {over:.1%} overshoot; V falls after the step; the slacker tendon "
+            f"keeps {run.torques.min():.2g} N m."
         ),
         holds=falls and settled < 0.04 and over < 0.02 and bool(run.torques.min() > 0),
         draw=draw,
@@ -162,16 +165,18 @@ def sines(library: Any, setting: Setting) -> list[Figure]:
         Figure(
             number="15.25 (simulated)",
             title=f"A sine of {FREQUENCIES[0]:g} Hz at 3 kHz",
-            claim=f"The law follows a sine; within {error:.1e} rad once its derivatives are fed.",
+            claim="The law follows a sine.",
+            found=f"Within {error:.1e} rad of {amplitude:g} rad once the sine's derivatives are fed.",
             holds=error < 0.01 * amplitude,
             draw=follow,
         ),
         Figure(
             number="15.26 (simulated)",
             title="Gain over frequency at 3 kHz",
-            claim=(
-                f"The gain stays near one over a wide range: at {FREQUENCIES[-1]:g} Hz it is {gains[0, -1]:.3f}, and "
-                f"{gains[1, -1]:.2f} if only the position is fed."
+            claim="The gain stays near one over a wide range of frequencies.",
+            found=(
+                f"At {FREQUENCIES[-1]:g} Hz it is {gains[0, -1]:.3f} with the derivatives fed, and {gains[1, -1]:.2f} "
+                "with the position alone."
             ),
             holds=bool(np.abs(gains[0] - 1).max() < 0.05),
             draw=diagram,
@@ -194,7 +199,8 @@ def rendered(library: Any) -> Figure:
     return Figure(
         number="15.27 (simulated)",
         title="Torque at an imposed deflexion",
-        claim=f"The link renders the stiffness that it is told to; here within {worst:.0e} N m.",
+        claim="The torque of the tendons at an imposed deflexion is that of the desired stiffness.",
+        found=f"It is, within {worst:.0e} N m.",
         holds=worst < 1e-9,
         draw=draw,
     )

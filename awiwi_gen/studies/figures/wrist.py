@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from awiwi_gen.hand import Hand, Wrist
-from awiwi_gen.studies.figure import Figure
+from awiwi_gen.studies.figures.figure import Figure
 
 Array = np.ndarray[Any, Any]
 
@@ -38,7 +38,8 @@ def bars(library: Any, wrist: Wrist) -> Figure:
     return Figure(
         number="6.9",
         title="Errors of the six distances between the points of the wrist",
-        claim=f"The distances stay constant up to rounding; here within {worst:.0e} m over the whole range.",
+        claim="The distances stay constant up to rounding.",
+        found=f"Within {worst:.0e} m over the whole range of the wrist.",
         holds=bool(worst < EXACT),
         draw=draw,
     )
@@ -61,10 +62,10 @@ def displacements(library: Any, wrist: Wrist) -> Figure:
     return Figure(
         number="6.10",
         title="Tendon displacements that a wrist motion causes",
-        claim=(
-            f"Flexion hardly moves the tendons (here up to {np.abs(flexing).max() * 1e3:.2f} mm), abduction moves them "
-            f"{ratio:.1f} times as far, in proportion to their distance from the median "
-            f"(correlation in each layer at least {linear:.3f})."
+        claim="Flexion hardly moves the tendons, abduction moves them in proportion to their distance from the median.",
+        found=(
+            f"Flexion moves them by up to {np.abs(flexing).max() * 1e3:.2f} mm, abduction {ratio:.1f} times as far; the "
+            f"correlation with the distance is at least {linear:.3f} in each layer."
         ),
         holds=bool(ratio > 5 and linear > 0.99),
         draw=draw,

@@ -11,7 +11,7 @@ from awiwi_gen.hand import Hand, Spring
 from awiwi_gen.hand.lever import Lever
 from awiwi_gen.kernels.base_estimate import base_of
 from awiwi_gen.studies.base_search import BaseSearch
-from awiwi_gen.studies.figure import Figure
+from awiwi_gen.studies.figures.figure import Figure
 
 Array = np.ndarray[Any, Any]
 
@@ -76,8 +76,8 @@ def coriolis(library: Any, hand: Hand, spring: Spring) -> Figure:
     return Figure(
         number="5.7",
         title="What Coriolis and centrifugal terms change in the motion of the index finger",
-        claim=(
-            "Without these terms the finger moves the same, as far as the sensors can tell. "
+        claim="Without these terms the finger moves the same, as far as the sensors can tell.",
+        found=(
             f"A count of the sensors is {seen * 1e3:.2g} mrad, an error of 0.5 mm in the lengths {coarse * 1e3:.0f} "
             f"mrad. Damping read as {told}. The difference is a drift of phase, growing with time, less with damping. "
             f"Less than a count of the sensors it remains with {unseen or 'none of these'}. Abduction is moved too, by "
@@ -175,9 +175,10 @@ def estimates(library: Any, hand: Hand, finger: str) -> list[Figure]:
         Figure(
             number="5.16",
             title=f"Base joints of the {finger} by the gradient search, 30 iterations from (0, 0)",
-            claim=(
-                "30 iterations find the joints, but for the corners. The mended search finds these too, from exact "
-                f"lengths to {clean} iterations; the figure shows {visible:.1e} rad."
+            claim="30 iterations find the joints, but for the corners.",
+            found=(
+                f"The mended search finds the corners too. From exact lengths its largest errors are {clean} iterations; "
+                f"the figure shows {visible:.1e} rad."
             ),
             holds=bool(result.error(0.0, 30) < visible),
             draw=draw_one,
@@ -185,9 +186,9 @@ def estimates(library: Any, hand: Hand, finger: str) -> list[Figure]:
         Figure(
             number="5.17",
             title=f"The same for {COUNTS[0]}, {COUNTS[1]} and {COUNTS[2]} iterations, from lengths with errors",
-            claim=(
-                f"Few iterations are enough, for errors of the lengths soon decide. Largest errors after "
-                f"{', '.join(map(str, COUNTS))} iterations, for lengths wrong by up to {noisy}."
+            claim="Few iterations are enough, for errors of the lengths soon decide.",
+            found=(
+                f"Largest errors after {', '.join(map(str, COUNTS))} iterations, for lengths wrong by up to {noisy}."
             ),
             holds=enough,
             draw=draw_all,

@@ -21,7 +21,7 @@ from awiwi_gen.studies.joint_loops import (
 )
 from awiwi_gen.studies.optimal_gains import cancelling, regulator
 from awiwi_gen.studies.pair_loops import TABLE_PAIR, TUNING, at_rest, literal_loop, pair_loop
-from awiwi_gen.studies.printed import Printed, compared
+from awiwi_gen.studies.printed.number import Printed, compared
 from awiwi_gen.studies.sampling import PERIOD
 
 FIGURE_15_13 = (5.0, 1.0, 100.0, 100.0)  # K1 .. K4
@@ -215,7 +215,7 @@ def optimum(library: Any, hand: Hand) -> Iterator[Printed]:
     drawn = nearest(library, plant, wanted, draw(PRINTED_BOX, SAMPLES, SEED), relative=False)
     pole = impedance_loop(library, plant, drawn.gains).poles().real.max()
     yield Printed(
-        "algorithm 3", "rand(1, 4)", f"slowest pole {pole:.2g} 1/s", "not reproducible",
+        "chapter 16, algorithm 3", "rand(1, 4)", f"slowest pole {pole:.2g} 1/s", "not reproducible",
         "gains between 0 and 1 hold no useful K_3 or K_4; and the best draw is overwritten by its feedback gains",
     )  # fmt: skip
     yield compared("chapter 16, tendons", "38", float(hand.tendons), "of this hand")

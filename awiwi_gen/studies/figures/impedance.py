@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from awiwi_gen.hand import Hand
-from awiwi_gen.studies.figure import Figure
+from awiwi_gen.studies.figures.figure import Figure
 from awiwi_gen.studies.joint_loops import TABLE_15_1, TABLE_16_1, UNIT_WEIGHTS, Array, Plant, impedance_loop
 
 STEP = np.pi / 4
@@ -63,20 +63,16 @@ def stiffness(library: Any) -> list[Figure]:
         Figure(
             number="15.16 (deflexion)",
             title="A step and a load at three stiffnesses",
-            claim=(
-                f"The stiffness decides the deflexion under {LOAD:g} N m: "
-                f"{', '.join(f'{rest:.3g}' for rest in rests)} rad, once the load is fed to the law."
-            ),
+            claim=f"The stiffness decides the deflexion under {LOAD:g} N m.",
+            found=f"{', '.join(f'{rest:.3g}' for rest in rests)} rad, load over stiffness, once the load is fed to the law.",
             holds=bool(np.allclose(np.array(rests) * STIFFNESSES, LOAD, rtol=1e-6)),
             draw=draw,
         ),
         Figure(
             number="15.16 (rise)",
             title="The rise at three stiffnesses",
-            claim=(
-                "The rise times are identical, for the motor imposes them. Here the slowest time constants are "
-                f"{', '.join(f'{t:.2g}' for t in slow)} s: K_d / K_p."
-            ),
+            claim="The rise times are identical, for the motor imposes them.",
+            found=f"The slowest time constants are {', '.join(f'{t:.2g}' for t in slow)} s: K_d / K_p.",
             holds=max(slow) < 1.1 * min(slow),
             draw=draw,
         ),
@@ -98,7 +94,8 @@ def damping(library: Any) -> Figure:
     return Figure(
         number="15.17",
         title="A step and a load at three dampings",
-        claim=f"More damping settles later: {', '.join(f'{t:.3g}' for t in arrivals)} s.",
+        claim="More damping settles later.",
+        found=f"The step is within 2 % after {', '.join(f'{t:.3g}' for t in arrivals)} s.",
         holds=arrivals == sorted(arrivals) and arrivals[0] < arrivals[-1],
         draw=draw,
     )
@@ -130,10 +127,8 @@ def neglected_rate(library: Any) -> Figure:
     return Figure(
         number="15.16 (rate of the load)",
         title="A load step whose rate is not fed to the law",
-        claim=(
-            "It is practically sufficient to neglect the rate. Here the link overshoots its deflexion "
-            f"{', '.join(f'{peak:.3g}' for peak in peaks)} times."
-        ),
+        claim="It is practically sufficient to neglect the rate of the outer torque.",
+        found=f"The link goes to {' and '.join(f'{peak:.3g}' for peak in peaks)} times its deflexion.",
         holds=max(peaks) < 1.1,
         draw=draw,
     )
@@ -224,10 +219,11 @@ def nonlinear(library: Any) -> list[Figure]:
         Figure(
             number="15.19",
             title="Linear and nonlinear law behind a nonlinear spring",
-            claim=(
-                "In free motion both laws do the same; under load the nonlinear one settles sooner, overshoots more. "
-                f"Here they differ by {apart:.1e} rad at most, then settle after {times['free'][0]:.1f} and "
-                f"{times['free'][1]:.1f} ms and overshoot by {over['free'][0]:.0%} and {over['free'][1]:.0%}."
+            claim="In free motion both laws do the same; under load the nonlinear one settles sooner, overshoots more.",
+            found=(
+                f"In free motion they differ by {apart:.1e} rad at most; under load the nonlinear and the linear law "
+                f"settle after {times['free'][0]:.1f} and {times['free'][1]:.1f} ms and overshoot by "
+                f"{over['free'][0]:.0%} and {over['free'][1]:.0%}."
             ),
             holds=bool(
                 apart < 0.02 * STEP and times["free"][0] < times["free"][1] and over["free"][0] > over["free"][1]
@@ -237,18 +233,17 @@ def nonlinear(library: Any) -> list[Figure]:
         Figure(
             number="15.20",
             title="Stiffness of the spring during figure 15.19",
-            claim=(
-                "Accelerating the link changes the stiffness little, loading it much: "
-                f"by {changes[0]:.0%} and by {changes[1]:.0%}."
-            ),
+            claim="Accelerating the link changes the stiffness little, loading it much.",
+            found=f"By {changes[0]:.0%} and by {changes[1]:.0%}.",
             holds=changes[0] < 0.1 * changes[1],
             draw=draw(free, free.stiffness, "k [N m/rad]"),
         ),
         Figure(
             number="15.21",
             title=f"The same with torques cut at {SATURATION:g} N m",
-            claim=(
-                "Saturation makes the laws more alike; the nonlinear one still settles sooner. Here they overshoot by "
+            claim="Saturation makes the laws more alike; the nonlinear one still settles sooner.",
+            found=(
+                "The nonlinear and the linear law overshoot by "
                 f"{over['cut'][0]:.0%} and {over['cut'][1]:.0%} and settle after {times['cut'][0]:.0f} and "
                 f"{times['cut'][1]:.0f} ms, {times['free'][0]:.0f} and {times['free'][1]:.0f} ms without saturation."
             ),

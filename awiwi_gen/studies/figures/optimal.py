@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from awiwi_gen.hand import Hand
-from awiwi_gen.studies.figure import Figure
+from awiwi_gen.studies.figures.figure import Figure
 from awiwi_gen.studies.gain_search import PRINTED_BOX, USEFUL_BOX, Box, draw, nearest
 from awiwi_gen.studies.joint_loops import TABLE_16_1, impedance_loop
 from awiwi_gen.studies.optimal_gains import regulator
@@ -49,8 +49,9 @@ def draws(library: Any, number: str, title: str, R: float, box: Box, runs: int, 
     return Figure(
         number=f"{number} ({title})",
         title=f"Steps of drawn gains, {title}",
-        claim=(
-            "All drawn gains move the link alike. Here the curves are up to "
+        claim="All drawn gains move the link alike.",
+        found=(
+            "The curves are up to "
             f"{apart:.0%} of the step apart, have slowest poles from {min(slowest):.2g} to {max(slowest):.2g} 1/s, "
             f"and cover at least {arrived:.0%} of the step in {END * 1e3:.0f} ms."
         ),

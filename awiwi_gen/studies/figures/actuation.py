@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from awiwi_gen.hand import Hand, Motor
-from awiwi_gen.studies.figure import Figure
+from awiwi_gen.studies.figures.figure import Figure
 from awiwi_gen.studies.identify import fit_friction
 
 Array = np.ndarray[Any, Any]
@@ -64,7 +64,8 @@ def friction(library: Any, motor: Motor) -> Figure:
     return Figure(
         number="3.3",
         title="Friction found from the mean motor torque at constant speeds",
-        claim=f"atan(g1 w) g2 + g3 w fits the mean torques; the simulated motor's own comes back within {error:.2%}.",
+        claim="The mean torques at constant speeds follow atan(g1 w) g2 + g3 w.",
+        found=f"The friction of the simulated motor comes back within {error:.2%} of its largest value.",
         holds=error < 0.02,
         draw=draw,
     )
@@ -161,7 +162,8 @@ def repeatability(recordings: Recordings) -> Figure:
     return Figure(
         number="3.4",
         title=f"Commanded torque of {RUNS} motions at {recordings.speed:g} rad/s from the same angle",
-        claim=f"Position dependent disturbances repeat; here runs differ by {share:.0%} of what they have in common.",
+        claim="The disturbance repeats: it depends on the position.",
+        found=f"Runs differ by {share:.0%} of what they have in common.",
         holds=share < 0.2,
         draw=draw,
     )
@@ -184,10 +186,8 @@ def frequencies(recordings: Recordings) -> Figure:
     return Figure(
         number="3.5",
         title="Frequencies of the disturbance at two speeds",
-        claim=(
-            f"The main line moves with the rotor's speed: at twice the speed it is at {shift:.3g} times the frequency, "
-            f"{heights:.2f} times as high. So the disturbance depends on the position."
-        ),
+        claim="The main line moves with the rotor's speed, so the disturbance depends on the position.",
+        found=f"At twice the speed it is at {shift:.3g} times the frequency, {heights:.2f} times as high.",
         holds=abs(shift - 2) < 1e-6 and abs(heights - 1) < 0.1,
         draw=draw,
     )
@@ -209,7 +209,8 @@ def compensation(recordings: Recordings) -> Figure:
     return Figure(
         number="3.6",
         title="Frequencies of the controller's torque with and without compensation",
-        claim=f"Feeding the disturbance forward attenuates the rotor's main line; here {left:.0%} of it is left.",
+        claim="Feeding the disturbance forward attenuates the rotor's main line.",
+        found=f"Of its amplitude {left:.0%} is left.",
         holds=left < 0.25,
         draw=draw,
     )
@@ -240,9 +241,10 @@ def characteristic(library: Any) -> Figure:
     return Figure(
         number="4.7",
         title="Force and stiffness of the tendon's mechanism",
-        claim=(
-            f"The stiffness rises with the force, from {stiff.min() / 1e3:.1f} to {stiff.max() / 1e3:.1f} N/mm up to "
-            f"{pulled.max():.0f} N; polynomials give the force within {error:.0e} of its largest value."
+        claim="The stiffness rises with the force, and a polynomial is enough for either.",
+        found=(
+            f"It rises from {stiff.min() / 1e3:.1f} to {stiff.max() / 1e3:.1f} N/mm up to {pulled.max():.0f} N; "
+            f"polynomials give the force within {error:.0e} of its largest value."
         ),
         holds=progressive and error < 1e-6,
         draw=draw,

@@ -1,0 +1,74 @@
+"""What kernels may cost: counts of operations after every pass, committed beside the generated code.
+
+Counts do not drift as clocks do, so a run that makes a kernel dearer is refused until somebody accepts it.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from awiwi_gen.cache import key
+from awiwi_gen.errors import BudgetError
+
+if TYPE_CHECKING:
+    from awiwi_gen.kernel import Kernel
+    from awiwi_gen.records import Record
+
+BUDGET = "budget.json"
+SLACK = 0.02
+Steps = Sequence[Sequence[Any]]  # pairs: a pass, and the weight of the graph after it
+
+
+def budget_text(kernels: Iterable[Kernel], records: Mapping[str, Record], options: Any) -> str:
+    """The budget file: for each kernel what its part is like, and its weight after each pass."""
+    rows = []
+    for kernel in kernels:
+        kind = key(kernel.structure, options)[:16]
+        row = {"part": kind, "weight": [list(step) for step in records[kernel.name].costs]}
+        rows.append(f" {json.dumps(kernel.name)}: {json.dumps(row)}")
+    return "{\n" + ",\n".join(rows) + "\n}\n"
+
+
+def require_budget(directory: Path, text: str) -> None:
+    """Hold new costs against the budget in a directory, if there is one.
+
+    Kernels are compared where the structure of their part and the options are the same. Raises BudgetError with all
+    kernels that cost more.
+    """
+    try:
+        old = json.loads((directory / BUDGET).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return
+    excesses = [
+        f"{name} {sentence}"
+        for name, row in json.loads(text).items()
+        if isinstance(old.get(name), dict) and old[name].get("part") == row["part"]
+        for sentence in excess(old[name]["weight"], row["weight"])
+    ]
+    if excesses:
+        mend = f"mend what made them dearer, or accept it with --accept-cost ({directory / BUDGET} is the budget)"
+        raise BudgetError("\n".join([*excesses, mend]))
+
+
+def excess(old: Steps, new: Steps) -> list[str]:
+    """A sentence if the last weight is above the budget, with the pass that does worse; else nothing."""
+    before, after = old[-1][1], new[-1][1]
+    if after <= before * (1 + SLACK):
+        return []
+    removed = dict(_removals(old))
+    losses = {name: removed.get(name, 0) - weight for name, weight in _removals(new)}
+    worst = max(losses, key=lambda name: losses[name])
+    cause = (
+        f"pass {worst} removes {losses[worst]} less" if worst != new[0][0] else f"{worst} gives {losses[worst]} more"
+    )
+    return [f"costs {after}, its budget is {before} (+{100 * (after / before - 1):.1f} %): {cause} than before"]
+
+
+def _removals(steps: Steps) -> list[tuple[str, int]]:
+    """What each pass takes away; the first step is where the passes start from."""
+    first = [(steps[0][0], -steps[0][1])]
+    return first + [(name, last - weight) for (_, last), (name, weight) in pairwise(steps)]

@@ -1,0 +1,57 @@
+"""Angles that do not wait for each other's sines come first, so that their sines and cosines are computed together."""
+
+from __future__ import annotations
+
+from awiwi_gen.ir.graph import LEAVES, Graph, Output, Ref, node_of, operands
+
+LANES = 4
+
+
+def waits(graph: Graph) -> list[int]:
+    """Per node, how many sines or cosines of one another must be known before it."""
+    found: list[int] = []
+    for node in graph.nodes:
+        own = node[0] in ("sin", "cos")
+        found.append(max((found[node_of(ref)] for ref in operands(node)), default=0) + own)
+    return found
+
+
+def angle_groups(graph: Graph) -> dict[Ref, tuple[Ref, ...]]:
+    """For every angle, the angles whose sines and cosines are computed with its own: up to four."""
+    depth = waits(graph)
+    rounds: dict[int, list[Ref]] = {}
+    for index, node in enumerate(graph.nodes):
+        if node[0] in ("sin", "cos"):
+            angles = rounds.setdefault(depth[index], [])
+            if node[1] not in angles:
+                angles.append(node[1])
+    groups: dict[Ref, tuple[Ref, ...]] = {}
+    for angles in rounds.values():
+        for first in range(0, len(angles), LANES):
+            group = tuple(angles[first : first + LANES])
+            groups |= dict.fromkeys(group, group)
+    return groups
+
+
+def gather(graph: Graph) -> Graph:
+    """The same nodes in another order: what the first angles need, then what the next ones need, then the rest."""
+    depth = waits(graph)
+    last = max(depth, default=0) + 1
+    turn = [last] * len(graph.nodes)  # the round of angles a node is needed for
+    for index in range(len(graph.nodes) - 1, -1, -1):
+        node = graph.nodes[index]
+        for ref in operands(node):
+            due = depth[index] if node[0] in ("sin", "cos") else last
+            turn[node_of(ref)] = min(turn[node_of(ref)], turn[index], due)
+    order = sorted(range(len(graph.nodes)), key=lambda index: (turn[index], index))
+    position = {old: new for new, old in enumerate(order)}
+
+    def new(ref: Ref) -> Ref:
+        return position[ref] if ref >= 0 else ~position[~ref]
+
+    nodes = tuple(
+        node if node[0] in LEAVES else (node[0], *(new(r) for r in node[1:]))
+        for node in (graph.nodes[i] for i in order)
+    )
+    outputs = tuple(Output(o.name, o.shape, tuple(new(r) for r in o.elements)) for o in graph.outputs)
+    return Graph(nodes, outputs)

@@ -1,0 +1,188 @@
+"""Let values carry a factor of their own, so that constants elsewhere become one and their products vanish.
+
+``x = k*a``, ``y = x*b`` may as well compute ``a`` with ``k`` in what ``a`` is made of. Every value gets an unknown
+factor. What has no constant now must stay so, which is a linear equation for the factors' logarithms; each product with
+a constant would lose it by one more such equation. Those that the others leave open are added, the most frequent first.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from fractions import Fraction
+
+from flint import arb, ctx, fmpq
+
+from awiwi_gen.ir.builder import Builder, copy_node, rebuild
+from awiwi_gen.ir.graph import LEAVES, Graph, Node, Ref, node_of, operands
+
+BITS = 400
+LARGEST = 1e9  # no value is scaled by more, for single precision has a small range
+Row = dict[int, Fraction]  # a linear form in the logarithms of the factors
+Powers = dict[Fraction, Fraction]  # constant -> exponent: the logarithm on an equation's right side
+
+
+class _System:
+    """Linear equations for the logarithms of the factors, solved as far as they go."""
+
+    def __init__(self) -> None:
+        self.solved: dict[int, tuple[Row, Powers]] = {}
+
+    def reduced(self, row: Row, powers: Powers) -> tuple[Row, Powers]:
+        """The same equation in the unknowns that are still free."""
+        result, right = Row(), Powers(powers)
+        for unknown, factor in row.items():
+            known, value = self.solved.get(unknown, ({unknown: Fraction(1)}, {}))
+            _add(result, known, factor)
+            _add(right, value, -factor)
+        return result, right
+
+    def require(self, row: Row, powers: Powers) -> bool:
+        """Add the equation row = powers unless it follows from the others, or contradicts them."""
+        row, powers = self.reduced(row, powers)
+        if not row:
+            return False
+        pivot = max(row)
+        factor = row.pop(pivot)
+        solution = {unknown: -f / factor for unknown, f in row.items()}, {k: e / factor for k, e in powers.items()}
+        for unknown, (form, value) in self.solved.items():
+            if pivot in form:
+                share = form.pop(pivot)
+                _add(form, solution[0], share)
+                _add(value, solution[1], share)
+                self.solved[unknown] = form, value
+        self.solved[pivot] = solution
+        return True
+
+
+def _add(total: dict, other: dict, factor: Fraction) -> None:  # type: ignore[type-arg]
+    for key, value in other.items():
+        total[key] = total.get(key, Fraction(0)) + factor * value
+        if not total[key]:
+            del total[key]
+
+
+def scale(graph: Graph) -> Graph:
+    """The same graph with fewer products with constants."""
+    group = _groups(graph)
+    system, wishes = _System(), []
+    for index, node in enumerate(graph.nodes):
+        if node[0] not in ("mul", "inv"):
+            continue
+        row, constant = _equation(graph, group, index, node)
+        if constant == 1:
+            system.require(row, {})
+        else:
+            wishes.append((row, {constant: Fraction(-1)}))
+    if not _fulfil(system, wishes):
+        return graph
+    factors = {unknown: _value(powers) for unknown, (_, powers) in system.solved.items()}
+    if any(not 1 / LARGEST < abs(x) < LARGEST for x in factors.values()):
+        return graph
+    return _rewritten(graph, group, factors)
+
+
+def _groups(graph: Graph) -> list[int]:
+    """For each node one that must have the same factor; -1 for those that keep their value."""
+    group = list(range(len(graph.nodes)))
+
+    def find(index: int) -> int:
+        while index != -1 and group[index] != index:
+            index = group[index]
+        return index
+
+    def join(a: int, b: int) -> None:
+        a, b = sorted((find(a), find(b)))
+        if b != a:
+            group[b] = a
+
+    fixed = {node_of(ref) for ref in graph.roots}
+    for index, node in enumerate(graph.nodes):
+        if node[0] not in ("add", "mul", "inv"):
+            fixed |= {index, *(node_of(r) for r in operands(node))}
+        elif node[0] == "add":
+            for ref in node[1:]:
+                if graph.nodes[node_of(ref)][0] != "const":
+                    join(index, node_of(ref))
+    for index in fixed:
+        join(-1, index)
+    return [find(index) for index in range(len(graph.nodes))]
+
+
+def _equation(graph: Graph, group: list[int], index: int, node: Node) -> tuple[Row, Fraction]:
+    """Factors of a product's factors, less that of the product; and its constant."""
+    row, constant = Row(), Fraction(1)
+    for ref in node[1:]:
+        if graph.nodes[ref][0] == "const":
+            constant = graph.nodes[ref][1]
+        elif group[ref] >= 0:
+            _add(row, {group[ref]: Fraction(1)}, Fraction(-1 if node[0] == "inv" else 1))
+    if group[index] >= 0:
+        _add(row, {group[index]: Fraction(1)}, Fraction(-1))
+    return row, constant
+
+
+def _fulfil(system: _System, wishes: list[tuple[Row, Powers]]) -> int:
+    """Add the equations that most constants wish for, until none is left open; returns how many were added."""
+    added = 0
+    while wishes:
+        wishes = [wish for wish in (system.reduced(*wish) for wish in wishes) if wish[0]]
+        counts = Counter(_normal(*wish) for wish in wishes)
+        if not counts:
+            break
+        best = max(counts.values())
+        chosen = next(wish for wish in wishes if counts[_normal(*wish)] == best)
+        added += system.require(*chosen)
+    return added
+
+
+def _normal(row: Row, powers: Powers) -> tuple[object, ...]:
+    """Equal for wishes that one equation fulfils."""
+    pivot = row[min(row)]
+    value = sum(float(e / pivot) * _log(k) for k, e in powers.items())
+    return (*((u, row[u] / pivot) for u in sorted(row)), round(value, 9))
+
+
+def _log(value: Fraction) -> float:
+    with ctx.workprec(64):
+        return float(arb(fmpq(value.numerator, value.denominator)).log().mid())
+
+
+def _value(powers: Powers) -> Fraction:
+    """The product of constants to their exponents: exact if these are integers, else at 400 bits."""
+    result = Fraction(1)
+    with ctx.workprec(BITS):
+        for k, e in powers.items():
+            if e.denominator == 1:
+                result *= k**e.numerator
+            else:
+                x = (arb(fmpq(k.numerator, k.denominator)).log() * arb(fmpq(e.numerator, e.denominator))).exp()
+                mantissa, exponent = x.mid().man_exp()
+                result *= Fraction(int(mantissa)) * Fraction(2) ** int(exponent)
+    return result
+
+
+def _rewritten(graph: Graph, group: list[int], factors: dict[int, Fraction]) -> Graph:
+    scales = [factors.get(one, Fraction(1)) for one in group]
+    position = {node: index for index, node in enumerate(graph.nodes)}
+
+    def rule(builder: Builder, node: Node, refs: tuple[Ref, ...]) -> Ref:
+        if node[0] in LEAVES or node[0] not in ("add", "mul"):
+            return copy_node(builder, node, refs)
+        own, terms = scales[position[node]], []
+        if node[0] == "add":
+            for ref in refs:
+                constant = builder.value(ref)
+                terms.append(ref if constant is None else builder.const(constant / own))
+            return builder.add(terms)
+        constant = 1 / own
+        for old, ref in zip(node[1:], refs, strict=True):
+            value = builder.value(ref)
+            constant *= scales[old] if value is None else value
+            if value is None:
+                terms.append(ref)
+        near = round(constant)
+        if near and abs(constant - near) < Fraction(1, 1 << 300):
+            constant = Fraction(near)
+        return builder.mul([builder.const(constant), *terms])
+
+    return rebuild(graph, rule)

@@ -1,0 +1,151 @@
+"""What a clock of 3 kHz and one sample of delay leave of a law and its gains: the loop of the compiled kernels.
+
+At rest dry friction is a stiff damper, and would make nearly all gains look good; while a motor slides it is a constant
+torque, and damps nothing. Gains must do for both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from awiwi_gen.errors import InputError
+from awiwi_gen.simulate import PERIOD, Machine, Scenario, simulate
+from awiwi_gen.studies.benchmark.joint import Joint, loop_around, values_of
+from awiwi_gen.studies.benchmark.laws import Law
+from awiwi_gen.studies.sampled_loop import STABLE, SampledLoop
+
+WIDEST = 1e3  # by how much gains are changed in the search for such that work
+MOVES = 24  # steps of that search
+HALVINGS = 10
+SPARE = (0.0, 0.25, 0.5, 0.75, 1.0)  # periods of further delay that the nearest gains bear
+RESTING = 600  # ticks in which noise is watched
+SETTLING = 12  # ticks, until all that a law writes has come to rest
+
+
+@dataclass(frozen=True)
+class Clocked:
+    """A law with gains on the clock: spectral radius, and the delay [s] that it bears beyond its one sample.
+
+    ``noise`` is the largest torque that the sensors' noise alone makes it ask for, in parts of what the motors have.
+    """
+
+    law: str
+    gains: Mapping[str, float]
+    radius: float
+    margin: float
+    noise: float
+
+    @property
+    def runs(self) -> bool:
+        """Whether it can run."""
+        return self.radius < STABLE and self.noise < 1
+
+    @property
+    def reason(self) -> str:
+        """Why it can, or cannot."""
+        clock = f"{1 / PERIOD:.0f} Hz and one sample of delay"
+        if self.radius >= STABLE:
+            return f"unstable at {clock}: spectral radius {self.radius:.4g}"
+        if self.noise >= 1:
+            return f"stable at {clock}, but the sensors' noise alone drives the motors to their limit"
+        return f"stable at {clock}: spectral radius {self.radius:.4f}, delay margin {self.margin * 1e6:.0f} us"
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        return {
+            "law": self.law, "gains": dict(self.gains), "radius": self.radius, "margin": self.margin,
+            "noise": self.noise, "runs": self.runs,
+        }  # fmt: skip
+
+
+def clocked(library: Any, law: Law, gains: Mapping[str, float], joint: Joint, force: float) -> Clocked:
+    """How a law with gains does on the clock. Raises InputError where its kernels refuse them."""
+    loops = loops_of(library, law, gains, joint, force)
+    radius = max(loop.radius(0.0) for loop in loops)
+    spare = min(loop.margin() for loop in loops) if radius < STABLE else 0.0
+    return Clocked(law.name, dict(gains), radius, spare, noise(library, law, gains, joint, force))
+
+
+def noise(library: Any, law: Law, gains: Mapping[str, float], joint: Joint, force: float) -> float:
+    """The largest torque besides its mean that a law asks for at rest, in parts of the motors' limit."""
+    values = values_of(joint, joint.believed(), force) | law.values(library, joint.believed(), force, gains)
+    loop = loop_around(joint, list(law.blocks))
+    (trace,) = simulate(library, loop, [Scenario(values, RESTING, seed=1)], ["wanted"])
+    asked = trace["wanted"][RESTING // 3 :]
+    return float(np.abs(asked - asked.mean(axis=0)).max() / joint.limit) if len(asked) else float("inf")
+
+
+def loops_of(library: Any, law: Law, gains: Mapping[str, float], joint: Joint, force: float) -> list[SampledLoop]:
+    """The loop with motors that slide, then with motors at rest."""
+    sliding = replace(joint, friction=joint.friction * [1, 0, 1])
+    loops = []
+    for each in (sliding, joint):
+        values = values_of(each, each.believed(), force) | law.values(library, each.believed(), force, gains)
+        machine = Machine(library, loop_around(each, list(law.blocks)).exact(), Scenario(values, 0))
+        for _ in range(SETTLING):
+            machine.signals[:] = machine.tick(machine.signals)
+        loops.append(SampledLoop(machine))
+    return loops
+
+
+@dataclass(frozen=True)
+class Nearest:
+    """The gains nearest to some that fail: what was changed, by which factor, and how they do."""
+
+    changed: str
+    factor: float
+    clocked: Clocked
+
+
+def nearest(library: Any, law: Law, gains: Mapping[str, float], joint: Joint, force: float) -> Nearest | None:
+    """The gains that run and need the smallest factor: one gain alone, or all as of a slower or faster law.
+
+    They run with another sample of delay, too, so that they do not stand at the brink. None if there are none within a
+    factor of a thousand.
+    """
+    directions = {"bandwidth": {name: gain.power for name, gain in law.gains.items()}}
+    directions |= {name: {name: 1} for name in gains}
+    ways = [(name, sign) for name in directions for sign in (-1, 1)]
+
+    def moved(name: str, exponent: float) -> dict[str, float]:
+        powers = directions[name]
+        return {key: value * WIDEST ** (exponent * powers.get(key, 0)) for key, value in gains.items()}
+
+    def works(name: str, exponent: float) -> bool:
+        chosen = moved(name, exponent)
+        try:
+            loops = loops_of(library, law, chosen, joint, force)
+        except InputError:
+            return False
+        stable = all(loop.radius(late) < STABLE for late in SPARE for loop in loops)
+        return stable and noise(library, law, chosen, joint, force) < 1
+
+    for step in range(1, MOVES + 1):
+        for name, sign in ways:
+            if works(name, sign * step / MOVES):
+                fails, best = (step - 1) / MOVES, step / MOVES
+                for _ in range(HALVINGS):
+                    middle = (fails + best) / 2
+                    fails, best = (fails, middle) if works(name, sign * middle) else (middle, best)
+                chosen = moved(name, sign * best)
+                return Nearest(name, float(WIDEST ** (sign * best)), clocked(library, law, chosen, joint, force))
+    return None
+
+
+def require_clocked(library: Any, law: Law, gains: Mapping[str, float], joint: Joint, force: float) -> Clocked:
+    """How gains do on the clock. Raises InputError for such that fail, with the reason and the nearest that do not."""
+    found = clocked(library, law, gains, joint, force)
+    if found.runs:
+        return found
+    way_out = nearest(library, law, gains, joint, force)
+    if way_out is None:
+        instead = f"neither another bandwidth nor any gain alone mends that within a factor of {WIDEST:g}"
+    else:
+        new = way_out.clocked.gains
+        told = ", ".join(f"{name} = {value:.4g}" for name, value in new.items() if value != gains[name])
+        instead = f"the nearest that run have {told} ({way_out.clocked.reason})"
+    raise InputError(f"{law.name}: these gains are {found.reason}; {instead}")

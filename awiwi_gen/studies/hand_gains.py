@@ -1,0 +1,87 @@
+"""Gains that a hand file brings along, tried on the clock before they become C.
+
+Each tendon is taken as one half of its joint, as `awiwi-gen tune` does; the law is the antagonistic one, at 3 kHz and a
+delay of one sample, about a rest under two pretensions. Gains that are unstable there are refused.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+import awiwi_gen
+from awiwi_gen.cache import Cache, code_digest, key
+from awiwi_gen.errors import Fault, InputError
+from awiwi_gen.hand import Hand
+from awiwi_gen.studies.joint_loops import Plant
+from awiwi_gen.studies.pair_loops import Pair, pair_loop
+from awiwi_gen.studies.sampling import PERIOD
+from awiwi_gen.studies.tune import GAINS, plants
+
+PRETENSIONS = (10.0, 20.0)  # N
+POWERS = {"K_p": 2, "K_d": 1, "K_3": 1, "K_4": 1, "C_t": 0, "C_s": -2}  # of the bandwidth that a gain grows with
+SLOWEST, HALVINGS = 1e-3, 12
+
+
+def require_running_gains(hand: Hand, store: Cache) -> None:
+    """Raise InputError that names every tendon of a hand whose gains cannot run, and the fastest like them that can."""
+    if not hand.gains:
+        return
+    digest = key(hand.digest(), code_digest("studies", "control", "models", "kernels"))
+    faults = store.memo("gains", digest, lambda: failing(awiwi_gen.build(hand), hand))
+    if faults:
+        raise InputError(faults)
+
+
+def failing(library: Any, hand: Hand) -> list[Fault]:
+    """A fault for each tendon whose gains cannot run."""
+    found: dict[int, tuple[str, list[Plant]]] = {}
+    for force in PRETENSIONS:
+        for name, finger in hand.fingers.items():
+            first = hand.blocks[name][0].start
+            for index, (joint, plant) in enumerate(plants(library, hand, name, finger, force)):
+                found.setdefault(first + index, (f"{name}, {joint}", []))[1].append(plant)
+    faults = []
+    for place, gains in enumerate(hand.gains):
+        joint, both = found[gains.tendon]
+        wanted = {name: float(getattr(gains, name)) for name in GAINS}
+        worst = max(radius(library, plant, wanted) for plant in both)
+        if not worst < 1:
+            message = (
+                f"= {gains.tendon} ({joint}): these gains are unstable at {1 / PERIOD:.0f} Hz and a delay of one sample "
+                f"(spectral radius {worst:.3g}); {way_out(library, both, wanted)}"
+            )
+            faults.append(Fault(key=f"gains[{place}].tendon", message=message))
+    return faults
+
+
+def radius(library: Any, plant: Plant, gains: dict[str, float]) -> float:
+    """Spectral radius of a joint whose both tendons have these gains; infinite where the law refuses them."""
+    pair = Pair(plant.m, (plant.b / 2,) * 2, (plant.k / 2,) * 2)
+    impedance, tuning = list(gains.values())[:2], list(gains.values())[2:]
+    loop, constant = pair_loop(library.backstepping_antagonistic, pair, impedance, tuning)
+    if not (np.isfinite(loop.K).all() and np.isfinite(constant).all()):
+        return float("inf")
+    return loop.sampled_radius()
+
+
+def way_out(library: Any, both: list[Plant], gains: dict[str, float]) -> str:
+    """The same gains at the largest share of their bandwidth that the clock allows, in words."""
+
+    def slower(share: float) -> dict[str, float]:
+        return {name: value * share ** POWERS[name] for name, value in gains.items()}
+
+    def works(share: float) -> bool:
+        return all(radius(library, plant, slower(share)) < 1 for plant in both)
+
+    shares = np.geomspace(1, SLOWEST, 61)
+    first = next((i for i, share in enumerate(shares) if works(share)), None)
+    if first is None:
+        return "nor are they stable if the law is made slower"
+    fails, best = shares[first - 1], shares[first]
+    for _ in range(HALVINGS):
+        middle = float(np.sqrt(fails * best))
+        fails, best = (fails, middle) if works(middle) else (middle, best)
+    told = ", ".join(f'{name} = "{value:.4g} {GAINS[name]}"' for name, value in slower(best).items())
+    return f"the fastest like them that run are {told}"

@@ -1,0 +1,63 @@
+/* Numbers of twice the digits, as unevaluated sums of two, by error-free transformations (Dekker, Knuth). They need
+   arithmetic in the declared type and no contraction to fused multiply-add. Not part of the firmware interface. */
+#ifndef AWIWI_TWOFOLD_H
+#define AWIWI_TWOFOLD_H
+
+#include "real.h"
+
+/* high + low, of which high is the nearest number. */
+typedef struct awiwi_twofold {
+    awiwi_real high, low;
+} awiwi_twofold;
+
+/* a + b where |a| is not less than |b|, or a is 0. */
+static inline awiwi_twofold awiwi_joined(awiwi_real a, awiwi_real b)
+{
+    const awiwi_real sum = a + b;
+    const awiwi_twofold x = {sum, b - (sum - a)};
+    return x;
+}
+
+static inline awiwi_twofold awiwi_twofold_add(awiwi_twofold x, awiwi_twofold y)
+{
+    const awiwi_real sum = x.high + y.high, part = sum - x.high;
+    const awiwi_real lost = (x.high - (sum - part)) + (y.high - part);
+    return awiwi_joined(sum, lost + (x.low + y.low));
+}
+
+/* a b without rounding: halves of the digits have products that fit. */
+static inline awiwi_twofold awiwi_exact_product(awiwi_real a, awiwi_real b)
+{
+    const awiwi_real split = AWIWI_REAL_EPSILON < (awiwi_real)1e-10 ? (awiwi_real)134217729 : (awiwi_real)4097;
+    const awiwi_real a1 = split * a - (split * a - a), a2 = a - a1;
+    const awiwi_real b1 = split * b - (split * b - b), b2 = b - b1, product = a * b;
+    const awiwi_twofold x = {product, a2 * b2 - (((product - a1 * b1) - a2 * b1) - a1 * b2)};
+    return x;
+}
+
+static inline awiwi_twofold awiwi_twofold_multiply(awiwi_twofold x, awiwi_twofold y)
+{
+    const awiwi_twofold p = awiwi_exact_product(x.high, y.high);
+    return awiwi_joined(p.high, p.low + (x.high * y.low + x.low * y.high));
+}
+
+static inline awiwi_twofold awiwi_twofold_of(awiwi_real a)
+{
+    const awiwi_twofold x = {a, 0};
+    return x;
+}
+
+static inline awiwi_twofold awiwi_twofold_minus(awiwi_twofold x)
+{
+    const awiwi_twofold y = {-x.high, -x.low};
+    return y;
+}
+
+static inline awiwi_twofold awiwi_twofold_divide(awiwi_twofold x, awiwi_real d)
+{
+    const awiwi_real first = x.high / d;
+    const awiwi_twofold left = awiwi_twofold_add(x, awiwi_twofold_minus(awiwi_exact_product(first, d)));
+    return awiwi_joined(first, (left.high + left.low) / d);
+}
+
+#endif

@@ -1,0 +1,190 @@
+"""Laws compared on one joint of the hand: what the best one reaches, what cannot run, and what bad input does."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+pytest.importorskip("scipy")
+
+from awiwi_gen.errors import InputError
+from awiwi_gen.simulate import Scenario, simulate
+from awiwi_gen.studies.benchmark.clock import clocked, nearest, require_clocked
+from awiwi_gen.studies.benchmark.compare import compare
+from awiwi_gen.studies.benchmark.joint import joint_of, loop_around, values_of
+from awiwi_gen.studies.benchmark.laws import LAWS
+from awiwi_gen.studies.benchmark.scenarios import FORCES, PLANTS
+
+BEST = LAWS["backstepping_adaptive"]
+HEAVIER = "link 30 % heavier"
+
+
+@pytest.fixture(scope="module")
+def joint(lib, hand):
+    return joint_of(lib, hand)
+
+
+@pytest.fixture(scope="module")
+def rows(lib, hand):
+    return compare(lib, hand)
+
+
+def of(rows, law, plant=None):
+    return [row for row in rows if row.law == law and plant in (None, row.plant)]
+
+
+# -- the goal -----------------------------------------------------------------------------------------------
+
+
+def test_the_best_law_reaches_the_goal_with_every_spring_friction_and_pretension(rows):
+    found = [row for row in of(rows, BEST.name) if row.plant != HEAVIER]
+
+    assert len(found) == (len(PLANTS) - 1) * len(FORCES)
+    for row in found:
+        assert row.score.settling <= 0.040, row
+        assert row.score.overshoot <= 0.02, row
+        assert abs(row.score.stiffness) <= 0.03, row
+        assert row.score.slack == 0, row
+        assert row.score.good, row
+
+
+def test_no_other_law_reaches_it(rows):
+    assert not [row for row in rows if row.law != BEST.name and row.score.good]
+
+
+def test_a_heavier_link_is_taken_for_a_load_and_overshoots(rows):
+    """What the best law does not do: the observer knows no mass but the hand file's."""
+    for row in of(rows, BEST.name, HEAVIER):
+        assert row.score.overshoot > 0.02
+        assert abs(row.score.stiffness) <= 0.03
+
+
+def test_motors_on_springs_of_their_own_leave_the_stiffness_to_the_tendons(rows):
+    for row in of(rows, "motor_pd", "as known"):
+        assert row.score.settling < 0.040
+        assert abs(row.score.stiffness) > 0.1
+
+
+def test_the_printed_decoupling_lets_a_tendon_go_slack_and_the_exact_law_does_not(rows):
+    assert all(row.score.slack > 0 for row in of(rows, "backstepping_decoupled", "as known"))
+    assert all(row.score.slack == 0 for row in of(rows, "backstepping_antagonistic"))
+
+
+def test_two_comparisons_give_the_same_numbers(lib, hand):
+    first, second = (compare(lib, hand, [BEST], forces=[10.0], plants=["as known"]) for _ in range(2))
+
+    assert first == second
+
+
+# -- the clock ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
+def test_every_laws_own_gains_run_on_the_clock_with_half_a_sample_to_spare(lib, joint, law):
+    found = clocked(lib, law, law.gains_with({}), joint, 10.0)
+
+    assert found.runs
+    assert found.radius < 1
+    assert found.margin > 0.5 / 3000
+
+
+def test_a_loop_that_is_called_unstable_is_unstable_when_it_runs(lib, joint):
+    law = LAWS["motor_pd"]
+    gains = law.gains_with({"kp": 6000.0})
+    assert clocked(lib, law, gains, joint, 10.0).radius > 1
+
+    values = values_of(joint, joint.believed(), 10.0) | law.values(lib, joint.believed(), 10.0, gains)
+    values["x"][2] += 1e-3
+    sliding = values | {"friction": joint.friction * [1, 0, 1], "known_friction": joint.friction * [1, 0, 0.9]}
+    (trace,) = simulate(lib, loop_around(joint, list(law.blocks)).exact(), [Scenario(sliding, 1500)], ["x"])
+
+    assert trace.done < 1500 or np.abs(trace["x"][-100:, 2]).max() > 1
+
+
+def test_gains_that_cannot_run_are_refused_with_the_reason_and_the_nearest_that_do(lib, joint):
+    law = LAWS["motor_pd"]
+    gains = law.gains_with({"kp": 6000.0})
+
+    with pytest.raises(
+        InputError, match=r"unstable at 3000 Hz and one sample of delay.*the nearest that run have kp = "
+    ):
+        require_clocked(lib, law, gains, joint, 10.0)
+
+    found = nearest(lib, law, gains, joint, 10.0)
+    assert found.clocked.runs
+    assert found.clocked.margin > 0.9 / 3000  # with something to spare
+    assert found == nearest(lib, law, gains, joint, 10.0)
+
+
+def test_gains_that_only_amplify_noise_are_refused_too(lib, joint):
+    found = clocked(lib, BEST, BEST.gains_with({"K_3": 2000.0, "K_4": 2000.0}), joint, 10.0)
+
+    assert found.radius < 1
+    assert not found.runs
+    assert "the sensors' noise alone" in found.reason
+
+
+def test_the_printed_damping_of_the_impedance_is_refused(lib, joint):
+    """K_d = 0.05 N m s/rad on a link of some 1e-5 kg m^2 asks for a pole that no clock of 3 kHz can have."""
+    found = clocked(lib, BEST, BEST.gains_with({"K_d": 0.05}), joint, 10.0)
+
+    assert not found.runs
+    assert found.radius > 1
+
+
+# -- bad input ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
+@pytest.mark.parametrize("bad", [0.0, -1.0, np.nan, np.inf])
+def test_gains_that_are_not_positive_numbers_are_refused_by_name(law, bad):
+    for name in law.gains:
+        with pytest.raises(InputError, match=f"{law.name}: the gain {name} = "):
+            law.gains_with({name: bad})
+
+
+@pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
+def test_a_reference_far_beyond_the_motors_leaves_torques_within_their_limit_and_is_recovered_from(lib, joint, law):
+    ticks, goal = 6000, np.zeros((6000, 5))
+    goal[100:700, 0] = 1.0
+    values = values_of(joint, joint.believed(), 20.0) | law.values(lib, joint.believed(), 20.0, law.gains_with({}))
+    values.pop("goal")
+    (trace,) = simulate(
+        lib, loop_around(joint, list(law.blocks)), [Scenario(values, ticks, {"goal": goal})], ["x", "u", "wanted"]
+    )
+
+    assert np.abs(trace["wanted"]).max() > joint.limit
+    assert np.abs(trace["u"]).max() <= joint.limit
+    assert trace.done == ticks
+    assert np.isfinite(trace["x"]).all()
+    assert np.abs(trace["x"][-300:, 0]).max() < 0.02
+
+
+def test_while_a_stiffness_is_singular_the_law_refuses_and_then_recovers(lib, joint):
+    ticks, impedance = 1500, np.tile([0.5, 0.003], (1500, 1))
+    impedance[300:330, 0] = 0.0
+    values = values_of(joint, joint.believed(), 20.0) | BEST.values(lib, joint.believed(), 20.0, BEST.gains_with({}))
+    values.pop("impedance")
+    loop = loop_around(joint, list(BEST.blocks))
+    (trace,) = simulate(lib, loop, [Scenario(values, ticks, {"impedance": impedance})], ["x", "u", "tau"])
+
+    assert trace.refused == 30
+    assert trace["u"][302:330] == pytest.approx(0)
+    assert trace.status == 0
+    assert np.abs(trace["x"][-300:, 0]).max() < 0.01
+    assert trace["tau"][-300:].mean() == pytest.approx(20.0 * joint.arm, rel=0.02)
+
+
+def test_a_sensor_that_fails_for_a_while_commands_nothing_and_is_recovered_from(lib, joint):
+    """The load, as the law is told, is no number for 10 ms."""
+    ticks, told = 1500, np.zeros(1500)
+    told[300:330] = np.nan
+    law = [*BEST.blocks[:-1], type(BEST.blocks[-1])(
+        BEST.blocks[-1].kernel, {**BEST.blocks[-1].wires, "external": ("told", "nothing")}
+    )]  # fmt: skip
+    values = values_of(joint, joint.believed(), 20.0) | BEST.values(lib, joint.believed(), 20.0, BEST.gains_with({}))
+    (trace,) = simulate(lib, loop_around(joint, law), [Scenario(values, ticks, {"told": told})], ["x", "u"])
+
+    assert trace.refused == 30
+    assert trace["u"][302:330] == pytest.approx(0)
+    assert np.abs(trace["x"][-300:, 0]).max() < 0.01

@@ -1,0 +1,89 @@
+"""A kernel may not grow dearer unnoticed: the budget beside the generated code."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+import awiwi_gen.ir.passes as passes
+from awiwi_gen.budget import BUDGET, excess, require_budget
+from awiwi_gen.derive import Deriver
+from awiwi_gen.emit.options import Options
+from awiwi_gen.errors import BudgetError
+from awiwi_gen.hand import Hand
+from awiwi_gen.pipeline import Job, generate
+from awiwi_gen.records import make_record
+
+BEFORE = (("derivation", 100), ("share", 80), ("factor", 70))
+
+
+def job(**changes: object) -> Job:
+    return replace(Job(Hand.load(), only="index_gravity"), **changes)
+
+
+def lower(directory: Path, name: str) -> str:
+    """Halve a kernel's budget; returns the text of the file."""
+    budget = json.loads((directory / BUDGET).read_text())
+    budget[name]["weight"] = [[step, weight // 2] for step, weight in budget[name]["weight"]]
+    text = json.dumps(budget)
+    (directory / BUDGET).write_text(text)
+    return text
+
+
+def test_a_kernel_above_its_budget_stops_the_run_and_leaves_the_directory_as_it_was(tmp_path):
+    generate(job(), tmp_path / "c")
+    text = lower(tmp_path / "c", "index_gravity")
+
+    with pytest.raises(BudgetError, match=r"(?s)index_gravity costs \d+, its budget is \d+ .*--accept-cost"):
+        generate(job(), tmp_path / "c")
+    assert (tmp_path / "c" / BUDGET).read_text() == text
+
+
+def test_an_accepted_cost_is_the_new_budget(tmp_path):
+    generate(job(), tmp_path / "c")
+    text = (tmp_path / "c" / BUDGET).read_text()
+    lower(tmp_path / "c", "index_gravity")
+
+    assert generate(job(accept_cost=True), tmp_path / "c")
+    assert (tmp_path / "c" / BUDGET).read_text() == text
+
+
+def test_a_pass_that_does_nothing_any_more_is_named(monkeypatch):
+    kernel = job(only="index_joint_torque").kernels[0]
+    graphs = {"casadi": Deriver(kernel.part).derive(kernel, "casadi")}
+
+    def share_sums(graph):
+        return graph
+
+    def costs(*pipeline) -> tuple[tuple[str, int], ...]:
+        monkeypatch.setattr(passes, "PIPELINES", (pipeline,))
+        return make_record(kernel, graphs, "x", Options(), "digest").costs
+
+    pipeline = passes.PIPELINES[1]
+    before = costs(*pipeline)
+    (sentence,) = excess(before, costs(*(share_sums if p.__name__ == "share_sums" else p for p in pipeline)))
+
+    assert "share_sums" in sentence
+
+
+def test_two_per_cent_are_within_the_budget():
+    assert not excess(BEFORE, (("derivation", 100), ("share", 80), ("factor", 71)))
+    assert excess(BEFORE, (("derivation", 100), ("share", 80), ("factor", 72)))
+
+
+def test_a_longer_derivation_is_told_from_a_worse_pass():
+    (longer,) = excess(BEFORE, (("derivation", 130), ("share", 110), ("factor", 100)))
+    (worse,) = excess(BEFORE, (("derivation", 100), ("share", 95), ("factor", 85)))
+
+    assert "derivation gives 30 more" in longer
+    assert "pass share removes 15 less" in worse
+
+
+def test_parts_of_another_structure_are_not_compared(tmp_path):
+    row = {"part": "old", "weight": [["derivation", 1]]}
+    (tmp_path / BUDGET).write_text(json.dumps({"one": row}))
+
+    require_budget(tmp_path, json.dumps({"one": {"part": "new", "weight": [["derivation", 9]]}}))

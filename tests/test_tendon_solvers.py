@@ -1,0 +1,128 @@
+"""The distribution's C by itself: fingers and springs that no hand has, how much work it is, and which tendons are pairs."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import tendon_solvers as solvers
+from tendon_solvers import NOT_CONVERGED, OK, OUT_OF_DOMAIN, demand, fingers, quadratic
+
+import awiwi_gen
+from awiwi_gen.kernels.fingers_control import antagonists, distribution, groups
+
+
+@pytest.fixture(scope="module")
+def library(tmp_path_factory):
+    return solvers.compiled(tmp_path_factory.mktemp("solvers"))
+
+
+def test_the_search_finds_what_the_formulas_of_pairs_give(library):
+    random = np.random.default_rng(12)
+    told, untold, *_ = fingers(library, random)
+
+    for _ in range(200):
+        tau, K = demand(told, random, 1.0)
+        by_formula, by_search = told.distribute(tau, K), untold.distribute(tau, K)
+        assert by_formula[0] == by_search[0] == OK
+        assert np.abs(by_formula[1] - by_search[1]).max() < 1e-8
+
+
+def test_the_work_is_bounded_as_the_header_says_and_small(library):
+    random = np.random.default_rng(13)
+    counts = {"pairs": [0], "search": [0]}
+
+    for _ in range(150):
+        for finger in fingers(library, random):
+            status, f = finger.distribute(*demand(finger, random, random.choice([0.0, 1.0, 10.0])))
+            assert status == OK
+            assert finger.low <= f.min() <= f.max() <= finger.high
+            counts["pairs" if finger.pairs else "search"].append(finger.calls)
+
+    assert max(counts["pairs"]) <= 10
+    assert max(counts["search"]) <= 100
+
+
+@pytest.mark.parametrize("kind", ["steps", "flat", "falling", "saw"])
+def test_springs_that_no_spring_is_like_end_within_the_bounds(library, kind):
+    random = np.random.default_rng(14)
+    curves = {
+        "steps": lambda f: (5000 + 3000 * np.floor(f / 10), 0.0, 0.0),
+        "flat": lambda f: (5000.0, 0.0, 0.0),
+        "falling": lambda f: (20000 - 150 * f, -150.0, 0.0),
+        "saw": lambda f: (5000 + 400 * (f % 7), 400.0, 0.0),
+    }
+
+    for _ in range(60):
+        for finger in fingers(library, random):
+            tau, K = demand(finger, random, 1.0)
+            finger.curve = curves[kind]
+            status, f = finger.distribute(tau, K)
+            assert finger.calls <= 2 + 64 + 3 * 97
+            assert finger.low <= f.min() <= f.max() <= finger.high
+            assert status in (OK, NOT_CONVERGED)
+            assert np.abs(finger.P.T @ f + tau).max() < 1e-13
+
+
+def test_a_curve_that_ends_too_early_is_a_status(library):
+    for finger in fingers(library, np.random.default_rng(15)):
+        tau, K = demand(finger, np.random.default_rng(16), 0.0)
+        finger.curve = lambda f: quadratic(f) if 20 < f < 80 else None
+
+        status, f = finger.distribute(tau, K)
+
+        assert status == OUT_OF_DOMAIN
+        assert finger.low <= f.min() <= f.max() <= finger.high
+
+
+def test_a_hand_without_springs_takes_its_limits_of_stiffness(root):
+    hand = awiwi_gen.Hand.load(root / "tests" / "one_finger.toml")
+    lib = awiwi_gen.build(hand)
+    tension = np.array([0.0, 50.0, 100.0])
+
+    k, slope, curvature, status = lib.jaw_tendon_stiffness(tension)
+
+    assert status == 0
+    assert np.allclose(k, [1000, 25500, 50000])
+    assert np.allclose(slope, 490)
+    assert np.all(curvature == 0)
+    random = np.random.default_rng(17)
+    f = random.uniform(1, 99, (500, 3))
+    P = lib.jaw_coupling(np.zeros(2))
+    K = np.einsum("si,ia,ib->sab", lib.jaw_tendon_stiffness(f).k, P, P)
+    found = lib.jaw_tendon_distribution(np.zeros(2), -f @ P, K, 0.0, 100.0)
+    assert not found.status.any()
+    assert np.abs(found.f - f).max() < 1e-8
+
+
+# -- which tendons are pairs --------------------------------------------------------------------------------
+
+
+def test_pairs_and_spans_are_read_off_the_routing(hand):
+    found = {
+        name: [(group, antagonists(finger, group)) for group in groups(finger)] for name, finger in hand.fingers.items()
+    }
+
+    assert found["index"] == [([0, 1, 2, 3], [(0, 3), (1, 2)]), ([4, 5, 6, 7], [(4, 5), (6, 7)])]
+    assert found["thumb"] == [([0, 1, 2, 3], []), ([4, 5, 6, 7], [(4, 5), (6, 7)])]
+    assert found["ring"] == [([0, 1, 2, 3], [(0, 3), (1, 2)]), ([4, 5], [(4, 5)])]
+    assert found["fifth"][0] == ([0, 1], [(0, 1)])
+
+
+def test_every_pair_is_a_direction_of_the_null_space_and_they_fill_it(lib, hand):
+    for name in ("index", "middle", "ring", "fifth"):
+        P = lib[f"{name}_coupling"](np.zeros(len(hand.fingers[name].joints)))
+        pairs = [pair for group in groups(hand.fingers[name]) for pair in antagonists(hand.fingers[name], group)]
+        moves = np.zeros((len(pairs), len(P)))
+        for move, pair in zip(moves, pairs, strict=True):
+            move[list(pair)] = 1
+
+        assert np.abs(moves @ P).max() == 0
+        assert len(pairs) == len(P) - np.linalg.matrix_rank(P)
+
+
+def test_tendons_that_are_no_independent_pairs_are_searched(root):
+    finger = awiwi_gen.Hand.load(root / "tests" / "one_finger.toml").fingers["jaw"]
+    twice = finger.model_copy(update={"tendons": finger.tendons[2:] * 2})
+
+    assert distribution(finger).strings["searched"] == "0, 1, 2"
+    assert distribution(twice).strings["searched"] == "0, 1"
