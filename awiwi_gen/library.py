@@ -92,7 +92,8 @@ class KernelFunction:
         given = args if len(args) == len(self._names) and not named else self._bound(args, named)
         arrays = [self._checked(place, value) for place, value in enumerate(given)]
         leads = [a.shape[: a.ndim - len(shape)] for a, shape in zip(arrays, self._shapes, strict=True)]
-        lead = leads[0] if leads.count(leads[0]) == len(leads) else self._common(leads, arrays)
+        several = {lead for lead in leads if lead}
+        lead = self._common(leads, arrays) if len(several) > 1 else several.pop() if several else ()
         samples = [_samples(a, own, lead, shape) for a, own, shape in zip(arrays, leads, self._shapes, strict=True)]
         results = [np.empty(lead + shape, dtype) for shape, dtype in self._results]
         pointers = [(self._library.pointer(array), step) for array, step in samples]
@@ -160,8 +161,11 @@ class KernelFunction:
 def _samples(array: Array, own: tuple[int, ...], lead: tuple[int, ...], shape: tuple[int, ...]) -> tuple[Array, int]:
     """An input as samples that are evenly apart: an array to point at, and the step from one to the next."""
     size = prod(shape)
-    if not prod(lead) or (own == lead and array.flags.c_contiguous and array.flags.aligned):
-        return array, size
+    packed = array.flags.c_contiguous and array.flags.aligned
+    if packed and (own == lead or not own):
+        return array, size if own else 0
+    if not prod(lead):
+        return np.empty(0, array.dtype), size
     rows = np.broadcast_to(array, lead + shape).reshape(-1, size)
     step, misfit = divmod(rows.strides[0], array.itemsize)
     if misfit or not rows.flags.aligned or (size > 1 and rows.strides[1] != array.itemsize):

@@ -26,9 +26,9 @@ ONE_FINGER = Path(__file__).with_name("one_finger.toml")
 ODD = 1003  # no multiple of any vector's length
 RANDOM = np.random.default_rng(7)
 VARIANTS = {
-    "double": Options(trig="own"),
-    "single": Options(scalar="f32", trig="own"),
-    "runtime": Options(params="runtime", trig="own"),
+    "double": Options(),
+    "single": Options(scalar="f32"),
+    "runtime": Options(params="runtime"),
 }
 
 
@@ -110,7 +110,7 @@ def test_samples_that_are_no_number_spoil_no_neighbour(jaw):
 
 
 def test_each_sample_has_a_status_of_its_own(hand):
-    wrist = vectorised(cached_tree(Job(hand, Options(trig="own"), "wrist_points")))
+    wrist = vectorised(cached_tree(Job(hand, only="wrist_points")))
     q71, q73 = RANDOM.uniform(0.5, 0.7, ODD), RANDOM.uniform(-1.0, 1.0, ODD)
     together = wrist.wrist_points(q71, q73)
     apart = [wrist.wrist_points(a, b) for a, b in zip(q71, q73, strict=True)]
