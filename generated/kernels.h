@@ -1928,7 +1928,9 @@ int awiwi_sdre_joint(const double m[1], const double b[1], const double dq[1], c
 
 /*
  * Gains of u = -K x that minimise the integral of x'Q x + R u^2, and the least cost x'S x; in coherent
- * units. The residual is that of the Riccati equation for S, relative to its terms.
+ * units. The residual is that of the Riccati equation for S, relative to its terms. Refused are a
+ * plant that B cannot stabilise, costs that reward a motion, and costs that leave one for nothing that
+ * does not decay by itself.
  * Source: eq. 13.1 to 13.5.
  *   in   A[4][4] in 1, -1e+07 to 1e+07
  *   in   B[4] in 1, -10000 to 10000
