@@ -54,6 +54,7 @@ def goals(results: dict[str, Any]) -> list[Row]:
             peers = [r for r in mine if group_of(r["contender"]) != "ours"]
             mine = [r for r in mine if group_of(r["contender"]) == "ours"]
             entry = {"hand": hand, "quantity": name}
+            most = quantity.goal.operations if hand == "index" else None  # a count belongs to a finger, ratios to all
             counts = {c: per[name] for c, per in result["operations"].items() if name in per}
             own = counts[mine[0]["contender"]]["operations"]
             theirs = {c: n["operations"] for c, n in counts.items() if group_of(c) != "ours"}
@@ -61,9 +62,9 @@ def goals(results: dict[str, Any]) -> list[Row]:
             rows.append(
                 {**entry, "measure": "operations", "ours": own, "peer": least and theirs[least], "name": least}
                 | {
-                    "goal": quantity.goal.operations,
-                    "aim": quantity.goal.aim,
-                    "met": _met(own, quantity.goal.operations),
+                    "goal": most,
+                    "aim": quantity.goal.aim if most else None,
+                    "met": _met(own, most),
                 }
             )
             for measure, goal, portable in _measures(quantity.goal):
