@@ -14,8 +14,8 @@ enum { AWIWI_MOST_STATES = 4 };
    x'S x = the least cost from x: the stabilising solution of S A + A'S - S b b'S/R + Q = 0. Arrays are row by row, n
    is at most AWIWI_MOST_STATES, of Q the symmetric part counts. Doubles at most `iterations` times from each of at
    most 3 starts, and refines each at most 12 times with twice the digits.
-   `residual` is the largest entry of the left side for the S that is returned, evaluated with twice the digits, relative
-   to the largest sum of its terms' magnitudes, both in coordinates that the solver balances. Returns
+   `residual` is the largest entry of the left side for the S that is returned, evaluated with twice the digits,
+   relative to the largest sum of its terms' magnitudes, both in coordinates that the solver balances. Returns
    AWIWI_OK             the loop A - b K is stable and K is the optimum's but for its last digit;
    AWIWI_OUT_OF_DOMAIN  R is not positive, some motion is rewarded by Q, b cannot stabilise A, or a motion that does not
                         decay costs nothing: (A, Q) is not detectable;
