@@ -6,16 +6,19 @@ changed number recompiles the kernels it changes. The wrapper cffi makes depends
 
 from __future__ import annotations
 
+import ctypes
 import importlib.machinery
 import importlib.util
 import json
 import os
+import platform
 import re
 import shutil
 import subprocess
 import sys
 import sysconfig
 import tempfile
+from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache
@@ -34,6 +37,10 @@ WARNINGS = ("-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wdouble-promotio
 FLAGS = ("-std=c99", "-O2", "-fPIC", "-ffp-contract=off", *WARNINGS)
 GLUE_FLAGS = ("-O0", "-fPIC", "-w")  # what cffi writes is long and runs once a call; the loops are optimised
 OPTIMISED = '#pragma GCC push_options\n#pragma GCC optimize ("O1")\n{}\n#pragma GCC pop_options\n'
+BATCH_FLAGS = ("-std=c99", "-O3", "-fPIC", "-w", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math")
+GCC_FLAGS = ("-fschedule-insns", "-fsched-pressure", "--param", "vect-epilogues-nomask=0")  # long straight-line loops
+UNFUSED = (("-mno-fma",), ("-mno-fma", "-mno-avx512f"))  # x86 without the instructions, in AVX-512 they are built in
+FUSED = re.compile(r"\b(v?fn?m(add|sub|la|ls|acc|sac)|xvn?m(add|sub)|vfm[as])\w*")
 
 
 @dataclass(frozen=True)
@@ -62,6 +69,17 @@ def compiler() -> Compiler:
     raise NoCompilerError(f"no C compiler: {wanted}; {MEND}")
 
 
+@cache
+def native() -> tuple[tuple[str, ...], str]:
+    """Flags for this very machine, and what they make of it: code for one machine must not be run on another."""
+    for flags in ("-march=native",), ("-mcpu=native",):
+        try:
+            return flags, compiler().run(*flags, "-E", "-dM", "-x", "c", os.devnull)
+        except BuildError:
+            continue
+    return (), platform.machine()
+
+
 MEND = "install one (Debian: apt-get install gcc) or set CC"
 
 
@@ -80,13 +98,23 @@ def headers(directory: Path) -> str:
     return "\0".join(re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL) for text in texts)
 
 
+def sources(directory: Path) -> list[Path]:
+    """All C files of a generated directory and of csrc."""
+    return [*sorted(directory.glob("*.c")), *sorted(CSRC.glob("*.c"))]
+
+
+def object_name(source: Path, shared: str) -> str:
+    """The digest of everything that decides an object."""
+    return key(source.read_text(encoding="utf-8"), shared, FLAGS, compiler().version) + ".o"
+
+
 def compile_objects(directory: Path, store: Cache) -> list[Path]:
     """Objects of all C files of a generated directory and of csrc; only those not in the cache are compiled."""
     cc, shared = compiler(), headers(directory)
     includes = (f"-I{directory}", f"-I{CSRC}")
 
     def compile_one(source: Path) -> Path:
-        digest = key(source.read_text(encoding="utf-8"), shared, FLAGS, cc.version) + ".o"
+        digest = object_name(source, shared)
         target = store.directory / "objects" / digest
         if not target.exists():
             with tempfile.TemporaryDirectory() as scratch:
@@ -96,7 +124,7 @@ def compile_objects(directory: Path, store: Cache) -> list[Path]:
         return target
 
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        return list(pool.map(compile_one, [*sorted(directory.glob("*.c")), *sorted(CSRC.glob("*.c"))]))
+        return list(pool.map(compile_one, sources(directory)))
 
 
 def declarations(directory: Path) -> str:
@@ -125,7 +153,67 @@ def load(directory: Path, store: Cache | None = None) -> Library:
             compiler().run("-shared", *(str(o) for o in objects), str(wrapper), "-o", str(made), "-lm")
             target = store.put_bytes("libraries", digest, made.read_bytes())
     module = _import(name, target)
-    return Library(manifest, module.lib, module.ffi)
+    loaded = frozenset(path.name for path in objects)
+
+    def vectorised(entry: Mapping[str, Any]) -> Any:
+        return batch_function(entry, manifest, directory, store, loaded, module.ffi)
+
+    return Library(manifest, module.lib, module.ffi, vectorised)
+
+
+def batch_function(
+    entry: Mapping[str, Any],
+    manifest: Mapping[str, Any],
+    directory: Path,
+    store: Cache,
+    loaded: frozenset[str],
+    ffi: Any,
+) -> Any:
+    """A kernel's loop over samples, compiled for this machine's vectors; None where vectors do not help.
+
+    Raises BuildError when that fails, and when the directory is no longer what the library was ``loaded`` from.
+    """
+    from awiwi_gen.emit.batch import batch_file, worthwhile
+
+    source = directory / f"{entry['name']}.c"
+    text = source.read_text(encoding="utf-8")
+    if not worthwhile(entry, text):
+        return None
+    shared = headers(directory)
+    if object_name(source, shared) not in loaded:
+        raise BuildError(f"{directory} has changed since it was loaded; load it again")
+    prefix, scalar = manifest["prefix"], manifest["c_type"]
+    written = batch_file(entry, prefix, scalar, text)
+    includes = (f"-I{directory}", f"-I{CSRC}")
+    digest = key(written, text, shared, BATCH_FLAGS, GCC_FLAGS, UNFUSED, native(), compiler().version) + ".so"
+    target = store.directory / "batches" / digest
+    if not target.exists():
+        with tempfile.TemporaryDirectory() as scratch:
+            made = _compile_batch(written, Path(scratch), includes)
+            target = store.put_bytes("batches", digest, made.read_bytes())
+    function = getattr(ctypes.CDLL(str(target)), f"{prefix}_{entry['name']}_batch")
+    pointer = f"{scalar} *"
+    types = ["ptrdiff_t", *[f"const {prefix}_params *"] * entry["params"]]
+    types += [f"const {pointer}", "ptrdiff_t"] * len(entry["inputs"]) + [pointer] * len(entry["outputs"])
+    types += ["int *"] * entry["status"]
+    return ffi.cast(f"void (*)({', '.join(types)})", ctypes.cast(function, ctypes.c_void_p).value)
+
+
+def _compile_batch(written: str, scratch: Path, includes: tuple[str, ...]) -> Path:
+    """A loop over samples as a library for this machine, of which no instruction multiplies and adds at once.
+
+    gcc 12 makes such where it finds a sum beside a difference, whatever it is told; then it may not know them.
+    """
+    source, assembly, made = scratch / "batch.c", scratch / "batch.s", scratch / "batch.so"
+    source.write_text(written, encoding="utf-8")
+    flags, machine = native()
+    flags += () if "clang" in compiler().version else GCC_FLAGS
+    for without in UNFUSED if "__x86_64__" in machine else ((),):
+        compiler().run(*BATCH_FLAGS, *flags, *without, *includes, "-S", str(source), "-o", str(assembly))
+        if not FUSED.search(assembly.read_text(encoding="utf-8")):
+            compiler().run("-shared", str(assembly), "-o", str(made), "-lm")
+            return made
+    raise BuildError(f"{compiler().version} fuses multiplications with additions against its flags")
 
 
 def _glue_source(manifest: dict[str, Any], declared: str) -> str:

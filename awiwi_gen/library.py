@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+import os
+import warnings
 from collections import namedtuple
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from math import prod
 from typing import Any
 
 import numpy as np
 
-from awiwi_gen.errors import InputError
+from awiwi_gen.errors import BuildError, InputError
 
 Array = np.ndarray[Any, Any]
+Pointers = list[tuple[Any, int]]  # where samples begin, and the step from one to the next
+
+VECTORISE_AFTER = 100_000  # samples of a kernel
+SINCOS, CALL = 60, 20  # operations that a sine and cosine, and a call, are worth
+WORTH_A_THREAD = 10_000_000  # operations: some milliseconds against a tenth for starting a thread
 
 
 @cache
@@ -33,14 +41,18 @@ def restore(name: str, fields: tuple[str, ...], values: tuple[Array, ...]) -> An
 class KernelFunction:
     """One compiled kernel. Call it with arrays in the order, or by the names, of its inputs.
 
-    An input of shape (4,) takes arrays (..., 4); leading dimensions broadcast against each other. One output
-    comes as an array, several as a named tuple. Kernels that can fail add a field ``status``, an integer array
-    over the leading dimensions with 0 for success. Raises InputError (a ValueError) for shapes that do not fit.
+    An input of shape (4,) takes arrays (..., 4); leading dimensions broadcast against each other, and no input is
+    copied for that or for its layout where samples are evenly apart in memory. One output comes as an array, several
+    as a named tuple. Kernels that can fail add a field ``status``, an integer array over the leading dimensions with 0
+    for success. Raises InputError (a ValueError) for shapes that do not fit.
+
+    Large batches run in vector units and on several cores (see `Library`); every sample has the same bits however many
+    come with it.
 
     ``flat`` is the kernel as a C function of one array with all inputs and one with all outputs.
     """
 
-    def __init__(self, entry: Mapping[str, Any], dtype: type, ffi: Any, batch: Any, flat: Any, params: Any) -> None:
+    def __init__(self, entry: Mapping[str, Any], library: Library, loop: Any, flat: Any, params: Any) -> None:
         self.name: str = entry["name"]
         self.doc: str = entry["doc"]
         self.source: str = entry["source"]
@@ -48,12 +60,19 @@ class KernelFunction:
         self.inputs: list[dict[str, Any]] = entry["inputs"]
         self.outputs: list[dict[str, Any]] = entry["outputs"]
         self.__doc__ = f"{self.doc}\n\n{self.signature}\nSource: {self.source}."
-        self.dtype = np.dtype(dtype)
+        self.dtype = library.dtype
         self.flat = flat
-        self._ffi, self._batch, self._params = ffi, batch, params
-        self._pointer = "double[]" if self.dtype == np.float64 else "float[]"
-        fields = [o["name"] for o in self.outputs] + (["status"] if entry["status"] else [])
-        self._has_status: bool = entry["status"]
+        self._entry, self._library, self._loop, self._vectorised = entry, library, loop, None
+        self._seen = 0
+        self._params: tuple[Any, ...] = () if params is None else (params,)
+        self._names = [port["name"] for port in self.inputs]
+        self._shapes = [tuple(port["shape"]) for port in self.inputs]
+        self._results = [(tuple(port["shape"]), self.dtype) for port in self.outputs]
+        self._work = self.cost["operations"] + SINCOS * self.cost["sincos"] + CALL
+        fields = [o["name"] for o in self.outputs]
+        if entry["status"]:
+            self._results.append(((), np.dtype(np.intc)))
+            fields.append("status")
         self._result = result_type(self.name, tuple(fields))
 
     @property
@@ -70,31 +89,56 @@ class KernelFunction:
 
     def __call__(self, *args: Any, **named: Any) -> Any:
         """Evaluate the kernel at one or many points."""
-        arrays = [self._checked(port, value) for port, value in zip(self.inputs, self._bound(args, named), strict=True)]
-        leads = [a.shape[: a.ndim - len(p["shape"])] for a, p in zip(arrays, self.inputs, strict=True)]
-        try:
-            lead = np.broadcast_shapes(*leads)
-        except ValueError:
-            shapes = ", ".join(f"{p['name']} {a.shape}" for p, a in zip(self.inputs, arrays, strict=True))
-            raise InputError(f"{self.name}: leading dimensions do not broadcast: {shapes}") from None
-        arguments: list[Any] = [prod(lead)] if self._params is None else [prod(lead), self._params]
-        for array, own, port in zip(arrays, leads, self.inputs, strict=True):
-            if own != lead and any(n != 1 for n in own):
-                array = np.ascontiguousarray(np.broadcast_to(array, lead + tuple(port["shape"])))
-                own = lead
-            step = prod(port["shape"]) if own == lead else 0
-            arguments += [self._ffi.from_buffer(self._pointer, array), step]
-        results = [np.empty(lead + tuple(o["shape"]), self.dtype) for o in self.outputs]
-        arguments += [self._ffi.from_buffer(self._pointer, r, require_writable=True) for r in results]
-        if self._has_status:
-            results.append(np.empty(lead, np.intc))
-            arguments.append(self._ffi.from_buffer("int[]", results[-1], require_writable=True))
-        self._batch(*arguments)
+        given = args if len(args) == len(self._names) and not named else self._bound(args, named)
+        arrays = [self._checked(place, value) for place, value in enumerate(given)]
+        leads = [a.shape[: a.ndim - len(shape)] for a, shape in zip(arrays, self._shapes, strict=True)]
+        several = {lead for lead in leads if lead}
+        lead = self._common(leads, arrays) if len(several) > 1 else several.pop() if several else ()
+        samples = [_samples(a, own, lead, shape) for a, own, shape in zip(arrays, leads, self._shapes, strict=True)]
+        results = [np.empty(lead + shape, dtype) for shape, dtype in self._results]
+        pointers = [(self._library.pointer(array), step) for array, step in samples]
+        targets = [
+            (self._library.pointer(r), prod(shape)) for r, (shape, _) in zip(results, self._results, strict=True)
+        ]
+        self._run(prod(lead), pointers, targets)
         return results[0] if len(results) == 1 else self._result(*results)
+
+    def _run(self, n: int, inputs: Pointers, outputs: Pointers) -> None:
+        """Evaluate n samples, in equal parts on several cores where that pays for the threads."""
+        loop = self._fastest(n)
+
+        def part(first: int, last: int) -> None:
+            moved = [x for pointer, step in inputs for x in (pointer + first * step, step)]
+            loop(last - first, *self._params, *moved, *(pointer + first * size for pointer, size in outputs))
+
+        parts = min(self._library.threads, n * self._work // WORTH_A_THREAD)
+        if parts <= 1:
+            part(0, n)
+            return
+        bounds = [n * k // parts for k in range(parts + 1)]
+        with ThreadPoolExecutor(parts) as pool:
+            list(pool.map(part, bounds[:-1], bounds[1:]))
+
+    def _fastest(self, n: int) -> Any:
+        """The loop over samples: compiled for vectors once so many were asked for that compiling is worth its time."""
+        if self._vectorised is None:
+            self._seen += n
+            if self._seen < self._library.vectorise_after:
+                return self._loop
+            self._vectorised = self._library.vectorised(self._entry) or self._loop
+        return self._vectorised
+
+    def _common(self, leads: list[tuple[int, ...]], arrays: list[Array]) -> tuple[int, ...]:
+        """The leading dimensions of the result."""
+        try:
+            return np.broadcast_shapes(*leads)
+        except ValueError:
+            shapes = ", ".join(f"{name} {a.shape}" for name, a in zip(self._names, arrays, strict=True))
+            raise InputError(f"{self.name}: leading dimensions do not broadcast: {shapes}") from None
 
     def _bound(self, args: tuple[Any, ...], named: dict[str, Any]) -> list[Any]:
         """Arguments in the order of the inputs."""
-        names = [port["name"] for port in self.inputs]
+        names = self._names
         given = dict(zip(names, args, strict=False)) | named
         missing = [n for n in names if n not in given]
         unknown = [n for n in given if n not in names]
@@ -102,36 +146,77 @@ class KernelFunction:
             raise InputError(f"{self.name} takes {', '.join(names)}; missing {missing}, unknown {unknown}")
         return [given[n] for n in names]
 
-    def _checked(self, port: dict[str, Any], value: Any) -> Array:
-        shape = tuple(port["shape"])
+    def _checked(self, place: int, value: Any) -> Array:
+        name, shape = self._names[place], self._shapes[place]
         try:
-            array: Array = np.asarray(value, dtype=self.dtype, order="C")
+            array: Array = np.asarray(value, self.dtype)
         except (TypeError, ValueError):
-            raise InputError(f"{self.name}: {port['name']} = {value!r} is not an array of numbers") from None
+            raise InputError(f"{self.name}: {name} = {value!r} is not an array of numbers") from None
         if array.shape[max(array.ndim - len(shape), 0) :] != shape:
             wanted = ", ".join(["...", *map(str, shape)])
-            raise InputError(f"{self.name}: {port['name']} has shape {array.shape}, expected ({wanted})")
+            raise InputError(f"{self.name}: {name} has shape {array.shape}, expected ({wanted})")
         return array
+
+
+def _samples(array: Array, own: tuple[int, ...], lead: tuple[int, ...], shape: tuple[int, ...]) -> tuple[Array, int]:
+    """An input as samples that are evenly apart: an array to point at, and the step from one to the next."""
+    size = prod(shape)
+    packed = array.flags.c_contiguous and array.flags.aligned
+    if packed and (own == lead or not own):
+        return array, size if own else 0
+    if not prod(lead):
+        return np.empty(0, array.dtype), size
+    rows = np.broadcast_to(array, lead + shape).reshape(-1, size)
+    step, misfit = divmod(rows.strides[0], array.itemsize)
+    if misfit or not rows.flags.aligned or (size > 1 and rows.strides[1] != array.itemsize):
+        return np.array(rows, order="C"), size
+    return rows, step
 
 
 class Library(Mapping[str, KernelFunction]):
     """All kernels of a compiled hand, by name as attributes or items.
 
+    Two numbers may be changed at any time. Batches that are large enough are shared by ``threads``, as many as there
+    are cores; 1 keeps to the calling one. A kernel that was evaluated ``vectorise_after`` times gets a loop compiled for
+    this machine's vector units, which takes a second and is kept; 0 compiles at the first call, infinity never. Neither
+    changes a bit of any result.
+
     ``c`` and ``ffi`` are what cffi made of the firmware's header: every function of it, kernels and solvers, called as
     in C, as in ``library.c.awiwi_index_mass_matrix(q, M)`` with arrays from ``library.ffi.new("double[4]")``.
     """
 
-    def __init__(self, manifest: Mapping[str, Any], lib: Any, ffi: Any) -> None:
-        dtype = np.float64 if manifest["c_type"] == "double" else np.float32
+    def __init__(
+        self, manifest: Mapping[str, Any], lib: Any, ffi: Any, vectorised: Callable[[Mapping[str, Any]], Any]
+    ) -> None:
+        self.c_type: str = manifest["c_type"]
+        self.dtype = np.dtype(np.float64 if self.c_type == "double" else np.float32)
         prefix = manifest["prefix"]
         self.manifest = manifest
         self.c, self.ffi = lib, ffi
         self.digest: str = ffi.string(getattr(lib, f"{prefix}_model_digest")).decode()
+        self.threads: int = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+        self.vectorise_after: float = VECTORISE_AFTER
+        self._vectorised = vectorised
         self._kernels = {}
         for place, entry in enumerate(manifest["kernels"]):
             params = lib.default_params() if entry["params"] else None
-            batch = getattr(lib, f"batch_{entry['name']}")
-            self._kernels[entry["name"]] = KernelFunction(entry, dtype, ffi, batch, lib.flat_kernels[place], params)
+            loop = getattr(lib, f"batch_{entry['name']}")
+            self._kernels[entry["name"]] = KernelFunction(entry, self, loop, lib.flat_kernels[place], params)
+
+    def pointer(self, array: Array) -> Any:
+        """Where an array's first element is; the array must outlive the pointer."""
+        kind = "int" if array.dtype == np.intc else self.c_type
+        if array.flags.c_contiguous:
+            return self.ffi.from_buffer(kind + "[]", array)
+        return self.ffi.cast(kind + " *", array.ctypes.data)
+
+    def vectorised(self, entry: Mapping[str, Any]) -> Any:
+        """A kernel's loop for vector units, or None; where it cannot be compiled a warning tells why."""
+        try:
+            return self._vectorised(entry)
+        except (BuildError, OSError) as error:
+            warnings.warn(f"{entry['name']} runs without vector units: {error}", RuntimeWarning, stacklevel=5)
+            return None
 
     def __getattr__(self, name: str) -> KernelFunction:
         try:

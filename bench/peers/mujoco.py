@@ -18,7 +18,9 @@ def model_xml(finger: dict[str, Any]) -> str:
         turn, i = link["turn"], link["inertia"]
         axes = [turn[row][0] for row in range(3)] + [turn[row][1] for row in range(3)]
         entries = [i[0][0], i[1][1], i[2][2], i[0][1], i[0][2], i[1][2]]
-        opened += f'<body pos="{_text(offset)}" xyaxes="{_text(axes)}"><joint name="j{number}" type="hinge" axis="0 0 1"/>'
+        opened += (
+            f'<body pos="{_text(offset)}" xyaxes="{_text(axes)}"><joint name="j{number}" type="hinge" axis="0 0 1"/>'
+        )
         opened += f'<inertial pos="{_text(link["com"])}" mass="{link["mass"]!r}" fullinertia="{_text(entries)}"/>'
         offset = link["offset"]
     closed = "</body>" * len(finger["links"])

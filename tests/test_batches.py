@@ -1,0 +1,339 @@
+"""Many samples at once: in vector units, on several cores, with the bits of each sample alone."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import awiwi_gen
+from awiwi_gen import library as library_module
+from awiwi_gen.build import BATCH_FLAGS, FUSED, UNFUSED, WARNINGS, compile_objects, compiler, load, native
+from awiwi_gen.cache import Cache
+from awiwi_gen.emit.batch import batch_file
+from awiwi_gen.emit.options import Options
+from awiwi_gen.errors import BuildError
+from awiwi_gen.pipeline import Job, cached_tree
+from awiwi_gen.resources import CSRC
+
+ONE_FINGER = Path(__file__).with_name("one_finger.toml")
+ODD = 1003  # no multiple of any vector's length
+RANDOM = np.random.default_rng(7)
+VARIANTS = {
+    "double": Options(),
+    "single": Options(scalar="f32"),
+    "runtime": Options(params="runtime"),
+}
+
+
+def tree(options: Options = VARIANTS["double"], only: str = "jaw_*") -> Path:
+    return cached_tree(Job(awiwi_gen.Hand.load(ONE_FINGER), options, only))
+
+
+def vectorised(directory: Path):
+    """A library that compiles for vectors at the first call, and stays on one core."""
+    made = load(directory)
+    made.vectorise_after, made.threads = 0, 1
+    return made
+
+
+@pytest.fixture(scope="module")
+def jaw():
+    return vectorised(tree())
+
+
+def points(function, *lead: int) -> list[np.ndarray]:
+    """Random inputs inside the ranges of a kernel."""
+    shapes = [(np.reshape(p["low"], p["shape"]), np.reshape(p["high"], p["shape"])) for p in function.inputs]
+    return [RANDOM.uniform(low, high, (*lead, *low.shape)).astype(function.dtype) for low, high in shapes]
+
+
+def fields(result) -> tuple[np.ndarray, ...]:
+    return result if isinstance(result, tuple) else (result,)
+
+
+def same_bits(a, b) -> bool:
+    return all(np.array_equal(x, y, equal_nan=True) for x, y in zip(fields(a), fields(b), strict=True))
+
+
+class Witness:
+    """Stands in for a kernel's loop over samples and remembers its calls."""
+
+    def __init__(self, function):
+        self.loop, self.calls = function._fastest(0), []
+
+    def __call__(self, n, *arguments):
+        self.calls.append((n, threading.get_ident()))
+        self.loop(n, *arguments)
+
+
+# ------------------------------------------------------------------------------------------------- the same bits
+
+
+@pytest.mark.parametrize("options", VARIANTS.values(), ids=VARIANTS)
+def test_every_sample_has_the_bits_it_has_alone(options):
+    alone, together = load(tree(options)), vectorised(tree(options))
+    alone.vectorise_after = np.inf
+    for name, function in together.items():
+        given = points(function, ODD)
+        results = fields(function(*given))
+        for sample in (0, 1, ODD // 2, ODD - 2, ODD - 1):
+            one = alone[name](*(array[sample] for array in given))
+            assert same_bits(one, tuple(r[sample] for r in results)), name
+        assert same_bits(alone[name](*given), results), name
+
+
+def test_batches_of_every_small_size_are_complete(jaw):
+    q, *_ = points(jaw.jaw_mass_matrix, 40)
+    expected = jaw.jaw_mass_matrix(q)
+
+    assert not np.isnan(expected).any()
+    for n in range(41):
+        assert same_bits(jaw.jaw_mass_matrix(q[:n]), expected[:n])
+
+
+def test_samples_that_are_no_number_spoil_no_neighbour(jaw):
+    given = points(jaw.jaw_inverse_dynamics, 64)
+    expected = jaw.jaw_inverse_dynamics(*given)
+    given[0][17] = np.nan
+    given[0][18] = np.inf
+    tau = jaw.jaw_inverse_dynamics(*given)
+
+    assert np.isnan(tau[[17, 18]]).any(axis=1).all()
+    assert same_bits(np.delete(tau, [17, 18], 0), np.delete(expected, [17, 18], 0))
+
+
+def test_each_sample_has_a_status_of_its_own(hand):
+    wrist = vectorised(cached_tree(Job(hand, only="wrist_points")))
+    q71, q73 = RANDOM.uniform(0.5, 0.7, ODD), RANDOM.uniform(-1.0, 1.0, ODD)
+    together = wrist.wrist_points(q71, q73)
+    apart = [wrist.wrist_points(a, b) for a, b in zip(q71, q73, strict=True)]
+
+    assert set(together.status.tolist()) == {0, 1}
+    assert same_bits(together, tuple(np.stack([one[k] for one in apart]) for k in range(len(together))))
+
+
+# ------------------------------------------------------------------------------------------------- vectors
+
+
+def test_the_loop_is_vectorised_by_the_compiler(tmp_path):
+    if native()[0] != ("-march=native",) or "__AVX__" not in native()[1] or "clang" in compiler().version:
+        pytest.skip("reads the assembly of gcc for x86 with AVX")
+    manifest = load(tree()).manifest
+    for entry in manifest["kernels"]:
+        if entry["name"] not in ("jaw_mass_matrix", "jaw_inverse_dynamics", "jaw_forward_dynamics"):
+            continue
+        assembly = compiled(
+            entry, manifest, tree(), tmp_path, *BATCH_FLAGS, *native()[0], *UNFUSED[0], "-S"
+        ).read_text()
+        loops = re.findall(r"\bv(?:add|sub|mul|div)(pd|sd)\b", assembly)
+
+        assert loops.count("pd") >= loops.count("sd") > 0, entry["name"]  # what is over is done one by one, once each
+
+
+@pytest.mark.parametrize(
+    "instruction",
+    ["vfmadd132pd %ymm0", "vfmsubadd132pd %ymm9", "vfnmadd231sd", "fmla v0.2d", "fmsub d0", "vfmacc.vv v1"],
+)
+def test_instructions_that_multiply_and_add_at_once_are_known(instruction):
+    assert FUSED.search(f"\t{instruction}, %ymm1\n")
+    assert not FUSED.search(
+        "\tvmulpd %ymm0, %ymm1, %ymm2\n\tvaddsubpd %ymm0\n\tfmul d0, d1, d2\n\tcall claw_fmadd_batch\n"
+    )
+
+
+def test_a_compiler_that_fuses_them_all_the_same_is_not_used(monkeypatch):
+    build = sys.modules["awiwi_gen.build"]
+    loaded = vectorised(tree())
+    monkeypatch.setattr(build, "native", lambda: (("-march=native",), "__x86_64__"))
+    monkeypatch.setattr(build, "FUSED", re.compile("vaddpd"))
+    monkeypatch.setattr(build, "BATCH_FLAGS", (*BATCH_FLAGS, "-DANOTHER"))
+    with pytest.warns(RuntimeWarning, match="fuses multiplications with additions against its flags"):
+        assert same_bits(
+            loaded.jaw_gravity(np.zeros((9, 2)), np.ones(3)), load(tree()).jaw_gravity(np.zeros((9, 2)), np.ones(3))
+        )
+
+
+@pytest.mark.parametrize("options", VARIANTS.values(), ids=VARIANTS)
+def test_the_c_of_a_batch_is_clean_and_links_with_everything_else(options, tmp_path):
+    directory = tree(options)
+    manifest = load(directory).manifest
+    batches = [
+        compiled(entry, manifest, directory, tmp_path, "-std=c99", "-O1", "-fPIC", *WARNINGS, "-c")
+        for entry in manifest["kernels"]
+        if entry["route"] != "solver"
+    ]
+    others = compile_objects(directory, Cache())
+    compiler().run("-shared", *map(str, batches + others), "-o", str(tmp_path / "all.so"), "-lm")
+
+    assert len(batches) > 10
+
+
+def compiled(entry, manifest, directory: Path, scratch: Path, *flags: str) -> Path:
+    text = (directory / f"{entry['name']}.c").read_text()
+    source, made = scratch / f"{entry['name']}_batch.c", scratch / f"{entry['name']}_batch.o"
+    source.write_text(batch_file(entry, manifest["prefix"], manifest["c_type"], text))
+    compiler().run(*flags, f"-I{directory}", f"-I{CSRC}", str(source), "-o", str(made))
+    return made
+
+
+def test_few_samples_are_not_worth_compiling_for(jaw):
+    fresh, asked = load(tree()), []
+    fresh.vectorised = asked.append
+    q = np.zeros((1000, 2))
+    for _ in range(99):
+        fresh.jaw_mass_matrix(q)
+    assert asked == []
+
+    fresh.jaw_mass_matrix(q)
+    assert [entry["name"] for entry in asked] == ["jaw_mass_matrix"]
+    fresh.jaw_mass_matrix(q)
+    assert len(asked) == 1
+
+
+@pytest.mark.parametrize("name", ["jaw_joint_estimate", "jaw_coupling"])
+def test_what_vectors_do_not_help_keeps_its_plain_loop(jaw, name):
+    assert jaw.vectorised(jaw[name]._entry) is None
+
+
+# ------------------------------------------------------------------------------------------------- memory
+
+
+@pytest.mark.parametrize(
+    "view",
+    [
+        lambda x: x,
+        lambda x: x[::2],
+        lambda x: x[::-1],
+        lambda x: x[3:4],
+        lambda x: np.asfortranarray(x),
+        lambda x: np.repeat(x, 3, axis=1)[:, ::3],
+        lambda x: np.concatenate([x, x], axis=1)[:, : x.shape[1]],
+        lambda x: x.reshape(8, -1, x.shape[1])[:, 1:],
+        lambda x: x.reshape(8, -1, x.shape[1]).transpose(1, 0, 2),
+        lambda x: np.broadcast_to(x[0], x.shape),
+        lambda x: np.frombuffer(b"\0" + x.tobytes(), x.dtype, offset=1).reshape(x.shape),
+    ],
+)
+def test_the_layout_of_an_input_does_not_matter(jaw, view):
+    given = [view(array) for array in points(jaw.jaw_inverse_dynamics, 64)]
+    packed = [np.array(array, order="C") for array in given]
+
+    assert same_bits(jaw.jaw_inverse_dynamics(*given), jaw.jaw_inverse_dynamics(*packed))
+
+
+@pytest.mark.parametrize(
+    ("array", "lead", "step"),
+    [
+        (np.zeros((6, 4)), (6,), 4),
+        (np.zeros((6, 9))[:, 2:6], (6,), 9),
+        (np.zeros((6, 4))[::-1], (6,), -4),
+        (np.zeros(4), (1000,), 0),
+        (np.zeros((1, 1, 4)), (30, 1000), 0),
+        (np.zeros((12, 4)).reshape(3, 4, 4), (3, 4), 4),
+    ],
+)
+def test_inputs_whose_samples_are_evenly_apart_are_not_copied(array, lead, step):
+    rows, found = library_module._samples(array, array.shape[:-1], lead, (4,))
+
+    assert found == step
+    assert np.shares_memory(rows, array)
+
+
+def test_inputs_with_different_leading_dimensions_meet_in_vectors(jaw):
+    q, qd, qdd, g = points(jaw.jaw_inverse_dynamics, 60)
+    q, qd, g = q[:20, None], qd[:3], g[0]
+    tau = jaw.jaw_inverse_dynamics(q, qd, qdd.reshape(20, 3, 2), g)
+
+    assert tau.shape == (20, 3, 2)
+    for index in np.ndindex(20, 3):
+        one = jaw.jaw_inverse_dynamics(q[index[0], 0], qd[index[1]], qdd.reshape(20, 3, 2)[index], g)
+        assert same_bits(tau[index], one)
+
+
+@pytest.mark.parametrize("lead", [(0,), (3, 0), (0, 5)])
+def test_empty_batches_give_empty_results(jaw, lead):
+    for function in jaw.values():
+        for result in fields(function(*points(function, *lead))):
+            assert result.shape[: len(lead)] == lead
+
+
+# ------------------------------------------------------------------------------------------------- threads
+
+
+@pytest.mark.parametrize("threads", [1, 2, 3, 8])
+def test_threads_share_a_large_batch_in_equal_parts(jaw, threads, monkeypatch):
+    monkeypatch.setattr(library_module, "WORTH_A_THREAD", 1)
+    monkeypatch.setattr(jaw, "threads", threads)
+    for name in ("jaw_forward_dynamics", "jaw_joint_estimate"):
+        function = jaw[name]
+        given = points(function, ODD)
+        witness = Witness(function)
+        monkeypatch.setattr(function, "_vectorised", witness)
+        together = function(*given)
+        sizes = [n for n, _ in witness.calls]
+
+        assert (len(sizes), sum(sizes)) == (threads, ODD)
+        assert max(sizes) - min(sizes) <= 1
+        assert (threading.get_ident() in {thread for _, thread in witness.calls}) == (threads == 1)
+        monkeypatch.setattr(jaw, "threads", 1)
+        assert same_bits(together, function(*given))
+        monkeypatch.setattr(jaw, "threads", threads)
+
+
+def test_small_batches_start_no_threads(jaw, monkeypatch):
+    monkeypatch.setattr(jaw, "threads", 8)
+    function = jaw.jaw_mass_matrix
+    witness = Witness(function)
+    monkeypatch.setattr(function, "_vectorised", witness)
+    function(np.zeros((1000, 2)))
+
+    assert witness.calls == [(1000, threading.get_ident())]
+
+
+# ------------------------------------------------------------------------------------------------- what fails
+
+
+@pytest.mark.filterwarnings("default")
+def test_a_directory_that_changed_since_it_was_loaded_is_not_compiled(tmp_path):
+    directory = tmp_path / "generated"
+    shutil.copytree(tree(), directory)
+    loaded = vectorised(directory)
+    q = np.full((5, 2), 0.1)
+    expected = load(tree()).jaw_mass_matrix(q)
+    source = directory / "jaw_mass_matrix.c"
+    source.write_text(source.read_text().replace("M[0] = ", "M[0] = 2.0*"))
+
+    with pytest.warns(RuntimeWarning, match="jaw_mass_matrix runs without vector units: .* has changed since it was"):
+        assert same_bits(loaded.jaw_mass_matrix(q), expected)
+    assert same_bits(loaded.jaw_mass_matrix(q), expected)
+
+
+def test_without_a_compiler_batches_still_run(monkeypatch):
+    loaded = vectorised(tree())
+
+    def fails(_):
+        raise BuildError("no more room")
+
+    monkeypatch.setattr(loaded, "_vectorised", fails)
+    with pytest.warns(RuntimeWarning, match="jaw_gravity runs without vector units: no more room"):
+        assert loaded.jaw_gravity(np.zeros((3, 2)), np.zeros(3)).shape == (3, 2)
+
+
+def test_processes_made_by_forking_have_threads_of_their_own(tmp_path):
+    code = (
+        "import multiprocessing, numpy as np, awiwi_gen.library as l\n"
+        "from awiwi_gen.build import load\n"
+        "from pathlib import Path\n"
+        f"lib = load(Path({str(tree())!r})); lib.threads = 2; l.WORTH_A_THREAD = 1\n"
+        "def run(_): return lib.jaw_mass_matrix(np.zeros((100, 2))).sum()\n"
+        "one = run(0)\n"
+        "with multiprocessing.get_context('fork').Pool(1) as pool: assert pool.map(run, [0]) == [one]\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=60, cwd=tmp_path)
