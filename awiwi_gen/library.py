@@ -20,7 +20,7 @@ Pointers = list[tuple[Any, int]]  # where samples begin, and the step from one t
 
 VECTORISE_AFTER = 100_000  # samples of a kernel
 SINCOS, CALL = 60, 20  # operations that a sine and cosine, and a call, are worth
-WORTH_A_THREAD = 10_000_000  # operations: some milliseconds against a tenth for starting a thread
+WORTH_A_THREAD = 30_000_000  # operations: a millisecond in vector units, against a tenth for starting a thread
 
 
 @cache
