@@ -43,7 +43,7 @@ class Params(StrEnum):
 
 
 class Math(StrEnum):
-    """Whose sine and cosine the C calls."""
+    """Whose sine, arcus tangent and exponential function the C calls."""
 
     own = "own"
     libm = "libm"
@@ -54,7 +54,7 @@ Output = Annotated[Path, typer.Option("--output", "-o", help="Directory of the g
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for programs.")]
 Only = Annotated[str, typer.Option("--only", metavar="GLOB", help="Only kernels whose name matches.")]
 ScalarOption = Annotated[Scalar, typer.Option("--scalar", help="Scalar type of the C.")]
-MathOption = Annotated[Math, typer.Option("--math", help="Own sine and cosine, or the C library's.")]
+MathOption = Annotated[Math, typer.Option("--math", help="Own sine, arcus tangent, ..., or the C library's.")]
 ParamsOption = Annotated[Params, typer.Option("--params", help="Numbers as constants or in a struct.")]
 GENERATED = Path("generated")
 PAGE = Path("build/report/index.html")

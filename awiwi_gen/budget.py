@@ -20,15 +20,15 @@ if TYPE_CHECKING:
 
 BUDGET = "budget.json"
 SLACK = 0.02
-Steps = Sequence[Sequence[Any]]  # pairs: a pass, and the weight of the graph after it
+Steps = Sequence[Sequence[Any]]  # a pass, operations and weight of the graph after it
 
 
 def budget_text(kernels: Iterable[Kernel], records: Mapping[str, Record], options: Any) -> str:
-    """The budget file: for each kernel what its part is like, and its weight after each pass."""
+    """The budget file: for each kernel what its part is like, and its operations and weight after each pass."""
     rows = []
     for kernel in kernels:
         kind = key(kernel.structure, options)[:16]
-        row = {"part": kind, "weight": [list(step) for step in records[kernel.name].costs]}
+        row = {"part": kind, "steps": [list(step) for step in records[kernel.name].costs]}
         rows.append(f" {json.dumps(kernel.name)}: {json.dumps(row)}")
     return "{\n" + ",\n".join(rows) + "\n}\n"
 
@@ -46,8 +46,8 @@ def require_budget(directory: Path, text: str) -> None:
     excesses = [
         f"{name} {sentence}"
         for name, row in json.loads(text).items()
-        if isinstance(old.get(name), dict) and old[name].get("part") == row["part"]
-        for sentence in excess(old[name]["weight"], row["weight"])
+        if isinstance(old.get(name), dict) and old[name].get("part") == row["part"] and "steps" in old[name]
+        for sentence in excess(old[name]["steps"], row["steps"])
     ]
     if excesses:
         mend = f"mend what made them dearer, or accept it with --accept-cost ({directory / BUDGET} is the budget)"
@@ -56,11 +56,11 @@ def require_budget(directory: Path, text: str) -> None:
 
 def excess(old: Steps, new: Steps) -> list[str]:
     """A sentence if the last weight is above the budget, with the pass that does worse; else nothing."""
-    before, after = old[-1][1], new[-1][1]
+    before, after = old[-1][-1], new[-1][-1]
     if after <= before * (1 + SLACK):
         return []
-    removed = dict(_removals(old))
-    losses = {name: removed.get(name, 0) - weight for name, weight in _removals(new)}
+    removed = removals(old, -1)
+    losses = {name: removed.get(name, 0) - weight for name, weight in removals(new, -1).items()}
     worst = max(losses, key=lambda name: losses[name])
     cause = (
         f"pass {worst} removes {losses[worst]} less" if worst != new[0][0] else f"{worst} gives {losses[worst]} more"
@@ -68,7 +68,12 @@ def excess(old: Steps, new: Steps) -> list[str]:
     return [f"costs {after}, its budget is {before} (+{100 * (after / before - 1):.1f} %): {cause} than before"]
 
 
-def _removals(steps: Steps) -> list[tuple[str, int]]:
-    """What each pass takes away; the first step is where the passes start from."""
-    first = [(steps[0][0], -steps[0][1])]
-    return first + [(name, last - weight) for (_, last), (name, weight) in pairwise(steps)]
+def removals(steps: Steps, measure: int) -> dict[str, int]:
+    """What each pass takes away, all its turns together: of operations (1) or of weight (-1).
+
+    The first step is where the passes start from; it takes away less than nothing.
+    """
+    result = {steps[0][0]: -steps[0][measure]}
+    for last, step in pairwise(steps):
+        result[step[0]] = result.get(step[0], 0) + last[measure] - step[measure]
+    return result

@@ -98,6 +98,11 @@ def headers(directory: Path) -> str:
     return "\0".join(re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL) for text in texts)
 
 
+def sources(directory: Path) -> list[Path]:
+    """All C files of a generated directory and of csrc."""
+    return [*sorted(directory.glob("*.c")), *sorted(CSRC.glob("*.c"))]
+
+
 def object_name(source: Path, shared: str) -> str:
     """The digest of everything that decides an object."""
     return key(source.read_text(encoding="utf-8"), shared, FLAGS, compiler().version) + ".o"
@@ -119,7 +124,7 @@ def compile_objects(directory: Path, store: Cache) -> list[Path]:
         return target
 
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        return list(pool.map(compile_one, [*sorted(directory.glob("*.c")), *sorted(CSRC.glob("*.c"))]))
+        return list(pool.map(compile_one, sources(directory)))
 
 
 def declarations(directory: Path) -> str:

@@ -26,6 +26,7 @@ from awiwi_gen.hand import Hand
 
 if TYPE_CHECKING:
     from awiwi_gen.records import Record
+    from awiwi_gen.verify.objects import Seal
     from awiwi_gen.verify.physics import Law
     from awiwi_gen.verify.verdict import Verdict
 
@@ -222,15 +223,17 @@ def _derive_task(task: tuple[str, dict[str, Any], Cache]) -> None:
 
 @dataclass(frozen=True)
 class Proof:
-    """What verification found: a verdict per kernel, and the laws of physics per part."""
+    """What verification found: a verdict per kernel, the laws of physics per part, and doubles in float objects."""
 
     verdicts: list[Verdict]
     laws: list[Law]
+    seal: Seal | None = None
 
     @property
     def passed(self) -> bool:
         """Everything passed."""
-        return all(v.passed for v in self.verdicts) and all(law.passed for law in self.laws)
+        sealed = self.seal is None or self.seal.passed
+        return sealed and all(v.passed for v in self.verdicts) and all(law.passed for law in self.laws)
 
 
 def verify(job: Job, directory: Path) -> Proof:
@@ -260,7 +263,24 @@ def _examine(job: Job, directory: Path) -> Proof:
         examine = partial(judge_record, kernel, record, used, library[kernel.name], job.options)
         verdicts.append(job.store.memo("verdicts", digest, examine))
         job.progress("verify", len(verdicts), len(job.kernels))
-    return Proof(verdicts, _obey_physics(job, records))
+    seal = _seal(job, directory)
+    found = seal.found if seal else {}
+    verdicts = [
+        v.refused(f"its object computes in double: {', '.join(x)}") if (x := found.get(f"{v.name}.c")) else v
+        for v in verdicts
+    ]
+    return Proof(verdicts, _obey_physics(job, records), seal)
+
+
+def _seal(job: Job, directory: Path) -> Seal | None:
+    """Whether the objects of a single-precision build keep to it."""
+    from awiwi_gen.build import compile_objects, sources
+    from awiwi_gen.verify.objects import examine
+
+    if job.options.scalar == "f64":
+        return None
+    names = [path.name for path in sources(directory)]
+    return examine(dict(zip(names, compile_objects(directory, job.store), strict=True)))
 
 
 def _obey_physics(job: Job, records: Mapping[str, Record]) -> list[Law]:

@@ -48,7 +48,8 @@ HOPELESS = 2  # passes seldom halve a cost
 class Record:
     """What is known of a kernel before it is compiled; ``digest`` names what it was made from.
 
-    ``values`` are the numbers of the hand that its graph reads when it runs; ``costs`` is its weight after each pass.
+    ``values`` are the numbers of the hand that its graph reads when it runs; ``costs``, after each pass, its
+    operations and their weight.
     """
 
     digest: str
@@ -60,7 +61,7 @@ class Record:
     passes: float
     reference: Reference
     values: Mapping[str, Fraction] = field(default_factory=dict)
-    costs: tuple[tuple[str, int], ...] = ()
+    costs: tuple[tuple[str, int, int], ...] = ()
 
 
 def derivation_key(kernel: Kernel, route: str) -> str:
@@ -181,8 +182,8 @@ def _record(
     used = {f"{kernel.path}.{path}": str(values[path]) for graph in graphs.values() for path in graph.params}
     text = kernel_file(function, key(json.dumps(used, sort_keys=True)))
     left = {path: values[path] for path in final.params}
-    steps = [("derivation", candidate.bound[route]), *candidate.stages]
-    costs = tuple((step, round(cost(graph).weight)) for step, graph in steps)
+    steps = [(step, cost(graph)) for step, graph in [("derivation", candidate.bound[route]), *candidate.stages]]
+    costs = tuple((step, spent.operations, round(spent.weight)) for step, spent in steps)
     return Record(
         candidate.digest, final, function, text, route, agreement, passes, reference(definition), left, costs
     )  # fmt: skip
@@ -211,7 +212,7 @@ def make_solver_record(
     function, text = solver_function(kernel, solver, prefix, options, functions, runtime)
     problem = _problem(kernel, used)
     exact = problem.solve(problem.sample(draw(kernel.inputs, kernel.path, options.dtype)))
-    costs = (("solver", round(function.cost.weight)),)
+    costs = (("solver", function.cost.operations, round(function.cost.weight)),)
     return Record(digest, None, function, text, "solver", 0.0, 0.0, exact, costs=costs)
 
 

@@ -12,6 +12,7 @@ from awiwi_gen.emit.tree import State
 
 if TYPE_CHECKING:
     from awiwi_gen.pipeline import Proof
+    from awiwi_gen.verify.objects import Seal
     from awiwi_gen.verify.verdict import Verdict
 
 COLUMNS = ("kernel", "operations", "sincos", "worst ulp", "scaled error", "witnesses agree", "verdict")
@@ -62,12 +63,24 @@ def print_proof(proof: Proof, manifest: Mapping[str, Any]) -> None:
     for law in proof.laws:
         if not law.passed:
             print(f"{law.part} FAILS: {law.statement} (by {law.worst:.1e})")
+    if proof.seal is not None:
+        print("\n".join(seal_lines(proof.seal)))
     v = proof.verdicts
     failed = [x.name for x in v if not x.passed]
     print(
         f"{len(v) - len(failed)} of {len(v)} kernels proved at {v[0].samples} samples each (seed {v[0].seed})"
         + (f"; FAILED: {', '.join(failed)}" if failed else "")
     )
+
+
+def seal_lines(seal: Seal) -> list[str]:
+    """What is said of the objects of a single-precision build."""
+    if seal.skipped:
+        return [f"single precision: objects not examined, {seal.skipped}"]
+    faults = [f"{name} FAILS: it computes in double: {', '.join(found)}" for name, found in seal.found.items()]
+    return faults or [
+        f"single precision: {seal.examined} objects compute nothing in double and call no double function"
+    ]
 
 
 def print_table(columns: Sequence[str], rows: Sequence[Sequence[str]], title: str = "") -> None:

@@ -23,6 +23,8 @@ VARIANTS: dict[str, tuple[str, ...]] = {
     "avx2": ("-O3", "-march=x86-64-v3", "-ffp-contract=off", *LENIENT),
     "avx2+fma": ("-O3", "-march=x86-64-v3", "-ffp-contract=fast", *LENIENT),
 }
+# What is in a shared object is inlined as it would be in a program.
+SHARED = ("-fPIC", "-fno-semantic-interposition")
 STANDARD = {"c": "-std=c99", "c++": "-std=c++17"}
 COMPILER = {"c": os.environ.get("CC", "cc").split(), "c++": os.environ.get("CXX", "c++").split()}
 
@@ -59,7 +61,7 @@ def build(contender: dict[str, Any], variant: str) -> Built:
     place = directory / "objects" / variant
     place.mkdir(parents=True, exist_ok=True)
     target, sizes = place / f"{contender['name']}.so", {}
-    flags = [*VARIANTS[variant], STANDARD[contender["language"]], "-fPIC", "-w", *contender["flags"]]
+    flags = [*VARIANTS[variant], STANDARD[contender["language"]], *SHARED, "-w", *contender["flags"]]
     compiler = COMPILER[contender["language"]]
     objects: dict[Path, None] = {}
     try:
@@ -75,13 +77,18 @@ def build(contender: dict[str, Any], variant: str) -> Built:
                     _run(*command, "-o", str(object_))
                 objects[object_] = None
             sizes[name] = sum(code_bytes(o, [call[0] for call in kernel["calls"]]) for o in made)
+        for source in contender.get("support", ()):
+            object_ = place / f"{source.name}.o"
+            _run(*compiler, *flags, "-c", str(source), "-o", str(object_))
+            objects[object_] = None
         loops, object_ = place / "loops.c", place / "loops.o"
         loops.write_text(loop_source(contender), encoding="utf-8")
         _run(*COMPILER["c"], *VARIANTS[variant], "-std=c99", "-fPIC", "-c", str(loops), "-o", str(object_))
         linked = [str(o) for o in (*objects, object_)]
         _run(*compiler, "-shared", "-Wl,-Bsymbolic,-z,now", *linked, *contender["libraries"], "-lm", "-o", str(target))
     except subprocess.CalledProcessError as error:
-        return Built(contender["name"], variant, target, {}, (error.stderr.strip().splitlines() or ["failed"])[0])
+        said = error.stderr.strip().splitlines() or ["failed"]
+        return Built(contender["name"], variant, target, {}, next((line for line in said if "error" in line), said[0]))
     return Built(contender["name"], variant, target, sizes)
 
 

@@ -16,8 +16,8 @@ from bench.quantities import QUANTITIES
 
 # Kernels that give a quantity, the first line whose kernels all exist: one combined kernel, or several called in turn.
 KERNELS = {
-    "pose_jacobian": (("pose_jacobian",), ("fingertip_pose", "jacobian")),
-    "tendons": (("torque_and_stiffness",), ("joint_torque", "joint_stiffness")),
+    "pose_jacobian": (("pose_and_jacobian",), ("fingertip_pose", "jacobian")),
+    "tendons": (("joint_torque_and_stiffness",), ("joint_torque", "joint_stiffness")),
 }
 
 
@@ -29,7 +29,7 @@ def contenders(hand: Hand, directory: Path) -> list[dict[str, Any]]:
 def _contender(hand: Hand, directory: Path, trig: Any) -> dict[str, Any]:
     generated = directory / "generated"
     directory.mkdir(parents=True, exist_ok=True)
-    generate(Job(hand, Options(trig=trig), only=f"{FINGER}_*"), generated)
+    generate(Job(hand, Options(math=trig), only=f"{FINGER}_*"), generated)
     manifest = json.loads((generated / "manifest.json").read_text(encoding="utf-8"))
     entries = {entry["name"]: entry for entry in manifest["kernels"]}
     kernels = {}
@@ -50,6 +50,7 @@ def _contender(hand: Hand, directory: Path, trig: Any) -> dict[str, Any]:
         "flags": [f"-I{generated.resolve()}", f"-I{CSRC}"],
         "libraries": [],
         "kernels": kernels,
+        "support": [path for path in sorted(generated.glob("*.c")) if path.stem not in entries],
         "note": "sine and cosine of the C library" if trig == "libm" else "own sine and cosine, inlined",
     }
 

@@ -75,6 +75,8 @@ int awiwi_least_squares(const awiwi_problem *p, const awiwi_real *measured, cons
     if (!begin(p, measured, start, q))
         return AWIWI_NOT_FINITE;
     awiwi_real best = cost(p, measured, q, gradient, normal, &blur);
+    if (!(best <= AWIWI_REAL_MAX))
+        return AWIWI_NOT_FINITE;
     for (int i = 1; i < iterations; i++) {
         int held[AWIWI_MOST_UNKNOWNS];
         awiwi_real longest = 0;
@@ -85,6 +87,8 @@ int awiwi_least_squares(const awiwi_problem *p, const awiwi_real *measured, cons
             trial[j] = awiwi_clamp(q[j] + step[j], p->low[j], p->high[j]);
             longest = awiwi_size(trial[j] - q[j]) > longest ? awiwi_size(trial[j] - q[j]) : longest;
         }
+        if (!awiwi_all_finite(trial, p->n))
+            return AWIWI_NOT_FINITE;
         const awiwi_real found = cost(p, measured, trial, trial_gradient, trial_normal, &blur);
         /* near the bottom rounding decides which cost is lower, and the step is still right */
         if (found <= best + blur || longest <= tolerance) {
@@ -97,7 +101,7 @@ int awiwi_least_squares(const awiwi_problem *p, const awiwi_real *measured, cons
                     normal[j][k] = trial_normal[j][k];
             }
             if (longest <= tolerance)
-                return awiwi_all_finite(q, p->n) ? AWIWI_OK : AWIWI_NOT_FINITE;
+                return AWIWI_OK;
         } else {
             damping = damping > 0 ? damping * 10 : (awiwi_real)0.001;
         }

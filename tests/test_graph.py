@@ -10,18 +10,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from awiwi_gen.ir.builder import Builder
+from awiwi_gen.ir.cost import cost
 from awiwi_gen.ir.graph import SIGNLESS, Graph, Node, Output, canonical, node_of, operands
-from awiwi_gen.ir.passes import PIPELINES, stages
+from awiwi_gen.ir.passes import AGAIN, BEGINNINGS, END, optimise, stages
 from awiwi_gen.ir.passes.bind import bind
 from awiwi_gen.ir.passes.factor import factor
 from awiwi_gen.ir.passes.finish import orient, quotients, schedule
 from awiwi_gen.ir.passes.flatten import flatten
+from awiwi_gen.ir.passes.gather import gather
 from awiwi_gen.ir.passes.scale import scale
 from awiwi_gen.ir.passes.share import share_products, share_sums
 from awiwi_gen.ir.passes.turn import turn
 from awiwi_gen.verify.reference import ball_values, disagreement
 
-PASSES = (flatten, turn, share_products, share_sums, factor, scale, quotients, orient, schedule)
+PASSES = (flatten, turn, share_products, share_sums, factor, scale, quotients, orient, schedule, gather)
 STEPS = st.lists(
     st.tuples(
         st.sampled_from(["add", "sub", "mul", "div", "neg", "sin", "cos", "sqrt"]),
@@ -119,12 +121,22 @@ def test_a_pass_keeps_the_value(apply, steps):
 
 
 @settings(deadline=None, max_examples=60)
-@pytest.mark.parametrize("passes", PIPELINES)
+@pytest.mark.parametrize("passes", [*(begin + AGAIN + END for begin in BEGINNINGS), AGAIN + BEGINNINGS[0]])
 @given(steps=STEPS)
-def test_a_pipeline_keeps_the_value(passes, steps):
+def test_passes_keep_the_value_one_after_the_other(passes, steps):
     graph = grow(steps)
 
     assert disagreement(*(ball_values(g, points(), VALUES) for g in (graph, stages(graph, passes)[-1][1]))) < 1e-50
+
+
+@settings(deadline=None, max_examples=30)
+@given(steps=STEPS)
+def test_optimising_keeps_the_value_and_never_costs_more(steps):
+    graph = grow(steps)
+    best = optimise(graph)[-1][1]
+
+    assert cost(best).weight <= cost(stages(graph, END)[-1][1]).weight
+    assert disagreement(*(ball_values(g, points(), VALUES) for g in (graph, best))) < 1e-50
 
 
 @settings(deadline=None)

@@ -11,8 +11,9 @@ from tendon_solvers import INFEASIBLE, NOT_FINITE, OK, OUT_OF_DOMAIN
 from awiwi_gen.kernels.fingers_control import antagonists, groups
 
 FINGERS = ["thumb", "index", "middle", "ring", "fifth"]
+SHAPES = ["thumb", "index", "ring"]  # of routing: the others are like the index
 PAIRED = ["index", "ring", "fifth"]
-GRID = 33
+GRID = 27
 
 
 # -- what the forces must do --------------------------------------------------------------------------------
@@ -43,13 +44,13 @@ def test_forces_that_give_what_is_asked_for_are_found_again(lib, finger):
     assert demands.error(found.f).max() < 1e-20
 
 
-@pytest.mark.parametrize("finger", FINGERS)
+@pytest.mark.parametrize("finger", SHAPES)
 def test_no_sequential_quadratic_programme_finds_a_nearer_stiffness(lib, finger):
-    demands = Demands(lib, finger, 25, seed=1)
+    demands = Demands(lib, finger, 20, seed=1)
     demands.unreachable()
     ours = demands.error(demands.solved().f)
 
-    for s in range(25):
+    for s in range(20):
         cost, torque = demands.problem(s)
         for start in (demands.f[s], np.full(demands.f.shape[1], (LOW + HIGH) / 2)):
             theirs = scipy.optimize.minimize(
@@ -62,11 +63,11 @@ def test_no_sequential_quadratic_programme_finds_a_nearer_stiffness(lib, finger)
 
 @pytest.mark.parametrize("finger", ["thumb", "index"])
 def test_no_trust_region_finds_a_nearer_stiffness(lib, finger):
-    demands = Demands(lib, finger, 4, seed=2)
+    demands = Demands(lib, finger, 3, seed=2)
     demands.unreachable()
     ours = demands.error(demands.solved().f)
 
-    for s in range(4):
+    for s in range(3):
         cost, torque = demands.problem(s)
         theirs = scipy.optimize.minimize(
             cost, demands.f[s], jac=True, method="trust-constr",
@@ -105,7 +106,7 @@ def test_pairs_reach_the_global_optimum_of_the_sums_of_their_stiffnesses(lib, ha
 
 
 def test_no_point_of_a_grid_over_all_pretensions_of_the_thumb_is_nearer(lib):
-    demands = Demands(lib, "thumb", 400, seed=4)
+    demands = Demands(lib, "thumb", 200, seed=4)
     demands.unreachable()
     best = demands.solved().f
 
@@ -211,6 +212,7 @@ def test_what_is_not_a_number_gives_a_status_and_forces_within_limits(lib, finge
         assert found.status == NOT_FINITE
         expected = (LOW + HIGH) / 2 if port not in ("f_min", "f_max") else 0.0
         assert np.all(found.f == expected)
+    assert demands.solved().status.tolist() == [OK]  # and it recovers
 
 
 @pytest.mark.parametrize("finger", FINGERS)

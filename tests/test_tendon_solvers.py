@@ -2,13 +2,28 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 import tendon_solvers as solvers
-from tendon_solvers import NOT_CONVERGED, OK, OUT_OF_DOMAIN, demand, fingers, quadratic
+from tendon_solvers import (
+    INFEASIBLE,
+    NOT_CONVERGED,
+    NOT_FINITE,
+    OK,
+    OUT_OF_DOMAIN,
+    demand,
+    fingers,
+    quadratic,
+)
 
 import awiwi_gen
-from awiwi_gen.kernels.fingers_control import antagonists, distribution, groups
+from awiwi_gen.kernels.fingers_control import INVERSIONS, SEARCHES, antagonists, distribution, groups
+from awiwi_gen.resources import CSRC
+
+DOCS = Path(__file__).resolve().parent.parent / "docs"
 
 
 @pytest.fixture(scope="module")
@@ -27,6 +42,17 @@ def test_the_search_finds_what_the_formulas_of_pairs_give(library):
         assert np.abs(by_formula[1] - by_search[1]).max() < 1e-8
 
 
+def test_the_bounds_told_are_those_of_the_header():
+    header = (CSRC / "awiwi_distribution.h").read_text()
+    most = {name: int(number) for name, number in re.findall(r"AWIWI_MOST_(\w+) = (\d+)", header)}
+
+    assert most["INVERSIONS"] + 2 == INVERSIONS
+    assert 3 * (1 + most["STIFFNESS_STEPS"]) == SEARCHES
+    assert f"| {INVERSIONS} evaluations" in (DOCS / "solvers.md").read_text()
+    assert f"3 x {most['TORQUE_STEPS']} steps" in (DOCS / "solvers.md").read_text()
+    assert f"3 x {SEARCHES // 3} evaluations" in (DOCS / "solvers.md").read_text()
+
+
 def test_the_work_is_bounded_as_the_header_says_and_small(library):
     random = np.random.default_rng(13)
     counts = {"pairs": [0], "search": [0]}
@@ -42,10 +68,11 @@ def test_the_work_is_bounded_as_the_header_says_and_small(library):
     assert max(counts["search"]) <= 100
 
 
-@pytest.mark.parametrize("kind", ["steps", "flat", "falling", "saw"])
+@pytest.mark.parametrize("kind", ["slack", "steps", "flat", "falling", "saw"])
 def test_springs_that_no_spring_is_like_end_within_the_bounds(library, kind):
     random = np.random.default_rng(14)
     curves = {
+        "slack": lambda f: (0.0, 0.0, 0.0),
         "steps": lambda f: (5000 + 3000 * np.floor(f / 10), 0.0, 0.0),
         "flat": lambda f: (5000.0, 0.0, 0.0),
         "falling": lambda f: (20000 - 150 * f, -150.0, 0.0),
@@ -61,6 +88,16 @@ def test_springs_that_no_spring_is_like_end_within_the_bounds(library, kind):
             assert finger.low <= f.min() <= f.max() <= finger.high
             assert status in (OK, NOT_CONVERGED)
             assert np.abs(finger.P.T @ f + tau).max() < 1e-13
+
+
+def test_tendons_that_pull_at_nothing_give_no_torque_and_forces_within_limits(library):
+    for finger in fingers(library, np.random.default_rng(20)):
+        finger.P *= 0
+        for tau, expected in ((np.zeros(2), OK), (np.array([0.1, 0.0]), INFEASIBLE)):
+            status, f = finger.distribute(tau, np.eye(2))
+
+            assert status in (expected, NOT_FINITE)
+            assert finger.low <= f.min() <= f.max() <= finger.high
 
 
 def test_a_curve_that_ends_too_early_is_a_status(library):

@@ -54,8 +54,8 @@ def linearised_gains(_: object, plant: Matrix, gains: Matrix, weights: Matrix) -
 def matched_rates(wanted: Matrix, plant: Matrix, impedance: Matrix, weights: Matrix) -> tuple[Matrix, list[Expr]]:
     """K_3 and K_4 for which the law has the wanted gains of tau and tau', with K_p and K_d given.
 
-    They are the roots of r^2 - sigma r + (pi - C_t / C_s). Positive where they exist: the square of half their
-    difference, their sum, their product.
+    They are the roots of r^2 - sigma r + (pi - C_t / C_s). Positive where they exist: all that is given but the gains,
+    the square of half their difference, their sum, their product.
     """
     m, b, k = plant
     stiffness, damping = impedance
@@ -66,14 +66,14 @@ def matched_rates(wanted: Matrix, plant: Matrix, impedance: Matrix, weights: Mat
     )
     apart = names.name(total**2 / 4 - product)
     larger = names.name(total / 2 + sqrt(apart))
-    return Matrix([larger, product / larger]), [apart, total, product]
+    return Matrix([larger, product / larger]), [*plant, *impedance, *weights, apart, total, product]
 
 
 def matched_weights(wanted: Matrix, plant: Matrix, impedance: Matrix) -> tuple[Matrix, Matrix, list[Expr]]:
     """K_3, K_4 and the weights C_t, C_s for which the law has all four wanted gains, with K_p and K_d given.
 
-    Coefficient by coefficient each is found from those before it, without a root; positive where they exist: 1 / C_t,
-    K_3, K_4, C_t / C_s.
+    Coefficient by coefficient each is found from those before it, without a root; positive where they exist: all that
+    is given but the gains, 1 / C_t, K_3, K_4, C_t / C_s.
     """
     m, b, k = plant
     stiffness, damping = impedance
@@ -85,4 +85,4 @@ def matched_weights(wanted: Matrix, plant: Matrix, impedance: Matrix) -> tuple[M
     fast = names.name(total - slow)
     ratio = names.name(product - fast * slow)
     weight = names.name(1 / inverse)
-    return Matrix([fast, slow]), Matrix([weight, weight / ratio]), [inverse, fast, slow, ratio]
+    return Matrix([fast, slow]), Matrix([weight, weight / ratio]), [*plant, *impedance, inverse, fast, slow, ratio]

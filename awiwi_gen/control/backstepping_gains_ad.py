@@ -28,7 +28,8 @@ def matched_rates(_: object, wanted: SX, plant: SX, impedance: SX, weights: SX) 
     mean = (c4 - fast_link[1]) / 2
     product = c3 - fast_link[0] - weights[0] / weights[1] - 2 * mean * fast_link[1]
     apart = (mean + ca.sqrt(product)) * (mean - ca.sqrt(product))
-    return ca.vertcat(mean + ca.sqrt(apart), mean - ca.sqrt(apart)), [apart, 2 * mean, product]
+    given = ca.vertsplit(ca.vertcat(plant, impedance, weights))
+    return ca.vertcat(mean + ca.sqrt(apart), mean - ca.sqrt(apart)), [*given, apart, 2 * mean, product]
 
 
 def matched_weights(_: object, wanted: SX, plant: SX, impedance: SX) -> tuple[SX, SX, list[SX]]:
@@ -45,4 +46,5 @@ def matched_weights(_: object, wanted: SX, plant: SX, impedance: SX) -> tuple[SX
     slow = dividend[1] / inverse + impedance[1] / m
     fast = quotient[1] - slow
     ratio = quotient[0] - inverse / m - fast * slow
-    return ca.vertcat(fast, slow), ca.vertcat(1, 1 / ratio) / inverse, [inverse, fast, slow, ratio]
+    given = ca.vertsplit(ca.vertcat(plant, impedance))
+    return ca.vertcat(fast, slow), ca.vertcat(1, 1 / ratio) / inverse, [*given, inverse, fast, slow, ratio]

@@ -14,6 +14,7 @@ from math import prod
 
 from awiwi_gen.emit.options import Options
 from awiwi_gen.ir.cost import Cost, cost
+from awiwi_gen.ir.elementary import OWN
 from awiwi_gen.ir.graph import LEAVES, Graph, Node, Ref, node_of, operands
 from awiwi_gen.ir.passes.gather import angle_groups
 from awiwi_gen.kernel import GUARDS
@@ -59,7 +60,8 @@ def c_function(
     prototype, definition = signature(f"{result} {prefix}_{name}", inputs, outputs, options, graph.params and prefix)
     read = {node[1] for node in graph.nodes if node[0] == "input"}
     functions = {node[0] for node in graph.nodes} - LEAVES - {"add", "mul", "div", "inv"}
-    turns = functions & {"sin", "cos"} if options.math == "own" else set()
+    own = functions & OWN.keys() if options.math == "own" else set()
+    headers = {'"trig.h"' if function in ("sin", "cos") else '"elementary.h"' for function in own}
     unused = tuple(f"(void){port};" for port in inputs if port not in read)
     return CFunction(
         name=name,
@@ -68,7 +70,7 @@ def c_function(
         comment=comment,
         statements=unused + tuple(printer.statements()),
         cost=cost(graph),
-        includes=("<math.h>",) * bool(functions - turns) + ('"trig.h"',) * bool(turns),
+        includes=("<math.h>",) * bool(functions - own) + tuple(sorted(headers)),
     )
 
 
@@ -166,7 +168,9 @@ class Printer:
             return f"{self.operand(refs[0], PRODUCT)}/{self.operand(refs[1], ATOM)}", PRODUCT
         if operation == "inv":
             return f"{self.options.literal(Fraction(1))}/{self.operand(refs[0], ATOM)}", PRODUCT
-        return f"{self.options.function(operation)}({', '.join(self.operand(r, SUM) for r in refs)})", ATOM
+        is_own = self.options.math == "own" and operation in OWN
+        name = f"{self.prefix}_{operation}" if is_own else self.options.function(operation)
+        return f"{name}({', '.join(self.operand(r, SUM) for r in refs)})", ATOM
 
     def parameter(self, path: str) -> str:
         """How a number of the hand is read."""

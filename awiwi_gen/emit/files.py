@@ -12,6 +12,7 @@ import numpy as np
 
 from awiwi_gen.emit.c import CFunction, identifier
 from awiwi_gen.emit.options import Options
+from awiwi_gen.ir.elementary import numbers
 from awiwi_gen.ir.trig import constants
 from awiwi_gen.kernel import Kernel, Port
 from awiwi_gen.resources import TEMPLATES
@@ -107,7 +108,7 @@ def shared_files(
         f".{identifier(path)} = {options.literal(quantity.value)}, /* {quantity.text} */"
         for path, quantity in quantities.items()
     ]
-    return (trig_files(prefix, options) if options.math == "own" else {}) | {
+    return (own_files(prefix, options) if options.math == "own" else {}) | {
         "real.h": render(
             "real.h.j2",
             banner=banner(),
@@ -129,35 +130,54 @@ def shared_files(
     }
 
 
-def trig_files(prefix: str, options: Options) -> dict[str, str]:
-    """Sine and cosine in the scalar type of this build."""
-    trig = constants(options.dtype)
+def own_files(prefix: str, options: Options) -> dict[str, str]:
+    """The functions of our own in the scalar type of this build."""
+    bits = 64 if options.scalar == "f64" else 32
+    common = {"banner": banner(), "prefix": prefix, "c_type": options.c_type, "bits": f"uint{bits}_t"}
+    trig, others = constants(options.dtype), numbers(options.dtype)
 
-    def four(value: float) -> str:
-        return f"FOUR({options.literal(Fraction(value))})"
+    def literal(value: float) -> str:
+        return options.literal(Fraction(value))
 
     def member(name: str, value: Any) -> tuple[str, str, str]:
         if isinstance(value, tuple):
-            return name, f"[{len(value)}]", f"{{{', '.join(map(four, value))}}}"
-        return name, "", four(value)
+            return name, f"[{len(value)}]", f"{{{', '.join(f'FOUR({literal(v)})' for v in value)}}}"
+        return name, "", f"FOUR({literal(value)})"
 
-    def polynomial(name: str, first: int = 0) -> str:
-        left = len(getattr(trig, name)) - first
-        pair = f"k->{name}[{first}][i]" + (f" + z * k->{name}[{first + 1}][i]" if left > 1 else "")
-        return f"({pair}) + zz * ({polynomial(name, first + 2)})" if left > 2 else pair
+    def column(name: str) -> str:
+        return _polynomial([f"k->{name}[{place}][i]" for place in range(len(getattr(trig, name)))])
 
-    bits = 64 if options.scalar == "f64" else 32
-    header = render(
-        "trig.h.j2",
-        banner=banner(),
-        guard=f"{prefix.upper()}_TRIG_H",
-        prefix=prefix,
-        c_type=options.c_type,
-        bits=f"uint{bits}_t",
-        top=bits - 1,
-        numbers=[member(name, value) for name, value in vars(trig).items()],
-        limit=f"{trig.limit:.0f}",
-        sine=polynomial("sine"),
-        cosine=polynomial("cosine"),
-    )
-    return {"trig.h": header, "trig.c": render("trig.c.j2", banner=banner(), prefix=prefix)}
+    texts: dict[str, object] = {name: literal(v) for name, v in vars(others).items() if isinstance(v, float)}
+    texts |= {name: [*map(literal, getattr(others, name))] for name in ("quarter_pi", "log_two")}
+    texts |= {"zero": literal(0.0), "one": literal(1.0), "two": literal(2.0)}
+    texts |= {"arctan": _polynomial([*map(literal, others.arctan)])}
+    texts |= {"exp": _polynomial([*map(literal, others.exp)], "r", "z")}
+    return {
+        "trig.h": render(
+            "trig.h.j2",
+            guard=f"{prefix.upper()}_TRIG_H",
+            top=bits - 1,
+            numbers=[member(name, value) for name, value in vars(trig).items()],
+            limit=f"{trig.limit:.0f}",
+            sine=column("sine"),
+            cosine=column("cosine"),
+            **common,
+        ),
+        "trig.c": render("trig.c.j2", **common),
+        "elementary.h": render(
+            "elementary.h.j2",
+            guard=f"{prefix.upper()}_ELEMENTARY_H",
+            k=texts,
+            limit=f"{others.limit:.0f}",
+            half_bits=others.half_bits,
+            digits=others.digits,
+            **common,
+        ),
+    }
+
+
+def _polynomial(coefficients: list[str], z: str = "z", zz: str = "zz") -> str:
+    """The text of ``ir.trig.polynomial``."""
+    first, *others = coefficients
+    pair = f"{first} + {z} * {others[0]}" if others else first
+    return f"({pair}) + {zz} * ({_polynomial(others[1:], z, zz)})" if len(others) > 1 else pair

@@ -17,7 +17,7 @@ import numpy as np
 from flint import arb, ctx, fmpq
 
 from awiwi_gen.errors import DimensionError
-from awiwi_gen.ir.trig import ULPS, sincos
+from awiwi_gen.ir.elementary import OWN, ULPS
 from awiwi_gen.units import Unit, one
 
 PRECISION_BITS = 256  # working precision of balls: the checks ask for 200
@@ -28,11 +28,11 @@ Array = np.ndarray[Any, Any]
 class Floats:
     """IEEE arithmetic in double or single precision on NumPy arrays, bit for bit what C computes.
 
-    Sine and cosine are our own or the C library's; other functions are the C library's, for NumPy has others.
+    Functions are our own, where we have one and it is asked for, or the C library's, for NumPy has others.
     """
 
-    def __init__(self, dtype: type = np.float64, own_trig: bool = False) -> None:
-        self.dtype, self.own_trig = dtype, own_trig
+    def __init__(self, dtype: type = np.float64, own: bool = False) -> None:
+        self.dtype, self.own = dtype, OWN if own else {}
 
     def const(self, value: Fraction) -> Any:
         return self.dtype(value.numerator / value.denominator)  # the division of integers rounds once
@@ -46,8 +46,8 @@ class Floats:
     def call(self, operation: str, *args: Any) -> Any:
         if operation == "sqrt":
             return np.sqrt(args[0])
-        if self.own_trig and operation in ("sin", "cos"):
-            return sincos(args[0], self.dtype)[operation == "cos"]
+        if operation in self.own:
+            return self.own[operation](*args, self.dtype)
         return np.asarray(libm(operation, self.dtype)(*args), self.dtype)[()]  # a function of numbers alone gives one
 
 
@@ -119,9 +119,9 @@ class Bounded:
     whose error exceeds it computes something else than its graph.
     """
 
-    def __init__(self, dtype: type = np.float64, own_trig: bool = False) -> None:
+    def __init__(self, dtype: type = np.float64, own: bool = False) -> None:
         self.u = UNIT_ROUNDOFF[dtype]
-        self.granted = EXACT | dict.fromkeys(("sin", "cos"), 2 * ULPS) if own_trig else EXACT
+        self.granted = EXACT | {name: 2 * ulps for name, ulps in ULPS.items()} if own else EXACT
         self.tiny = float(np.finfo(dtype).smallest_subnormal)
 
     def _rounded(self, value: Any, error: Any) -> tuple[Any, Any]:

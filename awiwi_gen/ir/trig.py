@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-ULPS = 0.6  # proven in double precision, checked for every angle in single
+ULPS = 0.62  # proven in double precision, where samples reach 0.595; in single every angle was tried, up to 0.587
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,17 @@ from typing import Any
 from awiwi_gen.control import backstepping_gains as gain
 from awiwi_gen.control import backstepping_gains_ad as gain_ad
 from awiwi_gen.kernel import Kernel, Port, Solver
-from awiwi_gen.kernels.control_backstepping import DAMPING, INERTIA, PORTS, RATES, STIFFNESS, WEIGHTS, box
+from awiwi_gen.kernels.control_backstepping import (
+    DAMPING,
+    INERTIA,
+    PLANT,
+    PORTS,
+    RATES,
+    STIFFNESS,
+    WEIGHTS,
+    box,
+    positive,
+)
 from awiwi_gen.kernels.declare import Family, Parameterless
 from awiwi_gen.models.derivatives import derivatives_of
 from awiwi_gen.units import Unit, one, s
@@ -95,7 +105,10 @@ def backstepping_state_gains_derivatives(_: Any, plant: Any, gains: Any, weights
     lambda _: {"rates": Port((2,), RATES)},
     "eq. 16.3, 16.4, solved",
     witness=gain_ad.matched_rates,
-    guards=("K_3 and K_4 are real and differ", "their sum is positive", "their product is positive"),
+    guards=(
+        *positive(*PLANT, "K_p", "K_d", "C_t", "C_s"),
+        *("K_3 and K_4 are real and differ", "their sum is positive", "their product is positive"),
+    ),
 )
 def optimal_backstepping_rates(_: Any, K_opt: Any, plant: Any, impedance: Any, weights: Any) -> Any:
     """K_3 and K_4 that give tau and tau' the feedback gains K_opt, with (K_p, K_d) and the weights given."""
@@ -106,7 +119,7 @@ def optimal_backstepping_rates(_: Any, K_opt: Any, plant: Any, impedance: Any, w
     lambda _: {"rates": Port((2,), RATES), "weights": Port((2,), WEIGHTS)},
     "eq. 15.89, 15.97, 16.3, 16.4, solved",
     witness=gain_ad.matched_weights,
-    guards=("C_t is positive", "K_3 is positive", "K_4 is positive", "C_s is positive"),
+    guards=positive(*PLANT, "K_p", "K_d", "C_t", "K_3", "K_4", "C_s"),
 )
 def optimal_backstepping_weights(_: Any, K_opt: Any, plant: Any, impedance: Any) -> Any:
     """(K_3, K_4) and the weights (C_t, C_s) that give all four feedback gains K_opt exactly, with (K_p, K_d) given.
@@ -141,5 +154,6 @@ def newton(_: Any, iterations: int = 40) -> Solver:
 def optimal_backstepping(_: Any, K_opt: Any, plant: Any, weights: Any, start: Any) -> Any:
     """(K_p, K_d) and (K_3, K_4) whose feedback gains are nearest to K_opt, by relative errors; start is a guess.
 
-    Status 0: they are equal. 1: no positive gains have them, these come nearest. 2: these are the nearest found.
+    Status 0: they are equal. 1: no positive gains have them, these come nearest; or something given is not positive,
+    and start is returned. 2: these are the nearest found. 3: something given is not a number; the result is zero.
     """

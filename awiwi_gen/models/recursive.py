@@ -104,13 +104,20 @@ def dynamics(finger: Finger, q: SX, qd: SX, g: SX) -> tuple[SX, SX, SX]:
 def energy(finger: Finger, q: SX, qd: SX, g: SX) -> tuple[SX, SX]:
     """Kinetic and potential energy [J] (eq. 5.4); potential zero is a mass at the origin of the base."""
     assembly = assemble(finger, q)
-    mass = _mass_and_coriolis(assembly, SX.zeros(q.numel()))[0]
-    each_pair_once = ca.triu(mass) - ca.diag(ca.diag(mass)) / 2
     potential, down = -ca.dot(g, assembly.ballast), assembly.turn @ g
     for joint in assembly.joints:
         down = joint.forth(down)
         potential -= ca.dot(down, joint.body.first)
-    return ca.dot(qd, each_pair_once @ qd), potential
+    return _kinetic_energy(assembly, qd), potential
+
+
+def _kinetic_energy(assembly: Assembly, qd: SX) -> SX:
+    plane = turning_plane(assembly)
+    if plane is not None:
+        return plane.kinetic_energy(ca.vertsplit(_ways(assembly, qd)[0] @ qd))
+    mass = mass_and_coriolis(assembly, SX.zeros(qd.numel()))[0]
+    each_pair_once = ca.triu(mass) - ca.diag(ca.diag(mass)) / 2
+    return ca.dot(qd, each_pair_once @ qd)
 
 
 def _mass_and_coriolis(assembly: Assembly, qd: SX) -> tuple[SX, SX]:

@@ -174,6 +174,17 @@ class TurningPlane:
                 result[0, 0] -= speeds[j + 1] * kappa
         return result
 
+    def kinetic_energy(self, speeds: list[SX]) -> SX:
+        """Of the moving finger [J]: of each body about its joint, and its momentum there with the joint's velocity."""
+        spins, velocity, total = _running(speeds[self.start :]), (SX(0), SX(0)), SX(0)
+        for body, arm, own, spin in zip(self.bodies, self.arms, self.own, spins, strict=True):
+            total += spin * (_dot(own, velocity) + body.inertia / 2 * spin)
+            velocity = velocity[0] + spin * arm[0], velocity[1] + spin * arm[1]
+        if self.lead:
+            along = sum((b.turned(b.along)[1] * spin for b, spin in zip(self.bodies, spins, strict=True)), SX(0))
+            total += speeds[0] * (along + speeds[0] * (self.turning_inertia() / 2))
+        return total
+
     def gravity(self, g: SX) -> list[SX]:
         """Torques of the joints that hold the finger still in gravity g (3) [N m]."""
         down, along = self._gravity(g)

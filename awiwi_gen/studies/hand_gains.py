@@ -6,6 +6,7 @@ delay of one sample, about a rest under two pretensions. Gains that are unstable
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -15,17 +16,17 @@ from awiwi_gen.cache import Cache, code_digest, key
 from awiwi_gen.errors import Fault, InputError
 from awiwi_gen.hand import Hand
 from awiwi_gen.studies.joint_loops import Plant
+from awiwi_gen.studies.nearest import WIDEST, nearest
 from awiwi_gen.studies.pair_loops import Pair, pair_loop
 from awiwi_gen.studies.sampling import PERIOD
 from awiwi_gen.studies.tune import GAINS, plants
 
 PRETENSIONS = (10.0, 20.0)  # N
 POWERS = {"K_p": 2, "K_d": 1, "K_3": 1, "K_4": 1, "C_t": 0, "C_s": -2}  # of the bandwidth that a gain grows with
-SLOWEST, HALVINGS = 1e-3, 12
 
 
 def require_running_gains(hand: Hand, store: Cache) -> None:
-    """Raise InputError that names every tendon of a hand whose gains cannot run, and the fastest like them that can."""
+    """Raise InputError that names every tendon of a hand whose gains cannot run, and the nearest that can."""
     if not hand.gains:
         return
     digest = key(hand.digest(), code_digest("studies", "control", "models", "kernels"))
@@ -56,32 +57,24 @@ def failing(library: Any, hand: Hand) -> list[Fault]:
     return faults
 
 
-def radius(library: Any, plant: Plant, gains: dict[str, float]) -> float:
+def radius(library: Any, plant: Plant, gains: Mapping[str, float], delay: int = 1) -> float:
     """Spectral radius of a joint whose both tendons have these gains; infinite where the law refuses them."""
     pair = Pair(plant.m, (plant.b / 2,) * 2, (plant.k / 2,) * 2)
     impedance, tuning = list(gains.values())[:2], list(gains.values())[2:]
     loop, constant = pair_loop(library.backstepping_antagonistic, pair, impedance, tuning)
     if not (np.isfinite(loop.K).all() and np.isfinite(constant).all()):
         return float("inf")
-    return loop.sampled_radius()
+    return loop.sampled_radius(delay)
 
 
 def way_out(library: Any, both: list[Plant], gains: dict[str, float]) -> str:
-    """The same gains at the largest share of their bandwidth that the clock allows, in words."""
+    """The nearest gains that run, in words; they bear another sample of delay, too."""
 
-    def slower(share: float) -> dict[str, float]:
-        return {name: value * share ** POWERS[name] for name, value in gains.items()}
+    def works(chosen: Mapping[str, float]) -> bool:
+        return all(radius(library, plant, chosen, delay) < 1 for plant in both for delay in (1, 2))
 
-    def works(share: float) -> bool:
-        return all(radius(library, plant, slower(share)) < 1 for plant in both)
-
-    shares = np.geomspace(1, SLOWEST, 61)
-    first = next((i for i, share in enumerate(shares) if works(share)), None)
-    if first is None:
-        return "nor are they stable if the law is made slower"
-    fails, best = shares[first - 1], shares[first]
-    for _ in range(HALVINGS):
-        middle = float(np.sqrt(fails * best))
-        fails, best = (fails, middle) if works(middle) else (middle, best)
-    told = ", ".join(f'{name} = "{value:.4g} {GAINS[name]}"' for name, value in slower(best).items())
-    return f"the fastest like them that run are {told}"
+    found = nearest(gains, POWERS, works)
+    if found is None:
+        return f"neither another bandwidth nor any gain alone mends that within a factor of {WIDEST:g}"
+    told = ", ".join(f'{name} = "{value:.6g} {GAINS[name]}"' for name, value in found.gains.items())
+    return f"the nearest that run are {told}"

@@ -21,7 +21,7 @@ from awiwi_gen.studies.figures import all_figures
 from awiwi_gen.studies.figures.absent import ABSENT
 from awiwi_gen.studies.figures.figure import Figure
 from awiwi_gen.studies.printed import all_numbers
-from awiwi_gen.studies.printed.number import Printed
+from awiwi_gen.studies.printed.number import Printed, Verdict
 
 if TYPE_CHECKING:
     from awiwi_gen.pipeline import Job, Proof
@@ -38,6 +38,11 @@ STYLE = {
     "legend.frameon": False,
 }
 FIRST_OF_PART_II = 7  # chapter
+COUNTED: dict[Verdict, str] = {
+    "agrees": "agree",
+    "misprint": "are misprints",
+    "not reproducible": "cannot be reproduced",
+}
 PARTS = {"Modelling": range(FIRST_OF_PART_II), "Control": range(FIRST_OF_PART_II, 100)}
 
 
@@ -124,7 +129,7 @@ def chapter(place: str) -> int:
 def summary(results: Results) -> str:
     """A sentence on what agrees."""
     verdicts = Counter(number.verdict for number in results.numbers)
-    told = ", ".join(f"{count} {name}" for name, count in sorted(verdicts.items()))
+    told = ", ".join(f"{verdicts[name]} {word}" for name, word in COUNTED.items() if verdicts[name])
     holding = sum(bool(figure.holds) for figure in results.figures)
     proved = sum(verdict.passed for verdict in results.proof.verdicts)
     return (

@@ -34,7 +34,7 @@ class Problem(Protocol):
     def solve(self, inputs: Mapping[str, Array]) -> Reference:
         """Exact outputs; those named status are the status that must be returned, which is otherwise 0."""
 
-    def mirror(self, inputs: Mapping[str, Array], own_trig: bool) -> Mapping[str, Array]:
+    def mirror(self, inputs: Mapping[str, Array], own: bool) -> Mapping[str, Array]:
         """What the solver computes in floats, by output, where that is known to the last bit."""
 
 
@@ -62,9 +62,9 @@ class LeastSquares:
         begun = np.clip(pose + random.uniform(-0.2, 0.2, pose.shape), low, high)
         return {"h": lengths.astype(start.dtype), "start": begun.astype(start.dtype)}
 
-    def model(self, q: Array, own_trig: bool = False) -> tuple[Array, Array]:
+    def model(self, q: Array, own: bool = False) -> tuple[Array, Array]:
         """Lengths (samples, m) and coupling (samples, m, n) at q (samples, n): in its arithmetic, bit for bit as C."""
-        floats = Floats(q.dtype.type, own_trig)
+        floats = Floats(q.dtype.type, own)
         other = np.zeros(len(q), q.dtype)
 
         def leaf(node: Node) -> Any:
@@ -97,7 +97,7 @@ class LeastSquares:
                     q[j][s] = (q[j][s] + step[j, 0]).mid()
         return reference({"q": q})
 
-    def mirror(self, inputs: Mapping[str, Array], own_trig: bool) -> Mapping[str, Array]:
+    def mirror(self, inputs: Mapping[str, Array], own: bool) -> Mapping[str, Array]:
         """What the solver computes in floats, by output, where that is known to the last bit."""
         return {}
 
@@ -117,24 +117,24 @@ class LeastSquares:
 class GradientSearch(LeastSquares):
     """The same by algorithm 1, mended: what it computes is repeated here operation by operation."""
 
-    def mirror(self, inputs: Mapping[str, Array], own_trig: bool) -> Mapping[str, Array]:
+    def mirror(self, inputs: Mapping[str, Array], own: bool) -> Mapping[str, Array]:
         """All trials, with the arithmetic and the order of csrc."""
         start, measured = inputs["start"], inputs["h"]
         low, high = (np.array(self.solver.arrays[end], start.dtype) for end in ("low", "high"))
         q = _clamped(start, low, high)
-        best, gradient, curvature = self._cost(q, measured, own_trig)
+        best, gradient, curvature = self._cost(q, measured, own)
         step = 1 / curvature
         for _ in range(1, self.solver.iterations):
             trial = _clamped(q - 2 * step[:, None] * gradient, low, high)
-            found, trial_gradient, _ = self._cost(trial, measured, own_trig)
+            found, trial_gradient, _ = self._cost(trial, measured, own)
             better = found < best
             q, gradient = (np.where(better[:, None], a, b) for a, b in ((trial, q), (trial_gradient, gradient)))
             best, step = np.where(better, found, best), np.where(better, step, step / 2)
         return {"q": q}
 
-    def _cost(self, q: Array, measured: Array, own_trig: bool) -> tuple[Array, Array, Array]:
+    def _cost(self, q: Array, measured: Array, own: bool) -> tuple[Array, Array, Array]:
         """Half the squared residual, its gradient, and the trace of P'P: sums over the tendons from the first on."""
-        h, P = self.model(q, own_trig)
+        h, P = self.model(q, own)
         residual = h - measured
         total, trace = np.zeros_like(q[:, 0]), np.zeros_like(q[:, 0])
         gradient, squares = np.zeros_like(q), np.zeros_like(q)

@@ -60,7 +60,7 @@ class Distribution:
         tau, K = (np.array([getattr(a, name) for a in answers]).astype(dtype) for name in ("tau", "K"))
         return {"q": drawn["q"], "tau": tau, "K": K, "f_min": low, "f_max": high}
 
-    def mirror(self, inputs: Mapping[str, Array], own_trig: bool) -> Mapping[str, Array]:
+    def mirror(self, inputs: Mapping[str, Array], own: bool) -> Mapping[str, Array]:
         """No bits are known."""
         return {}
 

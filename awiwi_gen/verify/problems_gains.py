@@ -73,6 +73,6 @@ class GainMatching:
                     gains[j][s] = (gains[j][s] + step[j, 0]).mid()
         return reference({"impedance": gains[:2], "rates": gains[2:]})
 
-    def mirror(self, inputs: Mapping[str, Array], own_trig: bool) -> Mapping[str, Array]:
+    def mirror(self, inputs: Mapping[str, Array], own: bool) -> Mapping[str, Array]:
         """No bits are known."""
         return {}

@@ -50,7 +50,7 @@ class Riccati:
         samples = [optimum(*plant) for plant in zip(*(inputs[name] for name in ("A", "B", "Q", "R")), strict=True)]
         return _reference({"K": [K for K, _ in samples], "S": [S for _, S in samples]})
 
-    def mirror(self, inputs: Mapping[str, Array], own_trig: bool) -> Mapping[str, Array]:
+    def mirror(self, inputs: Mapping[str, Array], own: bool) -> Mapping[str, Array]:
         """No bits are known."""
         return {}
 
@@ -91,7 +91,7 @@ class JointRegulator:
             torques.append([held - sum((g * (p - d) for g, p, d in zip(K, x, x_des, strict=True)), arb(0))])
         return _reference({"K": gains, "u": torques})
 
-    def mirror(self, inputs: Mapping[str, Array], own_trig: bool) -> Mapping[str, Array]:
+    def mirror(self, inputs: Mapping[str, Array], own: bool) -> Mapping[str, Array]:
         """No bits are known."""
         return {}
 

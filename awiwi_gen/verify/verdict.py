@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -48,6 +48,10 @@ class Verdict:
     def as_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
         return asdict(self)
+
+    def refused(self, reason: str) -> Verdict:
+        """The same with one more reason not to pass."""
+        return replace(self, passed=False, reasons=(*self.reasons, reason))
 
 
 def float_values(graph: Graph, inputs: Mapping[str, Array], params: Mapping[str, Any], algebra: Any) -> dict[str, Any]:
@@ -126,7 +130,7 @@ def judge(
     passes: float,
     seed: int,
     dtype: type,
-    own_trig: bool,
+    own: bool,
 ) -> Verdict:
     """Levels 1 and 3 for one compiled kernel, joined with what is known of its graphs."""
     samples = len(next(iter(inputs.values())))
@@ -136,8 +140,8 @@ def judge(
     guarded = len(outputs) < len(graph.outputs)
     computed = dict(zip(outputs, raw if len(outputs) + guarded > 1 else (raw,), strict=False))
     computed = {port: np.asarray(a).reshape(samples, -1) for port, a in computed.items()}
-    mirrored = float_values(graph, inputs, params, Floats(dtype, own_trig))
-    bounds = float_values(graph, inputs, params, Bounded(dtype, own_trig))
+    mirrored = float_values(graph, inputs, params, Floats(dtype, own))
+    bounds = float_values(graph, inputs, params, Bounded(dtype, own))
     exact = True
     worst_ulp = worst_scaled = bound_use = 0.0
     reasons = []

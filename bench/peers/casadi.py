@@ -46,4 +46,6 @@ def program(function: Any, quantity: Quantity) -> tuple[str, str]:
 
 def main(finger: dict[str, Any], directory: Path) -> None:
     """All quantities."""
-    make_all(Contender("casadi", ca.__version__, directory), finger, generate)
+    # Its functions are exported unless told otherwise; static ones are inlined.
+    flags = ["-DCASADI_SYMBOL_EXPORT=static"]
+    make_all(Contender("casadi", ca.__version__, directory, flags=flags), finger, generate)

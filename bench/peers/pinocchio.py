@@ -1,4 +1,8 @@
-"""Pinocchio: its C++ headers, out of the wheel, compiled here with each variant's flags; a model at run time."""
+"""Pinocchio: its C++ library, out of the wheel, called from C++; it computes with a model at run time.
+
+Its templates can also be compiled here with other flags, and with CasADi's scalars to generate code. Either takes minutes
+and gigabytes for one file, so it is not done.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +14,7 @@ from bench.peers.eigen import eigen_include
 from bench.peers.kit import Contender
 
 DEFINES = (
+    "-DPINOCCHIO_ENABLE_TEMPLATE_INSTANTIATION",  # the algorithms as the wheel has compiled them
     "-DBOOST_MPL_CFG_NO_PREPROCESSED_HEADERS",
     "-DBOOST_MPL_LIMIT_LIST_SIZE=30",
     "-DBOOST_MPL_LIMIT_VECTOR_SIZE=30",
@@ -67,33 +72,42 @@ static pinocchio::Model build()
 static pinocchio::Model model = build();
 static pinocchio::Data data(model);
 static const pinocchio::FrameIndex tip = model.getFrameId("tip");
-typedef Eigen::Map<const Eigen::Matrix<double, N, 1>> In;
-typedef Eigen::Map<Eigen::Matrix<double, N, 1>> Out;
-typedef Eigen::Map<Eigen::Matrix<double, N, N, Eigen::RowMajor>> Square;
-static void mass(const double *q, double *M)
+// Arrays of the types that the library is compiled for.
+static Eigen::VectorXd position(N), velocity(N), third(N);
+static pinocchio::Data::Matrix6x columns = pinocchio::Data::Matrix6x::Zero(6, N);
+static const Eigen::VectorXd &filled(Eigen::VectorXd &v, const double *x)
 {
-    pinocchio::crba(model, data, In(q), pinocchio::Convention::LOCAL);
+    for (int i = 0; i < N; i++) v[i] = x[i];
+    return v;
+}
+static void store(const Eigen::VectorXd &v, double *x) { for (int i = 0; i < N; i++) x[i] = v[i]; }
+static void mass(const Eigen::VectorXd &q, double *M)
+{
+    pinocchio::crba(model, data, q, pinocchio::Convention::LOCAL);
     for (int i = 0; i < N; i++) for (int j = i; j < N; j++) M[N*i + j] = M[N*j + i] = data.M(i, j);
 }
-static void fall(const double *g) { model.gravity.linear() << g[0], g[1], g[2]; }
+static void fall(const double *g) { for (int i = 0; i < 3; i++) model.gravity.linear()[i] = g[i]; }
 """
 
+Q, QD = "filled(position, q)", "filled(velocity, qd)"
 BODIES = {
-    "mass_matrix": "    mass(q, M);",
-    "inverse_dynamics": "    fall(g); Out(tau) = pinocchio::rnea(model, data, In(q), In(qd), In(qdd));",
-    "bias": "    fall(g); Out(bias) = pinocchio::nonLinearEffects(model, data, In(q), In(qd));",
-    "forward_dynamics": "    fall(g); Out(qdd) = pinocchio::aba(model, data, In(q), In(qd), In(tau), "
-    "pinocchio::Convention::LOCAL);",
-    "pose_jacobian": """    Eigen::Matrix<double, 6, N> columns;
-    columns.setZero();
-    pinocchio::computeJointJacobians(model, data, In(q));
-    const auto &pose = pinocchio::updateFramePlacement(model, data, tip);
+    "mass_matrix": f"    mass({Q}, M);",
+    "inverse_dynamics": f"    fall(g); store(pinocchio::rnea(model, data, {Q}, {QD}, filled(third, qdd)), tau);",
+    "bias": f"    fall(g); store(pinocchio::nonLinearEffects(model, data, {Q}, {QD}), bias);",
+    "forward_dynamics": f"""    fall(g);
+    const auto local = pinocchio::Convention::LOCAL;
+    store(pinocchio::aba(model, data, {Q}, {QD}, filled(third, tau), local), qdd);""",
+    "pose_jacobian": f"""    pinocchio::computeJointJacobians(model, data, {Q});
+    const pinocchio::SE3 &pose = pinocchio::updateFramePlacement(model, data, tip);
     pinocchio::getFrameJacobian(model, data, tip, pinocchio::LOCAL_WORLD_ALIGNED, columns);
-    Eigen::Map<Eigen::Matrix<double, 6, N, Eigen::RowMajor>>(J) = columns;
-    Eigen::Map<Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(T) = pose.toHomogeneousMatrix();""",
-    "dynamics": """    fall(g); mass(q, M);
-    Square(C) = pinocchio::computeCoriolisMatrix(model, data, In(q), In(qd));
-    Out(gravity) = pinocchio::computeGeneralizedGravity(model, data, In(q));""",
+    for (int i = 0; i < 6; i++) for (int j = 0; j < N; j++) J[N*i + j] = columns(i, j);
+    for (int i = 0; i < 3; i++) for (int j = 0; j < 3; j++) T[4*i + j] = pose.rotation()(i, j);
+    for (int i = 0; i < 3; i++) T[4*i + 3] = pose.translation()[i], T[12 + i] = 0;
+    T[15] = 1;""",
+    "dynamics": f"""    fall(g); mass({Q}, M);
+    const auto &coriolis = pinocchio::computeCoriolisMatrix(model, data, position, {QD});
+    for (int i = 0; i < N; i++) for (int j = 0; j < N; j++) C[N*i + j] = coriolis(i, j);
+    store(pinocchio::computeGeneralizedGravity(model, data, position), gravity);""",
 }
 
 
@@ -102,8 +116,10 @@ def main(finger: dict[str, Any], directory: Path) -> None:
     import pinocchio
 
     contender = Contender("pinocchio", pinocchio.__version__, directory, language="c++", counted=False)
-    contender.flags, contender.variants = include_flags(), ["portable", "avx2+fma"]
-    contender.note = "C++ headers of its wheel, compiled here; a model at run time"
+    contender.flags, contender.variants = include_flags(), ["portable"]
+    folder = Path(sysconfig.get_paths()["purelib"]) / "cmeel.prefix" / "lib"
+    contender.libraries = [str(folder / "libpinocchio_default.so"), f"-Wl,-rpath,{folder}"]
+    contender.note = "C++ library as in its wheel; a model at run time"
     (directory / "finger.txt").write_text(numbers(finger), encoding="utf-8")
     contender.environment, contender.kept = {"BENCH_FINGER": str((directory / "finger.txt").resolve())}, True
     contender.adapt(PRELUDE + GLOBALS, BODIES)

@@ -17,22 +17,41 @@ from awiwi_gen.ir.passes.turn import turn
 Pass = Callable[[Graph], Graph]
 
 # Tried in turn, the cheapest result wins: whether brackets pay depends on what products share.
-PIPELINES: tuple[tuple[Pass, ...], ...] = (
-    (flatten, turn, share_products, share_sums, factor, scale, quotients, orient, schedule, gather),
-    (flatten, turn, factor, scale, share_products, share_sums, quotients, orient, schedule, gather),
-    (quotients, orient, schedule, gather),
+BEGINNINGS: tuple[tuple[Pass, ...], ...] = (
+    (flatten, turn, share_products, share_sums, factor, scale),
+    (flatten, share_products, turn, factor, share_products, share_sums, scale),
+    (flatten, turn, factor, scale, share_products, share_sums),
+    (),
 )
+AGAIN: tuple[Pass, ...] = (flatten, share_products, share_sums, factor, scale)  # as long as it helps
+END: tuple[Pass, ...] = (quotients, orient, schedule, gather)
+
+Stages = list[tuple[str, Graph]]
 
 
-def stages(graph: Graph, passes: tuple[Pass, ...]) -> list[tuple[str, Graph]]:
-    """The graph after each pass, with the pass's name."""
+def stages(graph: Graph, passes: tuple[Pass, ...], known: dict[tuple[Pass, ...], Graph] | None = None) -> Stages:
+    """The graph after each pass, with the pass's name; what begins as something `known` is not computed again."""
+    known = {} if known is None else known
     result = []
-    for apply in passes:
-        graph = apply(graph)
+    for count, apply in enumerate(passes, 1):
+        if passes[:count] not in known:
+            known[passes[:count]] = apply(graph)
+        graph = known[passes[:count]]
         result.append((apply.__name__, graph))
     return result
 
 
-def optimise(graph: Graph) -> list[tuple[str, Graph]]:
-    """The stages of the cheapest pipeline; the last one is what is emitted."""
-    return min((stages(graph, passes) for passes in PIPELINES), key=lambda s: cost(s[-1][1]).weight)
+def optimise(graph: Graph) -> Stages:
+    """The stages of the cheapest way; the last one is what is emitted."""
+    known: dict[tuple[Pass, ...], Graph] = {}
+    ways = [[("", graph), *stages(graph, passes, known)] for passes in BEGINNINGS]
+    best = min(ways, key=_weight)
+    while True:
+        further = [*best, *stages(best[-1][1], AGAIN)]
+        if _weight(further) >= _weight(best):
+            return [*best, *stages(best[-1][1], END)][1:]
+        best = further
+
+
+def _weight(way: Stages) -> float:
+    return cost(way[-1][1]).weight

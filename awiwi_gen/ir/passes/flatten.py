@@ -29,8 +29,25 @@ def flatten(graph: Graph) -> Graph:
                 merged += [inner[1] if ref >= 0 else ~inner[1], *inner[2:]]
             elif inner[0] == node[0] == "add" and uses[node_of(old)] == 1:
                 merged += inner[1:] if ref >= 0 else [~r for r in inner[1:]]
+            elif node[0] == "add" and uses[node_of(old)] == 1 and _scaled_sum(graph, builder, old, ref):
+                factor, total = inner[1:]
+                terms = [builder.mul((factor, term)) for term in builder.nodes[total][1:]]
+                merged += terms if ref >= 0 else [~r for r in terms]
             else:
                 merged.append(ref)
         return builder.make(node[0], merged)
 
     return rebuild(graph, rule)
+
+
+def _scaled_sum(graph: Graph, builder: Builder, old: Ref, ref: Ref) -> bool:
+    """Whether a term is a constant times a sum that nothing else uses."""
+    parts = graph.nodes[node_of(old)][1:]
+    inner = builder.nodes[node_of(ref)][1:]
+    return (
+        graph.nodes[node_of(old)][0] == builder.nodes[node_of(ref)][0] == "mul"
+        and len(parts) == len(inner) == 2
+        and builder.nodes[inner[0]][0] == "const"
+        and builder.nodes[inner[1]][0] == "add"
+        and all(graph.uses[part] == 1 for part in parts if graph.nodes[part][0] == "add")
+    )

@@ -14,6 +14,7 @@ from fractions import Fraction
 from flint import arb, ctx, fmpq
 
 from awiwi_gen.ir.builder import Builder, copy_node, rebuild, shorten
+from awiwi_gen.ir.cost import cost
 from awiwi_gen.ir.graph import Graph, Node, Ref, node_of, operands
 
 BITS = 400
@@ -45,9 +46,15 @@ def turn(graph: Graph) -> Graph:
         if name == "cos" and ("sin", argument) in found:
             angle = _read(graph, parents, roots, _Angle(cosine, found["sin", argument]))
             phase = _best(angle) if angle else None
-            if angle and phase:
-                return turn(_turned(graph, angle, phase))
+            turned = _turned(graph, angle, phase) if angle and phase else graph
+            if _operations(turned) < _operations(graph):
+                return turn(turned)
     return graph
+
+
+def _operations(graph: Graph) -> int:
+    spent = cost(graph)
+    return spent.add + spent.mul
 
 
 def _read(graph: Graph, parents: list[list[int]], roots: set[int], angle: _Angle) -> _Angle | None:

@@ -16,11 +16,9 @@ from awiwi_gen.errors import InputError
 from awiwi_gen.simulate import PERIOD, Machine, Scenario, simulate
 from awiwi_gen.studies.benchmark.joint import Joint, loop_around, values_of
 from awiwi_gen.studies.benchmark.laws import Law
+from awiwi_gen.studies.nearest import WIDEST, nearest
 from awiwi_gen.studies.sampled_loop import STABLE, SampledLoop
 
-WIDEST = 1e3  # by how much gains are changed in the search for such that work
-MOVES = 24  # steps of that search
-HALVINGS = 10
 SPARE = (0.0, 0.25, 0.5, 0.75, 1.0)  # periods of further delay that the nearest gains bear
 RESTING = 600  # ticks in which noise is watched
 SETTLING = 12  # ticks, until all that a law writes has come to rest
@@ -92,48 +90,20 @@ def loops_of(library: Any, law: Law, gains: Mapping[str, float], joint: Joint, f
     return loops
 
 
-@dataclass(frozen=True)
-class Nearest:
-    """The gains nearest to some that fail: what was changed, by which factor, and how they do."""
+def running_gains(library: Any, law: Law, gains: Mapping[str, float], joint: Joint, force: float) -> Clocked | None:
+    """The gains nearest to some that fail, and how they do: they bear another sample of delay, too."""
 
-    changed: str
-    factor: float
-    clocked: Clocked
-
-
-def nearest(library: Any, law: Law, gains: Mapping[str, float], joint: Joint, force: float) -> Nearest | None:
-    """The gains that run and need the smallest factor: one gain alone, or all as of a slower or faster law.
-
-    They run with another sample of delay, too, so that they do not stand at the brink. None if there are none within a
-    factor of a thousand.
-    """
-    directions = {"bandwidth": {name: gain.power for name, gain in law.gains.items()}}
-    directions |= {name: {name: 1} for name in gains}
-    ways = [(name, sign) for name in directions for sign in (-1, 1)]
-
-    def moved(name: str, exponent: float) -> dict[str, float]:
-        powers = directions[name]
-        return {key: value * WIDEST ** (exponent * powers.get(key, 0)) for key, value in gains.items()}
-
-    def works(name: str, exponent: float) -> bool:
-        chosen = moved(name, exponent)
+    def works(chosen: Mapping[str, float]) -> bool:
         try:
+            if noise(library, law, chosen, joint, force) >= 1:  # the quicker look, and it sees what is unstable, too
+                return False
             loops = loops_of(library, law, chosen, joint, force)
         except InputError:
             return False
-        stable = all(loop.radius(late) < STABLE for late in SPARE for loop in loops)
-        return stable and noise(library, law, chosen, joint, force) < 1
+        return all(loop.radius(late) < STABLE for loop in loops for late in SPARE)
 
-    for step in range(1, MOVES + 1):
-        for name, sign in ways:
-            if works(name, sign * step / MOVES):
-                fails, best = (step - 1) / MOVES, step / MOVES
-                for _ in range(HALVINGS):
-                    middle = (fails + best) / 2
-                    fails, best = (fails, middle) if works(name, sign * middle) else (middle, best)
-                chosen = moved(name, sign * best)
-                return Nearest(name, float(WIDEST ** (sign * best)), clocked(library, law, chosen, joint, force))
-    return None
+    found = nearest(gains, {name: gain.power for name, gain in law.gains.items()}, works)
+    return clocked(library, law, found.gains, joint, force) if found else None
 
 
 def require_clocked(library: Any, law: Law, gains: Mapping[str, float], joint: Joint, force: float) -> Clocked:
@@ -141,11 +111,10 @@ def require_clocked(library: Any, law: Law, gains: Mapping[str, float], joint: J
     found = clocked(library, law, gains, joint, force)
     if found.runs:
         return found
-    way_out = nearest(library, law, gains, joint, force)
+    way_out = running_gains(library, law, gains, joint, force)
     if way_out is None:
         instead = f"neither another bandwidth nor any gain alone mends that within a factor of {WIDEST:g}"
     else:
-        new = way_out.clocked.gains
-        told = ", ".join(f"{name} = {value:.4g}" for name, value in new.items() if value != gains[name])
-        instead = f"the nearest that run have {told} ({way_out.clocked.reason})"
+        told = ", ".join(f"{name} = {value:.4g}" for name, value in way_out.gains.items() if value != gains[name])
+        instead = f"the nearest that run have {told} ({way_out.reason})"
     raise InputError(f"{law.name}: these gains are {found.reason}; {instead}")

@@ -233,10 +233,11 @@ def characteristic(library: Any) -> Figure:
 
     def draw(axes: Any) -> None:
         axes.plot(x * 1e3, force, label="force")
-        axes.set(xlabel="elongation [mm]", ylabel="tendon force [N]")
+        axes.set_xlabel("elongation [mm]")
+        axes.set_ylabel("tendon force [N]", color="tab:blue")
         other = axes.twinx()
         other.plot(x * 1e3, stiffness / 1e3, "--", color="tab:red", label="stiffness")
-        other.set_ylabel("tendon stiffness [N/mm]")
+        other.set_ylabel("tendon stiffness (dashed) [N/mm]", color="tab:red")
 
     return Figure(
         number="4.7",

@@ -120,7 +120,7 @@ def step(library: Any, setting: Setting) -> Figure:
         axes.plot(run.times, run.q, linewidth=0.8, label="q [rad]")
         axes.plot(run.times, run.V / run.V.max(), linewidth=0.8, label="V, scaled")
         axes.legend()
-        axes.set(xlabel="t [s]")
+        axes.set(xlabel="t [s]", ylabel="angle [rad], energy by its largest value")
 
     return Figure(
         number="15.24 (simulated)",
@@ -157,7 +157,7 @@ def sines(library: Any, setting: Setting) -> list[Figure]:
         axes.set(xlabel="t [s]", ylabel="q [rad]")
 
     def diagram(axes: Any) -> None:
-        axes.semilogx(FREQUENCIES, gains.T, "o-", label=["derivatives fed", "position only"])
+        axes.plot(FREQUENCIES, gains.T, "o-", label=["derivatives fed", "position only"])
         axes.set(xlabel="frequency [Hz]", ylabel="gain")
         axes.legend()
 

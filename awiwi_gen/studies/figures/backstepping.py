@@ -93,8 +93,8 @@ def phases(library: Any, number: str, gains: tuple[float, float]) -> Figure:
     falling, left = bool((np.diff(V, axis=0) <= 1e-12).all()), np.abs(trace[-1, :, 0]).max()
 
     def draw(axes: Any) -> None:
-        axes.plot(trace[..., 0], np.gradient(trace[..., 0], 60.0 / 3000, axis=0), linewidth=0.6)
-        axes.plot(start[:, 0], start[:, 0] ** 2 - start[:, 0] ** 3 + start[:, 1], "x", markersize=4)
+        for states, style in ((trace, "-"), (start[None], "x")):
+            axes.plot(states[..., 0], states[..., 0] ** 2 - states[..., 0] ** 3 + states[..., 1], style, linewidth=0.6)
         axes.set(xlabel="x1", ylabel="x1'")
 
     return Figure(

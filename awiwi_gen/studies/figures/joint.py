@@ -267,7 +267,7 @@ def sweep(joint: Joint) -> Figure:
     peaks = np.array(SWEEP)[gain.argmax(axis=0)]
 
     def draw(axes: Any) -> None:
-        axes.semilogx(SWEEP, gain, "o-", markersize=3, linewidth=0.8, label=[f"pretension {f:g} N" for f in TENSIONS])
+        axes.plot(SWEEP, gain, "o-", markersize=3, linewidth=0.8, label=[f"pretension {f:g} N" for f in TENSIONS])
         axes.set(xlabel="frequency [Hz]", ylabel="amplitude of the angle per desired angle")
         axes.legend()
 

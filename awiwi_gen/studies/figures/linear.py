@@ -39,17 +39,19 @@ def figures(library: Any, hand: Hand) -> list[Figure]:
 def open_loop() -> Figure:
     """Figure 12.3."""
     by_spring = [np.linalg.eigvals(TABLE_12_1.with_(k=k).A) for k in STIFFNESSES]
-    by_friction = [np.linalg.eigvals(TABLE_12_1.with_(dq=d).A) for d in STIFFNESSES]
+    by_friction = [np.linalg.eigvals(TABLE_12_1.with_(dq=share * TABLE_12_1.dq).A) for share in STIFFNESSES]
+    as_captioned = [np.linalg.eigvals(TABLE_12_1.with_(dq=d).A) for d in STIFFNESSES]
     slow = np.array([np.sort(np.abs(poles))[:2] for poles in by_spring])
     moved = float(np.ptp(slow[:, 1]) / slow[0, 1])
     fast = np.array([np.abs(poles).max() for poles in by_spring])
 
     def draw(axes: Any) -> None:
         _scatter(axes, by_spring, "spring 0.43 to 1.15 N m/rad")
+        _scatter(axes, by_friction, "link friction 0.43 to 1.15 of table 12.1")
         axes.set(xlabel="real part [1/s]", ylabel="imaginary part [1/s]")
         axes.legend()
 
-    real = max(poles[0].real for poles in ([p[np.argsort(-np.abs(p))] for p in by_friction]))
+    real = max(poles[0].real for poles in ([p[np.argsort(-np.abs(p))] for p in as_captioned]))
     return Figure(
         "12.3", "Poles of the joint alone over the stiffness of its spring",
         "The third and fourth pole hardly move.",

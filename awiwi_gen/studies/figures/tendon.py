@@ -153,21 +153,13 @@ def scheduled(bench: Bench) -> Figure:
     spread = [np.ptp(settling(times, forces, STEPS[:, 1], STEPS[:, 0], 0.05)) for times, forces in runs]
     beyond = [overshoot(forces, STEPS[:, 1], STEPS[:, 0]).max() for _, forces in runs]
 
-    def draw(axes: Any) -> None:
-        for (times, forces), style, name in zip(runs, (":", "-"), ("fixed", "scheduled"), strict=True):
-            for index in range(len(STEPS)):
-                label = name if index == 0 else None
-                axes.plot(times, forces[:, index], style, linewidth=0.8, color=f"C{index}", label=label)
-        axes.set(xlabel="t [s]", ylabel="tendon force [N]")
-        axes.legend()
-
     return Figure(
         "10.3", "Force steps with fixed and with scheduled gains",
         "Scheduled gains are better than fixed ones at every working point.",
         f"They overshoot by {beyond[1]:.1%} at most, fixed ones "
         f"by {beyond[0]:.1%}; their settling times differ by {spread[1] * 1e3:.0f} ms, those of fixed gains by "
         f"{spread[0] * 1e3:.0f} ms.",
-        bool(beyond[1] < WELL_DAMPED and beyond[1] <= beyond[0] and spread[1] < spread[0]), draw,
+        bool(beyond[1] < WELL_DAMPED and beyond[1] <= beyond[0] and spread[1] < spread[0]), _shares(runs),
     )  # fmt: skip
 
 
@@ -177,20 +169,12 @@ def measured(bench: Bench) -> Figure:
     runs = [bench.steps(gains, compensated=KNOWN, noise=NOISE) for gains in both]
     errors = [np.abs(forces - STEPS[:, 1]).mean(axis=0) * 1e3 * DURATION for _, forces in runs]
 
-    def draw(axes: Any) -> None:
-        for (times, forces), style, name in zip(runs, (":", "-"), ("fixed", "scheduled"), strict=True):
-            for index in range(len(STEPS)):
-                label = name if index == 0 else None
-                axes.plot(times, forces[:, index], style, linewidth=0.8, color=f"C{index}", label=label)
-        axes.set(xlabel="t [s]", ylabel="tendon force [N]")
-        axes.legend()
-
     listed = [", ".join(f"{each:.0f}" for each in error) for error in errors]
     return Figure(
         "10.4", f"Figure 10.3 with noise of {NOISE:g} N and {KNOWN:.0%} of the friction compensated",
         "In the experiments scheduled gains are better than fixed ones in all cases.",
         f"The error sums up to {listed[1]} N ms with scheduled and to {listed[0]} N ms with fixed gains, at {_forces()} N.",
-        bool(np.all(errors[1] <= 1.001 * errors[0])), draw,
+        bool(np.all(errors[1] <= 1.001 * errors[0])), _shares(runs),
     )  # fmt: skip
 
 
@@ -240,6 +224,20 @@ def state_dependent(bench: Bench) -> Figure:
         f"with that, the law of table 14.1 is {clock.reason}.",
         apart < 0.5, draw,
     )  # fmt: skip
+
+
+def _shares(runs: Any) -> Any:
+    """All steps on top of one another, as shares of their heights."""
+
+    def draw(axes: Any) -> None:
+        for (times, forces), style, name in zip(runs, (":", "-"), ("fixed", "scheduled"), strict=True):
+            for index, (start, goal) in enumerate(STEPS):
+                share, label = (forces[:, index] - start) / (goal - start), f"{name}, to {goal:g} N"
+                axes.plot(times * 1e3, share, style, linewidth=1.0, color=f"C{index}", label=label)
+        axes.set(xlabel="t [ms]", ylabel="force, as a share of the step", xlim=(0, 100))
+        axes.legend(ncols=2)
+
+    return draw
 
 
 def _forces() -> str:

@@ -218,4 +218,6 @@ def optimum(library: Any, hand: Hand) -> Iterator[Printed]:
         "chapter 16, algorithm 3", "rand(1, 4)", f"slowest pole {pole:.2g} 1/s", "not reproducible",
         "gains between 0 and 1 hold no useful K_3 or K_4; and the best draw is overwritten by its feedback gains",
     )  # fmt: skip
-    yield compared("chapter 16, tendons", "38", float(hand.tendons), "of this hand")
+    yield compared("chapters 14 and 16, tendons", "38", float(hand.tendons), "of this hand", "not reproducible")
+    joints = sum(len(finger.joints) for finger in hand.fingers.values())
+    yield compared("chapter 14, joints", "19", float(joints), "of the fingers of this hand", "not reproducible")

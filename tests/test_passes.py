@@ -1,0 +1,131 @@
+"""Passes that need sums of sines, or constants, to have anything to do."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from test_graph import VALUES, points
+
+from awiwi_gen.ir.builder import Builder
+from awiwi_gen.ir.cost import cost
+from awiwi_gen.ir.graph import Graph, Output, Ref
+from awiwi_gen.ir.passes import optimise
+from awiwi_gen.ir.passes.flatten import flatten
+from awiwi_gen.ir.passes.scale import scale
+from awiwi_gen.ir.passes.turn import turn
+from awiwi_gen.verify.reference import ball_values, disagreement
+
+NUMBERS = st.integers(-9, 9).filter(bool).map(lambda k: Fraction(k, 7))
+BODIES = st.lists(st.tuples(st.integers(0, 2), *[NUMBERS] * 4), min_size=1, max_size=5)
+USES = st.lists(
+    st.tuples(st.sampled_from(["add", "mul", "scaled"]), st.integers(0, 99), st.integers(0, 99)), max_size=12
+)
+
+
+def form(builder: Builder, turned: tuple[Ref, Ref], a: Fraction, b: Fraction) -> Ref:
+    """a cos + b sin."""
+    return builder.add([builder.mul((builder.const(x), leaf)) for x, leaf in zip((a, b), turned, strict=True)])
+
+
+def moments(
+    bodies: list[tuple[int, Fraction, Fraction, Fraction, Fraction]], uses: list[tuple[str, int, int]]
+) -> Graph:
+    """First and second moments of bodies that turn by three angles, and what is made of them."""
+    builder = Builder()
+    angles = [builder.input("x", 0), builder.add([builder.input("x", i) for i in (0, 1)]), builder.input("x", 2)]
+    refs = [builder.input("x", 3)]
+    for which, a, b, c, d in bodies:
+        cosine, sine = (builder.call(name, angles[which]) for name in ("cos", "sin"))
+        slope = form(builder, (cosine, sine), c, d)
+        refs += [form(builder, (cosine, sine), a, b), form(builder, (cosine, sine), -b, a)]
+        refs.append(builder.add((builder.mul((cosine, slope)), builder.const(c))))
+        refs.append(builder.add((builder.mul((sine, slope)), refs[0])))
+    for use, i, j in uses:
+        pair = (refs[i % len(refs)], refs[j % len(refs)])
+        scaled = (builder.const(Fraction(3, 11)), *pair)
+        refs.append(builder.mul(scaled) if use == "scaled" else builder.make(use, pair))
+    return builder.graph([Output("y", (len(refs) - 1,), tuple(refs[1:]))])
+
+
+def values_differ(a: Graph, b: Graph) -> float:
+    return float(disagreement(*(ball_values(graph, points(), VALUES) for graph in (a, b))))
+
+
+@settings(deadline=None, max_examples=60)
+@given(BODIES, USES)
+def test_moments_in_turned_axes_and_scaled_moments_are_the_same_moments(bodies, uses):
+    graph = flatten(moments(bodies, uses))
+    turned = turn(graph)
+
+    assert values_differ(graph, turned) < 1e-50
+    assert values_differ(graph, scale(graph)) < 1e-50
+    assert values_differ(graph, scale(turned)) < 1e-50
+    assert values_differ(graph, optimise(graph)[-1][1]) < 1e-50
+
+
+@settings(deadline=None, max_examples=60)
+@given(BODIES, USES)
+def test_turning_and_scaling_never_cost_products_or_sums(bodies, uses):
+    graph = flatten(moments(bodies, uses))
+
+    assert cost(scale(graph)).mul <= cost(graph).mul
+    assert cost(turn(graph)).add + cost(turn(graph)).mul <= cost(graph).add + cost(graph).mul
+
+
+def pair(builder: Builder) -> tuple[Ref, Ref, Ref, Ref]:
+    """Cosine and sine of an input, and the two components of a vector that turns with it."""
+    cosine, sine = (builder.call(name, builder.input("x", 0)) for name in ("cos", "sin"))
+    a, b = Fraction(3, 10), Fraction(-7, 10)
+    return cosine, sine, form(builder, (cosine, sine), a, b), form(builder, (cosine, sine), -b, a)
+
+
+def test_a_vector_that_turns_costs_two_products_and_a_phase():
+    builder = Builder()
+    _, _, x, y = pair(builder)
+    graph = builder.graph([Output("y", (2,), (x, y))])
+    before, after = cost(graph), cost(turn(graph))
+
+    assert (before.add, before.mul) == (2, 4)
+    assert (after.add, after.mul, after.sincos) == (1, 2, 1)
+
+
+def test_an_angle_whose_sine_is_itself_a_result_is_left_alone():
+    builder = Builder()
+    _, sine, x, y = pair(builder)
+    graph = builder.graph([Output("y", (3,), (x, y, sine))])
+
+    assert turn(graph) == graph
+
+
+def test_a_square_of_the_same_angle_turns_with_the_vector_and_stays_as_short():
+    builder = Builder()
+    cosine, sine, x, y = pair(builder)
+    square = builder.mul((cosine, form(builder, (cosine, sine), Fraction(2), Fraction(5))))
+    total = builder.add((square, builder.input("x", 1), builder.const(1)))
+    graph = builder.graph([Output("y", (3,), (x, y, total))])
+
+    assert cost(turn(graph)).mul == cost(graph).mul - 2
+    assert values_differ(graph, turn(graph)) < 1e-50
+
+
+def test_a_constant_that_can_be_carried_costs_no_product():
+    builder = Builder()
+    x, y, z = (builder.input("x", i) for i in range(3))
+    moment = builder.add((builder.mul((builder.const(2), x)), builder.mul((builder.const(3), y))))
+    users = [builder.mul((builder.const(5), moment, other)) for other in (y, z)]
+    graph = builder.graph([Output("y", (2,), tuple(users))])
+
+    assert cost(graph).mul == 6
+    assert cost(scale(graph)).mul == 4
+    assert values_differ(graph, scale(graph)) < 1e-50
+
+
+def test_results_and_arguments_of_functions_keep_their_scale():
+    builder = Builder()
+    x, y = (builder.input("x", i) for i in range(2))
+    angle = builder.add((builder.mul((builder.const(2), x)), y))
+    graph = builder.graph([Output("y", (2,), (builder.call("sin", angle), builder.mul((builder.const(3), angle))))])
+
+    assert scale(graph) == graph
