@@ -48,7 +48,8 @@ HOPELESS = 2  # passes seldom halve a cost
 class Record:
     """What is known of a kernel before it is compiled; ``digest`` names what it was made from.
 
-    ``values`` are the numbers of the hand that its graph reads when it runs; ``costs`` is its weight after each pass.
+    ``values`` are the numbers of the hand that its graph reads when it runs; ``costs`` is its weight after each pass;
+    ``inputs`` are the samples of its reference where a problem chose them.
     """
 
     digest: str
@@ -61,6 +62,7 @@ class Record:
     reference: Reference
     values: Mapping[str, Fraction] = field(default_factory=dict)
     costs: tuple[tuple[str, int], ...] = ()
+    inputs: Mapping[str, Any] = field(default_factory=dict)
 
 
 def derivation_key(kernel: Kernel, route: str) -> str:
@@ -210,9 +212,9 @@ def make_solver_record(
     functions = {family: record.function for family, record in used.items()}
     function, text = solver_function(kernel, solver, prefix, options, functions, runtime)
     problem = _problem(kernel, used)
-    exact = problem.solve(problem.sample(draw(kernel.inputs, kernel.path, options.dtype)))
+    inputs = problem.sample(draw(kernel.inputs, kernel.path, options.dtype))
     costs = (("solver", round(function.cost.weight)),)
-    return Record(digest, None, function, text, "solver", 0.0, 0.0, exact, costs=costs)
+    return Record(digest, None, function, text, "solver", 0.0, 0.0, problem.solve(inputs), costs=costs, inputs=inputs)
 
 
 def _problem(kernel: Kernel, used: Mapping[str, Record]) -> Problem:
@@ -254,9 +256,8 @@ def judge_record(
     """Levels 1 and 3 for one compiled kernel, joined with levels 2 and 4 of its record."""
     if record.graph is None:
         problem, tolerance = _problem(kernel, used), _solver(kernel).tolerance[options.scalar]
-        inputs = problem.sample(draw(kernel.inputs, kernel.path, options.dtype))
-        mirror = problem.mirror(inputs, options.math == "own")
-        return judge_solver(kernel.name, record.reference, mirror, inputs, function, tolerance, SEED)
+        mirror = problem.mirror(record.inputs, options.math == "own")
+        return judge_solver(kernel.name, record.reference, mirror, record.inputs, function, tolerance, SEED)
     return judge(
         kernel.name,
         record.graph,
