@@ -22,6 +22,7 @@ CATALOGUE = f"{PACKAGE.name}.kernels."
 EFFECTS = ""  # the name of the statements that bind none: they run whenever their module is imported
 
 
+@cache
 def code_of(*roots: Any) -> str:
     """Digest of all that these functions, classes or callable objects depend on in the package's source."""
     total = hashlib.sha256()
