@@ -10,6 +10,7 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import partial
 from typing import Any
 
 from awiwi_gen.build import load
@@ -74,7 +75,27 @@ def derivation_key(kernel: Kernel, route: str) -> str:
     return key(kernel.structure, function.__module__, name, ports, kernel.guards, code, libraries())
 
 
-def record_key(kernel: Kernel, graphs: Mapping[str, Graph], prefix: str, options: Options) -> str:
+@dataclass(frozen=True)
+class Fingerprint:
+    """What the key of a record needs of a graph, so that the graph itself is read only if the record is missing."""
+
+    digest: str
+    params: tuple[str, ...]
+    size: int
+
+
+def fingerprints(kernel: Kernel, cache: Cache) -> dict[str, Fingerprint]:
+    """Those of a kernel's derivations by all its routes."""
+
+    def taken(route: str) -> Fingerprint:
+        graph = load_graphs(kernel, cache, route)[route]
+        return Fingerprint(graph.digest, graph.params, len(graph.nodes))
+
+    keys = {route: derivation_key(kernel, route) for route in kernel.routes}
+    return {route: cache.memo("fingerprints", digest, partial(taken, route)) for route, digest in keys.items()}
+
+
+def record_key(kernel: Kernel, graphs: Mapping[str, Fingerprint], prefix: str, options: Options) -> str:
     """What a record depends on: the derivations, the numbers in them, the ports, the compiler's own code."""
     values = _values(kernel)
     used = {path: str(values[path]) for graph in graphs.values() for path in graph.params}
@@ -89,10 +110,10 @@ def solver_key(kernel: Kernel, used: Mapping[str, Record], prefix: str, options:
     return key(record_key(kernel, {}, prefix, options), *(record.digest for record in used.values()))
 
 
-def load_graphs(kernel: Kernel, cache: Cache) -> dict[str, Graph]:
-    """The derivations of a kernel by all its routes, from the cache."""
+def load_graphs(kernel: Kernel, cache: Cache, *routes: str) -> dict[str, Graph]:
+    """The derivations of a kernel by the given routes or by all, from the cache."""
     found: dict[str, Graph] = {}
-    for route in kernel.routes:
+    for route in routes or kernel.routes:
         graph = cache.get("derived", derivation_key(kernel, route))
         if not isinstance(graph, Graph):
             raise VerificationError(f"{kernel.name}: its derivation by {route} is missing from the cache")
