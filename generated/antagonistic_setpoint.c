@@ -12,7 +12,7 @@
  *   out  u_des[2] in N m
  * Returns 0 where slope 1 is positive and slope 2 is positive; elsewhere 1, and what is not defined is
  * NaN.
- * Cost: 15 add, 15 mul, 2 div, 1 neg.
+ * Cost: 15 add, 15 mul, 2 div.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
 #include "kernels.h"
@@ -22,16 +22,16 @@ int awiwi_antagonistic_setpoint(const double desired[restrict 5], const double p
     const double t0 = damping[0]*desired[1] + desired[2]*inertias[0];
     const double t1 = 0.5/slopes[0];
     const double t2 = damping[0]*desired[2] + desired[3]*inertias[0];
-    const double t3 = 0.5/slopes[1];
+    const double t3 = -0.5/slopes[1];
     const double t4 = 0.5*t0;
     const double t5 = damping[0]*desired[3] + desired[4]*inertias[0];
     x_des[0] = desired[0];
     x_des[1] = desired[1];
     x_des[2] = desired[0] + elongations[0] + t0*t1;
     x_des[3] = desired[1] + t2*t1;
-    x_des[4] = elongations[1] - desired[0] - t0*t3;
-    x_des[5] = -desired[1] - t2*t3;
+    x_des[4] = elongations[1] + t0*t3 - desired[0];
+    x_des[5] = t2*t3 - desired[1];
     u_des[0] = pretension[0] + t4 + inertias[1]*(desired[2] + t5*t1);
-    u_des[1] = pretension[0] - t4 - inertias[2]*(desired[2] + t5*t3);
+    u_des[1] = pretension[0] - t4 - inertias[2]*(desired[2] - t5*t3);
     return slopes[0] > 0.0 && slopes[1] > 0.0 ? 0 : 1;
 }

@@ -6,7 +6,7 @@
  *   in   k[2] in 1, 0.01 to 10
  *   out  u[1] in 1
  * Returns 0 where k1 is positive and k2 is positive; elsewhere 1, and what is not defined is NaN.
- * Cost: 6 add, 7 mul, 1 neg.
+ * Cost: 6 add, 7 mul.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
 #include "kernels.h"
@@ -16,6 +16,6 @@ int awiwi_backstepping_academic(const double x[restrict 2], const double k[restr
     const double t0 = x[0]*x[0];
     const double t1 = x[1] + t0;
     const double t2 = t1 - x[0]*t0;
-    u[0] = -(k[0]*t2) - k[1]*(k[0]*x[0] + t1) - x[0]*(2.0*t2 + 1.0);
+    u[0] = x[0]*(-2.0*t2 - 1.0) - k[0]*t2 - k[1]*(k[0]*x[0] + t1);
     return k[0] > 0.0 && k[1] > 0.0 ? 0 : 1;
 }

@@ -10,32 +10,35 @@
  *   out  K[4] in N m/rad, N m s/rad, 1, s
  *   out  K_cancelled[4] in N m/rad, N m s/rad, 1, s
  *   out  h[2] in 1, s
- * Cost: 11 add, 16 mul, 4 div, 1 neg.
+ * Cost: 11 add, 15 mul, 4 div, 1 neg.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
 #include "kernels.h"
 
 void awiwi_backstepping_state_gains(const double plant[restrict 3], const double gains[restrict 4], const double weights[restrict 2], double K[restrict 4], double K_cancelled[restrict 4], double h[restrict 2])
 {
-    const double t0 = plant[1]/plant[2];
-    const double t1 = gains[2]*gains[3] + weights[0]/weights[1];
-    const double t2 = gains[0]*t0*t1;
-    const double t3 = gains[2] + gains[3];
-    const double t4 = 1.0/weights[0];
-    const double t5 = t0*(gains[0]*t3 + gains[3]*t4 + gains[1]*t1);
-    const double t6 = 1.0/plant[0];
-    const double t7 = t6*(gains[0] + t4 + gains[1]*t3);
-    const double t8 = t0*(t1 + t7);
-    const double t9 = gains[1]*t6;
-    const double t10 = t0*(t3 + t9);
-    K[0] = t2;
-    K[1] = t5;
-    K[2] = t8 - (plant[0] + plant[1])*t6;
-    K[3] = t10;
-    K_cancelled[0] = t2;
-    K_cancelled[1] = t5;
-    K_cancelled[2] = t8;
-    K_cancelled[3] = t10;
-    h[0] = plant[1]*t6 - t0*t7;
-    h[1] = -(t9*t0);
+    const double t0 = 1.0/plant[2];
+    const double t1 = plant[1]*t0;
+    const double t2 = gains[2]*gains[3] + weights[0]/weights[1];
+    const double t3 = t1*t2;
+    const double t4 = gains[0]*t3;
+    const double t5 = gains[2] + gains[3];
+    const double t6 = 1.0/weights[0];
+    const double t7 = t1*(gains[0]*t5 + gains[3]*t6 + gains[1]*t2);
+    const double t8 = 1.0/plant[0];
+    const double t9 = plant[1]*t8;
+    const double t10 = t9*(1.0 - t0*(gains[0] + t6 + gains[1]*t5));
+    const double t11 = t3 - t10;
+    const double t12 = gains[1]*t8*t1;
+    const double t13 = t5*t1 + t12;
+    K[0] = t4;
+    K[1] = t7;
+    K[2] = t11 - 1.0;
+    K[3] = t13;
+    K_cancelled[0] = t4;
+    K_cancelled[1] = t7;
+    K_cancelled[2] = t9 + t11;
+    K_cancelled[3] = t13;
+    h[0] = t10;
+    h[1] = -t12;
 }

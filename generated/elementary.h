@@ -10,37 +10,51 @@
 #pragma STDC FP_CONTRACT OFF
 #endif
 
-/* x without its last 27 bits: products of two such numbers are exact. */
-static inline double awiwi_upper(double x)
+/* x with the bits that are set in kept: its upper half, whose products are exact, or nothing, or all but its sign. */
+static inline double awiwi_kept(double x, uint64_t kept)
 {
     uint64_t b;
     memcpy(&b, &x, sizeof b);
-    b = b >> 27 << 27;
+    b &= kept;
     memcpy(&x, &b, sizeof b);
     return x;
 }
 
-/* Angle of the point (x, y); NaN at the origin and at infinity. See awiwi_gen/ir/elementary.py. */
+/* x, its sign turned if that of y is negative. */
+static inline double awiwi_turned(double x, double y)
+{
+    uint64_t b, c;
+    memcpy(&b, &x, sizeof b);
+    memcpy(&c, &y, sizeof c);
+    b ^= c >> 63 << 63;
+    memcpy(&x, &b, sizeof b);
+    return x;
+}
+
+/* Angle of the point (x, y); NaN at infinity and where both are less than every normal number. See awiwi_gen/ir/elementary.py. */
 static inline double awiwi_atan2(double y, double x)
 {
-    const double down = (double)(y < 0.0), left = (double)(x < 0.0);
-    const double u = (1.0 - 2.0 * down) * y, v = (1.0 - 2.0 * left) * x;
-    const double steep = (double)(u > v);
+    const uint64_t none = 0, upper = ~none << 27, size = ~none >> 1;
+    const double one = 1.0, two = 2.0;
+    const double u = awiwi_kept(y, size), v = awiwi_kept(x, size);
     const double small = u > v ? v : u, big = u > v ? u : v;
-    const double middle = (double)(small > 0.4142135623730951 * big);
-    const double less = middle * big, more = middle * small, above = small - less, below = big + more;
+    const uint64_t is_steep = none - (u > v), is_middle = none - (small > 0.4142135623730951 * big);
+    const double less = awiwi_kept(big, is_middle), more = awiwi_kept(small, is_middle);
+    const double above = small - less, below = big + more;
+    const double inverse = one / below;
     const double lost = small - (above + less), missed = more - (below - big);
     const double r = above / below, z = r * r, zz = z * z; /* |r| <= tan(pi/8) */
-    const double rh = awiwi_upper(r), rl = r - rh, bh = awiwi_upper(below), bl = below - bh;
+    const double rh = awiwi_kept(r, upper), rl = r - rh, bh = awiwi_kept(below, upper), bl = below - bh;
     const double remainder = (((above - rh * bh) - rh * bl) - rl * bh) - rl * bl;
-    const double tail = (remainder + (lost - r * missed)) / below;
+    const double tail = (remainder + (lost - r * missed)) * inverse;
     const double bent = (-0.333333333333332 + z * 0.19999999999953683) + zz * ((-0.14285714280201212 + z * 0.11111110783599737) + zz * ((-0.09090897761107664 + z * 0.07692060281101173) + zz * ((-0.06663104964720176 + z * 0.05847897458255565) + zz * ((-0.05039348766772419 + z * 0.0380658726543648) + zz * (-0.017908857935075236)))));
     const double rest = r * (z * bent) + (tail - z * tail);
-    const double back = 1.0 - 2.0 * left, turned = 1.0 - 2.0 * steep;
-    const double quarters = 2.0 * (1.0 - back) + back * (2.0 * steep + turned * middle);
-    const double whole = quarters * 0.7853981633974483, part = back * turned * r, total = whole + part;
-    const double lower = quarters * 3.061616997868383e-17 + back * turned * rest;
-    return (1.0 - 2.0 * down) * (total + ((part - (total - whole)) + lower));
+    const double back = awiwi_turned(one, x), flat = one - awiwi_kept(two, is_steep);
+    const double sign = back * flat, middle = awiwi_kept(one, is_middle);
+    const double quarters = (two - back * (one + flat)) + sign * middle; /* of pi */
+    const double whole = quarters * 0.7853981633974483, part = sign * r, total = whole + part;
+    const double lower = quarters * 3.061616997868383e-17 + sign * rest;
+    return awiwi_turned(total + ((part - (total - whole)) + lower), y);
 }
 
 /* Arcus tangent of a finite number. */

@@ -6,7 +6,7 @@
  *   in   qd[4] in rad/s, -20 to 20
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  bias[4] in N m
- * Cost: 223 add, 250 mul, 2 div, 3 neg, 1 sqrt, 5 sincos.
+ * Cost: 223 add, 250 mul, 2 div, 1 sqrt, 5 sincos.
  * Inputs: sha256 d0df8ff241cc1ae7f3754b69e6914d3fe8fd8fd3f3a8cea2e9a7fef674657d8d.
  */
 #include <math.h>
@@ -24,7 +24,7 @@ void awiwi_fifth_bias(const double q[restrict 4], const double qd[restrict 4], c
     const double t5 = 1.0/t4;
     const double t6 = t4 + 6.475e-05;
     const double t7 = t3 - 0.012;
-    const double t8 = sqrt(-(5.625e-05*t4) - 0.25*t6*t6);
+    const double t8 = sqrt(-0.25*t6*t6 - 5.625e-05*t4);
     const double t9 = t5*(0.005*a0.sin[0]*t6 + t7*t8);
     const double t10 = 0.5*t6;
     const double t11 = 0.01*a0.sin[0];
@@ -130,23 +130,23 @@ void awiwi_fifth_bias(const double q[restrict 4], const double qd[restrict 4], c
     const double t110 = t109*t56 + t108 - t105*t62;
     const double t111 = 5.272e-07*t53 + 1.46e-05*t79 + t80*(t66 - t82) + t83*(t66 - t85) + t86*(t66 - t88) + t90*t57 + (t91 + 1.2172543764991075e-08)*t60 + t30*t94 + t95 - 8.78e-08*(t66 - t31) - t97*t55 - t99*t56 - 1.1684e-07*t25 - (t100 + t101 + 8.73e-08 - t102)*t29 - (t103 - 1.0164e-05)*t64 - (t104 - 2.08031e-06)*t62 - t105*t61 - t106*t63 - t38*t108 - t44*t110;
     const double t112 = t66 - t32;
-    const double t113 = t103 + 4.403e-08;
-    const double t114 = t58*t26;
-    const double t115 = t104 + 2.041e-08;
-    const double t116 = t79 + 0.006*(t33 - t29);
-    const double t117 = t107*t29 + t106*t36 - t116;
-    const double t118 = t91 - 2.729474562350089e-07;
-    const double t119 = g[1]*a0.sin[1] + a0.cos[1]*t92;
-    const double t120 = t119 + 0.006*(t67 - t68);
-    const double t121 = t107*t69 + t106*t68 + t120;
-    const double t122 = t86*t53 + t90*t112 + t43*(t109*t29 + t105*t41 + t117) - t118*t114 - 2.8512e-07*t68 - t102*t25 - t44*(t109*t70 + t105*t68 + t121);
-    const double t123 = t83*t53 + t115*t114 + t101*t25 + t109*t47 + t42*t117 + t122 - t99*t112 - 2.10072e-06*t68 - t105*t71 - t38*t121;
-    const double t124 = t80*t53 + t113*t114 + t100*t25 + t107*t48 + t123 - t97*t112 - 1.020803e-05*t68 - t106*t72 - t30*t120 - t37*t116;
-    const double t125 = 1.0626e-06*t27 + 5.272e-07*t112 + 8.73e-08*t25 + 0.006*(t73 + t49) + t124 - 8.78e-08*t53 - 8.79e-05*t79 - 5.313e-07*t68;
+    const double t113 = g[1]*a0.sin[1] + a0.cos[1]*t92;
+    const double t114 = t113 + 0.006*(t67 - t68);
+    const double t115 = t79 + 0.006*(t33 - t29);
+    const double t116 = t103 + 4.403e-08;
+    const double t117 = t58*t26;
+    const double t118 = t104 + 2.041e-08;
+    const double t119 = t107*t29 + t106*t36 - t115;
+    const double t120 = t91 - 2.729474562350089e-07;
+    const double t121 = t107*t69 + t106*t68 + t114;
+    const double t122 = t86*t53 + t90*t112 + t43*(t109*t29 + t105*t41 + t119) - t120*t117 - 2.8512e-07*t68 - t102*t25 - t44*(t109*t70 + t105*t68 + t121);
+    const double t123 = t83*t53 + t118*t117 + t101*t25 + t109*t47 + t42*t119 + t122 - t99*t112 - 2.10072e-06*t68 - t105*t71 - t38*t121;
+    const double t124 = t97*t112 + 1.020803e-05*t68 + t106*t72 + t30*t114 + t37*t115 - t80*t53 - t116*t117 - t100*t25 - t107*t48 - t123;
+    const double t125 = 1.0626e-06*t27 + 5.272e-07*t112 + 8.73e-08*t25 + 0.006*(t73 + t49) - t124 - 8.78e-08*t53 - 8.79e-05*t79 - 5.313e-07*t68;
     const double t126 = 0.000203*(g[0]*a0.sin[0] - g[2]*a0.cos[0]) + t3*(t13*t51 - t52*t74) + t11*(t52*t51 + t13*t74) + t17*(7.12e-05*t77 - 0.0001068*t78 - 1.0652e-06*t21 - 0.004*t50 - a0.sin[1]*t111 - a0.cos[1]*t125);
-    const double t127 = 4.1446e-07*t53 + 8.73e-08*(t18*(a0.cos[1]*t22 - a0.sin[1]*t26)) + t113*t55 + t102*(t32 - t88) + t115*t56 + 1.46e-05*t119 + 5.272e-07*t59 + (t80 + t83 + t86 - 8.78e-08)*t68 + t90*t60 + t109*t61 + t107*t63 + t42*t108 + t95 + t43*t110 - t100*(t32 - t82) - t101*(t32 - t85) - t118*t57 - 8.79e-05*t93 - t97*t64 - t99*t62 - t37*t94;
+    const double t127 = 4.1446e-07*t53 + 8.73e-08*(t18*(a0.cos[1]*t22 - a0.sin[1]*t26)) + t116*t55 + t102*(t32 - t88) + t118*t56 + 1.46e-05*t113 + 5.272e-07*t59 + (t80 + t83 + t86 - 8.78e-08)*t68 + t90*t60 + t109*t61 + t107*t63 + t42*t108 + t95 + t43*t110 - t100*(t32 - t82) - t101*(t32 - t85) - t120*t57 - 8.79e-05*t93 - t97*t64 - t99*t62 - t37*t94;
     bias[0] = t126;
     bias[1] = t127;
-    bias[2] = -t124;
-    bias[3] = -t123 - 0.7692307692307693*t122;
+    bias[2] = t124;
+    bias[3] = -0.7692307692307693*t122 - t123;
 }

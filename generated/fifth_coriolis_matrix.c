@@ -5,7 +5,7 @@
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   in   qd[4] in rad/s, -20 to 20
  *   out  C[4][4] in N m s/rad
- * Cost: 309 add, 359 mul, 2 div, 6 neg, 1 sqrt, 5 sincos.
+ * Cost: 309 add, 359 mul, 2 div, 2 neg, 1 sqrt, 5 sincos.
  * Inputs: sha256 1b4f2a45bcee4bea15ec85840eb1f3dc49fd8ba8ccf8ee50af2ad1ca522f359a.
  */
 #include <math.h>
@@ -29,7 +29,7 @@ void awiwi_fifth_coriolis_matrix(const double q[restrict 4], const double qd[res
     const double t11 = 1.0/t10;
     const double t12 = t10 + 6.475e-05;
     const double t13 = t3 - 0.012;
-    const double t14 = sqrt(-(5.625e-05*t10) - 0.25*t12*t12);
+    const double t14 = sqrt(-0.25*t12*t12 - 5.625e-05*t10);
     const double t15 = t11*(0.005*a0.sin[0]*t12 + t13*t14);
     const double t16 = 0.5*t12;
     const double t17 = 0.01*a0.sin[0];
@@ -142,47 +142,47 @@ void awiwi_fifth_coriolis_matrix(const double q[restrict 4], const double qd[res
     const double t123 = t97*t121;
     const double t124 = t97*t120;
     const double t125 = 0.004*t122 + a1.sin*(qd[1]*t75 + t70 - 1.1684e-07*t120 - t123) - a1.cos*(qd[1]*t87 - t124 - t102*t121);
-    const double t126 = t67 + t8*t120;
-    const double t127 = t47 + t24*t120;
-    const double t128 = qd[1]*t8 - t24*t121;
-    const double t129 = a1.cos*t127 - a1.sin*t128;
-    const double t130 = t107 + t92;
-    const double t131 = t66 - t111 - t63;
-    const double t132 = t69 + t131 - t113;
-    const double t133 = t84*t121;
-    const double t134 = 0.006*t128;
-    const double t135 = 0.004*t126 + a1.cos*(t130 + 0.006*(t126 + t127)) - a1.sin*(t105 + qd[1]*t132 + t74*t120 + t133 + t134);
-    const double t136 = t62 + t6*t120;
-    const double t137 = t65 + t7*t120 + 0.7692307692307693*t136;
-    const double t138 = t45 + t22*t120;
-    const double t139 = t46 + t23*t120 + 0.7692307692307693*t138;
+    const double t126 = t66 - t111 - t63;
+    const double t127 = t69 + t126 - t113;
+    const double t128 = t84*t121;
+    const double t129 = qd[1]*t8 - t24*t121;
+    const double t130 = 0.006*t129;
+    const double t131 = t67 + t8*t120;
+    const double t132 = t107 + t92;
+    const double t133 = t47 + t24*t120;
+    const double t134 = a1.sin*(t105 + qd[1]*t127 + t74*t120 + t128 + t130) - 0.004*t131 - a1.cos*(t132 + 0.006*(t131 + t133));
+    const double t135 = a1.cos*t133 - a1.sin*t129;
+    const double t136 = 5.772486465986733e-08*a0.cos[3];
+    const double t137 = t41 + t120;
+    const double t138 = 0.7692307692307693*t121;
+    const double t139 = t83*t121 - t82*t138;
     const double t140 = qd[1]*t6 - t22*t121;
     const double t141 = qd[1]*t7 + 0.7692307692307693*t140 - t23*t121;
-    const double t142 = a1.cos*t139 - a1.sin*t141;
-    const double t143 = t106 + t91;
-    const double t144 = 0.016923076923076923*a0.cos[2];
-    const double t145 = 0.016923076923076923*a0.sin[2];
-    const double t146 = t144*t136 - t145*t138;
-    const double t147 = t143 + t146 + t52*t137 - t64*t139;
-    const double t148 = 5.772486465986733e-08*a0.cos[3];
-    const double t149 = t41 + t120;
-    const double t150 = 0.7692307692307693*t121;
-    const double t151 = t83*t121 - t82*t150;
-    const double t152 = 0.006*t141;
-    const double t153 = 0.7692307692307693*qd[1];
-    const double t154 = 0.004*t137 + a1.cos*(t147 + 0.006*(t137 + t139)) - a1.sin*(t104 + qd[1]*t131 + t73*t120 + t148*t149 + t151 + t152 - t153*t63 - t145*t140 - t64*t141);
+    const double t142 = 0.006*t141;
+    const double t143 = 0.7692307692307693*qd[1];
+    const double t144 = 0.016923076923076923*a0.sin[2];
+    const double t145 = t62 + t6*t120;
+    const double t146 = t65 + t7*t120 + 0.7692307692307693*t145;
+    const double t147 = t45 + t22*t120;
+    const double t148 = t46 + t23*t120 + 0.7692307692307693*t147;
+    const double t149 = t106 + t91;
+    const double t150 = 0.016923076923076923*a0.cos[2];
+    const double t151 = t150*t145 - t144*t147;
+    const double t152 = t64*t148 - t149 - t151 - t52*t146;
+    const double t153 = a1.sin*(t104 + qd[1]*t126 + t73*t120 + t136*t137 + t139 + t142 - t143*t63 - t144*t140 - t64*t141) - 0.004*t146 - a1.cos*(0.006*(t146 + t148) - t152);
+    const double t154 = a1.cos*t148 - a1.sin*t141;
     const double t155 = qd[0]*t3;
     const double t156 = qd[0]*t17;
     const double t157 = t93*(t155*t19 + t156*t29) + t36*(0.004*t93*t37 + a1.cos*(t44 + t124 - 1.1684e-07*t121) + a1.sin*(t60 + t102*t120 - t123)) - t88*t115;
     const double t158 = qd[1]*t84 - t96*t120;
-    const double t159 = t153*t82 - qd[1]*t83;
+    const double t159 = t143*t82 - qd[1]*t83;
     const double t160 = 5.772486465986733e-08*a0.sin[3];
     const double t161 = a1.cos*t8;
     const double t162 = t114 - t86;
     const double t163 = 0.004*t120;
     const double t164 = 0.006*t120;
     const double t165 = 0.006*(qd[1] - t121);
-    const double t166 = t8*t163 - a1.cos*(qd[1]*t96 + t130 + t74*t121 - (t8 + t24)*t164) - a1.sin*(qd[1]*t101 + t133 + t24*t165);
+    const double t166 = t8*t163 - a1.cos*(qd[1]*t96 + t132 + t74*t121 - (t8 + t24)*t164) - a1.sin*(qd[1]*t101 + t128 + t24*t165);
     const double t167 = t155*(t24*t29 + t161*t19) + (a1.sin*t96 - 0.004*t24 - a1.cos*t162)*t115 + t36*t166 - t156*(t24*t19 - t161*t29);
     const double t168 = 0.7692307692307693*t22;
     const double t169 = t23 + t168;
@@ -190,27 +190,27 @@ void awiwi_fifth_coriolis_matrix(const double q[restrict 4], const double qd[res
     const double t171 = t7 + t170;
     const double t172 = a1.cos*t171;
     const double t173 = t160 - t95;
-    const double t174 = (t144*t6 - t145*t22)*(t39 + t120) - t143;
+    const double t174 = (t150*t6 - t144*t22)*(t39 + t120) - t149;
     const double t175 = (t52*t171 - t64*t169)*(qd[2] + t120) + t174;
     const double t176 = qd[1]*t48 + t61*t121;
     const double t177 = qd[1]*t52 + t64*t121 + t165;
-    const double t178 = t171*t163 + a1.cos*(qd[1]*t173 + (t171 + t169)*t164 + t175 - (t148 + t73)*t121) + a1.sin*(t153*t59 - qd[1]*t100 - t151 - t168*t176 - t169*t177);
-    const double t179 = t144*t22 + t145*t6 + t112 + t52*t169 + t64*t171 + 2.1932307692307691e-07 - 0.006*(t171 - t169);
+    const double t178 = t171*t163 + a1.cos*(qd[1]*t173 + (t171 + t169)*t164 + t175 - (t136 + t73)*t121) + a1.sin*(t143*t59 - qd[1]*t100 - t139 - t168*t176 - t169*t177);
+    const double t179 = t150*t22 + t144*t6 + t112 + t52*t169 + t64*t171 + 2.1932307692307691e-07 - 0.006*(t171 - t169);
     const double t180 = t155*(t169*t29 + t172*t19) + t36*t178 - t156*(t169*t19 - t172*t29) - (a1.sin*t173 + 0.004*t169 + a1.cos*t179)*t115;
     C[0] = t118;
     C[1] = t17*(t119*t19 - t29*t122) - t3*(t119*t29 + t19*t122) - t36*t125;
-    C[2] = -(t3*(t19*t126 + t29*t129)) - t17*(t29*t126 - t19*t129) - t36*t135;
-    C[3] = -(t3*(t19*t137 + t29*t142)) - t17*(t29*t137 - t19*t142) - t36*t154;
+    C[2] = t36*t134 - t3*(t19*t131 + t29*t135) - t17*(t29*t131 - t19*t135);
+    C[3] = t36*t153 - t3*(t19*t146 + t29*t154) - t17*(t29*t146 - t19*t154);
     C[4] = t157;
     C[5] = -t108;
-    C[6] = t44 + t101*t121 - t158 - t134;
-    C[7] = t43 + t159 + t95*t120 + t100*t121 - t160*t149 - t59*t150 - t144*t140 - t152 - t52*t141;
+    C[6] = t44 + t101*t121 - t158 - t130;
+    C[7] = t43 + t159 + t95*t120 + t100*t121 - t160*t137 - t59*t138 - t150*t140 - t142 - t52*t141;
     C[8] = t167;
-    C[9] = t158 + t8*t165 - (t132 + t162)*t121;
-    C[10] = -t130;
-    C[11] = -t147;
+    C[9] = t158 + t8*t165 - (t127 + t162)*t121;
+    C[10] = -t132;
+    C[11] = t152;
     C[12] = t180;
-    C[13] = t173*t120 + t63*t150 + t170*t176 + t171*t177 - t159 - (t131 + t179)*t121;
+    C[13] = t173*t120 + t63*t138 + t170*t176 + t171*t177 - t159 - (t126 + t179)*t121;
     C[14] = t175;
-    C[15] = t174 - t146;
+    C[15] = t174 - t151;
 }

@@ -8,7 +8,7 @@
  *   out  M[4][4] in kg m^2
  *   out  C[4][4] in N m s/rad
  *   out  gravity[4] in N m
- * Cost: 339 add, 401 mul, 2 div, 6 neg, 1 sqrt, 5 sincos.
+ * Cost: 339 add, 401 mul, 2 div, 2 neg, 1 sqrt, 5 sincos.
  * Inputs: sha256 1b4f2a45bcee4bea15ec85840eb1f3dc49fd8ba8ccf8ee50af2ad1ca522f359a.
  */
 #include <math.h>
@@ -64,7 +64,7 @@ void awiwi_fifth_dynamics(const double q[restrict 4], const double qd[restrict 4
     const awiwi_turn a1 = awiwi_sincos(t2);
     const double t43 = 0.00024*a1.cos - 0.000244;
     const double t44 = t43 + 6.475e-05;
-    const double t45 = sqrt(-(5.625e-05*t43) - 0.25*t44*t44);
+    const double t45 = sqrt(-0.25*t44*t44 - 5.625e-05*t43);
     const double t46 = 1.0/t45;
     const double t47 = 0.01*a1.cos;
     const double t48 = 1.0/t43;
@@ -176,45 +176,45 @@ void awiwi_fifth_dynamics(const double q[restrict 4], const double qd[restrict 4
     const double t154 = t40*t152;
     const double t155 = t40*t151;
     const double t156 = 0.004*t153 + a0.sin[3]*(qd[1]*t70 + t133 - 1.1684e-07*t151 - t154) - a0.cos[3]*(qd[1]*t85 - t155 - t32*t152);
-    const double t157 = t131 + t16*t151;
-    const double t158 = t126 + t18*t151;
-    const double t159 = qd[1]*t16 - t18*t152;
-    const double t160 = a0.cos[3]*t158 - a0.sin[3]*t159;
+    const double t157 = t83*t152;
+    const double t158 = qd[1]*t16 - t18*t152;
+    const double t159 = 0.006*t158;
+    const double t160 = t131 + t16*t151;
     const double t161 = t142 + t137;
-    const double t162 = t83*t152;
-    const double t163 = 0.006*t159;
-    const double t164 = 0.004*t157 + a0.cos[3]*(t161 + 0.006*(t157 + t158)) - a0.sin[3]*(t140 + qd[1]*t115 + t69*t151 + t162 + t163);
-    const double t165 = t129 + t5*t151;
-    const double t166 = t130 + t12*t151 + 0.7692307692307693*t165;
-    const double t167 = t124 + t3*t151;
-    const double t168 = t125 + t9*t151 + 0.7692307692307693*t167;
-    const double t169 = qd[1]*t5 - t3*t152;
-    const double t170 = qd[1]*t12 + 0.7692307692307693*t169 - t9*t152;
-    const double t171 = a0.cos[3]*t168 - a0.sin[3]*t170;
-    const double t172 = t141 + t136;
-    const double t173 = t104*t165 - t105*t167;
-    const double t174 = t172 + t173 + t74*t166 - t71*t168;
-    const double t175 = t120 + t151;
-    const double t176 = 0.7692307692307693*t152;
-    const double t177 = t82*t152 - t81*t176;
-    const double t178 = 0.006*t170;
-    const double t179 = 0.7692307692307693*qd[1];
-    const double t180 = a0.sin[3]*(t139 + qd[1]*t114 + t68*t151 + t116*t175 + t177 + t178 - t179*t113 - t105*t169 - t71*t170);
-    const double t181 = -(t47*(t61*t166 + t59*t171)) - t51*(t59*t166 - t61*t171) - t57*(0.004*t166 + a0.cos[3]*(t174 + 0.006*(t166 + t168)) - t180);
+    const double t162 = t126 + t18*t151;
+    const double t163 = a0.sin[3]*(t140 + qd[1]*t115 + t69*t151 + t157 + t159) - 0.004*t160 - a0.cos[3]*(t161 + 0.006*(t160 + t162));
+    const double t164 = a0.cos[3]*t162 - a0.sin[3]*t158;
+    const double t165 = t120 + t151;
+    const double t166 = 0.7692307692307693*t152;
+    const double t167 = t82*t152 - t81*t166;
+    const double t168 = qd[1]*t5 - t3*t152;
+    const double t169 = qd[1]*t12 + 0.7692307692307693*t168 - t9*t152;
+    const double t170 = 0.006*t169;
+    const double t171 = 0.7692307692307693*qd[1];
+    const double t172 = a0.sin[3]*(t139 + qd[1]*t114 + t68*t151 + t116*t165 + t167 + t170 - t171*t113 - t105*t168 - t71*t169);
+    const double t173 = t129 + t5*t151;
+    const double t174 = t130 + t12*t151 + 0.7692307692307693*t173;
+    const double t175 = t124 + t3*t151;
+    const double t176 = t125 + t9*t151 + 0.7692307692307693*t175;
+    const double t177 = t141 + t136;
+    const double t178 = t104*t173 - t105*t175;
+    const double t179 = t71*t176 - t177 - t178 - t74*t174;
+    const double t180 = a0.cos[3]*t176 - a0.sin[3]*t169;
+    const double t181 = t57*(t172 - 0.004*t174 - a0.cos[3]*(0.006*(t174 + t176) - t179)) - t47*(t61*t174 + t59*t180) - t51*(t59*t174 - t61*t180);
     const double t182 = qd[0]*t47;
     const double t183 = qd[0]*t51;
     const double t184 = t57*(0.004*t64*t118 + a0.cos[3]*(t123 + t155 - 1.1684e-07*t152) + a0.sin[3]*(t128 + t32*t151 - t154));
     const double t185 = qd[1]*t83 - t39*t151;
-    const double t186 = t179*t81 - qd[1]*t82;
+    const double t186 = t171*t81 - qd[1]*t82;
     const double t187 = 0.004*t151;
     const double t188 = 0.006*t151;
     const double t189 = 0.006*(qd[1] - t152);
-    const double t190 = t16*t187 - a0.cos[3]*(qd[1]*t39 + t161 + t69*t152 - (t16 + t18)*t188) - a0.sin[3]*(qd[1]*t31 + t162 + t18*t189);
-    const double t191 = (t104*t5 - t105*t3)*(t119 + t151) - t172;
+    const double t190 = t16*t187 - a0.cos[3]*(qd[1]*t39 + t161 + t69*t152 - (t16 + t18)*t188) - a0.sin[3]*(qd[1]*t31 + t157 + t18*t189);
+    const double t191 = (t104*t5 - t105*t3)*(t119 + t151) - t177;
     const double t192 = (t74*t98 - t71*t96)*(qd[2] + t151) + t191;
     const double t193 = qd[1]*t79 + t76*t152;
     const double t194 = qd[1]*t74 + t71*t152 + t189;
-    const double t195 = t98*t187 + a0.cos[3]*(qd[1]*t103 + (t98 + t96)*t188 + t192 - t117*t152) + a0.sin[3]*(t179*t29 - qd[1]*t30 - t177 - t95*t193 - t96*t194);
+    const double t195 = t98*t187 + a0.cos[3]*(qd[1]*t103 + (t98 + t96)*t188 + t192 - t117*t152) + a0.sin[3]*(t171*t29 - qd[1]*t30 - t167 - t95*t193 - t96*t194);
     const double t196 = g[0]*t61 + g[2]*t59;
     const double t197 = g[0]*t59 - g[2]*t61;
     const double t198 = g[1]*a0.sin[3] + a0.cos[3]*t196;
@@ -236,20 +236,20 @@ void awiwi_fifth_dynamics(const double q[restrict 4], const double qd[restrict 4
     M[15] = t7 + 2.0*t106 + 1.6871005917159763e-07;
     C[0] = t149;
     C[1] = t51*(t150*t61 - t59*t153) - t47*(t150*t59 + t61*t153) - t57*t156;
-    C[2] = -(t47*(t61*t157 + t59*t160)) - t51*(t59*t157 - t61*t160) - t57*t164;
+    C[2] = t57*t163 - t47*(t61*t160 + t59*t164) - t51*(t59*t160 - t61*t164);
     C[3] = t181;
     C[4] = t182*t65 + t183*t87 + t184 - t86*t146;
     C[5] = -t143;
-    C[6] = t123 + t31*t152 - t185 - t163;
-    C[7] = t122 + t186 + t38*t151 + t30*t152 - t102*t175 - t29*t176 - t104*t169 - t178 - t74*t170;
+    C[6] = t123 + t31*t152 - t185 - t159;
+    C[7] = t122 + t186 + t38*t151 + t30*t152 - t102*t165 - t29*t166 - t104*t168 - t170 - t74*t169;
     C[8] = t182*t91 + t93*t146 + t57*t190 - t183*t90;
     C[9] = t185 + t16*t189 - (t115 + t92)*t152;
     C[10] = -t161;
-    C[11] = -t174;
+    C[11] = t179;
     C[12] = t182*t101 + t57*t195 - t183*t100 - t109*t146;
-    C[13] = t103*t151 + t113*t176 + t97*t193 + t98*t194 - t186 - (t114 + t108)*t152;
+    C[13] = t103*t151 + t113*t166 + t97*t193 + t98*t194 - t186 - (t114 + t108)*t152;
     C[14] = t192;
-    C[15] = t191 - t173;
+    C[15] = t191 - t178;
     gravity[0] = g[0]*(0.000203*a1.sin + t63) + t56*(t58*t196 - t60*t197) - g[2]*(0.000203*a1.cos - t62);
     gravity[1] = 1.46e-05*t198 - t33*(g[1]*a0.cos[3] - a0.sin[3]*t196);
     gravity[2] = t18*t197 + t16*t198;

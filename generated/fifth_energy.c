@@ -7,7 +7,7 @@
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  kinetic[1] in J
  *   out  potential[1] in J
- * Cost: 133 add, 166 mul, 2 div, 1 neg, 1 sqrt, 5 sincos.
+ * Cost: 133 add, 166 mul, 2 div, 1 sqrt, 5 sincos.
  * Inputs: sha256 82c94b8f69f95d4e333edef1e77b9be9e828f140a78270df43f42bcfcd69897c.
  */
 #include <math.h>
@@ -54,7 +54,7 @@ void awiwi_fifth_energy(const double q[restrict 4], const double qd[restrict 4],
     const double t33 = 1.0/t32;
     const double t34 = t32 + 6.475e-05;
     const double t35 = t31 - 0.012;
-    const double t36 = sqrt(-(5.625e-05*t32) - 0.25*t34*t34);
+    const double t36 = sqrt(-0.25*t34*t34 - 5.625e-05*t32);
     const double t37 = t33*(0.005*a1.sin*t34 + t35*t36);
     const double t38 = 0.01*a1.sin;
     const double t39 = t33*(0.5*t35*t34 - t38*t36);

@@ -4,7 +4,7 @@
  * Source: eq. 5.2, 5.3, table 5.1.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   out  T[4][4] in 1, m
- * Cost: 28 add, 46 mul, 1 div, 4 neg, 1 sqrt, 5 sincos.
+ * Cost: 28 add, 46 mul, 1 div, 3 neg, 1 sqrt, 5 sincos.
  * Inputs: sha256 28edf41a51f84ef24222facbdc6e1021f809ccdd8b122d41df2ba55b8d1b95d9.
  */
 #include <math.h>
@@ -23,7 +23,7 @@ void awiwi_fifth_fingertip_pose(const double q[restrict 4], double T[restrict 16
     const double t6 = t4 + 0.26979166666666665;
     const double t7 = 0.01*a0.cos[2];
     const double t8 = t7 - 0.012;
-    const double t9 = sqrt(-(1.35e-08*t4) - 1.44e-08*t6*t6);
+    const double t9 = sqrt(-1.44e-08*t6*t6 - 1.35e-08*t4);
     const double t10 = 1.2e-06*a0.sin[2]*t6 + t8*t9;
     const double t11 = t6*t8 - 83.33333333333333*a0.sin[2]*t9;
     const double t12 = t5*(479784.442228385*t10 + 33.610469291294464*t11);

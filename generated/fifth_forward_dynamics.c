@@ -7,7 +7,7 @@
  *   in   tau[4] in N m, -1 to 1
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  qdd[4] in rad/s^2
- * Cost: 329 add, 355 mul, 6 div, 2 neg, 1 sqrt, 5 sincos.
+ * Cost: 329 add, 355 mul, 6 div, 1 neg, 1 sqrt, 5 sincos.
  * Inputs: sha256 1718087ca49bffea2cbf8b94cea197715d11a5dc4952832196147295c859c88c.
  */
 #include <math.h>
@@ -73,7 +73,7 @@ void awiwi_fifth_forward_dynamics(const double q[restrict 4], const double qd[re
     const double t52 = 1.0/t51;
     const double t53 = t51 + 6.475e-05;
     const double t54 = t50 - 0.012;
-    const double t55 = sqrt(-(5.625e-05*t51) - 0.25*t53*t53);
+    const double t55 = sqrt(-0.25*t53*t53 - 5.625e-05*t51);
     const double t56 = t52*(0.005*a1.sin*t53 + t54*t55);
     const double t57 = 0.5*t53;
     const double t58 = 0.01*a1.sin;

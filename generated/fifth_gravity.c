@@ -5,7 +5,7 @@
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  gravity[4] in N m
- * Cost: 41 add, 55 mul, 2 div, 1 neg, 1 sqrt, 5 sincos.
+ * Cost: 41 add, 55 mul, 2 div, 1 sqrt, 5 sincos.
  * Inputs: sha256 510cc29c516f948798433eb3b40aa4ff4fd7af8989efae96a8696b05c3c6c657.
  */
 #include <math.h>
@@ -28,7 +28,7 @@ void awiwi_fifth_gravity(const double q[restrict 4], const double g[restrict 3],
     const double t10 = 1.0/t9;
     const double t11 = t9 + 3.2375e-05;
     const double t12 = a0.cos[0] - 1.2;
-    const double t13 = sqrt(-(0.0001125*t9) - t11*t11);
+    const double t13 = sqrt(-0.0001125*t9 - t11*t11);
     const double t14 = a0.sin[0]*t11 + t12*t13;
     const double t15 = t12*t11 - a0.sin[0]*t13;
     const double t16 = t10*(0.575741330674062*t14 + 0.33610469291294465*t15);

@@ -11,7 +11,7 @@
  *   out  rocker_ratio[1] in 1
  *   out  transmission[1] in 1
  * Returns 0 where the loop closes; elsewhere 1, and what is not defined is NaN.
- * Cost: 15 add, 25 mul, 2 div, 4 neg, 1 sqrt, 1 sincos, 2 calls.
+ * Cost: 15 add, 25 mul, 2 div, 1 sqrt, 1 sincos, 2 calls.
  * Inputs: sha256 d021538d8900d42317b84036df325beebaa6feecad7df8e1e869f0ec5a1f0d9f.
  */
 #include <math.h>
@@ -29,19 +29,19 @@ int awiwi_fifth_hmc_four_bar(const double q[restrict 1], double coupler[restrict
     const double t4 = 0.5*(t1 - 5.625e-05 + 0.000121);
     const double t5 = 0.01*a0.cos;
     const double t6 = t5 - 0.012;
-    const double t7 = sqrt(-(5.625e-05*t1) - t4*t4);
+    const double t7 = sqrt(-5.625e-05*t1 - t4*t4);
     const double t8 = t2*(t3*t4 + t6*t7);
-    const double t9 = 133.33333333333334*t8;
+    const double t9 = -133.33333333333334*t8;
     const double t10 = t2*(t6*t4 - t3*t7);
-    const double t11 = 133.33333333333334*t10;
+    const double t11 = -133.33333333333334*t10;
     const double t12 = 90.9090909090909*(t3 - t8);
     const double t13 = 90.9090909090909*(t6 - t10);
     const double t14 = 1.0/t7;
-    const double t15 = t5*t8 - t3*t10;
-    coupler[0] = awiwi_atan2(-t9, -t11);
+    const double t15 = t3*t10 - t5*t8;
+    coupler[0] = awiwi_atan2(t9, t11);
     rocker[0] = awiwi_atan2(t12, t13);
-    coupler_ratio[0] = t14*(0.00012*a0.sin - t15);
-    rocker_ratio[0] = -(t14*t15);
-    transmission[0] = t11*t12 - t9*t13;
+    coupler_ratio[0] = t14*(0.00012*a0.sin + t15);
+    rocker_ratio[0] = t14*t15;
+    transmission[0] = t9*t13 - t11*t12;
     return -36730945.82185491*((t1 + 1.225e-05)*(t1 + 0.00034225)) > 0.0 ? 0 : 1;
 }

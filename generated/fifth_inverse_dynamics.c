@@ -7,7 +7,7 @@
  *   in   qdd[4] in rad/s^2, -2000 to 2000
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  tau[4] in N m
- * Cost: 238 add, 262 mul, 2 div, 2 neg, 1 sqrt, 5 sincos.
+ * Cost: 238 add, 262 mul, 2 div, 1 sqrt, 5 sincos.
  * Inputs: sha256 d0df8ff241cc1ae7f3754b69e6914d3fe8fd8fd3f3a8cea2e9a7fef674657d8d.
  */
 #include <math.h>
@@ -25,7 +25,7 @@ void awiwi_fifth_inverse_dynamics(const double q[restrict 4], const double qd[re
     const double t5 = 1.0/t4;
     const double t6 = t4 + 6.475e-05;
     const double t7 = t3 - 0.012;
-    const double t8 = sqrt(-(5.625e-05*t4) - 0.25*t6*t6);
+    const double t8 = sqrt(-0.25*t6*t6 - 5.625e-05*t4);
     const double t9 = t5*(0.005*a0.sin[0]*t6 + t7*t8);
     const double t10 = 0.5*t6;
     const double t11 = 0.01*a0.sin[0];
@@ -141,23 +141,23 @@ void awiwi_fifth_inverse_dynamics(const double q[restrict 4], const double qd[re
     const double t120 = t119*t74 + t118 - t115*t80;
     const double t121 = 5.272e-07*t71 + 1.46e-05*t89 + t90*(t60 - t92) + t93*(t60 - t95) + t96*(t60 - t98) + t100*t75 + t101*t53 + t102*t50 + (t103 + 1.2172543764991075e-08)*t78 + t30*t106 + t107 - 8.78e-08*(t60 - t31) - t109*t73 - t111*t74 - 1.1684e-07*t25 - 8.73e-08*t29 - (t112 - 1.0164e-05)*t82 - t113*t47 - (t114 - 2.08031e-06)*t80 - t115*t79 - t116*t81 - t37*t118 - t41*t120;
     const double t122 = t60 - t32;
-    const double t123 = t112 + 4.403e-08;
-    const double t124 = t76*t26;
-    const double t125 = t114 + 2.041e-08;
-    const double t126 = t89 + 0.006*(t33 - t29);
-    const double t127 = t116*t36 - t117*t53 - t126;
-    const double t128 = g[1]*a0.sin[1] + a0.cos[1]*t104;
-    const double t129 = t128 + 0.006*(t61 - t63);
-    const double t130 = t117*t62 + t116*t64 + t129;
+    const double t123 = g[1]*a0.sin[1] + a0.cos[1]*t104;
+    const double t124 = t123 + 0.006*(t61 - t63);
+    const double t125 = t89 + 0.006*(t33 - t29);
+    const double t126 = t112 + 4.403e-08;
+    const double t127 = t76*t26;
+    const double t128 = t114 + 2.041e-08;
+    const double t129 = t116*t36 - t117*t53 - t125;
+    const double t130 = t117*t62 + t116*t64 + t124;
     const double t131 = t103 - 2.729474562350089e-07;
-    const double t132 = t131*t124 + t96*t59 + t113*t25 + 2.8512e-07*t67 + t41*(t119*t65 + t115*t66 + t130) - t100*t122 - t44*(t115*t40 + t127 - t119*t50);
-    const double t133 = t125*t124 + t102*t25 + t119*t48 + t49*t127 - t93*t59 - t111*t122 - 2.10072e-06*t66 - t115*t68 - t37*t130 - t132;
-    const double t134 = t123*t124 + t101*t25 + t117*t51 + t133 - t90*t59 - t109*t122 - 1.020803e-05*t64 - t30*t129 - t52*t126 - t116*t69;
-    const double t135 = 1.0626e-06*t27 + 8.78e-08*t59 + 5.272e-07*t122 + 8.73e-08*t25 + 0.006*(t54 + t70) + t134 - 8.79e-05*t89 - 5.313e-07*t63;
+    const double t132 = t131*t127 + t96*t59 + t113*t25 + 2.8512e-07*t67 + t41*(t119*t65 + t115*t66 + t130) - t100*t122 - t44*(t115*t40 + t129 - t119*t50);
+    const double t133 = t128*t127 + t102*t25 + t119*t48 + t49*t129 - t93*t59 - t111*t122 - 2.10072e-06*t66 - t115*t68 - t37*t130 - t132;
+    const double t134 = t90*t59 + t109*t122 + 1.020803e-05*t64 + t30*t124 + t52*t125 + t116*t69 - t126*t127 - t101*t25 - t117*t51 - t133;
+    const double t135 = 1.0626e-06*t27 + 8.78e-08*t59 + 5.272e-07*t122 + 8.73e-08*t25 + 0.006*(t54 + t70) - t134 - 8.79e-05*t89 - 5.313e-07*t63;
     const double t136 = 2.03e-06*qdd[0] + 0.000203*(g[0]*a0.sin[0] - g[2]*a0.cos[0]) + t3*(t13*t56 - t57*t84) + t11*(t57*t56 + t13*t84) + t17*(7.12e-05*t87 + 1.0652e-06*t21 - 0.0001068*t88 - 0.004*t55 - a0.sin[1]*t121 - a0.cos[1]*t135);
-    const double t137 = 1.1684e-07*t59 + 5.313e-07*t71 + 8.73e-08*(t18*(a0.cos[1]*t22 - a0.sin[1]*t26)) + t123*t73 + t113*(t32 - t98) + t125*t74 + 1.46e-05*t128 + 5.272e-07*t77 + t90*t64 + t93*t66 + t96*t67 + t100*t78 + t119*t79 + t117*t81 + t49*t118 + t107 + t44*t120 - t101*(t32 - t92) - t102*(t32 - t95) - t131*t75 - 8.79e-05*t105 - 8.78e-08*t63 - t109*t82 - t111*t80 - t52*t106;
+    const double t137 = 1.1684e-07*t59 + 5.313e-07*t71 + 8.73e-08*(t18*(a0.cos[1]*t22 - a0.sin[1]*t26)) + t126*t73 + t113*(t32 - t98) + t128*t74 + 1.46e-05*t123 + 5.272e-07*t77 + t90*t64 + t93*t66 + t96*t67 + t100*t78 + t119*t79 + t117*t81 + t49*t118 + t107 + t44*t120 - t101*(t32 - t92) - t102*(t32 - t95) - t131*t75 - 8.79e-05*t105 - 8.78e-08*t63 - t109*t82 - t111*t80 - t52*t106;
     tau[0] = t136;
     tau[1] = t137;
-    tau[2] = -t134;
+    tau[2] = t134;
     tau[3] = 0.7692307692307693*t132 - t133;
 }

@@ -4,7 +4,7 @@
  * Source: eq. 5.3, differentiated.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   out  J[6][4] in m/rad, 1
- * Cost: 33 add, 59 mul, 2 div, 12 neg, 1 sqrt, 5 sincos.
+ * Cost: 33 add, 59 mul, 2 div, 4 neg, 1 sqrt, 5 sincos.
  * Inputs: sha256 41e0b066350c1515c23653124cb3764011a2af2cb74c560413362bf44f18b5d9.
  */
 #include <math.h>
@@ -23,13 +23,13 @@ void awiwi_fifth_jacobian(const double q[restrict 4], double J[restrict 24])
     const double t6 = 0.01*a0.cos[0];
     const double t7 = t6 - 0.012;
     const double t8 = t4 + 6.475e-05;
-    const double t9 = sqrt(-(5.625e-05*t4) - 0.25*t8*t8);
+    const double t9 = sqrt(-0.25*t8*t8 - 5.625e-05*t4);
     const double t10 = t5*(0.5*t7*t8 - t3*t9);
     const double t11 = t5*(0.005*a0.sin[0]*t8 + t7*t9);
     const double t12 = (0.00012*a0.sin[0] + t3*t10 - t6*t11)/t9;
-    const double t13 = 0.022*a0.sin[2] + 0.018*a0.sin[3];
-    const double t14 = 0.033*a0.sin[1] + t13;
-    const double t15 = t14 - 0.006;
+    const double t13 = -0.022*a0.sin[2] + -0.018*a0.sin[3];
+    const double t14 = -0.033*a0.sin[1] + t13;
+    const double t15 = t14 + 0.006;
     const double t16 = 115.1482661348124*t11 + 67.22093858258893*t10;
     const awiwi_turn a1 = awiwi_sincos(q[1]);
     const double t17 = 0.022*a0.cos[2] + 0.018*a0.cos[3];
@@ -40,22 +40,22 @@ void awiwi_fifth_jacobian(const double q[restrict 4], double J[restrict 24])
     const double t22 = 67.22093858258893*t11 - 115.1482661348124*t10;
     const double t23 = a1.cos*t16;
     const double t24 = a1.sin*t16;
-    const double t25 = 0.013846153846153847*a0.cos[3] + t17;
-    const double t26 = 0.013846153846153847*a0.sin[3] + t13;
+    const double t25 = t13 - 0.013846153846153847*a0.sin[3];
+    const double t26 = 0.013846153846153847*a0.cos[3] + t17;
     const double t27 = a1.cos*t22;
     const double t28 = a1.sin*t22;
-    J[0] = -t3 - t12*(t15*t16 - t21*t22);
-    J[1] = -(0.0036*t23) - t19*t24;
-    J[2] = -(t18*t22) - t14*t23;
-    J[3] = -(t25*t22) - t26*t23;
+    J[0] = t12*(t15*t16 + t21*t22) - t3;
+    J[1] = -0.0036*t23 - t19*t24;
+    J[2] = t14*t23 - t18*t22;
+    J[3] = t25*t23 - t26*t22;
     J[4] = 0.0;
     J[5] = -t20;
-    J[6] = -(a1.sin*t14);
-    J[7] = -(a1.sin*t26);
-    J[8] = t6 - t12*(t15*t22 + t21*t16);
-    J[9] = -(0.0036*t27) - t19*t28;
-    J[10] = t18*t16 - t14*t27;
-    J[11] = t25*t16 - t26*t27;
+    J[6] = a1.sin*t14;
+    J[7] = a1.sin*t25;
+    J[8] = t6 - t12*(t21*t16 - t15*t22);
+    J[9] = -0.0036*t27 - t19*t28;
+    J[10] = t18*t16 + t14*t27;
+    J[11] = t26*t16 + t25*t27;
     J[12] = 0.0;
     J[13] = -t22;
     J[14] = t24;

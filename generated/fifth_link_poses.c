@@ -4,7 +4,7 @@
  * Source: eq. 5.2.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   out  T[5][4][4] in 1, m
- * Cost: 38 add, 69 mul, 1 div, 16 neg, 1 sqrt, 5 sincos.
+ * Cost: 38 add, 69 mul, 1 div, 13 neg, 1 sqrt, 5 sincos.
  * Inputs: sha256 32b023dd4bb7a4597b7c1aa31cf4af44bf374e70b19ab512ecc615d4be915382.
  */
 #include <math.h>
@@ -22,7 +22,7 @@ void awiwi_fifth_link_poses(const double q[restrict 4], double T[restrict 80])
     const double t5 = t3 + 0.26979166666666665;
     const double t6 = 0.01*a0.cos[0];
     const double t7 = t6 - 0.012;
-    const double t8 = sqrt(-(1.35e-08*t3) - 1.44e-08*t5*t5);
+    const double t8 = sqrt(-1.44e-08*t5*t5 - 1.35e-08*t3);
     const double t9 = 1.2e-06*a0.sin[0]*t5 + t7*t8;
     const double t10 = t5*t7 - 83.33333333333333*a0.sin[0]*t8;
     const double t11 = t4*(479784.442228385*t9 + 33.610469291294464*t10);
@@ -34,14 +34,14 @@ void awiwi_fifth_link_poses(const double q[restrict 4], double T[restrict 80])
     const double t17 = a0.cos[1]*t12;
     const double t18 = a0.sin[1]*t12;
     const double t19 = t13 + 0.004*t12 - 0.006*t11;
-    const double t20 = a0.sin[2]*t12 - a0.cos[2]*t14;
+    const double t20 = a0.cos[2]*t14 - a0.sin[2]*t12;
     const double t21 = t16 + 0.006*t14;
     const double t22 = a0.cos[2]*a0.sin[1];
     const double t23 = 0.006*a0.sin[1];
     const double t24 = a0.sin[2]*t11 + a0.cos[2]*t17;
     const double t25 = t19 + 0.006*t17;
-    const double t26 = a0.sin[3]*t12 - a0.cos[3]*t14;
-    const double t27 = t21 - 0.033*t20;
+    const double t26 = a0.cos[3]*t14 - a0.sin[3]*t12;
+    const double t27 = t21 - -0.033*t20;
     const double t28 = a0.sin[1]*a0.cos[3];
     const double t29 = t23 + 0.033*t22;
     const double t30 = a0.sin[3]*t11 + a0.cos[3]*t17;
@@ -80,7 +80,7 @@ void awiwi_fifth_link_poses(const double q[restrict 4], double T[restrict 80])
     T[29] = 0.0;
     T[30] = 0.0;
     T[31] = 1.0;
-    T[32] = -t20;
+    T[32] = t20;
     T[33] = -(a0.cos[2]*t12) - a0.sin[2]*t14;
     T[34] = t15;
     T[35] = t21;
@@ -96,7 +96,7 @@ void awiwi_fifth_link_poses(const double q[restrict 4], double T[restrict 80])
     T[45] = 0.0;
     T[46] = 0.0;
     T[47] = 1.0;
-    T[48] = -t26;
+    T[48] = t26;
     T[49] = -(a0.cos[3]*t12) - a0.sin[3]*t14;
     T[50] = t15;
     T[51] = t27;
@@ -115,7 +115,7 @@ void awiwi_fifth_link_poses(const double q[restrict 4], double T[restrict 80])
     T[64] = a1.cos*t14 - a1.sin*t12;
     T[65] = -(a1.cos*t12) - a1.sin*t14;
     T[66] = t15;
-    T[67] = t27 - t32*t11 - 0.022*t26;
+    T[67] = t27 - t32*t11 - -0.022*t26;
     T[68] = a0.sin[1]*a1.cos;
     T[69] = -(a0.sin[1]*a1.sin);
     T[70] = -a0.cos[1];

@@ -4,7 +4,7 @@
  * Source: eq. 2.17, 5.4.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   out  M[4][4] in kg m^2
- * Cost: 113 add, 128 mul, 2 div, 1 neg, 1 sqrt, 5 sincos.
+ * Cost: 113 add, 128 mul, 2 div, 1 sqrt, 5 sincos.
  * Inputs: sha256 1718087ca49bffea2cbf8b94cea197715d11a5dc4952832196147295c859c88c.
  */
 #include <math.h>
@@ -21,7 +21,7 @@ void awiwi_fifth_mass_matrix(const double q[restrict 4], double M[restrict 16])
     const double t4 = 1.0/t3;
     const double t5 = t3 + 3.2375e-05;
     const double t6 = a0.cos[0] - 1.2;
-    const double t7 = sqrt(-(0.0001125*t3) - t5*t5);
+    const double t7 = sqrt(-0.0001125*t3 - t5*t5);
     const double t8 = a0.sin[0]*t5 + t6*t7;
     const double t9 = t6*t5 - a0.sin[0]*t7;
     const double t10 = (0.00012*a0.sin[0] - 5e-05*t4*(a0.cos[0]*t8 - a0.sin[0]*t9))/t7 - 1.0;

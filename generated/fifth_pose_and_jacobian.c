@@ -5,7 +5,7 @@
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   out  T[4][4] in 1, m
  *   out  J[6][4] in m/rad, 1
- * Cost: 41 add, 70 mul, 2 div, 15 neg, 1 sqrt, 5 sincos.
+ * Cost: 41 add, 70 mul, 2 div, 8 neg, 1 sqrt, 5 sincos.
  * Inputs: sha256 28edf41a51f84ef24222facbdc6e1021f809ccdd8b122d41df2ba55b8d1b95d9.
  */
 #include <math.h>
@@ -24,7 +24,7 @@ void awiwi_fifth_pose_and_jacobian(const double q[restrict 4], double T[restrict
     const double t6 = t3 + 3.2375e-05;
     const double t7 = 0.01*a0.cos[2];
     const double t8 = t7 - 0.012;
-    const double t9 = sqrt(-(0.0001125*t3) - t6*t6);
+    const double t9 = sqrt(-0.0001125*t3 - t6*t6);
     const double t10 = t5*t6 + t8*t9;
     const double t11 = t8*t6 - t5*t9;
     const double t12 = t4*(57.5741330674062*t10 + 33.610469291294464*t11);
@@ -33,9 +33,9 @@ void awiwi_fifth_pose_and_jacobian(const double q[restrict 4], double T[restrict
     const double t15 = a0.cos[0]*t14 + a0.sin[0]*t13;
     const double t16 = a0.sin[1]*t12;
     const awiwi_turn a1 = awiwi_sincos(t0);
-    const double t17 = 0.022*a1.sin + 0.018*a0.sin[0];
-    const double t18 = 0.033*a0.sin[3] + t17;
-    const double t19 = t18 - 0.006;
+    const double t17 = -0.022*a1.sin + -0.018*a0.sin[0];
+    const double t18 = -0.033*a0.sin[3] + t17;
+    const double t19 = -t18 - 0.006;
     const double t20 = 0.022*a1.cos + 0.018*a0.cos[0];
     const double t21 = 0.033*a0.cos[3] + t20;
     const double t22 = t21 + 0.006;
@@ -43,13 +43,13 @@ void awiwi_fifth_pose_and_jacobian(const double q[restrict 4], double T[restrict
     const double t24 = t23 - 0.004;
     const double t25 = t19*t14 + t24*t12;
     const double t26 = t7 - t25;
-    const double t27 = 0.0036*a0.cos[1] + a0.sin[1]*t22;
+    const double t27 = -0.0036*a0.cos[1] - a0.sin[1]*t22;
     const double t28 = a0.cos[1]*t14;
     const double t29 = a0.cos[0]*t12 - a0.sin[0]*t28;
     const double t30 = a0.sin[1]*t14;
     const double t31 = t19*t12 - t24*t14;
     const double t32 = t5 + t31;
-    const double t33 = (0.00012*a0.sin[2] - 0.005*(t4*(a0.cos[2]*t10 - a0.sin[2]*t11)))/t9 - 1.0;
+    const double t33 = 1.0 - (0.00012*a0.sin[2] - 0.005*(t4*(a0.cos[2]*t10 - a0.sin[2]*t11)))/t9;
     const double t34 = 1.7692307692307692*a0.sin[1];
     T[0] = a0.cos[0]*t13 - a0.sin[0]*t14;
     T[1] = -t15;
@@ -58,7 +58,7 @@ void awiwi_fifth_pose_and_jacobian(const double q[restrict 4], double T[restrict
     T[4] = a0.sin[1]*a0.cos[0];
     T[5] = -(a0.sin[1]*a0.sin[0]);
     T[6] = -a0.cos[1];
-    T[7] = t27;
+    T[7] = -t27;
     T[8] = a0.sin[0]*t12 + a0.cos[0]*t28;
     T[9] = t29;
     T[10] = t30;
@@ -67,23 +67,23 @@ void awiwi_fifth_pose_and_jacobian(const double q[restrict 4], double T[restrict
     T[13] = 0.0;
     T[14] = 0.0;
     T[15] = 1.0;
-    J[0] = -t32 - t31*t33;
-    J[1] = -(t27*t12);
-    J[2] = -(t21*t14) - t18*t13;
-    J[3] = -(t20*t14) - t17*t13 - 0.013846153846153847*t15;
+    J[0] = t31*t33 - t32;
+    J[1] = t27*t12;
+    J[2] = t18*t13 - t21*t14;
+    J[3] = t17*t13 + -0.013846153846153847*t15 - t20*t14;
     J[4] = 0.0;
     J[5] = -t23;
-    J[6] = -(a0.sin[1]*t18);
-    J[7] = a0.sin[1]*(-(0.013846153846153847*a0.sin[0]) - t17);
-    J[8] = t26 - t25*t33;
-    J[9] = -(t27*t14);
-    J[10] = t21*t12 - t18*t28;
-    J[11] = t20*t12 + 0.013846153846153847*t29 - t17*t28;
+    J[6] = a0.sin[1]*t18;
+    J[7] = a0.sin[1]*(t17 - 0.013846153846153847*a0.sin[0]);
+    J[8] = t26 + t25*t33;
+    J[9] = t27*t14;
+    J[10] = t21*t12 + t18*t28;
+    J[11] = t20*t12 + 0.013846153846153847*t29 + t17*t28;
     J[12] = 0.0;
     J[13] = -t14;
     J[14] = t16;
     J[15] = t34*t12;
-    J[16] = -t33 - 1.0;
+    J[16] = t33 - 1.0;
     J[17] = 0.0;
     J[18] = -a0.cos[1];
     J[19] = -1.7692307692307692*a0.cos[1];

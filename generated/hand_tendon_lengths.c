@@ -8,7 +8,7 @@
  *   out  h[38] in m
  * Returns 0 where the side bars are short of the line B0C0 (q73 between 0 and pi) and their plane is
  * short of A0 and bar AA0 reaches; elsewhere 1, and what is not defined is NaN.
- * Cost: 254 add, 182 mul, 2 div, 2 neg, 43 sqrt, 4 sincos.
+ * Cost: 254 add, 182 mul, 2 div, 43 sqrt, 4 sincos.
  * Inputs: sha256 043c7fe4cf3ab8c45707fb92fe06f721b86c5746382be7b476392fac3d18624a.
  */
 #include <math.h>
@@ -53,15 +53,15 @@ int awiwi_hand_tendon_lengths(const double q[restrict 19], const double wrist[re
     const double t32 = 0.5*a0.cos[3]*t29 + 23.80952380952381*t26*t31;
     const double t33 = 0.01*t28*t32;
     const double t34 = 39.36759889140841*t26*t29 - 0.017142857142857144*a0.cos[3]*t31;
-    const double t35 = -(0.004*a0.sin[3]) - t28*(0.018*t32 - 0.0168*t34);
-    const double t36 = 0.008*a0.cos[3] + t33 + t35;
+    const double t35 = 0.004*a0.sin[3] + t28*(0.018*t32 - 0.0168*t34);
+    const double t36 = 0.008*a0.cos[3] + t33 - t35;
     const double t37 = t28*t34;
     const double t38 = t23*t37;
     const double t39 = t28*(0.09523809523809523*t32 + 1.8*t34);
     const double t40 = 0.5*t24 - t23*t39;
     const double t41 = t38 + t40;
     const double t42 = t16*t37;
-    const double t43 = 0.004*a0.cos[3] + (-(0.5*t21) - t16*t39);
+    const double t43 = 0.004*a0.cos[3] - (0.5*t21 + t16*t39);
     const double t44 = 0.008*a0.sin[3] + t42 + t43;
     const double t45 = t36*t36 + t41*t41 + t44*t44;
     const double t46 = t16*t41 - t23*t44;
@@ -101,7 +101,7 @@ int awiwi_hand_tendon_lengths(const double q[restrict 19], const double wrist[re
     const double t80 = t78 + t79;
     const double t81 = t78 - t79;
     const double t82 = t38 - t40;
-    const double t83 = 0.028*a0.cos[3] + t35 - t33;
+    const double t83 = 0.028*a0.cos[3] - t35 - t33;
     const double t84 = 0.028*a0.sin[3] + t43 - t42;
     const double t85 = t83*t83 + t82*t82 + t84*t84;
     const double t86 = t16*t82 + t23*t84;

@@ -5,7 +5,7 @@
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   qd[4] in rad/s, -20 to 20
  *   out  C[4][4] in N m s/rad
- * Cost: 46 add, 49 mul, 4 neg, 3 sincos.
+ * Cost: 46 add, 49 mul, 2 neg, 3 sincos.
  * Inputs: sha256 282282bd680841d03234ba2709f06e709554a528cf56b8719c5e0b6114109589.
  */
 #include "trig.h"
@@ -18,9 +18,9 @@ void awiwi_index_coriolis_matrix(const double q[restrict 4], const double qd[res
     const awiwi_turn3 a0 = awiwi_sincos3(q[1], t0, t1);
     const double t2 = a0.cos[0] + 0.1485884101040119;
     const double t3 = 1.2925637369259591e-06*a0.cos[2];
-    const double t4 = (t2 + 0.7379891035165924*a0.cos[1])*t3 + a0.cos[2]*(9.716427232979388e-09*a0.cos[2] - 3.7031708931917554e-07*a0.sin[2]) - 4.858213616489694e-09;
+    const double t4 = 4.858213616489694e-09 - (t2 + 0.7379891035165924*a0.cos[1])*t3 - a0.cos[2]*(9.716427232979388e-09*a0.cos[2] - 3.7031708931917554e-07*a0.sin[2]);
     const double t5 = 4.8456e-08*a0.cos[1] + 8.326356e-06*a0.sin[1];
-    const double t6 = t2*t5 + a0.sin[1]*(5.22042e-06*a0.cos[1] - 2.28e-08*a0.sin[1] - 9.538979534520451e-07*a0.sin[2]) + t4 + 1.14e-08;
+    const double t6 = t2*t5 + a0.sin[1]*(5.22042e-06*a0.cos[1] - 2.28e-08*a0.sin[1] - 9.538979534520451e-07*a0.sin[2]) + 1.14e-08 - t4;
     const double t7 = 8.326356e-06*a0.cos[1] - 4.8456e-08*a0.sin[1] - 1.2925637369259591e-06*a0.sin[2];
     const double t8 = 1.8e-08*a0.cos[0] + t6 + a0.sin[0]*(2.1654944e-05*a0.cos[0] + t7 - 7.72e-08*a0.sin[0] + 3.6348e-06) + 3.86e-08;
     const double t9 = qd[1] + qd[2];
@@ -34,24 +34,24 @@ void awiwi_index_coriolis_matrix(const double q[restrict 4], const double qd[res
     const double t17 = qd[1]*t16;
     const double t18 = 9.538979534520451e-07*(a0.cos[1]*a0.cos[2] + a0.sin[1]*a0.sin[2]);
     const double t19 = t9*t18;
-    const double t20 = t10*t18;
-    const double t21 = t19 - t20;
+    const double t20 = -t10*t18;
+    const double t21 = t19 + t20;
     const double t22 = 1.2925637369259591e-06*(a0.cos[0]*a0.cos[2] + a0.sin[0]*a0.sin[2]);
     const double t23 = t10*t22;
     const double t24 = t21 + t9*(t22 - t16) - t23;
-    C[0] = -(qd[3]*t4) - qd[2]*t6 - qd[1]*t8;
+    C[0] = qd[3]*t4 - qd[2]*t6 - qd[1]*t8;
     C[1] = qd[1]*(1.244876e-06*a0.cos[0] - 9.6e-09*a0.sin[0]) + t12 - t13;
     C[2] = t12 - t14;
-    C[3] = -t11 - t15;
+    C[3] = t15 - t11;
     C[4] = t13;
     C[5] = t17 + t24;
     C[6] = t24;
-    C[7] = -t23 - t20;
+    C[7] = t20 - t23;
     C[8] = t14;
     C[9] = t21 + t17;
     C[10] = t21;
-    C[11] = -t20;
-    C[12] = t15;
+    C[11] = t20;
+    C[12] = -t15;
     C[13] = qd[1]*t22 + t19;
     C[14] = t19;
     C[15] = 0.0;

@@ -4,7 +4,7 @@
  * Source: eq. 5.3, differentiated.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   out  J[6][4] in m/rad, 1
- * Cost: 9 add, 16 mul, 10 neg, 4 sincos.
+ * Cost: 9 add, 16 mul, 3 neg, 4 sincos.
  * Inputs: sha256 cc479d3eaff2d23a1439c4046dc08cbbd6a22d642904ede3e49fae304d176b25.
  */
 #include "trig.h"
@@ -19,17 +19,17 @@ void awiwi_index_jacobian(const double q[restrict 4], double J[restrict 24])
     const double t3 = 0.0298*a0.cos[2] + t2;
     const double t4 = 0.04038*a0.cos[1] + t3;
     const double t5 = t4 + 0.006;
-    const double t6 = 0.00201*a0.sin[3];
-    const double t7 = 0.0298*a0.sin[2] + t6;
-    const double t8 = 0.04038*a0.sin[1] + t7;
-    J[0] = -(0.0057*a0.cos[0]) - a0.sin[0]*t5;
-    J[1] = -(a0.cos[0]*t8);
-    J[2] = -(a0.cos[0]*t7);
-    J[3] = -(a0.cos[0]*t6);
+    const double t6 = -0.00201*a0.sin[3];
+    const double t7 = t6 - 0.0298*a0.sin[2];
+    const double t8 = t7 - 0.04038*a0.sin[1];
+    J[0] = -0.0057*a0.cos[0] - a0.sin[0]*t5;
+    J[1] = a0.cos[0]*t8;
+    J[2] = a0.cos[0]*t7;
+    J[3] = a0.cos[0]*t6;
     J[4] = a0.cos[0]*t5 - 0.0057*a0.sin[0];
-    J[5] = -(a0.sin[0]*t8);
-    J[6] = -(a0.sin[0]*t7);
-    J[7] = -(a0.sin[0]*t6);
+    J[5] = a0.sin[0]*t8;
+    J[6] = a0.sin[0]*t7;
+    J[7] = a0.sin[0]*t6;
     J[8] = 0.0;
     J[9] = t4;
     J[10] = t3;

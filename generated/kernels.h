@@ -20,7 +20,7 @@ extern const char awiwi_model_digest[65];
  *   out  curvature[8] in 1/(N m)
  * Returns 0 where every tension is on its spring's curve, give or take a hundredth; elsewhere 1, and
  * what is not defined is NaN.
- * Cost: 198 add, 229 mul, 1 neg, 7 calls.
+ * Cost: 198 add, 229 mul, 7 calls.
  */
 int awiwi_thumb_tendon_stiffness(const double tension[8], double k[8], double slope[8], double curvature[8]);
 
@@ -38,7 +38,7 @@ void awiwi_thumb_fingertip_pose(const double q[4], double T[16]);
  * Source: eq. 5.2.
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   out  T[4][4][4] in 1, m
- * Cost: 14 add, 32 mul, 13 neg, 4 sincos.
+ * Cost: 14 add, 32 mul, 8 neg, 4 sincos.
  */
 void awiwi_thumb_link_poses(const double q[4], double T[64]);
 
@@ -47,7 +47,7 @@ void awiwi_thumb_link_poses(const double q[4], double T[64]);
  * Source: eq. 5.3, differentiated.
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   out  J[6][4] in m/rad, 1
- * Cost: 11 add, 25 mul, 12 neg, 4 sincos.
+ * Cost: 11 add, 25 mul, 3 neg, 4 sincos.
  */
 void awiwi_thumb_jacobian(const double q[4], double J[24]);
 
@@ -57,7 +57,7 @@ void awiwi_thumb_jacobian(const double q[4], double J[24]);
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   out  T[4][4] in 1, m
  *   out  J[6][4] in m/rad, 1
- * Cost: 13 add, 34 mul, 15 neg, 4 sincos.
+ * Cost: 13 add, 34 mul, 8 neg, 4 sincos.
  */
 void awiwi_thumb_pose_and_jacobian(const double q[4], double T[16], double J[24]);
 
@@ -66,7 +66,7 @@ void awiwi_thumb_pose_and_jacobian(const double q[4], double T[16], double J[24]
  * Source: eq. 2.17, 5.4.
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   out  M[4][4] in kg m^2
- * Cost: 48 add, 46 mul, 5 neg, 3 sincos.
+ * Cost: 48 add, 46 mul, 3 sincos.
  */
 void awiwi_thumb_mass_matrix(const double q[4], double M[16]);
 
@@ -76,7 +76,7 @@ void awiwi_thumb_mass_matrix(const double q[4], double M[16]);
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   in   qd[4] in rad/s, -20 to 20
  *   out  C[4][4] in N m s/rad
- * Cost: 132 add, 137 mul, 7 neg, 3 sincos.
+ * Cost: 132 add, 137 mul, 1 neg, 3 sincos.
  */
 void awiwi_thumb_coriolis_matrix(const double q[4], const double qd[4], double C[16]);
 
@@ -109,7 +109,7 @@ void awiwi_thumb_bias(const double q[4], const double qd[4], const double g[3], 
  *   in   qdd[4] in rad/s^2, -2000 to 2000
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  tau[4] in N m
- * Cost: 135 add, 145 mul, 2 neg, 4 sincos.
+ * Cost: 135 add, 145 mul, 4 sincos.
  */
 void awiwi_thumb_inverse_dynamics(const double q[4], const double qd[4], const double qdd[4], const double g[3], double tau[4]);
 
@@ -122,7 +122,7 @@ void awiwi_thumb_inverse_dynamics(const double q[4], const double qd[4], const d
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  dtau_dq[4][4] in N m/rad
  *   out  dtau_dqd[4][4] in N m s/rad
- * Cost: 374 add, 422 mul, 10 neg, 4 sincos.
+ * Cost: 374 add, 422 mul, 1 neg, 4 sincos.
  */
 void awiwi_thumb_inverse_dynamics_derivatives(const double q[4], const double qd[4], const double qdd[4], const double g[3], double dtau_dq[16], double dtau_dqd[16]);
 
@@ -147,7 +147,7 @@ void awiwi_thumb_forward_dynamics(const double q[4], const double qd[4], const d
  *   out  M[4][4] in kg m^2
  *   out  C[4][4] in N m s/rad
  *   out  gravity[4] in N m
- * Cost: 156 add, 172 mul, 8 neg, 4 sincos.
+ * Cost: 156 add, 172 mul, 1 neg, 4 sincos.
  */
 void awiwi_thumb_dynamics(const double q[4], const double qd[4], const double g[3], double M[16], double C[16], double gravity[4]);
 
@@ -186,7 +186,7 @@ void awiwi_thumb_coupling(const double q[4], double P[32]);
  * Source: eq. 5.11.
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   out  dP[8][4][4] in m/rad^2
- * Cost: 101 add, 112 mul, 4 div, 1 neg, 4 sqrt, 2 sincos.
+ * Cost: 101 add, 112 mul, 4 div, 4 sqrt, 2 sincos.
  */
 void awiwi_thumb_coupling_derivative(const double q[4], double dP[128]);
 
@@ -196,7 +196,7 @@ void awiwi_thumb_coupling_derivative(const double q[4], double dP[128]);
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   in   f[8] in N, 0 to 100
  *   out  tau[4] in N m
- * Cost: 60 add, 54 mul, 4 div, 1 neg, 4 sqrt, 2 sincos.
+ * Cost: 60 add, 54 mul, 4 div, 4 sqrt, 2 sincos.
  */
 void awiwi_thumb_joint_torque(const double q[4], const double f[8], double tau[4]);
 
@@ -242,7 +242,7 @@ int awiwi_thumb_joint_estimate(const double h[8], const double start[4], double 
  *   in   noise[1] in m, 0 to 0.001
  *   out  covariance[4][4] in rad^2
  *   out  worst[4] in rad
- * Cost: 68 add, 99 mul, 6 div, 2 neg, 6 sqrt, 2 sincos, 8 calls.
+ * Cost: 68 add, 99 mul, 6 div, 1 neg, 6 sqrt, 2 sincos, 8 calls.
  */
 void awiwi_thumb_joint_estimate_error(const double q[4], const double noise[1], double covariance[16], double worst[4]);
 
@@ -284,7 +284,7 @@ int awiwi_thumb_base_estimate_by_gradient(const double h[4], const double start[
  *   out  curvature[8] in 1/(N m)
  * Returns 0 where every tension is on its spring's curve, give or take a hundredth; elsewhere 1, and
  * what is not defined is NaN.
- * Cost: 198 add, 229 mul, 1 neg, 7 calls.
+ * Cost: 198 add, 229 mul, 7 calls.
  */
 int awiwi_index_tendon_stiffness(const double tension[8], double k[8], double slope[8], double curvature[8]);
 
@@ -311,7 +311,7 @@ void awiwi_index_link_poses(const double q[4], double T[64]);
  * Source: eq. 5.3, differentiated.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   out  J[6][4] in m/rad, 1
- * Cost: 9 add, 16 mul, 10 neg, 4 sincos.
+ * Cost: 9 add, 16 mul, 3 neg, 4 sincos.
  */
 void awiwi_index_jacobian(const double q[4], double J[24]);
 
@@ -321,7 +321,7 @@ void awiwi_index_jacobian(const double q[4], double J[24]);
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   out  T[4][4] in 1, m
  *   out  J[6][4] in m/rad, 1
- * Cost: 9 add, 20 mul, 13 neg, 4 sincos.
+ * Cost: 9 add, 20 mul, 8 neg, 4 sincos.
  */
 void awiwi_index_pose_and_jacobian(const double q[4], double T[16], double J[24]);
 
@@ -340,7 +340,7 @@ void awiwi_index_mass_matrix(const double q[4], double M[16]);
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   qd[4] in rad/s, -20 to 20
  *   out  C[4][4] in N m s/rad
- * Cost: 46 add, 49 mul, 4 neg, 3 sincos.
+ * Cost: 46 add, 49 mul, 2 neg, 3 sincos.
  */
 void awiwi_index_coriolis_matrix(const double q[4], const double qd[4], double C[16]);
 
@@ -386,7 +386,7 @@ void awiwi_index_inverse_dynamics(const double q[4], const double qd[4], const d
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  dtau_dq[4][4] in N m/rad
  *   out  dtau_dqd[4][4] in N m s/rad
- * Cost: 164 add, 198 mul, 4 neg, 4 sincos.
+ * Cost: 164 add, 198 mul, 1 neg, 4 sincos.
  */
 void awiwi_index_inverse_dynamics_derivatives(const double q[4], const double qd[4], const double qdd[4], const double g[3], double dtau_dq[16], double dtau_dqd[16]);
 
@@ -411,7 +411,7 @@ void awiwi_index_forward_dynamics(const double q[4], const double qd[4], const d
  *   out  M[4][4] in kg m^2
  *   out  C[4][4] in N m s/rad
  *   out  gravity[4] in N m
- * Cost: 77 add, 83 mul, 4 neg, 4 sincos.
+ * Cost: 77 add, 83 mul, 2 neg, 4 sincos.
  */
 void awiwi_index_dynamics(const double q[4], const double qd[4], const double g[3], double M[16], double C[16], double gravity[4]);
 
@@ -536,7 +536,7 @@ int awiwi_index_tendon_distribution(const double q[4], const double tau[4], cons
  *   out  curvature[8] in 1/(N m)
  * Returns 0 where every tension is on its spring's curve, give or take a hundredth; elsewhere 1, and
  * what is not defined is NaN.
- * Cost: 198 add, 229 mul, 1 neg, 7 calls.
+ * Cost: 198 add, 229 mul, 7 calls.
  */
 int awiwi_middle_tendon_stiffness(const double tension[8], double k[8], double slope[8], double curvature[8]);
 
@@ -563,7 +563,7 @@ void awiwi_middle_link_poses(const double q[4], double T[64]);
  * Source: eq. 5.3, differentiated.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   out  J[6][4] in m/rad, 1
- * Cost: 9 add, 16 mul, 10 neg, 4 sincos.
+ * Cost: 9 add, 16 mul, 3 neg, 4 sincos.
  */
 void awiwi_middle_jacobian(const double q[4], double J[24]);
 
@@ -573,7 +573,7 @@ void awiwi_middle_jacobian(const double q[4], double J[24]);
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   out  T[4][4] in 1, m
  *   out  J[6][4] in m/rad, 1
- * Cost: 9 add, 20 mul, 13 neg, 4 sincos.
+ * Cost: 9 add, 20 mul, 8 neg, 4 sincos.
  */
 void awiwi_middle_pose_and_jacobian(const double q[4], double T[16], double J[24]);
 
@@ -592,7 +592,7 @@ void awiwi_middle_mass_matrix(const double q[4], double M[16]);
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   qd[4] in rad/s, -20 to 20
  *   out  C[4][4] in N m s/rad
- * Cost: 46 add, 49 mul, 4 neg, 3 sincos.
+ * Cost: 46 add, 49 mul, 2 neg, 3 sincos.
  */
 void awiwi_middle_coriolis_matrix(const double q[4], const double qd[4], double C[16]);
 
@@ -638,7 +638,7 @@ void awiwi_middle_inverse_dynamics(const double q[4], const double qd[4], const 
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  dtau_dq[4][4] in N m/rad
  *   out  dtau_dqd[4][4] in N m s/rad
- * Cost: 164 add, 198 mul, 4 neg, 4 sincos.
+ * Cost: 164 add, 198 mul, 1 neg, 4 sincos.
  */
 void awiwi_middle_inverse_dynamics_derivatives(const double q[4], const double qd[4], const double qdd[4], const double g[3], double dtau_dq[16], double dtau_dqd[16]);
 
@@ -663,7 +663,7 @@ void awiwi_middle_forward_dynamics(const double q[4], const double qd[4], const 
  *   out  M[4][4] in kg m^2
  *   out  C[4][4] in N m s/rad
  *   out  gravity[4] in N m
- * Cost: 77 add, 83 mul, 4 neg, 4 sincos.
+ * Cost: 77 add, 83 mul, 2 neg, 4 sincos.
  */
 void awiwi_middle_dynamics(const double q[4], const double qd[4], const double g[3], double M[16], double C[16], double gravity[4]);
 
@@ -788,7 +788,7 @@ int awiwi_middle_tendon_distribution(const double q[4], const double tau[4], con
  *   out  curvature[6] in 1/(N m)
  * Returns 0 where every tension is on its spring's curve, give or take a hundredth; elsewhere 1, and
  * what is not defined is NaN.
- * Cost: 148 add, 171 mul, 1 neg, 5 calls.
+ * Cost: 148 add, 171 mul, 5 calls.
  */
 int awiwi_ring_tendon_stiffness(const double tension[6], double k[6], double slope[6], double curvature[6]);
 
@@ -815,7 +815,7 @@ void awiwi_ring_link_poses(const double q[3], double T[64]);
  * Source: eq. 5.3, differentiated.
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   out  J[6][3] in m/rad, 1
- * Cost: 11 add, 19 mul, 6 neg, 4 sincos.
+ * Cost: 11 add, 19 mul, 1 neg, 4 sincos.
  */
 void awiwi_ring_jacobian(const double q[3], double J[18]);
 
@@ -825,7 +825,7 @@ void awiwi_ring_jacobian(const double q[3], double J[18]);
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   out  T[4][4] in 1, m
  *   out  J[6][3] in m/rad, 1
- * Cost: 11 add, 23 mul, 9 neg, 4 sincos.
+ * Cost: 11 add, 23 mul, 6 neg, 4 sincos.
  */
 void awiwi_ring_pose_and_jacobian(const double q[3], double T[16], double J[18]);
 
@@ -890,7 +890,7 @@ void awiwi_ring_inverse_dynamics(const double q[3], const double qd[3], const do
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  dtau_dq[3][3] in N m/rad
  *   out  dtau_dqd[3][3] in N m s/rad
- * Cost: 179 add, 218 mul, 2 neg, 4 sincos.
+ * Cost: 179 add, 218 mul, 4 sincos.
  */
 void awiwi_ring_inverse_dynamics_derivatives(const double q[3], const double qd[3], const double qdd[3], const double g[3], double dtau_dq[9], double dtau_dqd[9]);
 
@@ -915,7 +915,7 @@ void awiwi_ring_forward_dynamics(const double q[3], const double qd[3], const do
  *   out  M[3][3] in kg m^2
  *   out  C[3][3] in N m s/rad
  *   out  gravity[3] in N m
- * Cost: 87 add, 97 mul, 1 neg, 4 sincos.
+ * Cost: 87 add, 97 mul, 4 sincos.
  */
 void awiwi_ring_dynamics(const double q[3], const double qd[3], const double g[3], double M[9], double C[9], double gravity[3]);
 
@@ -1040,7 +1040,7 @@ int awiwi_ring_tendon_distribution(const double q[3], const double tau[3], const
  *   out  curvature[8] in 1/(N m)
  * Returns 0 where every tension is on its spring's curve, give or take a hundredth; elsewhere 1, and
  * what is not defined is NaN.
- * Cost: 198 add, 229 mul, 1 neg, 7 calls.
+ * Cost: 198 add, 229 mul, 7 calls.
  */
 int awiwi_fifth_tendon_stiffness(const double tension[8], double k[8], double slope[8], double curvature[8]);
 
@@ -1049,7 +1049,7 @@ int awiwi_fifth_tendon_stiffness(const double tension[8], double k[8], double sl
  * Source: eq. 5.2, 5.3, table 5.1.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   out  T[4][4] in 1, m
- * Cost: 28 add, 46 mul, 1 div, 4 neg, 1 sqrt, 5 sincos.
+ * Cost: 28 add, 46 mul, 1 div, 3 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_fingertip_pose(const double q[4], double T[16]);
 
@@ -1058,7 +1058,7 @@ void awiwi_fifth_fingertip_pose(const double q[4], double T[16]);
  * Source: eq. 5.2.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   out  T[5][4][4] in 1, m
- * Cost: 38 add, 69 mul, 1 div, 16 neg, 1 sqrt, 5 sincos.
+ * Cost: 38 add, 69 mul, 1 div, 13 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_link_poses(const double q[4], double T[80]);
 
@@ -1067,7 +1067,7 @@ void awiwi_fifth_link_poses(const double q[4], double T[80]);
  * Source: eq. 5.3, differentiated.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   out  J[6][4] in m/rad, 1
- * Cost: 33 add, 59 mul, 2 div, 12 neg, 1 sqrt, 5 sincos.
+ * Cost: 33 add, 59 mul, 2 div, 4 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_jacobian(const double q[4], double J[24]);
 
@@ -1077,7 +1077,7 @@ void awiwi_fifth_jacobian(const double q[4], double J[24]);
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   out  T[4][4] in 1, m
  *   out  J[6][4] in m/rad, 1
- * Cost: 41 add, 70 mul, 2 div, 15 neg, 1 sqrt, 5 sincos.
+ * Cost: 41 add, 70 mul, 2 div, 8 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_pose_and_jacobian(const double q[4], double T[16], double J[24]);
 
@@ -1086,7 +1086,7 @@ void awiwi_fifth_pose_and_jacobian(const double q[4], double T[16], double J[24]
  * Source: eq. 2.17, 5.4.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   out  M[4][4] in kg m^2
- * Cost: 113 add, 128 mul, 2 div, 1 neg, 1 sqrt, 5 sincos.
+ * Cost: 113 add, 128 mul, 2 div, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_mass_matrix(const double q[4], double M[16]);
 
@@ -1096,7 +1096,7 @@ void awiwi_fifth_mass_matrix(const double q[4], double M[16]);
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   in   qd[4] in rad/s, -20 to 20
  *   out  C[4][4] in N m s/rad
- * Cost: 309 add, 359 mul, 2 div, 6 neg, 1 sqrt, 5 sincos.
+ * Cost: 309 add, 359 mul, 2 div, 2 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_coriolis_matrix(const double q[4], const double qd[4], double C[16]);
 
@@ -1106,7 +1106,7 @@ void awiwi_fifth_coriolis_matrix(const double q[4], const double qd[4], double C
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  gravity[4] in N m
- * Cost: 41 add, 55 mul, 2 div, 1 neg, 1 sqrt, 5 sincos.
+ * Cost: 41 add, 55 mul, 2 div, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_gravity(const double q[4], const double g[3], double gravity[4]);
 
@@ -1117,7 +1117,7 @@ void awiwi_fifth_gravity(const double q[4], const double g[3], double gravity[4]
  *   in   qd[4] in rad/s, -20 to 20
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  bias[4] in N m
- * Cost: 223 add, 250 mul, 2 div, 3 neg, 1 sqrt, 5 sincos.
+ * Cost: 223 add, 250 mul, 2 div, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_bias(const double q[4], const double qd[4], const double g[3], double bias[4]);
 
@@ -1129,7 +1129,7 @@ void awiwi_fifth_bias(const double q[4], const double qd[4], const double g[3], 
  *   in   qdd[4] in rad/s^2, -2000 to 2000
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  tau[4] in N m
- * Cost: 238 add, 262 mul, 2 div, 2 neg, 1 sqrt, 5 sincos.
+ * Cost: 238 add, 262 mul, 2 div, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_inverse_dynamics(const double q[4], const double qd[4], const double qdd[4], const double g[3], double tau[4]);
 
@@ -1142,7 +1142,7 @@ void awiwi_fifth_inverse_dynamics(const double q[4], const double qd[4], const d
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  dtau_dq[4][4] in N m/rad
  *   out  dtau_dqd[4][4] in N m s/rad
- * Cost: 957 add, 1075 mul, 2 div, 10 neg, 1 sqrt, 5 sincos.
+ * Cost: 957 add, 1075 mul, 2 div, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_inverse_dynamics_derivatives(const double q[4], const double qd[4], const double qdd[4], const double g[3], double dtau_dq[16], double dtau_dqd[16]);
 
@@ -1154,7 +1154,7 @@ void awiwi_fifth_inverse_dynamics_derivatives(const double q[4], const double qd
  *   in   tau[4] in N m, -1 to 1
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  qdd[4] in rad/s^2
- * Cost: 329 add, 355 mul, 6 div, 2 neg, 1 sqrt, 5 sincos.
+ * Cost: 329 add, 355 mul, 6 div, 1 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_forward_dynamics(const double q[4], const double qd[4], const double tau[4], const double g[3], double qdd[4]);
 
@@ -1167,7 +1167,7 @@ void awiwi_fifth_forward_dynamics(const double q[4], const double qd[4], const d
  *   out  M[4][4] in kg m^2
  *   out  C[4][4] in N m s/rad
  *   out  gravity[4] in N m
- * Cost: 339 add, 401 mul, 2 div, 6 neg, 1 sqrt, 5 sincos.
+ * Cost: 339 add, 401 mul, 2 div, 2 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_dynamics(const double q[4], const double qd[4], const double g[3], double M[16], double C[16], double gravity[4]);
 
@@ -1179,7 +1179,7 @@ void awiwi_fifth_dynamics(const double q[4], const double qd[4], const double g[
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  kinetic[1] in J
  *   out  potential[1] in J
- * Cost: 133 add, 166 mul, 2 div, 1 neg, 1 sqrt, 5 sincos.
+ * Cost: 133 add, 166 mul, 2 div, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_energy(const double q[4], const double qd[4], const double g[3], double kinetic[1], double potential[1]);
 
@@ -1294,7 +1294,7 @@ int awiwi_fifth_tendon_distribution(const double q[4], const double tau[4], cons
  *   out  rocker_ratio[1] in 1
  *   out  transmission[1] in 1
  * Returns 0 where the loop closes; elsewhere 1, and what is not defined is NaN.
- * Cost: 15 add, 25 mul, 2 div, 4 neg, 1 sqrt, 1 sincos, 2 calls.
+ * Cost: 15 add, 25 mul, 2 div, 1 sqrt, 1 sincos, 2 calls.
  */
 int awiwi_fifth_hmc_four_bar(const double q[1], double coupler[1], double rocker[1], double coupler_ratio[1], double rocker_ratio[1], double transmission[1]);
 
@@ -1308,7 +1308,7 @@ int awiwi_fifth_hmc_four_bar(const double q[1], double coupler[1], double rocker
  *   out  C[3] in m
  * Returns 0 where the side bars are short of the line B0C0 (q73 between 0 and pi) and their plane is
  * short of A0 and bar AA0 reaches; elsewhere 1, and what is not defined is NaN.
- * Cost: 20 add, 39 mul, 2 div, 3 neg, 1 sqrt, 2 sincos.
+ * Cost: 20 add, 39 mul, 2 div, 1 neg, 1 sqrt, 2 sincos.
  */
 int awiwi_wrist_points(const double q71[1], const double q73[1], double A[3], double B[3], double C[3]);
 
@@ -1332,7 +1332,7 @@ int awiwi_wrist_palm_pose(const double q71[1], const double q73[1], double T[16]
  *   out  h[38] in m
  * Returns 0 where the side bars are short of the line B0C0 (q73 between 0 and pi) and their plane is
  * short of A0 and bar AA0 reaches; elsewhere 1, and what is not defined is NaN.
- * Cost: 180 add, 145 mul, 2 div, 2 neg, 39 sqrt, 2 sincos.
+ * Cost: 180 add, 145 mul, 2 div, 39 sqrt, 2 sincos.
  */
 int awiwi_wrist_tendon_lengths(const double q71[1], const double q73[1], double h[38]);
 
@@ -1344,7 +1344,7 @@ int awiwi_wrist_tendon_lengths(const double q71[1], const double q73[1], double 
  *   out  dh[38][2] in m/rad
  * Returns 0 where the side bars are short of the line B0C0 (q73 between 0 and pi) and their plane is
  * short of A0 and bar AA0 reaches; elsewhere 1, and what is not defined is NaN.
- * Cost: 436 add, 478 mul, 41 div, 1 neg, 39 sqrt, 2 sincos.
+ * Cost: 436 add, 478 mul, 41 div, 39 sqrt, 2 sincos.
  */
 int awiwi_wrist_coupling(const double q71[1], const double q73[1], double dh[76]);
 
@@ -1357,7 +1357,7 @@ int awiwi_wrist_coupling(const double q71[1], const double q73[1], double dh[76]
  *   out  h[38] in m
  * Returns 0 where the side bars are short of the line B0C0 (q73 between 0 and pi) and their plane is
  * short of A0 and bar AA0 reaches; elsewhere 1, and what is not defined is NaN.
- * Cost: 254 add, 182 mul, 2 div, 2 neg, 43 sqrt, 4 sincos.
+ * Cost: 254 add, 182 mul, 2 div, 43 sqrt, 4 sincos.
  */
 int awiwi_hand_tendon_lengths(const double q[19], const double wrist[2], double h[38]);
 
@@ -1376,7 +1376,7 @@ void awiwi_hand_coupling(const double q[19], double P[722]);
  *   in   q[19] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727, -0.3491, -0.1745, -0.08727, -0.08727, -0.3491, -0.1745, -0.08727, -0.08727, -0.3491, -0.1745, -0.08727, -0.5236, -0.3491, -0.1745, -0.08727] to [0.6109, 0.6109, 1.396, 1.396, 0.3491, 1.484, 1.571, 1.396, 0.3491, 1.484, 1.571, 1.396, 0.3491, 1.484, 1.571, 0.6981, 0.3491, 1.484, 1.571]
  *   in   f[38] in N, 0 to 100
  *   out  tau[19] in N m
- * Cost: 85 add, 69 mul, 4 div, 1 neg, 4 sqrt, 2 sincos.
+ * Cost: 85 add, 69 mul, 4 div, 4 sqrt, 2 sincos.
  */
 void awiwi_hand_joint_torque(const double q[19], const double f[38], double tau[19]);
 
@@ -1539,7 +1539,7 @@ void awiwi_motor_torque(const double theta[1], const double thd[1], const double
  * Returns 0 where the roller is clear of the motor's pulley and the roller is clear of the fixed
  * pulley and the tendon turns the lever towards its taut end and the spring is stretched; elsewhere 1,
  * and what is not defined is NaN.
- * Cost: 38 add, 54 mul, 7 div, 1 neg, 3 sqrt, 1 sincos, 2 calls.
+ * Cost: 38 add, 54 mul, 7 div, 3 sqrt, 1 sincos, 2 calls.
  */
 int awiwi_spring_lever(const double theta[1], double dL[1], double force[1], double stiffness[1]);
 
@@ -1587,7 +1587,7 @@ int awiwi_spring_elongation(const double f[1], double x[1]);
  *   out  stiffness[38] in N/m
  * Returns 0 where the argument is within the lever's travel, give or take a hundredth; elsewhere 1,
  * and what is not defined is NaN.
- * Cost: 1062 add, 1137 mul, 1 neg, 37 calls.
+ * Cost: 1062 add, 1137 mul, 37 calls.
  */
 int awiwi_calibration_readings(const double readings[38], double dL[38], double force[38], double stiffness[38]);
 
@@ -1652,7 +1652,7 @@ void awiwi_guiding_friction(const double f[1], const double bend[1], double loss
  * is positive and pivot 3 of K_eff is positive and pivot 0 of K_mech - K_eff is positive and pivot 1
  * of K_mech - K_eff is positive and pivot 2 of K_mech - K_eff is positive and pivot 3 of K_mech -
  * K_eff is positive; elsewhere 1, and what is not defined is NaN.
- * Cost: 91 add, 111 mul, 7 div, 8 neg.
+ * Cost: 91 add, 111 mul, 7 div, 5 neg.
  */
 int awiwi_stiffness_correction(const double K_eff[16], const double K_mech[16], double K_imp[16]);
 
@@ -1876,7 +1876,7 @@ int awiwi_sdre_tendon(const double theta[1], const double thd[1], const double t
  * is positive and the first frequency is positive and the second frequency is positive and the first
  * damping ratio is positive and the second damping ratio is positive; elsewhere 1, and what is not
  * defined is NaN.
- * Cost: 14 add, 26 mul, 2 div, 1 neg.
+ * Cost: 14 add, 26 mul, 2 div.
  */
 int awiwi_pole_placement(const double m[1], const double b[1], const double k[1], const double dq[1], const double dtheta[1], const double omega[2], const double xi[2], double K[4]);
 
@@ -1951,7 +1951,7 @@ int awiwi_lqr(const double A[16], const double B[4], const double Q[16], const d
  *   in   k[2] in 1, 0.01 to 10
  *   out  u[1] in 1
  * Returns 0 where k1 is positive and k2 is positive; elsewhere 1, and what is not defined is NaN.
- * Cost: 6 add, 7 mul, 1 neg.
+ * Cost: 6 add, 7 mul.
  */
 int awiwi_backstepping_academic(const double x[2], const double k[2], double u[1]);
 
@@ -2052,7 +2052,7 @@ void awiwi_backstepping_impedance_lyapunov(const double state[4], const double d
  * Returns 0 where the link's inertia is positive and the motor's inertia is positive and the spring's
  * slope is positive and K_p is positive and K_d is positive and K_3 is positive and K_4 is positive
  * and C_t is positive and C_s is positive; elsewhere 1, and what is not defined is NaN.
- * Cost: 23 add, 20 mul, 4 div, 3 neg.
+ * Cost: 23 add, 20 mul, 4 div.
  */
 int awiwi_backstepping_nonlinear(const double state[4], const double desired[5], const double external[2], const double bodies[2], const double spring[2], const double gains[4], const double weights[2], double tau_m[1]);
 
@@ -2078,7 +2078,7 @@ int awiwi_backstepping_nonlinear(const double state[4], const double desired[5],
  * positive and C_s of motor 1 is positive and K_3 of motor 2 is positive and K_4 of motor 2 is
  * positive and C_t of motor 2 is positive and C_s of motor 2 is positive; elsewhere 1, and what is not
  * defined is NaN.
- * Cost: 42 add, 32 mul, 7 div, 5 neg.
+ * Cost: 42 add, 32 mul, 7 div.
  */
 int awiwi_backstepping_antagonistic(const double joint[2], const double torques[4], const double desired[5], const double pretension[3], const double external[2], const double inertias[3], const double springs[4], const double impedance[2], const double tunings[8], double tau_m[2]);
 
@@ -2122,7 +2122,7 @@ void awiwi_backstepping_antagonistic_lyapunov(const double joint[2], const doubl
  * positive and C_s of motor 1 is positive and K_3 of motor 2 is positive and K_4 of motor 2 is
  * positive and C_t of motor 2 is positive and C_s of motor 2 is positive; elsewhere 1, and what is not
  * defined is NaN.
- * Cost: 48 add, 40 mul, 7 div, 3 neg.
+ * Cost: 48 add, 40 mul, 7 div.
  */
 int awiwi_backstepping_antagonistic_decoupled(const double joint[2], const double torques[4], const double desired[5], const double pretension[3], const double external[2], const double inertias[3], const double springs[4], const double impedance[2], const double tunings[8], double tau_m[2]);
 
@@ -2137,7 +2137,7 @@ int awiwi_backstepping_antagonistic_decoupled(const double joint[2], const doubl
  *   out  K[4] in N m/rad, N m s/rad, 1, s
  *   out  K_cancelled[4] in N m/rad, N m s/rad, 1, s
  *   out  h[2] in 1, s
- * Cost: 11 add, 16 mul, 4 div, 1 neg.
+ * Cost: 11 add, 15 mul, 4 div, 1 neg.
  */
 void awiwi_backstepping_state_gains(const double plant[3], const double gains[4], const double weights[2], double K[4], double K_cancelled[4], double h[2]);
 
@@ -2181,7 +2181,7 @@ int awiwi_optimal_backstepping_rates(const double K_opt[4], const double plant[3
  * Returns 0 where the link's inertia is positive and the motor's inertia is positive and the stiffness
  * is positive and K_p is positive and K_d is positive and C_t is positive and K_3 is positive and K_4
  * is positive and C_s is positive; elsewhere 1, and what is not defined is NaN.
- * Cost: 8 add, 10 mul, 5 div, 7 neg.
+ * Cost: 8 add, 10 mul, 5 div, 3 neg.
  */
 int awiwi_optimal_backstepping_weights(const double K_opt[4], const double plant[3], const double impedance[2], double rates[2], double weights[2]);
 
@@ -2263,7 +2263,7 @@ void awiwi_antagonistic_observer(const double memory[13], const double thetas[2]
  *   out  u_des[2] in N m
  * Returns 0 where slope 1 is positive and slope 2 is positive; elsewhere 1, and what is not defined is
  * NaN.
- * Cost: 15 add, 15 mul, 2 div, 1 neg.
+ * Cost: 15 add, 15 mul, 2 div.
  */
 int awiwi_antagonistic_setpoint(const double desired[5], const double pretension[3], const double elongations[2], const double slopes[2], const double inertias[3], const double damping[1], double x_des[6], double u_des[2]);
 
@@ -2324,7 +2324,7 @@ void awiwi_antagonistic_sharing(const double torque[1], const double pretension[
  * positive and C_s of motor 1 is positive and K_3 of motor 2 is positive and K_4 of motor 2 is
  * positive and C_t of motor 2 is positive and C_s of motor 2 is positive; elsewhere 1, and what is not
  * defined is NaN.
- * Cost: 49 add, 37 mul, 7 div, 3 neg.
+ * Cost: 49 add, 37 mul, 7 div.
  */
 int awiwi_backstepping_adaptive(const double joint[2], const double torques[4], const double desired[5], const double pretension[3], const double external[2], const double inertias[3], const double springs[4], const double damping[1], const double impedance[2], const double tunings[8], const double resistance[2], double tau_m[2]);
 
@@ -2357,7 +2357,7 @@ void awiwi_plant_tendon(const double x[2], const double u[1], const double path[
  *   in   damping[2] in N m s/rad, from [0, 0] to [0.005, 0.1]
  *   out  xd[4] in rad/s, rad/s^2
  *   out  tau[2] in N m, N m/s
- * Cost: 6 add, 4 mul, 2 div, 1 neg.
+ * Cost: 6 add, 4 mul, 2 div.
  */
 void awiwi_plant_joint_linear(const double x[4], const double u[1], const double load[1], const double plant[3], const double damping[2], double xd[4], double tau[2]);
 
@@ -2394,7 +2394,7 @@ void awiwi_plant_joint_nonlinear(const double x[4], const double u[1], const dou
  *   out  xd[6] in rad/s, rad/s^2
  *   out  stretches[2] in rad
  *   out  tau[2] in N m
- * Cost: 19 add, 16 mul, 3 div, 2 neg, 4 calls.
+ * Cost: 19 add, 16 mul, 3 div, 1 neg, 4 calls.
  */
 void awiwi_plant_antagonistic(const double x[6], const double u[2], const double load[1], const double inertias[3], const double tendons[6], const double damping[1], const double friction[3], double xd[6], double stretches[2], double tau[2]);
 

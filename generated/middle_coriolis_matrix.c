@@ -5,7 +5,7 @@
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   qd[4] in rad/s, -20 to 20
  *   out  C[4][4] in N m s/rad
- * Cost: 46 add, 49 mul, 4 neg, 3 sincos.
+ * Cost: 46 add, 49 mul, 2 neg, 3 sincos.
  * Inputs: sha256 27e22bc7c4ee6e86004522d8f50690fdd8de460926c911ade00c68bec4af2ee2.
  */
 #include "trig.h"
@@ -18,9 +18,9 @@ void awiwi_middle_coriolis_matrix(const double q[restrict 4], const double qd[re
     const awiwi_turn3 a0 = awiwi_sincos3(q[1], t0, t1);
     const double t2 = a0.cos[0] + 0.13636363636363635;
     const double t3 = 1.6636106159795927e-06*a0.cos[2];
-    const double t4 = (t2 + 0.75*a0.cos[1])*t3 + a0.cos[2]*(1.0925468904244817e-08*a0.cos[2] - 4.735141006910168e-07*a0.sin[2]) - 5.4627344521224085e-09;
+    const double t4 = 5.4627344521224085e-09 - (t2 + 0.75*a0.cos[1])*t3 - a0.cos[2]*(1.0925468904244817e-08*a0.cos[2] - 4.735141006910168e-07*a0.sin[2]);
     const double t5 = 5.72e-08*a0.cos[1] + 1.06744e-05*a0.sin[1];
-    const double t6 = t2*t5 + a0.sin[1]*(6.78634e-06*a0.cos[1] - 2.56e-08*a0.sin[1] - 1.2477079619846946e-06*a0.sin[2]) + t4 + 1.28e-08;
+    const double t6 = t2*t5 + a0.sin[1]*(6.78634e-06*a0.cos[1] - 2.56e-08*a0.sin[1] - 1.2477079619846946e-06*a0.sin[2]) + 1.28e-08 - t4;
     const double t7 = 1.06744e-05*a0.cos[1] - 5.72e-08*a0.sin[1] - 1.6636106159795927e-06*a0.sin[2];
     const double t8 = 1.98e-08*a0.cos[0] + t6 + a0.sin[0]*(2.771021e-05*a0.cos[0] + t7 - 8.92e-08*a0.sin[0] + 4.2768e-06) + 4.46e-08;
     const double t9 = qd[1] + qd[2];
@@ -34,24 +34,24 @@ void awiwi_middle_coriolis_matrix(const double q[restrict 4], const double qd[re
     const double t17 = qd[1]*t16;
     const double t18 = 1.2477079619846946e-06*(a0.cos[1]*a0.cos[2] + a0.sin[1]*a0.sin[2]);
     const double t19 = t9*t18;
-    const double t20 = t10*t18;
-    const double t21 = t19 - t20;
+    const double t20 = -t10*t18;
+    const double t21 = t19 + t20;
     const double t22 = 1.6636106159795927e-06*(a0.cos[0]*a0.cos[2] + a0.sin[0]*a0.sin[2]);
     const double t23 = t10*t22;
     const double t24 = t21 + t9*(t22 - t16) - t23;
-    C[0] = -(qd[3]*t4) - qd[2]*t6 - qd[1]*t8;
+    C[0] = qd[3]*t4 - qd[2]*t6 - qd[1]*t8;
     C[1] = qd[1]*(1.16724e-06*a0.cos[0] - 1.166e-08*a0.sin[0]) + t12 - t13;
     C[2] = t12 - t14;
-    C[3] = -t11 - t15;
+    C[3] = t15 - t11;
     C[4] = t13;
     C[5] = t17 + t24;
     C[6] = t24;
-    C[7] = -t23 - t20;
+    C[7] = t20 - t23;
     C[8] = t14;
     C[9] = t21 + t17;
     C[10] = t21;
-    C[11] = -t20;
-    C[12] = t15;
+    C[11] = t20;
+    C[12] = -t15;
     C[13] = qd[1]*t22 + t19;
     C[14] = t19;
     C[15] = 0.0;

@@ -8,7 +8,7 @@
  *   out  M[4][4] in kg m^2
  *   out  C[4][4] in N m s/rad
  *   out  gravity[4] in N m
- * Cost: 77 add, 83 mul, 4 neg, 4 sincos.
+ * Cost: 77 add, 83 mul, 2 neg, 4 sincos.
  * Inputs: sha256 ae4a85ce0785917635eb44a968958b9f879dffad6da58c0336320b942386f084.
  */
 #include "trig.h"
@@ -44,8 +44,8 @@ void awiwi_middle_dynamics(const double q[restrict 4], const double qd[restrict 
     const double t24 = t18 + t23;
     const double t25 = t13*t2 + t14*t16 + t22;
     const double t26 = t13 + 0.006;
-    const double t27 = (t26 + t19)*t16 + 8.625935555155794e-09 - a0.sin[2]*t9;
-    const double t28 = t26*t15 + t27 + a0.sin[1]*t6 + 1.28e-08;
+    const double t27 = a0.sin[2]*t9 - (t26 + t19)*t16 - 8.625935555155794e-09;
+    const double t28 = t26*t15 + a0.sin[1]*t6 + 1.28e-08 - t27;
     const double t29 = 3.3e-06*a0.cos[0] + 0.0007128*a0.sin[0];
     const double t30 = 0.006*t29 + t28 + a0.sin[0]*t8 + 4.46e-08;
     const double t31 = qd[1] + qd[2];
@@ -59,8 +59,8 @@ void awiwi_middle_dynamics(const double q[restrict 4], const double qd[restrict 
     const double t39 = qd[1]*t38;
     const double t40 = t19*t16 - t20*t2;
     const double t41 = t31*t40;
-    const double t42 = t32*t40;
-    const double t43 = t41 - t42;
+    const double t42 = -t32*t40;
+    const double t43 = t41 + t42;
     const double t44 = t13*t16 - t14*t2;
     const double t45 = t32*t44;
     const double t46 = t43 + t31*(t44 - t38) - t45;
@@ -81,19 +81,19 @@ void awiwi_middle_dynamics(const double q[restrict 4], const double qd[restrict 
     M[13] = t25;
     M[14] = t22;
     M[15] = 5.16368e-07;
-    C[0] = -(qd[3]*t27) - qd[2]*t28 - qd[1]*t30;
+    C[0] = qd[3]*t27 - qd[2]*t28 - qd[1]*t30;
     C[1] = qd[1]*(1.16724e-06*a0.cos[0] - 1.166e-08*a0.sin[0]) + t34 - t35;
     C[2] = t34 - t36;
-    C[3] = -t33 - t37;
+    C[3] = t37 - t33;
     C[4] = t35;
     C[5] = t39 + t46;
     C[6] = t46;
-    C[7] = -t45 - t42;
+    C[7] = t42 - t45;
     C[8] = t36;
     C[9] = t43 + t39;
     C[10] = t43;
-    C[11] = -t42;
-    C[12] = t37;
+    C[11] = t42;
+    C[12] = -t37;
     C[13] = qd[1]*t44 + t41;
     C[14] = t41;
     C[15] = 0.0;

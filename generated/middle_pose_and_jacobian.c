@@ -5,7 +5,7 @@
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   out  T[4][4] in 1, m
  *   out  J[6][4] in m/rad, 1
- * Cost: 9 add, 20 mul, 13 neg, 4 sincos.
+ * Cost: 9 add, 20 mul, 8 neg, 4 sincos.
  * Inputs: sha256 15462d6160e9e4cd18a43275ab61dc404bca2d4b163c1071b4541fb6ea4f279d.
  */
 #include "trig.h"
@@ -22,9 +22,9 @@ void awiwi_middle_pose_and_jacobian(const double q[restrict 4], double T[restric
     const double t5 = t4 + 0.006;
     const double t6 = a0.cos[0]*t5 - 0.0047*a0.sin[0];
     const double t7 = 0.0047*a0.cos[0] + a0.sin[0]*t5;
-    const double t8 = 0.021*a0.sin[1];
-    const double t9 = 0.033*a0.sin[3] + t8;
-    const double t10 = 0.044*a0.sin[2] + t9;
+    const double t8 = -0.021*a0.sin[1];
+    const double t9 = t8 - 0.033*a0.sin[3];
+    const double t10 = -0.044*a0.sin[2] + t9;
     T[0] = a0.cos[0]*a0.cos[1];
     T[1] = -(a0.cos[0]*a0.sin[1]);
     T[2] = a0.sin[0];
@@ -36,19 +36,19 @@ void awiwi_middle_pose_and_jacobian(const double q[restrict 4], double T[restric
     T[8] = a0.sin[1];
     T[9] = a0.cos[1];
     T[10] = 0.0;
-    T[11] = t10;
+    T[11] = -t10;
     T[12] = 0.0;
     T[13] = 0.0;
     T[14] = 0.0;
     T[15] = 1.0;
     J[0] = -t7;
-    J[1] = -(a0.cos[0]*t10);
-    J[2] = -(a0.cos[0]*t9);
-    J[3] = -(a0.cos[0]*t8);
+    J[1] = a0.cos[0]*t10;
+    J[2] = a0.cos[0]*t9;
+    J[3] = a0.cos[0]*t8;
     J[4] = t6;
-    J[5] = -(a0.sin[0]*t10);
-    J[6] = -(a0.sin[0]*t9);
-    J[7] = -(a0.sin[0]*t8);
+    J[5] = a0.sin[0]*t10;
+    J[6] = a0.sin[0]*t9;
+    J[7] = a0.sin[0]*t8;
     J[8] = 0.0;
     J[9] = t4;
     J[10] = t3;

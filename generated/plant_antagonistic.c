@@ -15,7 +15,7 @@
  *   out  xd[6] in rad/s, rad/s^2
  *   out  stretches[2] in rad
  *   out  tau[2] in N m
- * Cost: 19 add, 16 mul, 3 div, 2 neg, 4 calls.
+ * Cost: 19 add, 16 mul, 3 div, 1 neg, 4 calls.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
 #include <math.h>
@@ -27,18 +27,18 @@ void awiwi_plant_antagonistic(const double x[restrict 6], const double u[restric
     const double t0 = 0.5*x[0];
     const double t1 = x[0] - x[2];
     const double t2 = t0 - 0.5*(x[2] + fabs(t1));
-    const double t3 = t2*(tendons[0] - t2*(tendons[1] - tendons[2]*t2));
+    const double t3 = t2*(t2*(tendons[1] - tendons[2]*t2) - tendons[0]);
     const double t4 = x[0] + x[4];
     const double t5 = t0 + 0.5*(x[4] + fabs(t4));
     const double t6 = t5*(tendons[3] + t5*(tendons[4] + tendons[5]*t5));
     xd[0] = x[1];
-    xd[1] = (load[0] - damping[0]*x[1] - t3 - t6)/inertias[0];
+    xd[1] = (load[0] + t3 - damping[0]*x[1] - t6)/inertias[0];
     xd[2] = x[3];
-    xd[3] = (u[0] + t3 - friction[2]*x[3] - friction[1]*awiwi_atan(friction[0]*x[3]))/inertias[1];
+    xd[3] = (u[0] - t3 - friction[2]*x[3] - friction[1]*awiwi_atan(friction[0]*x[3]))/inertias[1];
     xd[4] = x[5];
     xd[5] = (u[1] - friction[2]*x[5] - friction[1]*awiwi_atan(friction[0]*x[5]) - t6)/inertias[2];
     stretches[0] = -t1;
     stretches[1] = t4;
-    tau[0] = -t3;
+    tau[0] = t3;
     tau[1] = t6;
 }

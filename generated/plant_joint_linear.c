@@ -10,18 +10,18 @@
  *   in   damping[2] in N m s/rad, from [0, 0] to [0.005, 0.1]
  *   out  xd[4] in rad/s, rad/s^2
  *   out  tau[2] in N m, N m/s
- * Cost: 6 add, 4 mul, 2 div, 1 neg.
+ * Cost: 6 add, 4 mul, 2 div.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
 #include "kernels.h"
 
 void awiwi_plant_joint_linear(const double x[restrict 4], const double u[restrict 1], const double load[restrict 1], const double plant[restrict 3], const double damping[restrict 2], double xd[restrict 4], double tau[restrict 2])
 {
-    const double t0 = plant[2]*(x[0] - x[2]);
+    const double t0 = plant[2]*(x[2] - x[0]);
     xd[0] = x[1];
-    xd[1] = (load[0] - damping[0]*x[1] - t0)/plant[0];
+    xd[1] = (load[0] + t0 - damping[0]*x[1])/plant[0];
     xd[2] = x[3];
-    xd[3] = (u[0] + t0 - damping[1]*x[3])/plant[1];
-    tau[0] = -t0;
+    xd[3] = (u[0] - t0 - damping[1]*x[3])/plant[1];
+    tau[0] = t0;
     tau[1] = plant[2]*(x[3] - x[1]);
 }

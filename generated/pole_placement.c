@@ -15,7 +15,7 @@
  * is positive and the first frequency is positive and the second frequency is positive and the first
  * damping ratio is positive and the second damping ratio is positive; elsewhere 1, and what is not
  * defined is NaN.
- * Cost: 14 add, 26 mul, 2 div, 1 neg.
+ * Cost: 14 add, 26 mul, 2 div.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
 #include "kernels.h"
@@ -26,11 +26,11 @@ int awiwi_pole_placement(const double m[restrict 1], const double b[restrict 1],
     const double t1 = omega[0]*omega[1];
     const double t2 = b[0]*m[0]*t1;
     const double t3 = 1.0/m[0];
-    const double t4 = b[0]*(dq[0]*t3 - 2.0*(omega[0]*xi[0] + omega[1]*xi[1]));
-    const double t5 = -dtheta[0] - t4;
+    const double t4 = b[0]*(2.0*(omega[0]*xi[0] + omega[1]*xi[1]) - dq[0]*t3);
+    const double t5 = t4 - dtheta[0];
     const double t6 = b[0]*(omega[0]*omega[0] + omega[1]*omega[1] + 4.0*xi[0]*xi[1]*t1) - t3*(k[0]*(b[0] + m[0]) + dq[0]*(dtheta[0] + t5));
     K[0] = omega[0]*omega[1]*t0*t2 - t6;
-    K[1] = t4 + t0*(2.0*(omega[0]*xi[1] + omega[1]*xi[0])*t2 - dq[0]*t6) - dq[0];
+    K[1] = t0*(2.0*(omega[0]*xi[1] + omega[1]*xi[0])*t2 - dq[0]*t6) - t4 - dq[0];
     K[2] = t6;
     K[3] = t5;
     return m[0] > 0.0 && b[0] > 0.0 && k[0] > 0.0 && omega[0] > 0.0 && omega[1] > 0.0 && xi[0] > 0.0 && xi[1] > 0.0 ? 0 : 1;

@@ -8,7 +8,7 @@
  *   out  M[3][3] in kg m^2
  *   out  C[3][3] in N m s/rad
  *   out  gravity[3] in N m
- * Cost: 87 add, 97 mul, 1 neg, 4 sincos.
+ * Cost: 87 add, 97 mul, 4 sincos.
  * Inputs: sha256 d2fd8ea8122210c370a876d04ecdbc1ca49df3b198ba198458bb7b3639479b1a.
  */
 #include "trig.h"
@@ -45,8 +45,8 @@ void awiwi_ring_dynamics(const double q[restrict 3], const double qd[restrict 3]
     const double t25 = 0.032214285714285716*(a0.cos[0]*t2 + a0.sin[0]*t16) + 0.7857142857142857*t22 + t24;
     const double t26 = 0.7857142857142857*qd[2];
     const double t27 = t13 + 0.006;
-    const double t28 = (t27 + t19)*t16 + 7.765062493990363e-09 - a0.sin[2]*t9;
-    const double t29 = t27*t15 + t28 + a0.sin[1]*t6 + 1.176e-08;
+    const double t28 = a0.sin[2]*t9 - (t27 + t19)*t16 - 7.765062493990363e-09;
+    const double t29 = t27*t15 + a0.sin[1]*t6 + 1.176e-08 - t28;
     const double t30 = 3e-06*a0.cos[0] + 0.000615*a0.sin[0];
     const double t31 = 0.006*t30 + t29 + a0.sin[0]*t8 + 3.95e-08;
     const double t32 = qd[1] + qd[2];
@@ -54,7 +54,7 @@ void awiwi_ring_dynamics(const double q[restrict 3], const double qd[restrict 3]
     const double t34 = t33*(1.518649189246812e-07*a0.sin[2]);
     const double t35 = t32*(6.2216e-07*a0.cos[1] - 5.44e-09*a0.sin[1]) - t34;
     const double t36 = qd[0]*t31;
-    const double t37 = 0.7857142857142857*(qd[0]*t28) + qd[0]*t29;
+    const double t37 = -0.7857142857142857*(qd[0]*t28) + qd[0]*t29;
     const double t38 = t13*t17 - t14*t3;
     const double t39 = qd[1]*t38;
     const double t40 = t19*t16 - t20*t2;
@@ -72,7 +72,7 @@ void awiwi_ring_dynamics(const double q[restrict 3], const double qd[restrict 3]
     M[6] = t12;
     M[7] = t25;
     M[8] = t23 + 1.5714285714285714*t22 + 2.9889469387755104e-07;
-    C[0] = -(t26*t28) - qd[2]*t29 - qd[1]*t31;
+    C[0] = t26*t28 - qd[2]*t29 - qd[1]*t31;
     C[1] = qd[1]*(1.0264e-06*a0.cos[0] - 9.6e-09*a0.sin[0]) + t35 - t36;
     C[2] = t35 - 0.7857142857142857*t34 - t37;
     C[3] = t36;

@@ -8,7 +8,7 @@
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  dtau_dq[3][3] in N m/rad
  *   out  dtau_dqd[3][3] in N m s/rad
- * Cost: 179 add, 218 mul, 2 neg, 4 sincos.
+ * Cost: 179 add, 218 mul, 4 sincos.
  * Inputs: sha256 629681b331d715cabc79e549054515e6ff19ef45f5083fc8fb3efe64fdde7fbb.
  */
 #include "trig.h"
@@ -36,11 +36,11 @@ void awiwi_ring_inverse_dynamics_derivatives(const double q[restrict 3], const d
     const double t16 = 6.2216e-07*t13 - 5.44e-09*t15;
     const double t17 = 8.8637989782679e-07*a0.cos[3] + 3.106024997596145e-08*a0.sin[3];
     const double t18 = 3e-06*a0.cos[1] + 0.000615*a0.sin[1];
-    const double t19 = 1.2e-06*a0.cos[2] + 0.0002108*a0.sin[2];
-    const double t20 = 3.6007999995786246e-05*a0.cos[3] + 2.5285629012876123e-07*a0.sin[3];
-    const double t21 = t19 + t20;
+    const double t19 = 3.6007999995786246e-05*a0.cos[3] + 2.5285629012876123e-07*a0.sin[3];
+    const double t20 = -1.2e-06*a0.cos[2] + -0.0002108*a0.sin[2];
+    const double t21 = t19 - t20;
     const double t22 = t18 + t21;
-    const double t23 = 0.0305*t20;
+    const double t23 = 0.0305*t19;
     const double t24 = 2.352e-08*a0.cos[2] + 5.463e-06*a0.sin[2];
     const double t25 = t24 + t23;
     const double t26 = 0.0305*t5;
@@ -59,9 +59,9 @@ void awiwi_ring_inverse_dynamics_derivatives(const double q[restrict 3], const d
     const double t39 = t38 + 0.006;
     const double t40 = 0.0305*a0.cos[2];
     const double t41 = t39 + t40;
-    const double t42 = a0.cos[3]*t17 + (t36 + t37)*t20 - t41*t5 - 4.43189948913395e-07;
-    const double t43 = -(t39*t4) - a0.cos[2]*t27;
-    const double t44 = t36*t19 + a0.sin[2]*t25 + t43;
+    const double t42 = a0.cos[3]*t17 + (t36 + t37)*t19 - t41*t5 - 4.43189948913395e-07;
+    const double t43 = t39*t4 + a0.cos[2]*t27;
+    const double t44 = a0.sin[2]*t25 - t36*t20 - t43;
     const double t45 = 0.006*t3 + a0.cos[1]*t32 - a0.sin[1]*t30;
     const double t46 = qdd[1]*a0.sin[1] + a0.cos[1]*t8;
     const double t47 = t35*t35;
@@ -70,36 +70,36 @@ void awiwi_ring_inverse_dynamics_derivatives(const double q[restrict 3], const d
     const double t50 = 1.518649189246812e-07*a0.sin[3];
     const double t51 = 1.0264e-06*t9 + t16 + qdd[0]*t33 + t34*(t35*t42 + t11*t44 - qd[1]*t45) - 9.6e-09*t46 - 1.518649189246812e-07*t48 - t49*t50 - t7*t22;
     const double t52 = 6.429999999247544e-05*a0.cos[3] + 4.515290895156451e-07*a0.sin[3];
-    const double t53 = t19 + t52;
+    const double t53 = t52 - t20;
     const double t54 = t36*t53;
     const double t55 = 5.5464732099931155e-08*a0.cos[3] - 1.582821246119268e-06*a0.sin[3];
     const double t56 = 4.515290895156451e-07*a0.cos[3] - 6.429999999247544e-05*a0.sin[3];
-    const double t57 = t37*t20 + a0.sin[3]*t55 + 7.91410623059634e-07 - t41*t56;
+    const double t57 = t37*t19 + a0.sin[3]*t55 + 7.91410623059634e-07 - t41*t56;
     const double t58 = 0.0305*t52;
     const double t59 = t24 + t58;
-    const double t60 = a0.sin[2]*t59 + t43;
+    const double t60 = a0.sin[2]*t59 - t43;
     const double t61 = 2.71187355222645e-07*a0.sin[3];
     const double t62 = qdd[0]*(a0.cos[3]*t55 + (0.082*a0.cos[1] + 0.012)*t53 + a0.cos[2]*(t58 + t59) + t28 - 2.7732366049965578e-08);
-    const double t63 = t7*t20;
-    const double t64 = -(t7*t19) - t63;
+    const double t63 = t7*t19;
+    const double t64 = t7*t20 - t63;
     const double t65 = qd[0]*qd[0];
-    const double t66 = 0.041*t9;
-    const double t67 = g[2] - t66;
-    const double t68 = 0.041*t46;
-    const double t69 = t2 + t68;
-    const double t70 = qdd[0]*(6.2216e-07*a0.cos[2] - 5.44e-09*a0.sin[2]) + t19*t67 + t4*t69;
+    const double t66 = 0.041*t46;
+    const double t67 = t2 + t66;
+    const double t68 = 0.041*t9;
+    const double t69 = g[2] - t68;
+    const double t70 = qdd[0]*(6.2216e-07*a0.cos[2] - 5.44e-09*a0.sin[2]) + t4*t67 - t20*t69;
     const double t71 = 0.0305*t15;
-    const double t72 = t69 + t71;
+    const double t72 = t67 + t71;
     const double t73 = 0.0305*t13;
-    const double t74 = t67 - t73;
-    const double t75 = qdd[0]*t50 + t65*t42 + t5*(t68 + t71 - t72) - t20*(t66 + t73 + t74);
-    const double t76 = t19*t66 + t70 - t4*t68 - t75 - t65*t44;
+    const double t74 = t69 - t73;
+    const double t75 = qdd[0]*t50 + t65*t42 + t5*(t66 + t71 - t72) - t19*(t68 + t73 + t74);
+    const double t76 = t70 - t20*t68 - t4*t66 - t75 - t65*t44;
     const double t77 = t49*t56 - t47*t52;
     const double t78 = t49*t52 + t47*t56;
-    const double t79 = qdd[0]*t61 + t5*t71 + t65*t57 - t20*t73 - t56*t72 - t52*t74;
-    const double t80 = t70 + t40*(t49*t20 + t47*t5 - t78) - t79 - t37*(t49*t5 - t47*t20 - t77) - t65*t60;
-    const double t81 = a0.cos[3]*(1.5530124987980726e-08*a0.cos[3] - 4.43189948913395e-07*a0.sin[3]) + t41*t20 - 7.765062493990363e-09;
-    const double t82 = t39*t19 + a0.sin[2]*t27 + 1.176e-08;
+    const double t79 = qdd[0]*t61 + t5*t71 + t65*t57 - t19*t73 - t56*t72 - t52*t74;
+    const double t80 = t70 + t40*(t49*t19 + t47*t5 - t78) - t79 - t37*(t49*t5 - t47*t19 - t77) - t65*t60;
+    const double t81 = a0.cos[3]*(1.5530124987980726e-08*a0.cos[3] - 4.43189948913395e-07*a0.sin[3]) + t41*t19 - 7.765062493990363e-09;
+    const double t82 = a0.sin[2]*t27 + 1.176e-08 - t39*t20;
     const double t83 = 0.006*t18 + a0.sin[1]*t32 + 3.95e-08;
     const double t84 = 1.24432e-06*t14 - 1.088e-08*t12;
     const double t85 = t35*a0.sin[3];
@@ -113,12 +113,12 @@ void awiwi_ring_inverse_dynamics_derivatives(const double q[restrict 3], const d
     const double t93 = 0.061*t14;
     const double t94 = t91*a0.sin[1];
     const double t95 = 0.061*t12;
-    const double t96 = (t92 + t93)*t20 - (t94 + t95)*t5;
-    const double t97 = t35*t20;
+    const double t96 = (t92 + t93)*t19 - (t94 + t95)*t5;
+    const double t97 = t35*t19;
     const double t98 = a0.cos[2]*t97 - a0.sin[2]*t90;
-    const double t99 = t92*t19 + t96 - t94*t4 - 0.061*t98;
+    const double t99 = t96 - t92*t20 - t94*t4 - 0.061*t98;
     const double t100 = 2.4e-06*t14 + 0.0004216*t12;
-    const double t101 = t93*t20 - t95*t5;
+    const double t101 = t93*t19 - t95*t5;
     const double t102 = t101 - 0.10892857142857143*t98;
     dtau_dq[0] = t2*(t3 + t6 + 0.0001245) - 2.64e-05*t7;
     dtau_dq[1] = t51;

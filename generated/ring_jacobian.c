@@ -4,7 +4,7 @@
  * Source: eq. 5.3, differentiated.
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   out  J[6][3] in m/rad, 1
- * Cost: 11 add, 19 mul, 6 neg, 4 sincos.
+ * Cost: 11 add, 19 mul, 1 neg, 4 sincos.
  * Inputs: sha256 090304d03fe3bc2a4f7fd1fcdca40644c253e343cce00255c91570f1ebc31845.
  */
 #include "trig.h"
@@ -18,15 +18,15 @@ void awiwi_ring_jacobian(const double q[restrict 3], double J[restrict 18])
     const double t2 = 0.0305*a0.cos[2] + 0.0205*a0.cos[3];
     const double t3 = 0.041*a0.cos[1] + t2;
     const double t4 = t3 + 0.006;
-    const double t5 = 0.0305*a0.sin[2] + 0.0205*a0.sin[3];
-    const double t6 = 0.041*a0.sin[1] + t5;
-    const double t7 = 0.016107142857142858*a0.sin[3] + t5;
-    J[0] = -(0.0047*a0.cos[0]) - a0.sin[0]*t4;
-    J[1] = -(a0.cos[0]*t6);
-    J[2] = -(a0.cos[0]*t7);
+    const double t5 = -0.0205*a0.sin[3] - 0.0305*a0.sin[2];
+    const double t6 = t5 - 0.041*a0.sin[1];
+    const double t7 = t5 - 0.016107142857142858*a0.sin[3];
+    J[0] = -0.0047*a0.cos[0] - a0.sin[0]*t4;
+    J[1] = a0.cos[0]*t6;
+    J[2] = a0.cos[0]*t7;
     J[3] = a0.cos[0]*t4 - 0.0047*a0.sin[0];
-    J[4] = -(a0.sin[0]*t6);
-    J[5] = -(a0.sin[0]*t7);
+    J[4] = a0.sin[0]*t6;
+    J[5] = a0.sin[0]*t7;
     J[6] = 0.0;
     J[7] = t3;
     J[8] = 0.016107142857142858*a0.cos[3] + t2;

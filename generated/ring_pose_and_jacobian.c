@@ -5,7 +5,7 @@
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   out  T[4][4] in 1, m
  *   out  J[6][3] in m/rad, 1
- * Cost: 11 add, 23 mul, 9 neg, 4 sincos.
+ * Cost: 11 add, 23 mul, 6 neg, 4 sincos.
  * Inputs: sha256 8b1e4049e08ada68fc0fffe59ae1b436246736a5f349d22efb157c0e2c972c0c.
  */
 #include "trig.h"
@@ -21,9 +21,9 @@ void awiwi_ring_pose_and_jacobian(const double q[restrict 3], double T[restrict 
     const double t4 = t3 + 0.006;
     const double t5 = a0.cos[0]*t4 - 0.0047*a0.sin[0];
     const double t6 = 0.0047*a0.cos[0] + a0.sin[0]*t4;
-    const double t7 = 0.0305*a0.sin[3] + 0.0205*a0.sin[1];
-    const double t8 = 0.041*a0.sin[2] + t7;
-    const double t9 = 0.016107142857142858*a0.sin[1] + t7;
+    const double t7 = -0.0305*a0.sin[3] + -0.0205*a0.sin[1];
+    const double t8 = -0.041*a0.sin[2] + t7;
+    const double t9 = t7 - 0.016107142857142858*a0.sin[1];
     T[0] = a0.cos[0]*a0.cos[1];
     T[1] = -(a0.cos[0]*a0.sin[1]);
     T[2] = a0.sin[0];
@@ -35,17 +35,17 @@ void awiwi_ring_pose_and_jacobian(const double q[restrict 3], double T[restrict 
     T[8] = a0.sin[1];
     T[9] = a0.cos[1];
     T[10] = 0.0;
-    T[11] = t8;
+    T[11] = -t8;
     T[12] = 0.0;
     T[13] = 0.0;
     T[14] = 0.0;
     T[15] = 1.0;
     J[0] = -t6;
-    J[1] = -(a0.cos[0]*t8);
-    J[2] = -(a0.cos[0]*t9);
+    J[1] = a0.cos[0]*t8;
+    J[2] = a0.cos[0]*t9;
     J[3] = t5;
-    J[4] = -(a0.sin[0]*t8);
-    J[5] = -(a0.sin[0]*t9);
+    J[4] = a0.sin[0]*t8;
+    J[5] = a0.sin[0]*t9;
     J[6] = 0.0;
     J[7] = t3;
     J[8] = 0.016107142857142858*a0.cos[1] + t2;

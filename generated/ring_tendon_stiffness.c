@@ -9,7 +9,7 @@
  *   out  curvature[6] in 1/(N m)
  * Returns 0 where every tension is on its spring's curve, give or take a hundredth; elsewhere 1, and
  * what is not defined is NaN.
- * Cost: 148 add, 171 mul, 1 neg, 5 calls.
+ * Cost: 148 add, 171 mul, 5 calls.
  * Inputs: sha256 b64c46b637f0a464ed4766b60f7050b3f882b2c8a66fc18598209e2c9ff07328.
  */
 #include <math.h>
@@ -81,5 +81,5 @@ int awiwi_ring_tendon_stiffness(const double tension[restrict 6], double k[restr
     curvature[3] = 0.00043156509109859516*(t10*(t10*t33 - 5695.354368953386) + 4972.416806983404);
     curvature[4] = 0.00043156509109859516*(t14*(t14*t34 - 5695.354368953386) + 4972.416806983404);
     curvature[5] = 0.00043156509109859516*(t18*(t18*t35 - 5695.354368953386) + 4972.416806983404);
-    return -(0.5*t36) - 0.5*t45 - 0.5*fabs(t36 - t45) + 1.015625 > 0.0 ? 0 : 1;
+    return 1.015625 - (0.5*t36 + 0.5*t45 + 0.5*fabs(t36 - t45)) > 0.0 ? 0 : 1;
 }

@@ -9,7 +9,7 @@
  * Returns 0 where the roller is clear of the motor's pulley and the roller is clear of the fixed
  * pulley and the tendon turns the lever towards its taut end and the spring is stretched; elsewhere 1,
  * and what is not defined is NaN.
- * Cost: 38 add, 54 mul, 7 div, 1 neg, 3 sqrt, 1 sincos, 2 calls.
+ * Cost: 38 add, 54 mul, 7 div, 3 sqrt, 1 sincos, 2 calls.
  * Inputs: sha256 6a5695bb7e492700563a99433621bd21f8005fce81d41ed26a0365bf35bb62e3.
  */
 #include <math.h>
@@ -40,7 +40,7 @@ int awiwi_spring_lever(const double theta[restrict 1], double dL[restrict 1], do
     const double t17 = 1.0/t6;
     const double t18 = t17*(0.006*t5 - t1*t8);
     const double t19 = t17*(0.006*t1 + t5*t8);
-    const double t20 = awiwi_atan2(0.4601093262074292*t18 - 0.8878622685624981*t19, -(0.4601093262074292*t19) - 0.8878622685624981*t18);
+    const double t20 = awiwi_atan2(0.4601093262074292*t18 - 0.8878622685624981*t19, -0.8878622685624981*t18 - 0.4601093262074292*t19);
     const double t21 = 0.03*a0.cos;
     const double t22 = t21 + 0.024;
     const double t23 = 0.03*a0.sin;

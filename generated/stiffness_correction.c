@@ -12,64 +12,64 @@
  * is positive and pivot 3 of K_eff is positive and pivot 0 of K_mech - K_eff is positive and pivot 1
  * of K_mech - K_eff is positive and pivot 2 of K_mech - K_eff is positive and pivot 3 of K_mech -
  * K_eff is positive; elsewhere 1, and what is not defined is NaN.
- * Cost: 91 add, 111 mul, 7 div, 8 neg.
+ * Cost: 91 add, 111 mul, 7 div, 5 neg.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
 #include "kernels.h"
 
 int awiwi_stiffness_correction(const double K_eff[restrict 16], const double K_mech[restrict 16], double K_imp[restrict 16])
 {
-    const double t0 = K_eff[0] - K_mech[0];
-    const double t1 = 1.0/t0;
-    const double t2 = K_eff[0]*t1 - 1.0;
-    const double t3 = K_eff[4] - K_mech[4];
-    const double t4 = t3*t1;
-    const double t5 = K_eff[4] - K_eff[0]*t4;
-    const double t6 = K_eff[5] - K_mech[5] - t3*t4;
-    const double t7 = 1.0/t6;
-    const double t8 = t5*t7;
-    const double t9 = K_eff[8] - K_mech[8];
-    const double t10 = t9*t1;
-    const double t11 = K_eff[9] - K_mech[9] - t9*t4;
-    const double t12 = K_eff[8] - K_eff[0]*t10 - t11*t8;
-    const double t13 = t11*t7;
-    const double t14 = K_eff[10] - K_mech[10] - t9*t10 - t11*t13;
-    const double t15 = 1.0/t14;
-    const double t16 = t12*t15;
-    const double t17 = K_eff[12] - K_mech[12];
-    const double t18 = t17*t1;
-    const double t19 = K_eff[13] - K_mech[13] - t17*t4;
-    const double t20 = K_eff[14] - K_mech[14] - t17*t10 - t19*t13;
-    const double t21 = K_eff[12] - K_eff[0]*t18 - t19*t8 - t20*t16;
-    const double t22 = K_eff[15] - K_mech[15] - t17*t18 - t19*t19*t7 - t20*t20*t15;
-    const double t23 = 1.0/t22;
-    const double t24 = t21*t23;
-    const double t25 = K_eff[5] - K_eff[4]*t4;
-    const double t26 = t25*t7;
-    const double t27 = K_eff[9] - K_eff[4]*t10 - t11*t26;
-    const double t28 = t27*t15;
-    const double t29 = K_eff[13] - K_eff[4]*t18 - t19*t26 - t20*t28;
-    const double t30 = -(K_eff[4]*t2) - t25*t8 - t27*t16 - t29*t24;
-    const double t31 = K_eff[9] - K_eff[8]*t4;
-    const double t32 = t31*t7;
-    const double t33 = K_eff[10] - K_eff[8]*t10 - t11*t32;
-    const double t34 = t33*t15;
-    const double t35 = K_eff[14] - K_eff[8]*t18 - t19*t32 - t20*t34;
-    const double t36 = -(K_eff[8]*t2) - t31*t8 - t33*t16 - t35*t24;
-    const double t37 = K_eff[13] - K_eff[12]*t4;
-    const double t38 = t37*t7;
-    const double t39 = K_eff[14] - K_eff[12]*t10 - t11*t38;
-    const double t40 = t39*t15;
-    const double t41 = K_eff[15] - K_eff[12]*t18 - t19*t38 - t20*t40;
-    const double t42 = -(K_eff[12]*t2) - t37*t8 - t39*t16 - t41*t24;
-    const double t43 = K_eff[4]*t1;
-    const double t44 = t29*t23;
+    const double t0 = K_eff[12] - K_mech[12];
+    const double t1 = K_eff[0] - K_mech[0];
+    const double t2 = 1.0/t1;
+    const double t3 = t0*t2;
+    const double t4 = K_eff[4] - K_mech[4];
+    const double t5 = t4*t2;
+    const double t6 = K_eff[13] - K_mech[13] - t0*t5;
+    const double t7 = K_eff[4] - K_eff[0]*t5;
+    const double t8 = K_eff[5] - K_mech[5] - t4*t5;
+    const double t9 = 1.0/t8;
+    const double t10 = t7*t9;
+    const double t11 = K_eff[8] - K_mech[8];
+    const double t12 = t11*t2;
+    const double t13 = K_eff[9] - K_mech[9] - t11*t5;
+    const double t14 = t13*t9;
+    const double t15 = K_eff[14] - K_mech[14] - t0*t12 - t6*t14;
+    const double t16 = K_eff[8] - K_eff[0]*t12 - t13*t10;
+    const double t17 = K_eff[10] - K_mech[10] - t11*t12 - t13*t14;
+    const double t18 = 1.0/t17;
+    const double t19 = t16*t18;
+    const double t20 = K_eff[12] - K_eff[0]*t3 - t6*t10 - t15*t19;
+    const double t21 = K_eff[15] - K_mech[15] - t0*t3 - t6*t6*t9 - t15*t15*t18;
+    const double t22 = 1.0/t21;
+    const double t23 = -t20*t22;
+    const double t24 = K_eff[0]*t2 - 1.0;
+    const double t25 = K_eff[5] - K_eff[4]*t5;
+    const double t26 = t25*t9;
+    const double t27 = K_eff[9] - K_eff[4]*t12 - t13*t26;
+    const double t28 = t27*t18;
+    const double t29 = K_eff[13] - K_eff[4]*t3 - t6*t26 - t15*t28;
+    const double t30 = t29*t23 - K_eff[4]*t24 - t25*t10 - t27*t19;
+    const double t31 = K_eff[9] - K_eff[8]*t5;
+    const double t32 = t31*t9;
+    const double t33 = K_eff[10] - K_eff[8]*t12 - t13*t32;
+    const double t34 = t33*t18;
+    const double t35 = K_eff[14] - K_eff[8]*t3 - t6*t32 - t15*t34;
+    const double t36 = t35*t23 - K_eff[8]*t24 - t31*t10 - t33*t19;
+    const double t37 = K_eff[13] - K_eff[12]*t5;
+    const double t38 = t37*t9;
+    const double t39 = K_eff[14] - K_eff[12]*t12 - t13*t38;
+    const double t40 = t39*t18;
+    const double t41 = K_eff[15] - K_eff[12]*t3 - t6*t38 - t15*t40;
+    const double t42 = t41*t23 - K_eff[12]*t24 - t37*t10 - t39*t19;
+    const double t43 = K_eff[4]*t2;
+    const double t44 = t29*t22;
     const double t45 = K_eff[9] - K_eff[8]*t43 - t31*t26 - t33*t28 - t35*t44;
     const double t46 = K_eff[13] - K_eff[12]*t43 - t37*t26 - t39*t28 - t41*t44;
     const double t47 = K_eff[8]*K_eff[8];
-    const double t48 = t35*t23;
+    const double t48 = t35*t22;
     const double t49 = K_eff[8]*K_eff[12];
-    const double t50 = K_eff[14] - t49*t1 - t37*t32 - t39*t34 - t41*t48;
+    const double t50 = K_eff[14] - t49*t2 - t37*t32 - t39*t34 - t41*t48;
     const double t51 = K_eff[12]*K_eff[12];
     const double t52 = 1.0/K_eff[0];
     const double t53 = K_eff[4]*t52;
@@ -80,7 +80,7 @@ int awiwi_stiffness_correction(const double K_eff[restrict 16], const double K_m
     const double t58 = K_eff[10] - t52*t47 - t55*t57;
     const double t59 = K_eff[13] - K_eff[12]*t53;
     const double t60 = K_eff[14] - t52*t49 - t59*t57;
-    K_imp[0] = -(K_eff[0]*t2) - t5*t8 - t12*t16 - t21*t24;
+    K_imp[0] = t20*t23 - K_eff[0]*t24 - t7*t10 - t16*t19;
     K_imp[1] = t30;
     K_imp[2] = t36;
     K_imp[3] = t42;
@@ -90,11 +90,11 @@ int awiwi_stiffness_correction(const double K_eff[restrict 16], const double K_m
     K_imp[7] = t46;
     K_imp[8] = t36;
     K_imp[9] = t45;
-    K_imp[10] = K_eff[10] - t47*t1 - t31*t32 - t33*t34 - t35*t48;
+    K_imp[10] = K_eff[10] - t47*t2 - t31*t32 - t33*t34 - t35*t48;
     K_imp[11] = t50;
     K_imp[12] = t42;
     K_imp[13] = t46;
     K_imp[14] = t50;
-    K_imp[15] = K_eff[15] - t51*t1 - t37*t38 - t39*t40 - t41*t41*t23;
-    return K_eff[0] > 0.0 && t54 > 0.0 && t58 > 0.0 && K_eff[15] - t52*t51 - t59*t59*t56 - t60*t60*(1.0/t58) > 0.0 && -t0 > 0.0 && -t6 > 0.0 && -t14 > 0.0 && -t22 > 0.0 ? 0 : 1;
+    K_imp[15] = K_eff[15] - t51*t2 - t37*t38 - t39*t40 - t41*t41*t22;
+    return K_eff[0] > 0.0 && t54 > 0.0 && t58 > 0.0 && K_eff[15] - t52*t51 - t59*t59*t56 - t60*t60*(1.0/t58) > 0.0 && -t1 > 0.0 && -t8 > 0.0 && -t17 > 0.0 && -t21 > 0.0 ? 0 : 1;
 }

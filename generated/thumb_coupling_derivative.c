@@ -4,7 +4,7 @@
  * Source: eq. 5.11.
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   out  dP[8][4][4] in m/rad^2
- * Cost: 101 add, 112 mul, 4 div, 1 neg, 4 sqrt, 2 sincos.
+ * Cost: 101 add, 112 mul, 4 div, 4 sqrt, 2 sincos.
  * Inputs: sha256 4c7ea1578dc942e36d6e563cd97831da5179a3ff0e24a017614ea16cdc764ec6.
  */
 #include <math.h>
@@ -102,7 +102,7 @@ void awiwi_thumb_coupling_derivative(const double q[restrict 4], double dP[restr
     const double t85 = t79*t79;
     const double t86 = t84*t85;
     const double t87 = t59 + (t57*t77 - t56*t78);
-    const double t88 = t79*(-(t56*t83) - t57*t81 + t87*t86);
+    const double t88 = t79*(t87*t86 - (t56*t83 + t57*t81));
     dP[0] = t21*(t22*t23 + t24*t25 - t26*t28);
     dP[1] = t38;
     dP[2] = 0.0;

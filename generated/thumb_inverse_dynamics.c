@@ -7,7 +7,7 @@
  *   in   qdd[4] in rad/s^2, -2000 to 2000
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  tau[4] in N m
- * Cost: 135 add, 145 mul, 2 neg, 4 sincos.
+ * Cost: 135 add, 145 mul, 4 sincos.
  * Inputs: sha256 b7fe551f96056cda15630ccc8e1048458a04fd2c391240ea725523ad5d20e299.
  */
 #include "trig.h"
@@ -77,25 +77,25 @@ void awiwi_thumb_inverse_dynamics(const double q[restrict 4], const double qd[re
     const double t58 = t18*(t18 + t54);
     const double t59 = t35*t45 + t36*(t53 + t58);
     const double t60 = t29*t56 - t57*t42 - t59;
-    const double t61 = qdd[1] - t5;
-    const double t62 = t26*t4;
-    const double t63 = t25 + 1.1081e-07;
-    const double t64 = t14 - t52;
-    const double t65 = t14 + t40;
-    const double t66 = g[2]*a0.sin[1] + a0.cos[1]*t30;
-    const double t67 = 0.045*t65 + t66;
-    const double t68 = t10 + t11;
-    const double t69 = qdd[2] + t68;
-    const double t70 = t44 + t68;
-    const double t71 = t48 - 7.268123076923077e-07;
-    const double t72 = t39 - 0.045*t12;
-    const double t73 = t61*t17 + t43*t9 + t64*t47 + t36*(t67 + t49*(t65 + t55) + t33*t69) - 1.09224e-06*t70 - t62*t71 - t35*(t72 + t49*t42 - t33*t56);
-    const double t74 = t13*t61 + t41*t9 + t62*t63 + t73 - t64*t22 - 9.18506e-06*t69 - t29*t67 - t57*t72 - t49*t59 - t33*(t35*(t65 + t58) - t36*t70);
-    const double t75 = 8.4258e-05*t10 + 2.19e-07*t9 + 0.045*t60 + t74 - 2.95e-08*t61 - 0.001071*t39 - 1.58e-07*t64 - 4.2129e-05*t68;
+    const double t61 = t10 + t11;
+    const double t62 = t44 + t61;
+    const double t63 = t26*t4;
+    const double t64 = t48 - 7.268123076923077e-07;
+    const double t65 = t39 - 0.045*t12;
+    const double t66 = qdd[1] - t5;
+    const double t67 = t14 - t52;
+    const double t68 = t14 + t40;
+    const double t69 = g[2]*a0.sin[1] + a0.cos[1]*t30;
+    const double t70 = 0.045*t68 + t69;
+    const double t71 = qdd[2] + t61;
+    const double t72 = 1.09224e-06*t62 + t63*t64 + t35*(t65 + t49*t42 - t33*t56) - t66*t17 - t43*t9 - t67*t47 - t36*(t70 + t49*(t68 + t55) + t33*t71);
+    const double t73 = t25 + 1.1081e-07;
+    const double t74 = t72 + t67*t22 + 9.18506e-06*t71 + t29*t70 + t57*t65 + t49*t59 + t33*(t35*(t68 + t58) - t36*t62) - t13*t66 - t41*t9 - t63*t73;
+    const double t75 = 8.4258e-05*t10 + 2.19e-07*t9 + 0.045*t60 - t74 - 2.95e-08*t66 - 0.001071*t39 - 1.58e-07*t67 - 4.2129e-05*t61;
     const double t76 = 1.5405e-06*qdd[0] + 9e-06*t1 + 0.000204*t2 + a0.sin[1]*t51 - 6.48e-08*t9 - 6.426e-06*t12 - 0.006*t60 - a0.cos[1]*t75;
-    const double t77 = 4.5686e-07*t61 + 4.2129e-05*t6 + 2.95e-08*t68 + 2.19e-07*(qd[0]*(a0.cos[1]*t3 - a0.sin[1]*t4)) + t63*t24 + 1.08e-05*t66 + t57*t32 + t37*t47 + t49*t38 + t35*t50 + 0.045*(t57*t24 + t38 - t29*t28) - 1.58e-07*t27 - t41*(t52 - t16) - t43*(t52 - t20) - 0.001071*t31 - t13*t69 - t17*t70 - t22*t28 - t34*t71;
+    const double t77 = 4.5686e-07*t66 + 4.2129e-05*t6 + 2.95e-08*t61 + 2.19e-07*(qd[0]*(a0.cos[1]*t3 - a0.sin[1]*t4)) + t73*t24 + 1.08e-05*t69 + t57*t32 + t37*t47 + t49*t38 + t35*t50 + 0.045*(t57*t24 + t38 - t29*t28) - 1.58e-07*t27 - t41*(t52 - t16) - t43*(t52 - t20) - 0.001071*t31 - t13*t71 - t17*t62 - t22*t28 - t34*t64;
     tau[0] = t76;
     tau[1] = t77;
-    tau[2] = -t74;
-    tau[3] = -t73;
+    tau[2] = t74;
+    tau[3] = t72;
 }

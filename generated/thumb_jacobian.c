@@ -4,7 +4,7 @@
  * Source: eq. 5.3, differentiated.
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   out  J[6][4] in m/rad, 1
- * Cost: 11 add, 25 mul, 12 neg, 4 sincos.
+ * Cost: 11 add, 25 mul, 3 neg, 4 sincos.
  * Inputs: sha256 a7bb8ff1f782a8790c9bbc77b4aba27af39200e96fd5ea71f5378ce3f4c99cdf.
  */
 #include "trig.h"
@@ -13,38 +13,38 @@
 void awiwi_thumb_jacobian(const double q[restrict 4], double J[restrict 24])
 {
     const double t0 = q[2] + q[3];
-    const awiwi_turn4 a0 = awiwi_sincos4(q[0], q[2], t0, q[1]);
-    const double t1 = 0.025*a0.sin[2];
-    const double t2 = 0.032*a0.sin[1] + t1;
-    const double t3 = 0.025*a0.cos[2];
-    const double t4 = 0.032*a0.cos[1] + t3;
+    const awiwi_turn4 a0 = awiwi_sincos4(q[0], t0, q[2], q[1]);
+    const double t1 = -0.025*a0.sin[1];
+    const double t2 = t1 - 0.032*a0.sin[2];
+    const double t3 = 0.025*a0.cos[1];
+    const double t4 = 0.032*a0.cos[2] + t3;
     const double t5 = t4 + 0.045;
     const double t6 = a0.cos[3]*t5;
     const double t7 = t6 + 0.006;
-    const double t8 = a0.cos[0]*a0.sin[3];
+    const double t8 = -a0.cos[0]*a0.sin[3];
     const double t9 = a0.cos[0]*a0.cos[3];
-    const double t10 = a0.sin[0]*a0.sin[3];
+    const double t10 = -a0.sin[0]*a0.sin[3];
     const double t11 = a0.cos[3]*a0.sin[0];
-    J[0] = -(a0.cos[0]*t2) - a0.sin[0]*t7;
-    J[1] = -(t8*t5);
-    J[2] = -(a0.sin[0]*t4) - t9*t2;
-    J[3] = -(a0.sin[0]*t3) - t9*t1;
-    J[4] = a0.cos[0]*t7 - a0.sin[0]*t2;
-    J[5] = -(t10*t5);
-    J[6] = a0.cos[0]*t4 - t11*t2;
-    J[7] = a0.cos[0]*t3 - t11*t1;
+    J[0] = a0.cos[0]*t2 - a0.sin[0]*t7;
+    J[1] = t8*t5;
+    J[2] = t9*t2 - a0.sin[0]*t4;
+    J[3] = t9*t1 - a0.sin[0]*t3;
+    J[4] = a0.cos[0]*t7 + a0.sin[0]*t2;
+    J[5] = t10*t5;
+    J[6] = a0.cos[0]*t4 + t11*t2;
+    J[7] = a0.cos[0]*t3 + t11*t1;
     J[8] = 0.0;
     J[9] = t6;
-    J[10] = -(a0.sin[3]*t2);
-    J[11] = -(a0.sin[3]*t1);
+    J[10] = a0.sin[3]*t2;
+    J[11] = a0.sin[3]*t1;
     J[12] = 0.0;
     J[13] = a0.sin[0];
-    J[14] = -t8;
-    J[15] = -t8;
+    J[14] = t8;
+    J[15] = t8;
     J[16] = 0.0;
     J[17] = -a0.cos[0];
-    J[18] = -t10;
-    J[19] = -t10;
+    J[18] = t10;
+    J[19] = t10;
     J[20] = 1.0;
     J[21] = 0.0;
     J[22] = a0.cos[3];

@@ -7,7 +7,7 @@
  *   in   noise[1] in m, 0 to 0.001
  *   out  covariance[4][4] in rad^2
  *   out  worst[4] in rad
- * Cost: 68 add, 99 mul, 6 div, 2 neg, 6 sqrt, 2 sincos, 8 calls.
+ * Cost: 68 add, 99 mul, 6 div, 1 neg, 6 sqrt, 2 sincos, 8 calls.
  * Inputs: sha256 587a65bca3163563dc3b07fe3ba2c07934dd21d567d7f82f1bc6b0fb691a7376.
  */
 #include <math.h>
@@ -86,14 +86,14 @@ void awiwi_thumb_joint_estimate_error(const double q[restrict 4], const double n
     const double t66 = 1.0/sqrt(t62*t62 + t63*t63 + t64*t64 + t65*t65);
     const double t67 = t66*t66;
     const double t68 = t61*t67;
-    const double t69 = t0*t68;
+    const double t69 = -t0*t68;
     const double t70 = 10416.666666666666*t0;
     const double t71 = fabs(t20*t50 - t63*t68) + fabs(t27*t50 - t62*t68) + fabs(t41*t50 + t65*t68) + fabs(t48*t50 + t64*t68);
-    covariance[0] = t0*t50 + t61*t69;
-    covariance[1] = -t69;
+    covariance[0] = t0*t50 - t61*t69;
+    covariance[1] = t69;
     covariance[2] = 0.0;
     covariance[3] = 0.0;
-    covariance[4] = -t69;
+    covariance[4] = t69;
     covariance[5] = t0*t67;
     covariance[6] = 0.0;
     covariance[7] = 0.0;

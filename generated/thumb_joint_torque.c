@@ -5,7 +5,7 @@
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   in   f[8] in N, 0 to 100
  *   out  tau[4] in N m
- * Cost: 60 add, 54 mul, 4 div, 1 neg, 4 sqrt, 2 sincos.
+ * Cost: 60 add, 54 mul, 4 div, 4 sqrt, 2 sincos.
  * Inputs: sha256 587a65bca3163563dc3b07fe3ba2c07934dd21d567d7f82f1bc6b0fb691a7376.
  */
 #include <math.h>
@@ -52,13 +52,13 @@ void awiwi_thumb_joint_torque(const double q[restrict 4], const double f[restric
     const double t34 = t29*t30;
     const double t35 = t25*t26;
     const double t36 = a0.sin[0]*(0.003*(t14 + t18 + t27 + t31) - t3*(t32 - t33) - t19*(t34 - t35)) - a0.cos[0]*(0.003*(t32 + t33 + t34 + t35) - t3*(t14 - t18) - t19*(t27 - t31));
-    const double t37 = t22*(t30 + t26);
-    const double t38 = t8*(t13 + t17);
-    const double t39 = a0.cos[0]*t32 - a0.sin[0]*t18;
-    const double t40 = a0.sin[0]*t14 - a0.cos[0]*t33;
-    const double t41 = a0.cos[0]*t34 - a0.sin[0]*t31;
-    const double t42 = a0.cos[0]*t35 - a0.sin[0]*t27;
-    const double t43 = -(a0.cos[1]*(0.047*(t37 + t38) - 0.0025*(t39 + t40 + t41 - t42))) - a0.sin[1]*(0.0025*(t37 - t38) - 0.047*(t39 + t40 + t42 - t41));
+    const double t37 = a0.cos[0]*t32 - a0.sin[0]*t18;
+    const double t38 = a0.sin[0]*t14 - a0.cos[0]*t33;
+    const double t39 = a0.cos[0]*t34 - a0.sin[0]*t31;
+    const double t40 = a0.cos[0]*t35 - a0.sin[0]*t27;
+    const double t41 = t22*(t30 + t26);
+    const double t42 = t8*(t13 + t17);
+    const double t43 = a0.cos[1]*(0.0025*(t37 + t38 + t39 - t40) - 0.047*(t41 + t42)) - a0.sin[1]*(0.0025*(t41 - t42) - 0.047*(t37 + t38 + t40 - t39));
     const double t44 = f[6] - f[7];
     tau[0] = t36;
     tau[1] = t43;

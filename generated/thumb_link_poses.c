@@ -4,7 +4,7 @@
  * Source: eq. 5.2.
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   out  T[4][4][4] in 1, m
- * Cost: 14 add, 32 mul, 13 neg, 4 sincos.
+ * Cost: 14 add, 32 mul, 8 neg, 4 sincos.
  * Inputs: sha256 cd912ab3289456ec069beac4761440cf1d21f475ca4f2bc6f55b373b40f43897.
  */
 #include "trig.h"
@@ -15,12 +15,12 @@ void awiwi_thumb_link_poses(const double q[restrict 4], double T[restrict 64])
     const double t0 = q[2] + q[3];
     const awiwi_turn4 a0 = awiwi_sincos4(q[0], q[1], q[2], t0);
     const double t1 = a0.cos[0]*a0.cos[1];
-    const double t2 = a0.cos[0]*a0.sin[1];
+    const double t2 = -a0.cos[0]*a0.sin[1];
     const double t3 = 0.006*a0.cos[0];
     const double t4 = a0.cos[1]*a0.sin[0];
-    const double t5 = a0.sin[0]*a0.sin[1];
+    const double t5 = -a0.sin[0]*a0.sin[1];
     const double t6 = 0.006*a0.sin[0];
-    const double t7 = a0.sin[0]*a0.sin[2] - a0.cos[2]*t1;
+    const double t7 = a0.cos[2]*t1 - a0.sin[0]*a0.sin[2];
     const double t8 = t3 + 0.045*t1;
     const double t9 = a0.cos[0]*a0.sin[2] + a0.cos[2]*t4;
     const double t10 = t6 + 0.045*t4;
@@ -43,11 +43,11 @@ void awiwi_thumb_link_poses(const double q[restrict 4], double T[restrict 64])
     T[14] = 0.0;
     T[15] = 1.0;
     T[16] = t1;
-    T[17] = -t2;
+    T[17] = t2;
     T[18] = a0.sin[0];
     T[19] = t3;
     T[20] = t4;
-    T[21] = -t5;
+    T[21] = t5;
     T[22] = -a0.cos[0];
     T[23] = t6;
     T[24] = a0.sin[1];
@@ -58,13 +58,13 @@ void awiwi_thumb_link_poses(const double q[restrict 4], double T[restrict 64])
     T[29] = 0.0;
     T[30] = 0.0;
     T[31] = 1.0;
-    T[32] = -t7;
+    T[32] = t7;
     T[33] = -(a0.cos[2]*a0.sin[0]) - a0.sin[2]*t1;
-    T[34] = -t2;
+    T[34] = t2;
     T[35] = t8;
     T[36] = t9;
     T[37] = a0.cos[0]*a0.cos[2] - a0.sin[2]*t4;
-    T[38] = -t5;
+    T[38] = t5;
     T[39] = t10;
     T[40] = t11;
     T[41] = -(a0.sin[1]*a0.sin[2]);
@@ -76,11 +76,11 @@ void awiwi_thumb_link_poses(const double q[restrict 4], double T[restrict 64])
     T[47] = 1.0;
     T[48] = a0.cos[3]*t1 - a0.sin[0]*a0.sin[3];
     T[49] = -(a0.sin[0]*a0.cos[3]) - t1*a0.sin[3];
-    T[50] = -t2;
-    T[51] = t8 - 0.032*t7;
+    T[50] = t2;
+    T[51] = t8 - -0.032*t7;
     T[52] = a0.cos[0]*a0.sin[3] + a0.cos[3]*t4;
     T[53] = a0.cos[0]*a0.cos[3] - t4*a0.sin[3];
-    T[54] = -t5;
+    T[54] = t5;
     T[55] = t10 + 0.032*t9;
     T[56] = a0.sin[1]*a0.cos[3];
     T[57] = -(a0.sin[1]*a0.sin[3]);

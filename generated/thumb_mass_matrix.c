@@ -4,7 +4,7 @@
  * Source: eq. 2.17, 5.4.
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   out  M[4][4] in kg m^2
- * Cost: 48 add, 46 mul, 5 neg, 3 sincos.
+ * Cost: 48 add, 46 mul, 3 sincos.
  * Inputs: sha256 eb684d40ad53461219ce6205f05b311d2262086fa4be9e6eb81e8ea245c94e57.
  */
 #include "trig.h"
@@ -28,10 +28,10 @@ void awiwi_thumb_mass_matrix(const double q[restrict 4], double M[restrict 16])
     const double t12 = 3.6055512754639894e-09*a0.sin[1];
     const double t13 = 3.59e-08*a0.cos[0] + 4.46e-09*a0.sin[0] + t12;
     const double t14 = a0.cos[2]*(0.375*(t2 + 3.4272e-05) + (a0.cos[2]*(t11 - 4.5686e-07) - 2.0*a0.sin[2]*(t13 + 2.19e-07)));
-    const double t15 = 3.6055512754639894e-09*a0.cos[1];
-    const double t16 = 4.46e-09*a0.cos[0] + t15 - 3.59e-08*a0.sin[0];
-    const double t17 = 1.40625*t4 + a0.sin[1]*t9 + a0.cos[0]*(t4 - 1.215e-07) + 2.6973153846153845e-07 - a0.sin[0]*(t8 + t1 + 1.49175e-05);
-    const double t18 = -(a0.cos[2]*(t16 - 2.95e-08)) - a0.sin[2]*t17;
+    const double t15 = -3.6055512754639894e-09*a0.cos[1];
+    const double t16 = t15 + 3.59e-08*a0.sin[0] - 4.46e-09*a0.cos[0];
+    const double t17 = a0.sin[0]*(t8 + t1 + 1.49175e-05) - 1.40625*t4 - a0.sin[1]*t9 - a0.cos[0]*(t4 - 1.215e-07) - 2.6973153846153845e-07;
+    const double t18 = a0.cos[2]*(t16 + 2.95e-08) + a0.sin[2]*t17;
     const double t19 = 0.1875*t2 + a0.cos[2]*(1.40625*t2 + t6) - a0.sin[2]*t13;
     const double t20 = t5 + 1.09224e-06;
     const double t21 = 0.1875*t1 + a0.cos[2]*(1.40625*t1 + t20) - a0.sin[2]*t12;
@@ -41,14 +41,14 @@ void awiwi_thumb_mass_matrix(const double q[restrict 4], double M[restrict 16])
     M[3] = t21;
     M[4] = t18;
     M[5] = 2.0*a0.sin[0]*t4 + t10 + t7 - 9.439677692307693e-06;
-    M[6] = -t16;
-    M[7] = -t15;
+    M[6] = t16;
+    M[7] = t15;
     M[8] = t19;
-    M[9] = -t16;
+    M[9] = t16;
     M[10] = t6;
     M[11] = t20;
     M[12] = t21;
-    M[13] = -t15;
+    M[13] = t15;
     M[14] = t20;
     M[15] = 1.09224e-06;
 }

@@ -5,7 +5,7 @@
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   out  T[4][4] in 1, m
  *   out  J[6][4] in m/rad, 1
- * Cost: 13 add, 34 mul, 15 neg, 4 sincos.
+ * Cost: 13 add, 34 mul, 8 neg, 4 sincos.
  * Inputs: sha256 e56e526ea40970104fe9bee780b2560b3c841e631e95f0e1cea4522e61111cae.
  */
 #include "trig.h"
@@ -17,26 +17,26 @@ void awiwi_thumb_pose_and_jacobian(const double q[restrict 4], double T[restrict
     const awiwi_turn4 a0 = awiwi_sincos4(t0, q[0], q[1], q[2]);
     const double t1 = a0.cos[1]*a0.cos[2];
     const double t2 = a0.sin[1]*a0.cos[0] + t1*a0.sin[0];
-    const double t3 = a0.cos[1]*a0.sin[2];
+    const double t3 = -a0.cos[1]*a0.sin[2];
     const double t4 = 0.032*a0.cos[3] + 0.025*a0.cos[0];
     const double t5 = t4 + 0.045;
     const double t6 = a0.cos[2]*t5;
     const double t7 = t6 + 0.006;
-    const double t8 = 0.025*a0.sin[0];
-    const double t9 = 0.032*a0.sin[3] + t8;
-    const double t10 = a0.cos[1]*t7 - a0.sin[1]*t9;
+    const double t8 = -0.025*a0.sin[0];
+    const double t9 = t8 - 0.032*a0.sin[3];
+    const double t10 = a0.cos[1]*t7 + a0.sin[1]*t9;
     const double t11 = a0.cos[2]*a0.sin[1];
     const double t12 = a0.cos[1]*a0.cos[0] - t11*a0.sin[0];
-    const double t13 = a0.sin[1]*a0.sin[2];
-    const double t14 = a0.cos[1]*t9 + a0.sin[1]*t7;
+    const double t13 = -a0.sin[1]*a0.sin[2];
+    const double t14 = a0.sin[1]*t7 - a0.cos[1]*t9;
     const double t15 = a0.sin[2]*t5;
     T[0] = a0.cos[0]*t1 - a0.sin[1]*a0.sin[0];
     T[1] = -t2;
-    T[2] = -t3;
+    T[2] = t3;
     T[3] = t10;
     T[4] = a0.cos[1]*a0.sin[0] + a0.cos[0]*t11;
     T[5] = t12;
-    T[6] = -t13;
+    T[6] = t13;
     T[7] = t14;
     T[8] = a0.sin[2]*a0.cos[0];
     T[9] = -(a0.sin[2]*a0.sin[0]);
@@ -48,24 +48,24 @@ void awiwi_thumb_pose_and_jacobian(const double q[restrict 4], double T[restrict
     T[15] = 1.0;
     J[0] = -t14;
     J[1] = -(a0.cos[1]*t15);
-    J[2] = -(a0.sin[1]*t4) - t1*t9;
+    J[2] = t1*t9 - a0.sin[1]*t4;
     J[3] = -0.025*t2;
     J[4] = t10;
     J[5] = -(a0.sin[1]*t15);
-    J[6] = a0.cos[1]*t4 - t11*t9;
+    J[6] = a0.cos[1]*t4 + t11*t9;
     J[7] = 0.025*t12;
     J[8] = 0.0;
     J[9] = t6;
-    J[10] = -(a0.sin[2]*t9);
-    J[11] = -(a0.sin[2]*t8);
+    J[10] = a0.sin[2]*t9;
+    J[11] = a0.sin[2]*t8;
     J[12] = 0.0;
     J[13] = a0.sin[1];
-    J[14] = -t3;
-    J[15] = -t3;
+    J[14] = t3;
+    J[15] = t3;
     J[16] = 0.0;
     J[17] = -a0.cos[1];
-    J[18] = -t13;
-    J[19] = -t13;
+    J[18] = t13;
+    J[19] = t13;
     J[20] = 1.0;
     J[21] = 0.0;
     J[22] = a0.cos[2];

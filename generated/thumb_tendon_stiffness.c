@@ -9,7 +9,7 @@
  *   out  curvature[8] in 1/(N m)
  * Returns 0 where every tension is on its spring's curve, give or take a hundredth; elsewhere 1, and
  * what is not defined is NaN.
- * Cost: 198 add, 229 mul, 1 neg, 7 calls.
+ * Cost: 198 add, 229 mul, 7 calls.
  * Inputs: sha256 b64c46b637f0a464ed4766b60f7050b3f882b2c8a66fc18598209e2c9ff07328.
  */
 #include <math.h>
@@ -105,5 +105,5 @@ int awiwi_thumb_tendon_stiffness(const double tension[restrict 8], double k[rest
     curvature[5] = 0.00043156509109859516*(t18*(t18*t47 - 5695.354368953386) + 4972.416806983404);
     curvature[6] = 0.00043156509109859516*(t22*(t22*t48 - 5695.354368953386) + 4972.416806983404);
     curvature[7] = 0.00043156509109859516*(t26*(t26*t49 - 5695.354368953386) + 4972.416806983404);
-    return -(0.5*t50) - 0.5*t63 - 0.5*fabs(t50 - t63) + 1.015625 > 0.0 ? 0 : 1;
+    return 1.015625 - (0.5*t50 + 0.5*t63 + 0.5*fabs(t50 - t63)) > 0.0 ? 0 : 1;
 }

@@ -7,7 +7,7 @@
  *   out  dh[38][2] in m/rad
  * Returns 0 where the side bars are short of the line B0C0 (q73 between 0 and pi) and their plane is
  * short of A0 and bar AA0 reaches; elsewhere 1, and what is not defined is NaN.
- * Cost: 436 add, 478 mul, 41 div, 1 neg, 39 sqrt, 2 sincos.
+ * Cost: 436 add, 478 mul, 41 div, 39 sqrt, 2 sincos.
  * Inputs: sha256 c9e8bcef7946e105e81ceb55d9a65cfc81331bce477c734136b5eb268c572442.
  */
 #include <math.h>
@@ -62,8 +62,8 @@ int awiwi_wrist_coupling(const double q71[restrict 1], const double q73[restrict
     const double t42 = t41 + 0.008*a0.sin[1];
     const double t43 = t10*t28;
     const double t44 = t15*(0.09523809523809523*t34 + 1.8*t27);
-    const double t45 = -(0.5*t11) - t10*t44;
-    const double t46 = t42 + t43 + t45;
+    const double t45 = 0.5*t11 + t10*t44;
+    const double t46 = t42 + t43 - t45;
     const double t47 = 0.004*a0.sin[1];
     const double t48 = 0.008*a0.cos[1] - t47;
     const double t49 = t10*t38;
@@ -158,7 +158,7 @@ int awiwi_wrist_coupling(const double q71[restrict 1], const double q73[restrict
     const double t138 = 1.0/sqrt(t64 + 0.7619047619047619*t65 + 0.001412 - 0.025904761904761906*t10 - 0.068*t59);
     const double t139 = 1.0/sqrt(t64 + 0.8571428571428571*t65 + 0.001549 - 0.03*t10 - 0.07*t59);
     const double t140 = t41 + 0.028*a0.sin[1];
-    const double t141 = t140 + t45 - t43;
+    const double t141 = t140 - t45 - t43;
     const double t142 = 0.028*a0.cos[1] - t47;
     const double t143 = t142 + t50 + t49;
     const double t144 = t142 - t52 - t53;

@@ -9,7 +9,7 @@
  *   out  C[3] in m
  * Returns 0 where the side bars are short of the line B0C0 (q73 between 0 and pi) and their plane is
  * short of A0 and bar AA0 reaches; elsewhere 1, and what is not defined is NaN.
- * Cost: 20 add, 39 mul, 2 div, 3 neg, 1 sqrt, 2 sincos.
+ * Cost: 20 add, 39 mul, 2 div, 1 neg, 1 sqrt, 2 sincos.
  * Inputs: sha256 db74b2a34f56c6ccad41684846d922ba049b7832368c63b234f7fba0d2100dce.
  */
 #include <math.h>
@@ -21,16 +21,16 @@ int awiwi_wrist_points(const double q71[restrict 1], const double q73[restrict 1
     const awiwi_turn2 a0 = awiwi_sincos2(q71[0], q73[0]);
     const double t0 = 0.074565407529229*a0.sin[1];
     const double t1 = 1.0/(1.650024824145215*a0.cos[1] - 1.9293993677555321);
-    const double t2 = t0*t1;
-    const double t3 = t0 - t2;
+    const double t2 = -t0*t1;
+    const double t3 = t0 + t2;
     const double t4 = 0.074565407529229*a0.cos[1];
-    const double t5 = (t4 - 0.042)*t1;
-    const double t6 = 23.80952380952381*(t4 + t5);
+    const double t5 = (0.042 - t4)*t1;
+    const double t6 = 23.80952380952381*(t4 - t5);
     const double t7 = 0.072*a0.cos[0];
     const double t8 = t7*t7;
-    const double t9 = t4 - t5;
+    const double t9 = t4 + t5;
     const double t10 = t9 - 0.042;
-    const double t11 = 23.80952380952381*(t0 + t2);
+    const double t11 = 23.80952380952381*(t0 - t2);
     const double t12 = 0.072*a0.sin[0] - t3;
     const double t13 = t10*t11 + t12*t6;
     const double t14 = t8 + t13*t13;
@@ -47,8 +47,8 @@ int awiwi_wrist_points(const double q71[restrict 1], const double q73[restrict 1
     B[0] = a0.cos[0]*t0;
     B[1] = t4;
     B[2] = a0.sin[0]*t0;
-    C[0] = -(a0.cos[0]*t2);
-    C[1] = -t5;
-    C[2] = -(a0.sin[0]*t2);
+    C[0] = a0.cos[0]*t2;
+    C[1] = t5;
+    C[2] = a0.sin[0]*t2;
     return a0.sin[1] > 0.0 && 0.002592*a0.cos[0] > 0.0 && t17 > 0.0 ? 0 : 1;
 }

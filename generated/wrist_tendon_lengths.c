@@ -7,7 +7,7 @@
  *   out  h[38] in m
  * Returns 0 where the side bars are short of the line B0C0 (q73 between 0 and pi) and their plane is
  * short of A0 and bar AA0 reaches; elsewhere 1, and what is not defined is NaN.
- * Cost: 180 add, 145 mul, 2 div, 2 neg, 39 sqrt, 2 sincos.
+ * Cost: 180 add, 145 mul, 2 div, 39 sqrt, 2 sincos.
  * Inputs: sha256 c9e8bcef7946e105e81ceb55d9a65cfc81331bce477c734136b5eb268c572442.
  */
 #include <math.h>
@@ -39,15 +39,15 @@ int awiwi_wrist_tendon_lengths(const double q71[restrict 1], const double q73[re
     const double t19 = 0.5*a0.cos[1]*t16 + 23.80952380952381*t13*t18;
     const double t20 = 0.01*t15*t19;
     const double t21 = 39.36759889140841*t13*t16 - 0.017142857142857144*a0.cos[1]*t18;
-    const double t22 = -(0.004*a0.sin[1]) - t15*(0.018*t19 - 0.0168*t21);
-    const double t23 = 0.008*a0.cos[1] + t20 + t22;
+    const double t22 = 0.004*a0.sin[1] + t15*(0.018*t19 - 0.0168*t21);
+    const double t23 = 0.008*a0.cos[1] + t20 - t22;
     const double t24 = t15*t21;
     const double t25 = t10*t24;
     const double t26 = t15*(0.09523809523809523*t19 + 1.8*t21);
     const double t27 = 0.5*t11 - t10*t26;
     const double t28 = t25 + t27;
     const double t29 = t3*t24;
-    const double t30 = 0.004*a0.cos[1] + (-(0.5*t8) - t3*t26);
+    const double t30 = 0.004*a0.cos[1] - (0.5*t8 + t3*t26);
     const double t31 = 0.008*a0.sin[1] + t29 + t30;
     const double t32 = t23*t23 + t28*t28 + t31*t31;
     const double t33 = t3*t28 - t10*t31;
@@ -64,7 +64,7 @@ int awiwi_wrist_tendon_lengths(const double q71[restrict 1], const double q73[re
     const double t44 = 0.000554 - 0.0054761904761904765*t3;
     const double t45 = 0.00113 - 0.019190476190476192*t3;
     const double t46 = t25 - t27;
-    const double t47 = 0.028*a0.cos[1] + t22 - t20;
+    const double t47 = 0.028*a0.cos[1] - t22 - t20;
     const double t48 = 0.028*a0.sin[1] + t30 - t29;
     const double t49 = t47*t47 + t46*t46 + t48*t48;
     const double t50 = t3*t46 + t10*t48;
