@@ -26,10 +26,11 @@
  *   out  load[1] in N m
  *   out  modelled[2] in N m
  *   out  resistance[2] in N m
- * Cost: 119 add, 134 mul, 13 div, 4 neg, 12 calls.
+ * Cost: 119 add, 132 mul, 13 div, 4 neg, 12 calls.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
 #include <math.h>
+#include "elementary.h"
 #include "kernels.h"
 
 void awiwi_antagonistic_observer(const double memory[restrict 13], const double thetas[restrict 2], const double stretches[restrict 2], const double measured[restrict 2], const double acted[restrict 2], const double acting[restrict 2], const double inertias[restrict 3], const double tendons[restrict 6], const double damping[restrict 1], const double friction[restrict 3], const double bandwidths[restrict 4], const double period[restrict 1], double memory_next[restrict 13], double joint[restrict 2], double motors[restrict 4], double torques[restrict 4], double springs[restrict 4], double load[restrict 1], double modelled[restrict 2], double resistance[restrict 2])
@@ -39,7 +40,7 @@ void awiwi_antagonistic_observer(const double memory[restrict 13], const double 
     const double t2 = 1.0/inertias[0];
     const double t3 = memory[2] + t2*(memory[9] - memory[10] - damping[0]*memory[1]);
     const double t4 = memory[0] + memory[1]*period[0] + t1*t3;
-    const double t5 = exp(-(bandwidths[0]*period[0]));
+    const double t5 = awiwi_exp(-(bandwidths[0]*period[0]));
     const double t6 = 0.5*(stretches[0] + thetas[1] - stretches[1] - thetas[0]) + t4;
     const double t7 = t4 + (t5*t5*t5 - 1.0)*t6;
     const double t8 = 1.5/period[0];
@@ -50,10 +51,10 @@ void awiwi_antagonistic_observer(const double memory[restrict 13], const double 
     const double t13 = memory[2] + t12*t9*t10;
     const double t14 = friction[0]*friction[1];
     const double t15 = friction[0]*friction[0];
-    const double t16 = (acted[0] - memory[9] - friction[2]*memory[4] - friction[1]*atan(friction[0]*memory[4]))/(inertias[1] + t0*(friction[2] + t14/(memory[4]*memory[4]*t15 + 1.0)));
+    const double t16 = (acted[0] - memory[9] - friction[2]*memory[4] - friction[1]*awiwi_atan(friction[0]*memory[4]))/(inertias[1] + t0*(friction[2] + t14/(memory[4]*memory[4]*t15 + 1.0)));
     const double t17 = memory[5] + t16;
     const double t18 = memory[3] + memory[4]*period[0] + t1*t17;
-    const double t19 = exp(-(bandwidths[1]*period[0]));
+    const double t19 = awiwi_exp(-(bandwidths[1]*period[0]));
     const double t20 = t19*t19*t19 - 1.0;
     const double t21 = thetas[0] - t18;
     const double t22 = t18 - t20*t21;
@@ -63,7 +64,7 @@ void awiwi_antagonistic_observer(const double memory[restrict 13], const double 
     const double t26 = memory[4] + period[0]*t17 + t25*t21;
     const double t27 = t12*t23*t24;
     const double t28 = memory[5] - t27*t21;
-    const double t29 = (acted[1] - memory[10] - friction[2]*memory[7] - friction[1]*atan(friction[0]*memory[7]))/(inertias[2] + t0*(friction[2] + t14/(memory[7]*memory[7]*t15 + 1.0)));
+    const double t29 = (acted[1] - memory[10] - friction[2]*memory[7] - friction[1]*awiwi_atan(friction[0]*memory[7]))/(inertias[2] + t0*(friction[2] + t14/(memory[7]*memory[7]*t15 + 1.0)));
     const double t30 = memory[8] + t29;
     const double t31 = memory[6] + memory[7]*period[0] + t1*t30;
     const double t32 = thetas[1] - t31;
@@ -77,7 +78,7 @@ void awiwi_antagonistic_observer(const double memory[restrict 13], const double 
     const double t40 = tendons[2]*t38;
     const double t41 = tendons[0] - t38*(t39 - 3.0*t40);
     const double t42 = memory[9] + memory[11]*(memory[0] - memory[3] - t36)*t41;
-    const double t43 = exp(-(bandwidths[2]*period[0])) - 1.0;
+    const double t43 = awiwi_exp(-(bandwidths[2]*period[0])) - 1.0;
     const double t44 = t42 - t43*(measured[0] - t42);
     const double t45 = t7 + t33;
     const double t46 = t37 + 0.5*(t33 + fabs(t45));
@@ -86,28 +87,26 @@ void awiwi_antagonistic_observer(const double memory[restrict 13], const double 
     const double t49 = tendons[3] + t46*(t47 + 3.0*t48);
     const double t50 = memory[10] - memory[12]*(memory[0] + memory[6] - t45)*t49;
     const double t51 = t50 - t43*(measured[1] - t50);
-    const double t52 = exp(-(bandwidths[3]*period[0])) - 1.0;
-    const double t53 = tendons[0] - t38*(tendons[1] - t40);
-    const double t54 = t38*t53;
-    const double t55 = memory[11] + t52*t54*(1.0/(0.0001*tendons[0]*tendons[0] + t38*t53*t54))*(memory[11]*t54 + t44);
-    const double t56 = tendons[3] + t46*(tendons[4] + t48);
-    const double t57 = t46*t56;
-    const double t58 = memory[12] + t52*t57*(1.0/(0.0001*tendons[3]*tendons[3] + t46*t56*t57))*(memory[12]*t57 - t51);
-    const double t59 = t13 - t2*(damping[0]*t11 + t51 - t44);
-    const double t60 = t7 + period[0]*t11 + t1*t59;
-    const double t61 = t11 + period[0]*t59;
-    const double t62 = (acting[0] - friction[2]*t26 - friction[1]*atan(friction[0]*t26) - t44)/(inertias[1] + t0*(friction[2] + t14/(t15*t26*t26 + 1.0)));
-    const double t63 = t28 + t62;
-    const double t64 = t22 + period[0]*t26 + t1*t63;
-    const double t65 = t26 + period[0]*t63;
-    const double t66 = (acting[1] - friction[2]*t34 - friction[1]*atan(friction[0]*t34) - t51)/(inertias[2] + t0*(friction[2] + t14/(t15*t34*t34 + 1.0)));
-    const double t67 = t35 + t66;
-    const double t68 = t33 + period[0]*t34 + t1*t67;
-    const double t69 = t34 + period[0]*t67;
-    const double t70 = t41*t55;
-    const double t71 = t49*t58;
-    const double t72 = friction[2]*t65 + friction[1]*atan(friction[0]*t65);
-    const double t73 = friction[2]*t69 + friction[1]*atan(friction[0]*t69);
+    const double t52 = awiwi_exp(-(bandwidths[3]*period[0])) - 1.0;
+    const double t53 = t38*(tendons[0] - t38*(tendons[1] - t40));
+    const double t54 = memory[11] + t52*t53*(1.0/(0.0001*tendons[0]*tendons[0] + t53*t53))*(memory[11]*t53 + t44);
+    const double t55 = t46*(tendons[3] + t46*(tendons[4] + t48));
+    const double t56 = memory[12] + t52*t55*(1.0/(0.0001*tendons[3]*tendons[3] + t55*t55))*(memory[12]*t55 - t51);
+    const double t57 = t13 - t2*(damping[0]*t11 + t51 - t44);
+    const double t58 = t7 + period[0]*t11 + t1*t57;
+    const double t59 = t11 + period[0]*t57;
+    const double t60 = (acting[0] - friction[2]*t26 - friction[1]*awiwi_atan(friction[0]*t26) - t44)/(inertias[1] + t0*(friction[2] + t14/(t15*t26*t26 + 1.0)));
+    const double t61 = t28 + t60;
+    const double t62 = t22 + period[0]*t26 + t1*t61;
+    const double t63 = t26 + period[0]*t61;
+    const double t64 = (acting[1] - friction[2]*t34 - friction[1]*awiwi_atan(friction[0]*t34) - t51)/(inertias[2] + t0*(friction[2] + t14/(t15*t34*t34 + 1.0)));
+    const double t65 = t35 + t64;
+    const double t66 = t33 + period[0]*t34 + t1*t65;
+    const double t67 = t34 + period[0]*t65;
+    const double t68 = t41*t54;
+    const double t69 = t49*t56;
+    const double t70 = friction[2]*t63 + friction[1]*awiwi_atan(friction[0]*t63);
+    const double t71 = friction[2]*t67 + friction[1]*awiwi_atan(friction[0]*t67);
     memory_next[0] = t7;
     memory_next[1] = t11;
     memory_next[2] = t13;
@@ -119,25 +118,25 @@ void awiwi_antagonistic_observer(const double memory[restrict 13], const double 
     memory_next[8] = t35;
     memory_next[9] = t44;
     memory_next[10] = t51;
-    memory_next[11] = t55;
-    memory_next[12] = t58;
-    joint[0] = t60;
-    joint[1] = t61;
-    motors[0] = t64;
-    motors[1] = t65;
-    motors[2] = t68;
-    motors[3] = t69;
-    torques[0] = t44 + t70*(t36 + t64 - t60);
-    torques[1] = t70*(t65 - t61);
-    torques[2] = t51 - t71*(t45 - t60 - t68);
-    torques[3] = t71*(t61 + t69);
-    springs[0] = t70;
-    springs[1] = (t39 - 6.0*t40)*t55;
-    springs[2] = t71;
-    springs[3] = (t47 + 6.0*t48)*t58;
+    memory_next[11] = t54;
+    memory_next[12] = t56;
+    joint[0] = t58;
+    joint[1] = t59;
+    motors[0] = t62;
+    motors[1] = t63;
+    motors[2] = t66;
+    motors[3] = t67;
+    torques[0] = t44 + t68*(t36 + t62 - t58);
+    torques[1] = t68*(t63 - t59);
+    torques[2] = t51 - t69*(t45 - t58 - t66);
+    torques[3] = t69*(t59 + t67);
+    springs[0] = t68;
+    springs[1] = (t39 - 6.0*t40)*t54;
+    springs[2] = t69;
+    springs[3] = (t47 + 6.0*t48)*t56;
     load[0] = inertias[0]*t13;
-    modelled[0] = t72;
-    modelled[1] = t73;
-    resistance[0] = t72 - inertias[1]*t28;
-    resistance[1] = t73 - inertias[2]*t35;
+    modelled[0] = t70;
+    modelled[1] = t71;
+    resistance[0] = t70 - inertias[1]*t28;
+    resistance[1] = t71 - inertias[2]*t35;
 }

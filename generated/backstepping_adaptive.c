@@ -21,7 +21,7 @@
  * positive and C_s of motor 1 is positive and K_3 of motor 2 is positive and K_4 of motor 2 is
  * positive and C_t of motor 2 is positive and C_s of motor 2 is positive; elsewhere 1, and what is not
  * defined is NaN.
- * Cost: 49 add, 39 mul, 7 div.
+ * Cost: 49 add, 37 mul, 7 div, 3 neg.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
 #include "kernels.h"
@@ -29,19 +29,23 @@
 int awiwi_backstepping_adaptive(const double joint[restrict 2], const double torques[restrict 4], const double desired[restrict 5], const double pretension[restrict 3], const double external[restrict 2], const double inertias[restrict 3], const double springs[restrict 4], const double damping[restrict 1], const double impedance[restrict 2], const double tunings[restrict 8], const double resistance[restrict 2], double tau_m[restrict 2])
 {
     const double t0 = 1.0/inertias[0];
-    const double t1 = t0*(external[0] + torques[0] - torques[2] - damping[0]*joint[1]);
+    const double t1 = t0*(damping[0]*joint[1] + (torques[2] - torques[0] - external[0]));
     const double t2 = 1.0/springs[0];
-    const double t3 = desired[1] - joint[1];
-    const double t4 = desired[2] - t1;
-    const double t5 = damping[0]*desired[1] + desired[2]*inertias[0] + impedance[0]*(desired[0] - joint[0]) + impedance[1]*t3;
+    const double t3 = torques[1]*t2;
+    const double t4 = desired[2] + t1;
+    const double t5 = damping[0]*desired[3] + desired[4]*inertias[0] + impedance[0]*t4 + impedance[1]*(desired[3] - t0*(external[1] + (torques[1] - torques[3]) + damping[0]*t1));
     const double t6 = 0.5*t5;
-    const double t7 = 0.5*(damping[0]*desired[2] + desired[3]*inertias[0] + impedance[0]*t3 + impedance[1]*t4);
-    const double t8 = damping[0]*desired[3] + desired[4]*inertias[0] + impedance[0]*t4 + impedance[1]*(desired[3] - t0*(external[1] + torques[1] - torques[3] - damping[0]*t1));
+    const double t7 = desired[1] - joint[1];
+    const double t8 = impedance[1]*t7 + (damping[0]*desired[1] + desired[2]*inertias[0] + impedance[0]*(desired[0] - joint[0]));
     const double t9 = 0.5*t8;
-    const double t10 = pretension[2] + (tunings[1]*t3 + t4)/tunings[2] + (tunings[0]*tunings[1] + tunings[2]/tunings[3])*(pretension[0] + t6 - torques[0]) + (tunings[0] + tunings[1])*(pretension[1] + t7 - torques[1]) + t9 - springs[1]*torques[1]*torques[1]*t2*t2;
-    const double t11 = 1.0/springs[2];
-    const double t12 = pretension[2] + (tunings[4]*tunings[5] + tunings[6]/tunings[7])*(pretension[0] - torques[2] - t6) + (tunings[4] + tunings[5])*(pretension[1] - torques[3] - t7) - springs[3]*torques[3]*torques[3]*t11*t11 - (tunings[5]*t3 + t4)/tunings[6] - t9;
-    tau_m[0] = resistance[0] + torques[0] + inertias[1]*(t1 + t2*t10);
-    tau_m[1] = resistance[1] + torques[2] - inertias[2]*(t1 - t11*t12);
+    const double t10 = 0.5*(damping[0]*desired[2] + desired[3]*inertias[0] + impedance[0]*t7 + impedance[1]*t4);
+    const double t11 = (tunings[0]*tunings[1] + tunings[2]/tunings[3])*(torques[0] + (-pretension[0] - t9)) + (tunings[0] + tunings[1])*(torques[1] + (-pretension[1] - t10));
+    const double t12 = inertias[1]*(t1 + t2*(springs[1]*(t3*t3) + (-pretension[2] - t6 + (t11 - (tunings[1]*t7 + t4)/tunings[2]))));
+    const double t13 = 1.0/springs[2];
+    const double t14 = torques[3]*t13;
+    const double t15 = (tunings[4]*tunings[5] + tunings[6]/tunings[7])*(torques[2] + (t9 - pretension[0])) + (tunings[4] + tunings[5])*(torques[3] + (t10 - pretension[1]));
+    const double t16 = inertias[2]*(t1 - t13*(springs[3]*(t14*t14) + (t6 - pretension[2] + ((tunings[5]*t7 + t4)/tunings[6] + t15))));
+    tau_m[0] = resistance[0] + (torques[0] - t12);
+    tau_m[1] = resistance[1] + (torques[2] + t16);
     return inertias[0] > 0.0 && inertias[1] > 0.0 && inertias[2] > 0.0 && springs[0] > 0.0 && springs[2] > 0.0 && impedance[0] > 0.0 && impedance[1] > 0.0 && tunings[0] > 0.0 && tunings[1] > 0.0 && tunings[2] > 0.0 && tunings[3] > 0.0 && tunings[4] > 0.0 && tunings[5] > 0.0 && tunings[6] > 0.0 && tunings[7] > 0.0 ? 0 : 1;
 }

@@ -21,7 +21,7 @@
  * positive and C_s of motor 1 is positive and K_3 of motor 2 is positive and K_4 of motor 2 is
  * positive and C_t of motor 2 is positive and C_s of motor 2 is positive; elsewhere 1, and what is not
  * defined is NaN.
- * Cost: 42 add, 34 mul, 7 div.
+ * Cost: 42 add, 32 mul, 7 div, 5 neg.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
 #include "kernels.h"
@@ -29,18 +29,22 @@
 int awiwi_backstepping_antagonistic(const double joint[restrict 2], const double torques[restrict 4], const double desired[restrict 5], const double pretension[restrict 3], const double external[restrict 2], const double inertias[restrict 3], const double springs[restrict 4], const double impedance[restrict 2], const double tunings[restrict 8], double tau_m[restrict 2])
 {
     const double t0 = 1.0/inertias[0];
-    const double t1 = (external[0] + torques[0] - torques[2])*t0;
+    const double t1 = t0*(torques[2] + (-external[0] - torques[0]));
     const double t2 = 1.0/springs[0];
-    const double t3 = desired[1] - joint[1];
-    const double t4 = desired[2] - t1;
-    const double t5 = desired[4]*inertias[0] + impedance[0]*t4 + impedance[1]*(desired[3] - (external[1] + torques[1] - torques[3])*t0);
+    const double t3 = torques[1]*t2;
+    const double t4 = desired[2] + t1;
+    const double t5 = impedance[1]*(desired[3] + t0*(torques[3] + (-external[1] - torques[1]))) + (desired[4]*inertias[0] + impedance[0]*t4);
     const double t6 = 0.5*t5;
-    const double t7 = 0.5*(desired[2]*inertias[0] + impedance[0]*(desired[0] - joint[0]) + impedance[1]*t3);
-    const double t8 = 0.5*(desired[3]*inertias[0] + impedance[0]*t3 + impedance[1]*t4);
-    const double t9 = pretension[2] + (tunings[1]*t3 + t4)/tunings[2] + t6 + (tunings[0]*tunings[1] + tunings[2]/tunings[3])*(pretension[0] + t7 - torques[0]) + (tunings[0] + tunings[1])*(pretension[1] + t8 - torques[1]) - springs[1]*torques[1]*torques[1]*t2*t2;
-    const double t10 = 1.0/springs[2];
-    const double t11 = pretension[2] + (tunings[4]*tunings[5] + tunings[6]/tunings[7])*(pretension[0] - torques[2] - t7) + (tunings[4] + tunings[5])*(pretension[1] - torques[3] - t8) - springs[3]*torques[3]*torques[3]*t10*t10 - (tunings[5]*t3 + t4)/tunings[6] - t6;
-    tau_m[0] = torques[0] + inertias[1]*(t1 + t2*t9);
-    tau_m[1] = torques[2] - inertias[2]*(t1 - t10*t11);
+    const double t7 = desired[1] - joint[1];
+    const double t8 = 0.5*(impedance[1]*t7 + (desired[2]*inertias[0] + impedance[0]*(desired[0] - joint[0])));
+    const double t9 = 0.5*(desired[3]*inertias[0] + impedance[0]*t7 + impedance[1]*t4);
+    const double t10 = (tunings[0]*tunings[1] + tunings[2]/tunings[3])*(torques[0] + (-pretension[0] - t8)) + (tunings[0] + tunings[1])*(torques[1] + (-pretension[1] - t9));
+    const double t11 = inertias[1]*(t1 + t2*(springs[1]*(t3*t3) + (-pretension[2] - t6 + t10 - (tunings[1]*t7 + t4)/tunings[2])));
+    const double t12 = 1.0/springs[2];
+    const double t13 = torques[3]*t12;
+    const double t14 = (tunings[4]*tunings[5] + tunings[6]/tunings[7])*(torques[2] + (t8 - pretension[0])) + (tunings[4] + tunings[5])*(torques[3] + (t9 - pretension[1]));
+    const double t15 = inertias[2]*(t1 - t12*(springs[3]*(t13*t13) + ((tunings[5]*t7 + t4)/tunings[6] + (t6 - pretension[2] + t14))));
+    tau_m[0] = torques[0] - t11;
+    tau_m[1] = torques[2] + t15;
     return inertias[0] > 0.0 && inertias[1] > 0.0 && inertias[2] > 0.0 && springs[0] > 0.0 && springs[2] > 0.0 && impedance[0] > 0.0 && impedance[1] > 0.0 && tunings[0] > 0.0 && tunings[1] > 0.0 && tunings[2] > 0.0 && tunings[3] > 0.0 && tunings[4] > 0.0 && tunings[5] > 0.0 && tunings[6] > 0.0 && tunings[7] > 0.0 ? 0 : 1;
 }

@@ -19,7 +19,7 @@
  * positive and C_s of motor 1 is positive and K_3 of motor 2 is positive and K_4 of motor 2 is
  * positive and C_t of motor 2 is positive and C_s of motor 2 is positive; elsewhere 1, and what is not
  * defined is NaN.
- * Cost: 48 add, 42 mul, 7 div.
+ * Cost: 48 add, 40 mul, 7 div, 3 neg.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
 #include "kernels.h"
@@ -30,16 +30,22 @@ int awiwi_backstepping_antagonistic_decoupled(const double joint[restrict 2], co
     const double t1 = external[0] + torques[0];
     const double t2 = t0*(torques[2] - t1);
     const double t3 = 1.0/springs[0];
-    const double t4 = desired[1] - joint[1];
-    const double t5 = desired[2] - t1*t0;
-    const double t6 = desired[4]*inertias[0];
-    const double t7 = 0.5*(desired[2]*inertias[0] + impedance[0]*(desired[0] - joint[0]) + impedance[1]*t4);
-    const double t8 = desired[3]*inertias[0] + impedance[0]*t4;
-    const double t9 = pretension[2] + (tunings[1]*t4 + t5)/tunings[2] + 0.5*(t6 + impedance[0]*t5 + impedance[1]*(desired[3] - (external[1] + torques[1])*t0)) + (tunings[0]*tunings[1] + tunings[2]/tunings[3])*(pretension[0] + t7 - torques[0]) + (tunings[0] + tunings[1])*(pretension[1] + 0.5*(t8 + impedance[1]*t5) - torques[1]) - springs[1]*torques[1]*torques[1]*t3*t3;
-    const double t10 = 1.0/springs[2];
-    const double t11 = desired[2] - (external[0] - torques[2])*t0;
-    const double t12 = pretension[2] + (tunings[4]*tunings[5] + tunings[6]/tunings[7])*(pretension[0] - torques[2] - t7) + (tunings[4] + tunings[5])*(pretension[1] - torques[3] - 0.5*(t8 + impedance[1]*t11)) - springs[3]*torques[3]*torques[3]*t10*t10 - (tunings[5]*t4 + t11)/tunings[6] - 0.5*(t6 + impedance[0]*t11 + impedance[1]*(desired[3] - (external[1] - torques[3])*t0));
-    tau_m[0] = torques[0] - inertias[1]*(t2 - t3*t9);
-    tau_m[1] = torques[2] + inertias[2]*(t2 + t10*t12);
+    const double t4 = torques[1]*t3;
+    const double t5 = desired[4]*inertias[0];
+    const double t6 = desired[2] - t1*t0;
+    const double t7 = -pretension[2] - 0.5*(impedance[1]*(desired[3] - (external[1] + torques[1])*t0) + (t5 + impedance[0]*t6));
+    const double t8 = desired[1] - joint[1];
+    const double t9 = 0.5*(impedance[1]*t8 + (desired[2]*inertias[0] + impedance[0]*(desired[0] - joint[0])));
+    const double t10 = desired[3]*inertias[0] + impedance[0]*t8;
+    const double t11 = (tunings[0]*tunings[1] + tunings[2]/tunings[3])*(torques[0] + (-pretension[0] - t9)) + (tunings[0] + tunings[1])*(torques[1] + (-pretension[1] - 0.5*(t10 + impedance[1]*t6)));
+    const double t12 = torques[0] - inertias[1]*(t2 + t3*(springs[1]*(t4*t4) + (t7 + t11 - (tunings[1]*t8 + t6)/tunings[2])));
+    const double t13 = 1.0/springs[2];
+    const double t14 = torques[3]*t13;
+    const double t15 = desired[2] - (external[0] - torques[2])*t0;
+    const double t16 = 0.5*(impedance[1]*(desired[3] - (external[1] - torques[3])*t0) + (t5 + impedance[0]*t15)) - pretension[2];
+    const double t17 = (tunings[4]*tunings[5] + tunings[6]/tunings[7])*(torques[2] + (t9 - pretension[0])) + (tunings[4] + tunings[5])*(torques[3] + (0.5*(t10 + impedance[1]*t15) - pretension[1]));
+    const double t18 = torques[2] + inertias[2]*(t2 - t13*(springs[3]*(t14*t14) + ((tunings[5]*t8 + t15)/tunings[6] + (t16 + t17))));
+    tau_m[0] = t12;
+    tau_m[1] = t18;
     return inertias[0] > 0.0 && inertias[1] > 0.0 && inertias[2] > 0.0 && springs[0] > 0.0 && springs[2] > 0.0 && impedance[0] > 0.0 && impedance[1] > 0.0 && tunings[0] > 0.0 && tunings[1] > 0.0 && tunings[2] > 0.0 && tunings[3] > 0.0 && tunings[4] > 0.0 && tunings[5] > 0.0 && tunings[6] > 0.0 && tunings[7] > 0.0 ? 0 : 1;
 }

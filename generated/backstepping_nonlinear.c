@@ -14,7 +14,7 @@
  * Returns 0 where the link's inertia is positive and the motor's inertia is positive and the spring's
  * slope is positive and K_p is positive and K_d is positive and K_3 is positive and K_4 is positive
  * and C_t is positive and C_s is positive; elsewhere 1, and what is not defined is NaN.
- * Cost: 23 add, 21 mul, 4 div.
+ * Cost: 23 add, 20 mul, 4 div, 3 neg.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
 #include "kernels.h"
@@ -24,10 +24,11 @@ int awiwi_backstepping_nonlinear(const double state[restrict 4], const double de
     const double t0 = 1.0/bodies[0];
     const double t1 = (external[0] + state[2])*t0;
     const double t2 = 1.0/spring[0];
-    const double t3 = desired[2] - t1;
-    const double t4 = desired[1] - state[1];
-    const double t5 = (gains[2]*gains[3] + weights[0]/weights[1])*(state[2] - bodies[0]*desired[2] - gains[0]*(desired[0] - state[0]) - gains[1]*t4);
-    const double t6 = bodies[0]*desired[4] + gains[0]*t3 + gains[1]*(desired[3] - (external[1] + state[3])*t0) + (gains[3]*t4 + t3)/weights[0] - spring[1]*state[3]*state[3]*t2*t2 - t5 - (gains[2] + gains[3])*(state[3] - bodies[0]*desired[3] - gains[0]*t4 - gains[1]*t3);
-    tau_m[0] = state[2] + bodies[1]*(t1 + t2*t6);
+    const double t3 = state[3]*t2;
+    const double t4 = desired[2] - t1;
+    const double t5 = desired[1] - state[1];
+    const double t6 = (gains[2]*gains[3] + weights[0]/weights[1])*(state[2] + (-(bodies[0]*desired[2]) - gains[0]*(desired[0] - state[0]) - gains[1]*t5));
+    const double t7 = -(bodies[0]*desired[4]) - gains[0]*t4 - gains[1]*(desired[3] - (external[1] + state[3])*t0) + (t6 + (gains[2] + gains[3])*(state[3] + (-(bodies[0]*desired[3]) - gains[0]*t5 - gains[1]*t4)));
+    tau_m[0] = state[2] + bodies[1]*(t1 - t2*(spring[1]*(t3*t3) + (t7 - (gains[3]*t5 + t4)/weights[0])));
     return bodies[0] > 0.0 && bodies[1] > 0.0 && spring[0] > 0.0 && gains[0] > 0.0 && gains[1] > 0.0 && gains[2] > 0.0 && gains[3] > 0.0 && weights[0] > 0.0 && weights[1] > 0.0 ? 0 : 1;
 }

@@ -6,7 +6,7 @@
  *   in   qd[4] in rad/s, -20 to 20
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  bias[4] in N m
- * Cost: 223 add, 249 mul, 2 div, 3 neg, 1 sqrt, 5 sincos.
+ * Cost: 223 add, 250 mul, 2 div, 3 neg, 1 sqrt, 5 sincos.
  * Inputs: sha256 d0df8ff241cc1ae7f3754b69e6914d3fe8fd8fd3f3a8cea2e9a7fef674657d8d.
  */
 #include <math.h>
@@ -47,8 +47,8 @@ void awiwi_fifth_bias(const double q[restrict 4], const double qd[restrict 4], c
     const double t28 = t27 + a0.cos[1]*t21;
     const double t29 = t27 + t28;
     const double t30 = 1.4e-06*a0.cos[2] + 0.0003465*a0.sin[2];
-    const double t31 = a0.cos[1]*t18*t22;
-    const double t32 = a0.sin[1]*t18*t26;
+    const double t31 = t22*t22;
+    const double t32 = t26*t26;
     const double t33 = t31 + t32;
     const double t34 = 2.0*t22;
     const double t35 = qd[2]*(qd[2] + t34);
@@ -144,7 +144,7 @@ void awiwi_fifth_bias(const double q[restrict 4], const double qd[restrict 4], c
     const double t124 = t80*t53 + t113*t114 + t100*t25 + t107*t48 + t123 - t97*t112 - 1.020803e-05*t68 - t106*t72 - t30*t120 - t37*t116;
     const double t125 = 1.0626e-06*t27 + 5.272e-07*t112 + 8.73e-08*t25 + 0.006*(t73 + t49) + t124 - 8.78e-08*t53 - 8.79e-05*t79 - 5.313e-07*t68;
     const double t126 = 0.000203*(g[0]*a0.sin[0] - g[2]*a0.cos[0]) + t3*(t13*t51 - t52*t74) + t11*(t52*t51 + t13*t74) + t17*(7.12e-05*t77 - 0.0001068*t78 - 1.0652e-06*t21 - 0.004*t50 - a0.sin[1]*t111 - a0.cos[1]*t125);
-    const double t127 = 4.1446e-07*t53 + 8.73e-08*(t31 - t32) + t113*t55 + t102*(t32 - t88) + t115*t56 + 1.46e-05*t119 + 5.272e-07*t59 + (t80 + t83 + t86 - 8.78e-08)*t68 + t90*t60 + t109*t61 + t107*t63 + t42*t108 + t95 + t43*t110 - t100*(t32 - t82) - t101*(t32 - t85) - t118*t57 - 8.79e-05*t93 - t97*t64 - t99*t62 - t37*t94;
+    const double t127 = 4.1446e-07*t53 + 8.73e-08*(t18*(a0.cos[1]*t22 - a0.sin[1]*t26)) + t113*t55 + t102*(t32 - t88) + t115*t56 + 1.46e-05*t119 + 5.272e-07*t59 + (t80 + t83 + t86 - 8.78e-08)*t68 + t90*t60 + t109*t61 + t107*t63 + t42*t108 + t95 + t43*t110 - t100*(t32 - t82) - t101*(t32 - t85) - t118*t57 - 8.79e-05*t93 - t97*t64 - t99*t62 - t37*t94;
     bias[0] = t126;
     bias[1] = t127;
     bias[2] = -t124;

@@ -11,10 +11,11 @@
  *   out  rocker_ratio[1] in 1
  *   out  transmission[1] in 1
  * Returns 0 where the loop closes; elsewhere 1, and what is not defined is NaN.
- * Cost: 14 add, 28 mul, 2 div, 2 neg, 1 sqrt, 1 sincos, 2 calls.
+ * Cost: 15 add, 25 mul, 2 div, 4 neg, 1 sqrt, 1 sincos, 2 calls.
  * Inputs: sha256 d021538d8900d42317b84036df325beebaa6feecad7df8e1e869f0ec5a1f0d9f.
  */
 #include <math.h>
+#include "elementary.h"
 #include "trig.h"
 #include "kernels.h"
 
@@ -24,21 +25,23 @@ int awiwi_fifth_hmc_four_bar(const double q[restrict 1], double coupler[restrict
     const awiwi_turn a0 = awiwi_sincos(t0);
     const double t1 = 0.00024*a0.cos - 0.000244;
     const double t2 = 1.0/t1;
-    const double t3 = t1 + 6.475e-05;
-    const double t4 = 0.01*a0.cos;
-    const double t5 = t4 - 0.012;
-    const double t6 = sqrt(-(5.625e-05*t1) - 0.25*t3*t3);
-    const double t7 = t2*(0.005*a0.sin*t3 + t5*t6);
-    const double t8 = 0.01*a0.sin;
-    const double t9 = t2*(0.5*t5*t3 - t8*t6);
-    const double t10 = t8 - t7;
-    const double t11 = t5 - t9;
-    const double t12 = 1.0/t6;
-    const double t13 = t4*t7 - t8*t9;
-    coupler[0] = atan2(-133.33333333333334*t7, -133.33333333333334*t9);
-    rocker[0] = atan2(90.9090909090909*t10, 90.9090909090909*t11);
-    coupler_ratio[0] = t12*(0.00012*a0.sin - t13);
-    rocker_ratio[0] = -(t12*t13);
-    transmission[0] = -12121.212121212122*(t7*t11 - t9*t10);
-    return -36730945.82185491*(t1 + 1.225e-05)*(t1 + 0.00034225) > 0.0 ? 0 : 1;
+    const double t3 = 0.01*a0.sin;
+    const double t4 = 0.5*(t1 - 5.625e-05 + 0.000121);
+    const double t5 = 0.01*a0.cos;
+    const double t6 = t5 - 0.012;
+    const double t7 = sqrt(-(5.625e-05*t1) - t4*t4);
+    const double t8 = t2*(t3*t4 + t6*t7);
+    const double t9 = 133.33333333333334*t8;
+    const double t10 = t2*(t6*t4 - t3*t7);
+    const double t11 = 133.33333333333334*t10;
+    const double t12 = 90.9090909090909*(t3 - t8);
+    const double t13 = 90.9090909090909*(t6 - t10);
+    const double t14 = 1.0/t7;
+    const double t15 = t5*t8 - t3*t10;
+    coupler[0] = awiwi_atan2(-t9, -t11);
+    rocker[0] = awiwi_atan2(t12, t13);
+    coupler_ratio[0] = t14*(0.00012*a0.sin - t15);
+    rocker_ratio[0] = -(t14*t15);
+    transmission[0] = t11*t12 - t9*t13;
+    return -36730945.82185491*((t1 + 1.225e-05)*(t1 + 0.00034225)) > 0.0 ? 0 : 1;
 }

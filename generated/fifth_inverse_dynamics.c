@@ -7,7 +7,7 @@
  *   in   qdd[4] in rad/s^2, -2000 to 2000
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  tau[4] in N m
- * Cost: 238 add, 261 mul, 2 div, 2 neg, 1 sqrt, 5 sincos.
+ * Cost: 238 add, 262 mul, 2 div, 2 neg, 1 sqrt, 5 sincos.
  * Inputs: sha256 d0df8ff241cc1ae7f3754b69e6914d3fe8fd8fd3f3a8cea2e9a7fef674657d8d.
  */
 #include <math.h>
@@ -48,8 +48,8 @@ void awiwi_fifth_inverse_dynamics(const double q[restrict 4], const double qd[re
     const double t28 = t27 - a0.cos[1]*t21;
     const double t29 = t27 + t28;
     const double t30 = 1.4e-06*a0.cos[2] + 0.0003465*a0.sin[2];
-    const double t31 = a0.cos[1]*t18*t22;
-    const double t32 = a0.sin[1]*t18*t26;
+    const double t31 = t22*t22;
+    const double t32 = t26*t26;
     const double t33 = t31 + t32;
     const double t34 = 2.0*t22;
     const double t35 = qd[2]*(qd[2] + t34);
@@ -155,7 +155,7 @@ void awiwi_fifth_inverse_dynamics(const double q[restrict 4], const double qd[re
     const double t134 = t123*t124 + t101*t25 + t117*t51 + t133 - t90*t59 - t109*t122 - 1.020803e-05*t64 - t30*t129 - t52*t126 - t116*t69;
     const double t135 = 1.0626e-06*t27 + 8.78e-08*t59 + 5.272e-07*t122 + 8.73e-08*t25 + 0.006*(t54 + t70) + t134 - 8.79e-05*t89 - 5.313e-07*t63;
     const double t136 = 2.03e-06*qdd[0] + 0.000203*(g[0]*a0.sin[0] - g[2]*a0.cos[0]) + t3*(t13*t56 - t57*t84) + t11*(t57*t56 + t13*t84) + t17*(7.12e-05*t87 + 1.0652e-06*t21 - 0.0001068*t88 - 0.004*t55 - a0.sin[1]*t121 - a0.cos[1]*t135);
-    const double t137 = 1.1684e-07*t59 + 5.313e-07*t71 + 8.73e-08*(t31 - t32) + t123*t73 + t113*(t32 - t98) + t125*t74 + 1.46e-05*t128 + 5.272e-07*t77 + t90*t64 + t93*t66 + t96*t67 + t100*t78 + t119*t79 + t117*t81 + t49*t118 + t107 + t44*t120 - t101*(t32 - t92) - t102*(t32 - t95) - t131*t75 - 8.79e-05*t105 - 8.78e-08*t63 - t109*t82 - t111*t80 - t52*t106;
+    const double t137 = 1.1684e-07*t59 + 5.313e-07*t71 + 8.73e-08*(t18*(a0.cos[1]*t22 - a0.sin[1]*t26)) + t123*t73 + t113*(t32 - t98) + t125*t74 + 1.46e-05*t128 + 5.272e-07*t77 + t90*t64 + t93*t66 + t96*t67 + t100*t78 + t119*t79 + t117*t81 + t49*t118 + t107 + t44*t120 - t101*(t32 - t92) - t102*(t32 - t95) - t131*t75 - 8.79e-05*t105 - 8.78e-08*t63 - t109*t82 - t111*t80 - t52*t106;
     tau[0] = t136;
     tau[1] = t137;
     tau[2] = -t134;

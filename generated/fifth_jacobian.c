@@ -4,7 +4,7 @@
  * Source: eq. 5.3, differentiated.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   out  J[6][4] in m/rad, 1
- * Cost: 37 add, 64 mul, 2 div, 12 neg, 1 sqrt, 5 sincos.
+ * Cost: 33 add, 59 mul, 2 div, 12 neg, 1 sqrt, 5 sincos.
  * Inputs: sha256 41e0b066350c1515c23653124cb3764011a2af2cb74c560413362bf44f18b5d9.
  */
 #include <math.h>
@@ -18,52 +18,54 @@ void awiwi_fifth_jacobian(const double q[restrict 4], double J[restrict 24])
     const double t2 = t1 + 0.7692307692307693*q[3];
     const awiwi_turn4 a0 = awiwi_sincos4(t0, q[2], t1, t2);
     const double t3 = 0.01*a0.sin[0];
-    const double t4 = 0.022*a0.sin[2] + 0.018*a0.sin[3];
-    const double t5 = 0.033*a0.sin[1] + t4;
-    const double t6 = t5 - 0.006;
-    const double t7 = 0.00012*a0.cos[0] - 0.000122;
-    const double t8 = 1.0/t7;
-    const double t9 = t7 + 3.2375e-05;
-    const double t10 = 0.01*a0.cos[0];
-    const double t11 = t10 - 0.012;
-    const double t12 = sqrt(-(0.0001125*t7) - t9*t9);
-    const double t13 = t3*t9 + t11*t12;
-    const double t14 = t11*t9 - t3*t12;
-    const double t15 = t8*(57.5741330674062*t13 + 33.610469291294464*t14);
+    const double t4 = 0.00024*a0.cos[0] - 0.000244;
+    const double t5 = 1.0/t4;
+    const double t6 = 0.01*a0.cos[0];
+    const double t7 = t6 - 0.012;
+    const double t8 = t4 + 6.475e-05;
+    const double t9 = sqrt(-(5.625e-05*t4) - 0.25*t8*t8);
+    const double t10 = t5*(0.5*t7*t8 - t3*t9);
+    const double t11 = t5*(0.005*a0.sin[0]*t8 + t7*t9);
+    const double t12 = (0.00012*a0.sin[0] + t3*t10 - t6*t11)/t9;
+    const double t13 = 0.022*a0.sin[2] + 0.018*a0.sin[3];
+    const double t14 = 0.033*a0.sin[1] + t13;
+    const double t15 = t14 - 0.006;
+    const double t16 = 115.1482661348124*t11 + 67.22093858258893*t10;
     const awiwi_turn a1 = awiwi_sincos(q[1]);
-    const double t16 = 0.022*a0.cos[2] + 0.018*a0.cos[3];
-    const double t17 = 0.033*a0.cos[1] + t16;
-    const double t18 = t17 + 0.006;
-    const double t19 = 0.0036*a1.sin - a1.cos*t18;
-    const double t20 = t19 - 0.004;
-    const double t21 = t8*(33.610469291294464*t13 - 57.5741330674062*t14);
-    const double t22 = (0.00012*a0.sin[0] - 0.005*(t8*(a0.cos[0]*t13 - a0.sin[0]*t14)))/t12 - 1.0 + 1.0;
-    const double t23 = 0.0036*a1.cos + a1.sin*t18;
-    const double t24 = a1.cos*t15;
-    const double t25 = a1.cos*t21;
-    const double t26 = 1.7692307692307692*a1.sin;
-    J[0] = -t3 - (t6*t15 - t20*t21)*t22;
-    J[1] = -(t23*t15);
-    J[2] = -(t17*t21) - t5*t24;
-    J[3] = -(t16*t21) - t4*t24 - 0.013846153846153847*(a0.cos[3]*t21 + a0.sin[3]*t24);
+    const double t17 = 0.022*a0.cos[2] + 0.018*a0.cos[3];
+    const double t18 = 0.033*a0.cos[1] + t17;
+    const double t19 = t18 + 0.006;
+    const double t20 = 0.0036*a1.sin - a1.cos*t19;
+    const double t21 = t20 - 0.004;
+    const double t22 = 67.22093858258893*t11 - 115.1482661348124*t10;
+    const double t23 = a1.cos*t16;
+    const double t24 = a1.sin*t16;
+    const double t25 = 0.013846153846153847*a0.cos[3] + t17;
+    const double t26 = 0.013846153846153847*a0.sin[3] + t13;
+    const double t27 = a1.cos*t22;
+    const double t28 = a1.sin*t22;
+    J[0] = -t3 - t12*(t15*t16 - t21*t22);
+    J[1] = -(0.0036*t23) - t19*t24;
+    J[2] = -(t18*t22) - t14*t23;
+    J[3] = -(t25*t22) - t26*t23;
     J[4] = 0.0;
-    J[5] = -t19;
-    J[6] = -(a1.sin*t5);
-    J[7] = a1.sin*(-(0.013846153846153847*a0.sin[3]) - t4);
-    J[8] = t10 - (t6*t21 + t20*t15)*t22;
-    J[9] = -(t23*t21);
-    J[10] = t17*t15 - t5*t25;
-    J[11] = t16*t15 + 0.013846153846153847*(a0.cos[3]*t15 - a0.sin[3]*t25) - t4*t25;
+    J[5] = -t20;
+    J[6] = -(a1.sin*t14);
+    J[7] = -(a1.sin*t26);
+    J[8] = t6 - t12*(t15*t22 + t21*t16);
+    J[9] = -(0.0036*t27) - t19*t28;
+    J[10] = t18*t16 - t14*t27;
+    J[11] = t25*t16 - t26*t27;
     J[12] = 0.0;
-    J[13] = -t21;
-    J[14] = a1.sin*t15;
-    J[15] = t26*t15;
-    J[16] = -t22;
+    J[13] = -t22;
+    J[14] = t24;
+    J[15] = 1.7692307692307692*t24;
+    J[16] = -t12;
     J[17] = 0.0;
     J[18] = -a1.cos;
     J[19] = -1.7692307692307692*a1.cos;
     J[20] = 0.0;
-    J[21] = t15;
-    J[22] = a1.sin*t21;
-    J[23] = t26*t21;
+    J[21] = t16;
+    J[22] = t28;
+    J[23] = 1.7692307692307692*t28;
 }

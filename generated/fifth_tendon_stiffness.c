@@ -9,7 +9,7 @@
  *   out  curvature[8] in 1/(N m)
  * Returns 0 where every tension is on its spring's curve, give or take a hundredth; elsewhere 1, and
  * what is not defined is NaN.
- * Cost: 198 add, 230 mul, 7 calls.
+ * Cost: 198 add, 229 mul, 1 neg, 7 calls.
  * Inputs: sha256 b64c46b637f0a464ed4766b60f7050b3f882b2c8a66fc18598209e2c9ff07328.
  */
 #include <math.h>
@@ -67,19 +67,20 @@ int awiwi_fifth_tendon_stiffness(const double tension[restrict 8], double k[rest
     const double t47 = t18*(t18*(t18*(24.53899769445488*t17 - 2332.303829653054) - 3595.5249875986037) + 6371.352269919792) - 1588.663036259213;
     const double t48 = t22*(t22*(t22*(24.53899769445488*t21 - 2332.303829653054) - 3595.5249875986037) + 6371.352269919792) - 1588.663036259213;
     const double t49 = t26*(t26*(t26*(24.53899769445488*t25 - 2332.303829653054) - 3595.5249875986037) + 6371.352269919792) - 1588.663036259213;
-    const double t50 = t21*t21;
-    const double t51 = t17*t17;
-    const double t52 = t13*t13;
-    const double t53 = t9*t9;
-    const double t54 = t6*t6;
-    const double t55 = t0*t0;
-    const double t56 = t3*t3;
-    const double t57 = 5.3945636387324395e-05*(t55 + t56) + 0.5*fabs(0.00010789127277464879*(t55 - t56));
-    const double t58 = 5.3945636387324395e-05*t54 + 0.5*(t57 + fabs(0.00010789127277464879*t54 - t57));
-    const double t59 = 5.3945636387324395e-05*t53 + 0.5*(t58 + fabs(0.00010789127277464879*t53 - t58));
-    const double t60 = 5.3945636387324395e-05*t52 + 0.5*(t59 + fabs(0.00010789127277464879*t52 - t59));
-    const double t61 = 5.3945636387324395e-05*t51 + 0.5*(t60 + fabs(0.00010789127277464879*t51 - t60));
-    const double t62 = 5.3945636387324395e-05*t50 + 0.5*(t61 + fabs(0.00010789127277464879*t50 - t61));
+    const double t50 = t26*t26;
+    const double t51 = t22*t22;
+    const double t52 = t18*t18;
+    const double t53 = t14*t14;
+    const double t54 = t10*t10;
+    const double t55 = t7*t7;
+    const double t56 = t1*t1;
+    const double t57 = t4*t4;
+    const double t58 = 0.5*t56 + 0.5*t57 + 0.5*fabs(t56 - t57);
+    const double t59 = 0.5*t55 + 0.5*t58 + 0.5*fabs(t55 - t58);
+    const double t60 = 0.5*t54 + 0.5*t59 + 0.5*fabs(t54 - t59);
+    const double t61 = 0.5*t53 + 0.5*t60 + 0.5*fabs(t53 - t60);
+    const double t62 = 0.5*t52 + 0.5*t61 + 0.5*fabs(t52 - t61);
+    const double t63 = 0.5*t51 + 0.5*t62 + 0.5*fabs(t51 - t62);
     k[0] = t1*(t1*(t1*(t1*t2 - 949.2257281588977) + 2486.208403491702) + 6612.930601228865) + 8724.567610373055;
     k[1] = t4*(t4*(t4*(t4*t5 - 949.2257281588977) + 2486.208403491702) + 6612.930601228865) + 8724.567610373055;
     k[2] = t7*(t7*(t7*(t7*t8 - 949.2257281588977) + 2486.208403491702) + 6612.930601228865) + 8724.567610373055;
@@ -104,5 +105,5 @@ int awiwi_fifth_tendon_stiffness(const double tension[restrict 8], double k[rest
     curvature[5] = 0.00043156509109859516*(t18*(t18*t47 - 5695.354368953386) + 4972.416806983404);
     curvature[6] = 0.00043156509109859516*(t22*(t22*t48 - 5695.354368953386) + 4972.416806983404);
     curvature[7] = 0.00043156509109859516*(t26*(t26*t49 - 5695.354368953386) + 4972.416806983404);
-    return 1.015625 - 5.3945636387324395e-05*t25*t25 - 0.5*(t62 + fabs(0.00010789127277464879*(t25*t25) - t62)) > 0.0 ? 0 : 1;
+    return -(0.5*t50) - 0.5*t63 - 0.5*fabs(t50 - t63) + 1.015625 > 0.0 ? 0 : 1;
 }

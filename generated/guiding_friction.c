@@ -9,10 +9,10 @@
  * Cost: 1 add, 2 mul, 1 calls.
  * Inputs: sha256 b1787cd3c6b4fc2e2d84ef503d433af6c421429c73d51fbd22d68259107b8428.
  */
-#include <math.h>
+#include "elementary.h"
 #include "kernels.h"
 
 void awiwi_guiding_friction(const double f[restrict 1], const double bend[restrict 1], double loss[restrict 1])
 {
-    loss[0] = f[0]*(1.0 - exp(-0.05*bend[0]));
+    loss[0] = f[0]*(1.0 - awiwi_exp(-0.05*bend[0]));
 }

@@ -4,7 +4,7 @@
  * Source: eq. 5.6, 5.9, 5.21.
  *   in   q[19] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727, -0.3491, -0.1745, -0.08727, -0.08727, -0.3491, -0.1745, -0.08727, -0.08727, -0.3491, -0.1745, -0.08727, -0.5236, -0.3491, -0.1745, -0.08727] to [0.6109, 0.6109, 1.396, 1.396, 0.3491, 1.484, 1.571, 1.396, 0.3491, 1.484, 1.571, 1.396, 0.3491, 1.484, 1.571, 0.6981, 0.3491, 1.484, 1.571]
  *   out  P[38][19] in m/rad
- * Cost: 43 add, 54 mul, 4 div, 1 neg, 4 sqrt, 2 sincos.
+ * Cost: 44 add, 50 mul, 4 div, 4 sqrt, 2 sincos.
  * Inputs: sha256 9b14a568be888c30da7a1d93aeeb047b23eb439117ee5d381d329e389e84ed49.
  */
 #include <math.h>
@@ -13,46 +13,55 @@
 
 void awiwi_hand_coupling(const double q[restrict 19], double P[restrict 722])
 {
-    const double t0 = q[1] + 1.5176549179499612;
-    const awiwi_turn2 a0 = awiwi_sincos2(q[0], t0);
-    const double t1 = 0.003*a0.cos[0];
-    const double t2 = 0.04706644239795483*a0.sin[1] + 0.006;
-    const double t3 = a0.sin[0]*t2;
-    const double t4 = t1 + t3;
-    const double t5 = 0.003*a0.sin[0];
-    const double t6 = a0.cos[0]*t2;
-    const double t7 = t5 - t6;
-    const double t8 = t7 + 0.002;
-    const double t9 = t4 - 0.03;
-    const double t10 = 0.04706644239795483*a0.cos[1] - 0.025;
-    const double t11 = t10*t10;
-    const double t12 = 1.0/sqrt(t11 + t9*t9 + t8*t8);
-    const double t13 = a0.sin[1]*t10;
-    const double t14 = 0.004992941637972863*a0.cos[1] + 0.046800860395935*a0.sin[1];
-    const double t15 = t14 + 0.006;
-    const double t16 = a0.sin[0]*t15;
-    const double t17 = t1 + t16;
-    const double t18 = a0.cos[0]*t15;
-    const double t19 = t5 - t18;
-    const double t20 = t19 + 0.002;
-    const double t21 = t17 - 0.03;
-    const double t22 = 0.046800860395935*a0.cos[1] - 0.004992941637972863*a0.sin[1];
-    const double t23 = t22 + 0.025;
-    const double t24 = t23*t23;
-    const double t25 = 1.0/sqrt(t24 + t21*t21 + t20*t20);
-    const double t26 = t14*t23;
-    const double t27 = t1 - t3;
-    const double t28 = t5 + t6;
-    const double t29 = t28 - 0.002;
-    const double t30 = t27 - 0.03;
-    const double t31 = 1.0/sqrt(t11 + t30*t30 + t29*t29);
-    const double t32 = t1 - t16;
-    const double t33 = t5 + t18;
-    const double t34 = t33 - 0.002;
-    const double t35 = t32 - 0.03;
-    const double t36 = 1.0/sqrt(t24 + t35*t35 + t34*t34);
-    P[0] = (t4*t8 - t7*t9)*t12;
-    P[1] = -0.04706644239795483*(t13 + a0.cos[1]*(a0.cos[0]*t8 - a0.sin[0]*t9))*t12;
+    const awiwi_turn2 a0 = awiwi_sincos2(q[0], q[1]);
+    const double t0 = 0.003*a0.cos[0];
+    const double t1 = 0.047*a0.cos[1];
+    const double t2 = 0.0025*a0.sin[1];
+    const double t3 = t1 + t2;
+    const double t4 = t3 + 0.006;
+    const double t5 = a0.sin[0]*t4;
+    const double t6 = t0 + t5;
+    const double t7 = 0.003*a0.sin[0];
+    const double t8 = a0.cos[0]*t4;
+    const double t9 = t7 - t8;
+    const double t10 = t9 + 0.002;
+    const double t11 = t6 - 0.03;
+    const double t12 = 0.0025*a0.cos[1];
+    const double t13 = 0.047*a0.sin[1];
+    const double t14 = t12 - t13;
+    const double t15 = t14 - 0.025;
+    const double t16 = t15*t15;
+    const double t17 = 1.0/sqrt(t16 + t11*t11 + t10*t10);
+    const double t18 = a0.sin[0]*t14;
+    const double t19 = t3*t15;
+    const double t20 = a0.cos[0]*t14;
+    const double t21 = t1 - t2;
+    const double t22 = t21 + 0.006;
+    const double t23 = a0.sin[0]*t22;
+    const double t24 = t0 + t23;
+    const double t25 = a0.cos[0]*t22;
+    const double t26 = t7 - t25;
+    const double t27 = t26 + 0.002;
+    const double t28 = t24 - 0.03;
+    const double t29 = t12 + t13;
+    const double t30 = t29 - 0.025;
+    const double t31 = t30*t30;
+    const double t32 = 1.0/sqrt(t31 + t28*t28 + t27*t27);
+    const double t33 = t21*t30;
+    const double t34 = a0.cos[0]*t29;
+    const double t35 = a0.sin[0]*t29;
+    const double t36 = t0 - t5;
+    const double t37 = t7 + t8;
+    const double t38 = t37 - 0.002;
+    const double t39 = t36 - 0.03;
+    const double t40 = 1.0/sqrt(t16 + t39*t39 + t38*t38);
+    const double t41 = t0 - t23;
+    const double t42 = t7 + t25;
+    const double t43 = t42 - 0.002;
+    const double t44 = t41 - 0.03;
+    const double t45 = 1.0/sqrt(t31 + t44*t44 + t43*t43);
+    P[0] = (t6*t10 - t9*t11)*t17;
+    P[1] = (t18*t11 - t19 - t20*t10)*t17;
     P[2] = 0.0;
     P[3] = 0.0;
     P[4] = 0.0;
@@ -70,8 +79,8 @@ void awiwi_hand_coupling(const double q[restrict 19], double P[restrict 722])
     P[16] = 0.0;
     P[17] = 0.0;
     P[18] = 0.0;
-    P[19] = (t17*t20 - t19*t21)*t25;
-    P[20] = (-t26 - t22*(a0.cos[0]*t20 - a0.sin[0]*t21))*t25;
+    P[19] = (t24*t27 - t26*t28)*t32;
+    P[20] = (t33 + t34*t27 - t35*t28)*t32;
     P[21] = 0.0;
     P[22] = 0.0;
     P[23] = 0.0;
@@ -89,8 +98,8 @@ void awiwi_hand_coupling(const double q[restrict 19], double P[restrict 722])
     P[35] = 0.0;
     P[36] = 0.0;
     P[37] = 0.0;
-    P[38] = (t27*t29 - t28*t30)*t31;
-    P[39] = -0.04706644239795483*(t13 - a0.cos[1]*(a0.cos[0]*t29 - a0.sin[0]*t30))*t31;
+    P[38] = (t36*t38 - t37*t39)*t40;
+    P[39] = (t20*t38 - t19 - t18*t39)*t40;
     P[40] = 0.0;
     P[41] = 0.0;
     P[42] = 0.0;
@@ -108,8 +117,8 @@ void awiwi_hand_coupling(const double q[restrict 19], double P[restrict 722])
     P[54] = 0.0;
     P[55] = 0.0;
     P[56] = 0.0;
-    P[57] = (t32*t34 - t33*t35)*t36;
-    P[58] = (t22*(a0.cos[0]*t34 - a0.sin[0]*t35) - t26)*t36;
+    P[57] = (t41*t43 - t42*t44)*t45;
+    P[58] = (t33 + t35*t44 - t34*t43)*t45;
     P[59] = 0.0;
     P[60] = 0.0;
     P[61] = 0.0;

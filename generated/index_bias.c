@@ -6,7 +6,7 @@
  *   in   qd[4] in rad/s, -20 to 20
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  bias[4] in N m
- * Cost: 55 add, 75 mul, 4 sincos.
+ * Cost: 55 add, 73 mul, 4 sincos.
  * Inputs: sha256 e81c8580817eac8f68e2015b14a5b569106ad1f3f949b7d278d0a2f0f5760292.
  */
 #include "trig.h"
@@ -30,22 +30,24 @@ void awiwi_index_bias(const double q[restrict 4], const double qd[restrict 4], c
     const double t12 = 0.04038*a0.cos[1];
     const double t13 = t12 + 0.006;
     const double t14 = 1.2e-06*a0.cos[2] + 0.0002062*a0.sin[2];
-    const double t15 = 9.538979534520451e-07*a0.sin[3];
-    const double t16 = t13*t14 + a0.sin[2]*(5.22042e-06*a0.cos[2] - 2.28e-08*a0.sin[2] - t15) + 1.14e-08;
-    const double t17 = 0.0298*a0.cos[2];
-    const double t18 = 3.2009998437988094e-05*a0.cos[3];
-    const double t19 = (t13 + t17)*t18 + a0.cos[3]*(9.716427232979388e-09*a0.cos[3] - 3.7031708931917554e-07*a0.sin[3]) - 4.858213616489694e-09;
-    const double t20 = 3e-06*a0.cos[1] + 0.0006058*a0.sin[1];
-    const double t21 = 0.006*t20 + a0.sin[1]*(2.1654944e-05*a0.cos[1] + 0.04038*t9 - 7.72e-08*a0.sin[1]) + 3.86e-08;
-    const double t22 = 3.22e-05*t2 + t3*(1.244876e-06*a0.cos[1] - 9.6e-09*a0.sin[1]) + t5*(7.5326e-07*a0.cos[2] - 5.8e-09*a0.sin[2]) + (g[0]*a0.sin[0] - g[1]*a0.cos[0])*(t6 + t9 + 0.0001245) - t11*(1.0746642198887319e-09*a0.cos[3] + 1.666789209732727e-07*a0.sin[3]) - 2.0*qd[0]*(t4*t16 + t10*t19 + qd[1]*t21);
-    const double t23 = 0.04038*a0.sin[1];
+    const double t15 = t13*t14 + a0.sin[2]*(5.22042e-06*a0.cos[2] - 2.28e-08*a0.sin[2] - 9.538979534520451e-07*a0.sin[3]) + 1.14e-08;
+    const double t16 = 0.0298*a0.cos[2];
+    const double t17 = 3.2009998437988094e-05*a0.cos[3];
+    const double t18 = (t13 + t16)*t17 + a0.cos[3]*(9.716427232979388e-09*a0.cos[3] - 3.7031708931917554e-07*a0.sin[3]) - 4.858213616489694e-09;
+    const double t19 = 3e-06*a0.cos[1] + 0.0006058*a0.sin[1];
+    const double t20 = 0.006*t19 + a0.sin[1]*(2.1654944e-05*a0.cos[1] + 0.04038*t9 - 7.72e-08*a0.sin[1]) + 3.86e-08;
+    const double t21 = 3.22e-05*t2 + t3*(1.244876e-06*a0.cos[1] - 9.6e-09*a0.sin[1]) + t5*(7.5326e-07*a0.cos[2] - 5.8e-09*a0.sin[2]) + (g[0]*a0.sin[0] - g[1]*a0.cos[0])*(t6 + t9 + 0.0001245) - t11*(1.0746642198887319e-09*a0.cos[3] + 1.666789209732727e-07*a0.sin[3]) - 2.0*qd[0]*(t4*t15 + t10*t18 + qd[1]*t20);
+    const double t22 = 0.04038*a0.sin[1];
+    const double t23 = t11*t8;
     const double t24 = t2 + t3*t12;
     const double t25 = qd[0]*qd[0];
-    const double t26 = g[2] + t3*t23;
-    const double t27 = (0.0298*t5*a0.sin[2] + t26)*t8 + (t24 + t5*t17)*t18 + t25*t19;
-    const double t28 = t24*t14 + t25*t16 + t27 - t26*t7 - t11*(9.538979534520451e-07*a0.cos[2]*a0.cos[3] + a0.sin[2]*t15);
-    bias[0] = t22;
-    bias[1] = t20*t2 + t23*(t5*t7 - t11*t8) + t28 + t25*t21 - g[2]*t6 - t12*(t5*t14 + t11*t18);
-    bias[2] = t28;
-    bias[3] = t27;
+    const double t26 = g[2] + t3*t22;
+    const double t27 = 0.0298*a0.sin[2];
+    const double t28 = (t26 + t5*t27)*t8 + (t24 + t5*t16)*t17 + t25*t18;
+    const double t29 = t11*t17;
+    const double t30 = t24*t14 + t25*t15 + t28 - t26*t7 - t16*t29 - t27*t23;
+    bias[0] = t21;
+    bias[1] = t19*t2 + t22*(t5*t7 - t23) + t30 + t25*t20 - g[2]*t6 - t12*(t5*t14 + t29);
+    bias[2] = t30;
+    bias[3] = t28;
 }

@@ -5,7 +5,7 @@
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   qd[4] in rad/s, -20 to 20
  *   out  C[4][4] in N m s/rad
- * Cost: 46 add, 50 mul, 4 neg, 3 sincos.
+ * Cost: 46 add, 49 mul, 4 neg, 3 sincos.
  * Inputs: sha256 282282bd680841d03234ba2709f06e709554a528cf56b8719c5e0b6114109589.
  */
 #include "trig.h"
@@ -22,7 +22,7 @@ void awiwi_index_coriolis_matrix(const double q[restrict 4], const double qd[res
     const double t5 = 4.8456e-08*a0.cos[1] + 8.326356e-06*a0.sin[1];
     const double t6 = t2*t5 + a0.sin[1]*(5.22042e-06*a0.cos[1] - 2.28e-08*a0.sin[1] - 9.538979534520451e-07*a0.sin[2]) + t4 + 1.14e-08;
     const double t7 = 8.326356e-06*a0.cos[1] - 4.8456e-08*a0.sin[1] - 1.2925637369259591e-06*a0.sin[2];
-    const double t8 = 1.8e-08*(a0.cos[0] + 201.93333333333334*a0.sin[0]) + a0.sin[0]*(2.1654944e-05*a0.cos[0] + t7 - 7.72e-08*a0.sin[0]) + t6 + 3.86e-08;
+    const double t8 = 1.8e-08*a0.cos[0] + t6 + a0.sin[0]*(2.1654944e-05*a0.cos[0] + t7 - 7.72e-08*a0.sin[0] + 3.6348e-06) + 3.86e-08;
     const double t9 = qd[1] + qd[2];
     const double t10 = qd[3] + t9;
     const double t11 = t10*(1.0746642198887319e-09*a0.cos[2] + 1.666789209732727e-07*a0.sin[2]);

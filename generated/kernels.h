@@ -20,7 +20,7 @@ extern const char awiwi_model_digest[65];
  *   out  curvature[8] in 1/(N m)
  * Returns 0 where every tension is on its spring's curve, give or take a hundredth; elsewhere 1, and
  * what is not defined is NaN.
- * Cost: 198 add, 230 mul, 7 calls.
+ * Cost: 198 add, 229 mul, 1 neg, 7 calls.
  */
 int awiwi_thumb_tendon_stiffness(const double tension[8], double k[8], double slope[8], double curvature[8]);
 
@@ -66,7 +66,7 @@ void awiwi_thumb_pose_and_jacobian(const double q[4], double T[16], double J[24]
  * Source: eq. 2.17, 5.4.
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   out  M[4][4] in kg m^2
- * Cost: 48 add, 49 mul, 4 neg, 3 sincos.
+ * Cost: 48 add, 46 mul, 5 neg, 3 sincos.
  */
 void awiwi_thumb_mass_matrix(const double q[4], double M[16]);
 
@@ -76,7 +76,7 @@ void awiwi_thumb_mass_matrix(const double q[4], double M[16]);
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   in   qd[4] in rad/s, -20 to 20
  *   out  C[4][4] in N m s/rad
- * Cost: 134 add, 142 mul, 5 neg, 3 sincos.
+ * Cost: 132 add, 137 mul, 7 neg, 3 sincos.
  */
 void awiwi_thumb_coriolis_matrix(const double q[4], const double qd[4], double C[16]);
 
@@ -97,7 +97,7 @@ void awiwi_thumb_gravity(const double q[4], const double g[3], double gravity[4]
  *   in   qd[4] in rad/s, -20 to 20
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  bias[4] in N m
- * Cost: 108 add, 134 mul, 4 sincos.
+ * Cost: 108 add, 135 mul, 4 sincos.
  */
 void awiwi_thumb_bias(const double q[4], const double qd[4], const double g[3], double bias[4]);
 
@@ -109,7 +109,7 @@ void awiwi_thumb_bias(const double q[4], const double qd[4], const double g[3], 
  *   in   qdd[4] in rad/s^2, -2000 to 2000
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  tau[4] in N m
- * Cost: 135 add, 144 mul, 2 neg, 4 sincos.
+ * Cost: 135 add, 145 mul, 2 neg, 4 sincos.
  */
 void awiwi_thumb_inverse_dynamics(const double q[4], const double qd[4], const double qdd[4], const double g[3], double tau[4]);
 
@@ -122,7 +122,7 @@ void awiwi_thumb_inverse_dynamics(const double q[4], const double qd[4], const d
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  dtau_dq[4][4] in N m/rad
  *   out  dtau_dqd[4][4] in N m s/rad
- * Cost: 388 add, 435 mul, 10 neg, 4 sincos.
+ * Cost: 374 add, 422 mul, 10 neg, 4 sincos.
  */
 void awiwi_thumb_inverse_dynamics_derivatives(const double q[4], const double qd[4], const double qdd[4], const double g[3], double dtau_dq[16], double dtau_dqd[16]);
 
@@ -134,7 +134,7 @@ void awiwi_thumb_inverse_dynamics_derivatives(const double q[4], const double qd
  *   in   tau[4] in N m, -1 to 1
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  qdd[4] in rad/s^2
- * Cost: 172 add, 191 mul, 3 div, 3 neg, 4 sincos.
+ * Cost: 171 add, 190 mul, 3 div, 1 neg, 4 sincos.
  */
 void awiwi_thumb_forward_dynamics(const double q[4], const double qd[4], const double tau[4], const double g[3], double qdd[4]);
 
@@ -147,7 +147,7 @@ void awiwi_thumb_forward_dynamics(const double q[4], const double qd[4], const d
  *   out  M[4][4] in kg m^2
  *   out  C[4][4] in N m s/rad
  *   out  gravity[4] in N m
- * Cost: 156 add, 174 mul, 8 neg, 4 sincos.
+ * Cost: 156 add, 172 mul, 8 neg, 4 sincos.
  */
 void awiwi_thumb_dynamics(const double q[4], const double qd[4], const double g[3], double M[16], double C[16], double gravity[4]);
 
@@ -159,7 +159,7 @@ void awiwi_thumb_dynamics(const double q[4], const double qd[4], const double g[
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  kinetic[1] in J
  *   out  potential[1] in J
- * Cost: 65 add, 81 mul, 4 sincos.
+ * Cost: 65 add, 80 mul, 4 sincos.
  */
 void awiwi_thumb_energy(const double q[4], const double qd[4], const double g[3], double kinetic[1], double potential[1]);
 
@@ -168,7 +168,7 @@ void awiwi_thumb_energy(const double q[4], const double qd[4], const double g[3]
  * Source: eq. 5.5, 5.18, 5.22.
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   out  h[8] in m
- * Cost: 28 add, 23 mul, 2 neg, 4 sqrt, 2 sincos.
+ * Cost: 26 add, 22 mul, 2 neg, 4 sqrt, 2 sincos.
  */
 void awiwi_thumb_tendon_lengths(const double q[4], double h[8]);
 
@@ -177,7 +177,7 @@ void awiwi_thumb_tendon_lengths(const double q[4], double h[8]);
  * Source: eq. 5.6, 5.9, 5.21.
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   out  P[8][4] in m/rad
- * Cost: 43 add, 54 mul, 4 div, 1 neg, 4 sqrt, 2 sincos.
+ * Cost: 44 add, 50 mul, 4 div, 4 sqrt, 2 sincos.
  */
 void awiwi_thumb_coupling(const double q[4], double P[32]);
 
@@ -196,7 +196,7 @@ void awiwi_thumb_coupling_derivative(const double q[4], double dP[128]);
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   in   f[8] in N, 0 to 100
  *   out  tau[4] in N m
- * Cost: 62 add, 57 mul, 4 div, 4 sqrt, 2 sincos.
+ * Cost: 60 add, 54 mul, 4 div, 1 neg, 4 sqrt, 2 sincos.
  */
 void awiwi_thumb_joint_torque(const double q[4], const double f[8], double tau[4]);
 
@@ -207,7 +207,7 @@ void awiwi_thumb_joint_torque(const double q[4], const double f[8], double tau[4
  *   in   f[8] in N, 0 to 100
  *   in   k[8] in N/m, 1000 to 50000
  *   out  K[4][4] in N m/rad
- * Cost: 125 add, 143 mul, 4 div, 4 sqrt, 2 sincos.
+ * Cost: 125 add, 135 mul, 4 div, 4 sqrt, 2 sincos.
  */
 void awiwi_thumb_joint_stiffness(const double q[4], const double f[8], const double k[8], double K[16]);
 
@@ -219,7 +219,7 @@ void awiwi_thumb_joint_stiffness(const double q[4], const double f[8], const dou
  *   in   k[8] in N/m, 1000 to 50000
  *   out  tau[4] in N m
  *   out  K[4][4] in N m/rad
- * Cost: 134 add, 157 mul, 4 div, 1 neg, 4 sqrt, 2 sincos.
+ * Cost: 134 add, 145 mul, 4 div, 1 neg, 4 sqrt, 2 sincos.
  */
 void awiwi_thumb_joint_torque_and_stiffness(const double q[4], const double f[8], const double k[8], double tau[4], double K[16]);
 
@@ -242,7 +242,7 @@ int awiwi_thumb_joint_estimate(const double h[8], const double start[4], double 
  *   in   noise[1] in m, 0 to 0.001
  *   out  covariance[4][4] in rad^2
  *   out  worst[4] in rad
- * Cost: 67 add, 109 mul, 6 div, 6 sqrt, 2 sincos, 8 calls.
+ * Cost: 68 add, 99 mul, 6 div, 2 neg, 6 sqrt, 2 sincos, 8 calls.
  */
 void awiwi_thumb_joint_estimate_error(const double q[4], const double noise[1], double covariance[16], double worst[4]);
 
@@ -284,7 +284,7 @@ int awiwi_thumb_base_estimate_by_gradient(const double h[4], const double start[
  *   out  curvature[8] in 1/(N m)
  * Returns 0 where every tension is on its spring's curve, give or take a hundredth; elsewhere 1, and
  * what is not defined is NaN.
- * Cost: 198 add, 230 mul, 7 calls.
+ * Cost: 198 add, 229 mul, 1 neg, 7 calls.
  */
 int awiwi_index_tendon_stiffness(const double tension[8], double k[8], double slope[8], double curvature[8]);
 
@@ -330,7 +330,7 @@ void awiwi_index_pose_and_jacobian(const double q[4], double T[16], double J[24]
  * Source: eq. 2.17, 5.4.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   out  M[4][4] in kg m^2
- * Cost: 33 add, 33 mul, 3 sincos.
+ * Cost: 33 add, 32 mul, 3 sincos.
  */
 void awiwi_index_mass_matrix(const double q[4], double M[16]);
 
@@ -340,7 +340,7 @@ void awiwi_index_mass_matrix(const double q[4], double M[16]);
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   qd[4] in rad/s, -20 to 20
  *   out  C[4][4] in N m s/rad
- * Cost: 46 add, 50 mul, 4 neg, 3 sincos.
+ * Cost: 46 add, 49 mul, 4 neg, 3 sincos.
  */
 void awiwi_index_coriolis_matrix(const double q[4], const double qd[4], double C[16]);
 
@@ -361,7 +361,7 @@ void awiwi_index_gravity(const double q[4], const double g[3], double gravity[4]
  *   in   qd[4] in rad/s, -20 to 20
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  bias[4] in N m
- * Cost: 55 add, 75 mul, 4 sincos.
+ * Cost: 55 add, 73 mul, 4 sincos.
  */
 void awiwi_index_bias(const double q[4], const double qd[4], const double g[3], double bias[4]);
 
@@ -386,7 +386,7 @@ void awiwi_index_inverse_dynamics(const double q[4], const double qd[4], const d
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  dtau_dq[4][4] in N m/rad
  *   out  dtau_dqd[4][4] in N m s/rad
- * Cost: 165 add, 197 mul, 4 neg, 4 sincos.
+ * Cost: 164 add, 198 mul, 4 neg, 4 sincos.
  */
 void awiwi_index_inverse_dynamics_derivatives(const double q[4], const double qd[4], const double qdd[4], const double g[3], double dtau_dq[16], double dtau_dqd[16]);
 
@@ -423,7 +423,7 @@ void awiwi_index_dynamics(const double q[4], const double qd[4], const double g[
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  kinetic[1] in J
  *   out  potential[1] in J
- * Cost: 50 add, 60 mul, 4 sincos.
+ * Cost: 43 add, 57 mul, 4 sincos.
  */
 void awiwi_index_energy(const double q[4], const double qd[4], const double g[3], double kinetic[1], double potential[1]);
 
@@ -536,7 +536,7 @@ int awiwi_index_tendon_distribution(const double q[4], const double tau[4], cons
  *   out  curvature[8] in 1/(N m)
  * Returns 0 where every tension is on its spring's curve, give or take a hundredth; elsewhere 1, and
  * what is not defined is NaN.
- * Cost: 198 add, 230 mul, 7 calls.
+ * Cost: 198 add, 229 mul, 1 neg, 7 calls.
  */
 int awiwi_middle_tendon_stiffness(const double tension[8], double k[8], double slope[8], double curvature[8]);
 
@@ -582,7 +582,7 @@ void awiwi_middle_pose_and_jacobian(const double q[4], double T[16], double J[24
  * Source: eq. 2.17, 5.4.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   out  M[4][4] in kg m^2
- * Cost: 33 add, 33 mul, 3 sincos.
+ * Cost: 33 add, 32 mul, 3 sincos.
  */
 void awiwi_middle_mass_matrix(const double q[4], double M[16]);
 
@@ -592,7 +592,7 @@ void awiwi_middle_mass_matrix(const double q[4], double M[16]);
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   qd[4] in rad/s, -20 to 20
  *   out  C[4][4] in N m s/rad
- * Cost: 46 add, 50 mul, 4 neg, 3 sincos.
+ * Cost: 46 add, 49 mul, 4 neg, 3 sincos.
  */
 void awiwi_middle_coriolis_matrix(const double q[4], const double qd[4], double C[16]);
 
@@ -613,7 +613,7 @@ void awiwi_middle_gravity(const double q[4], const double g[3], double gravity[4
  *   in   qd[4] in rad/s, -20 to 20
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  bias[4] in N m
- * Cost: 55 add, 75 mul, 4 sincos.
+ * Cost: 55 add, 73 mul, 4 sincos.
  */
 void awiwi_middle_bias(const double q[4], const double qd[4], const double g[3], double bias[4]);
 
@@ -638,7 +638,7 @@ void awiwi_middle_inverse_dynamics(const double q[4], const double qd[4], const 
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  dtau_dq[4][4] in N m/rad
  *   out  dtau_dqd[4][4] in N m s/rad
- * Cost: 165 add, 197 mul, 4 neg, 4 sincos.
+ * Cost: 164 add, 198 mul, 4 neg, 4 sincos.
  */
 void awiwi_middle_inverse_dynamics_derivatives(const double q[4], const double qd[4], const double qdd[4], const double g[3], double dtau_dq[16], double dtau_dqd[16]);
 
@@ -675,7 +675,7 @@ void awiwi_middle_dynamics(const double q[4], const double qd[4], const double g
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  kinetic[1] in J
  *   out  potential[1] in J
- * Cost: 50 add, 60 mul, 4 sincos.
+ * Cost: 43 add, 57 mul, 4 sincos.
  */
 void awiwi_middle_energy(const double q[4], const double qd[4], const double g[3], double kinetic[1], double potential[1]);
 
@@ -788,7 +788,7 @@ int awiwi_middle_tendon_distribution(const double q[4], const double tau[4], con
  *   out  curvature[6] in 1/(N m)
  * Returns 0 where every tension is on its spring's curve, give or take a hundredth; elsewhere 1, and
  * what is not defined is NaN.
- * Cost: 148 add, 172 mul, 5 calls.
+ * Cost: 148 add, 171 mul, 1 neg, 5 calls.
  */
 int awiwi_ring_tendon_stiffness(const double tension[6], double k[6], double slope[6], double curvature[6]);
 
@@ -834,7 +834,7 @@ void awiwi_ring_pose_and_jacobian(const double q[3], double T[16], double J[18])
  * Source: eq. 2.17, 5.4.
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   out  M[3][3] in kg m^2
- * Cost: 38 add, 37 mul, 3 sincos.
+ * Cost: 37 add, 36 mul, 3 sincos.
  */
 void awiwi_ring_mass_matrix(const double q[3], double M[9]);
 
@@ -844,7 +844,7 @@ void awiwi_ring_mass_matrix(const double q[3], double M[9]);
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   in   qd[3] in rad/s, -20 to 20
  *   out  C[3][3] in N m s/rad
- * Cost: 52 add, 58 mul, 1 neg, 3 sincos.
+ * Cost: 51 add, 58 mul, 1 neg, 3 sincos.
  */
 void awiwi_ring_coriolis_matrix(const double q[3], const double qd[3], double C[9]);
 
@@ -865,7 +865,7 @@ void awiwi_ring_gravity(const double q[3], const double g[3], double gravity[3])
  *   in   qd[3] in rad/s, -20 to 20
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  bias[3] in N m
- * Cost: 56 add, 78 mul, 4 sincos.
+ * Cost: 56 add, 76 mul, 4 sincos.
  */
 void awiwi_ring_bias(const double q[3], const double qd[3], const double g[3], double bias[3]);
 
@@ -890,7 +890,7 @@ void awiwi_ring_inverse_dynamics(const double q[3], const double qd[3], const do
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  dtau_dq[3][3] in N m/rad
  *   out  dtau_dqd[3][3] in N m s/rad
- * Cost: 180 add, 219 mul, 2 neg, 4 sincos.
+ * Cost: 179 add, 218 mul, 2 neg, 4 sincos.
  */
 void awiwi_ring_inverse_dynamics_derivatives(const double q[3], const double qd[3], const double qdd[3], const double g[3], double dtau_dq[9], double dtau_dqd[9]);
 
@@ -902,7 +902,7 @@ void awiwi_ring_inverse_dynamics_derivatives(const double q[3], const double qd[
  *   in   tau[3] in N m, -1 to 1
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  qdd[3] in rad/s^2
- * Cost: 96 add, 110 mul, 3 div, 1 neg, 4 sincos.
+ * Cost: 95 add, 111 mul, 3 div, 1 neg, 4 sincos.
  */
 void awiwi_ring_forward_dynamics(const double q[3], const double qd[3], const double tau[3], const double g[3], double qdd[3]);
 
@@ -915,7 +915,7 @@ void awiwi_ring_forward_dynamics(const double q[3], const double qd[3], const do
  *   out  M[3][3] in kg m^2
  *   out  C[3][3] in N m s/rad
  *   out  gravity[3] in N m
- * Cost: 89 add, 95 mul, 1 neg, 4 sincos.
+ * Cost: 87 add, 97 mul, 1 neg, 4 sincos.
  */
 void awiwi_ring_dynamics(const double q[3], const double qd[3], const double g[3], double M[9], double C[9], double gravity[3]);
 
@@ -927,7 +927,7 @@ void awiwi_ring_dynamics(const double q[3], const double qd[3], const double g[3
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  kinetic[1] in J
  *   out  potential[1] in J
- * Cost: 51 add, 59 mul, 4 sincos.
+ * Cost: 43 add, 59 mul, 4 sincos.
  */
 void awiwi_ring_energy(const double q[3], const double qd[3], const double g[3], double kinetic[1], double potential[1]);
 
@@ -1040,7 +1040,7 @@ int awiwi_ring_tendon_distribution(const double q[3], const double tau[3], const
  *   out  curvature[8] in 1/(N m)
  * Returns 0 where every tension is on its spring's curve, give or take a hundredth; elsewhere 1, and
  * what is not defined is NaN.
- * Cost: 198 add, 230 mul, 7 calls.
+ * Cost: 198 add, 229 mul, 1 neg, 7 calls.
  */
 int awiwi_fifth_tendon_stiffness(const double tension[8], double k[8], double slope[8], double curvature[8]);
 
@@ -1067,7 +1067,7 @@ void awiwi_fifth_link_poses(const double q[4], double T[80]);
  * Source: eq. 5.3, differentiated.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   out  J[6][4] in m/rad, 1
- * Cost: 37 add, 64 mul, 2 div, 12 neg, 1 sqrt, 5 sincos.
+ * Cost: 33 add, 59 mul, 2 div, 12 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_jacobian(const double q[4], double J[24]);
 
@@ -1086,7 +1086,7 @@ void awiwi_fifth_pose_and_jacobian(const double q[4], double T[16], double J[24]
  * Source: eq. 2.17, 5.4.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   out  M[4][4] in kg m^2
- * Cost: 114 add, 134 mul, 2 div, 2 neg, 1 sqrt, 5 sincos.
+ * Cost: 113 add, 128 mul, 2 div, 1 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_mass_matrix(const double q[4], double M[16]);
 
@@ -1096,7 +1096,7 @@ void awiwi_fifth_mass_matrix(const double q[4], double M[16]);
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   in   qd[4] in rad/s, -20 to 20
  *   out  C[4][4] in N m s/rad
- * Cost: 324 add, 379 mul, 2 div, 8 neg, 1 sqrt, 5 sincos.
+ * Cost: 309 add, 359 mul, 2 div, 6 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_coriolis_matrix(const double q[4], const double qd[4], double C[16]);
 
@@ -1117,7 +1117,7 @@ void awiwi_fifth_gravity(const double q[4], const double g[3], double gravity[4]
  *   in   qd[4] in rad/s, -20 to 20
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  bias[4] in N m
- * Cost: 223 add, 249 mul, 2 div, 3 neg, 1 sqrt, 5 sincos.
+ * Cost: 223 add, 250 mul, 2 div, 3 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_bias(const double q[4], const double qd[4], const double g[3], double bias[4]);
 
@@ -1129,7 +1129,7 @@ void awiwi_fifth_bias(const double q[4], const double qd[4], const double g[3], 
  *   in   qdd[4] in rad/s^2, -2000 to 2000
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  tau[4] in N m
- * Cost: 238 add, 261 mul, 2 div, 2 neg, 1 sqrt, 5 sincos.
+ * Cost: 238 add, 262 mul, 2 div, 2 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_inverse_dynamics(const double q[4], const double qd[4], const double qdd[4], const double g[3], double tau[4]);
 
@@ -1142,7 +1142,7 @@ void awiwi_fifth_inverse_dynamics(const double q[4], const double qd[4], const d
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  dtau_dq[4][4] in N m/rad
  *   out  dtau_dqd[4][4] in N m s/rad
- * Cost: 968 add, 1075 mul, 2 div, 13 neg, 1 sqrt, 5 sincos.
+ * Cost: 957 add, 1075 mul, 2 div, 10 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_inverse_dynamics_derivatives(const double q[4], const double qd[4], const double qdd[4], const double g[3], double dtau_dq[16], double dtau_dqd[16]);
 
@@ -1154,7 +1154,7 @@ void awiwi_fifth_inverse_dynamics_derivatives(const double q[4], const double qd
  *   in   tau[4] in N m, -1 to 1
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  qdd[4] in rad/s^2
- * Cost: 336 add, 362 mul, 6 div, 2 neg, 1 sqrt, 5 sincos.
+ * Cost: 329 add, 355 mul, 6 div, 2 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_forward_dynamics(const double q[4], const double qd[4], const double tau[4], const double g[3], double qdd[4]);
 
@@ -1167,7 +1167,7 @@ void awiwi_fifth_forward_dynamics(const double q[4], const double qd[4], const d
  *   out  M[4][4] in kg m^2
  *   out  C[4][4] in N m s/rad
  *   out  gravity[4] in N m
- * Cost: 357 add, 423 mul, 2 div, 7 neg, 1 sqrt, 5 sincos.
+ * Cost: 339 add, 401 mul, 2 div, 6 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_dynamics(const double q[4], const double qd[4], const double g[3], double M[16], double C[16], double gravity[4]);
 
@@ -1179,7 +1179,7 @@ void awiwi_fifth_dynamics(const double q[4], const double qd[4], const double g[
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  kinetic[1] in J
  *   out  potential[1] in J
- * Cost: 139 add, 174 mul, 2 div, 1 neg, 1 sqrt, 5 sincos.
+ * Cost: 133 add, 166 mul, 2 div, 1 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_energy(const double q[4], const double qd[4], const double g[3], double kinetic[1], double potential[1]);
 
@@ -1294,7 +1294,7 @@ int awiwi_fifth_tendon_distribution(const double q[4], const double tau[4], cons
  *   out  rocker_ratio[1] in 1
  *   out  transmission[1] in 1
  * Returns 0 where the loop closes; elsewhere 1, and what is not defined is NaN.
- * Cost: 14 add, 28 mul, 2 div, 2 neg, 1 sqrt, 1 sincos, 2 calls.
+ * Cost: 15 add, 25 mul, 2 div, 4 neg, 1 sqrt, 1 sincos, 2 calls.
  */
 int awiwi_fifth_hmc_four_bar(const double q[1], double coupler[1], double rocker[1], double coupler_ratio[1], double rocker_ratio[1], double transmission[1]);
 
@@ -1357,7 +1357,7 @@ int awiwi_wrist_coupling(const double q71[1], const double q73[1], double dh[76]
  *   out  h[38] in m
  * Returns 0 where the side bars are short of the line B0C0 (q73 between 0 and pi) and their plane is
  * short of A0 and bar AA0 reaches; elsewhere 1, and what is not defined is NaN.
- * Cost: 255 add, 184 mul, 2 div, 2 neg, 43 sqrt, 4 sincos.
+ * Cost: 254 add, 182 mul, 2 div, 2 neg, 43 sqrt, 4 sincos.
  */
 int awiwi_hand_tendon_lengths(const double q[19], const double wrist[2], double h[38]);
 
@@ -1366,7 +1366,7 @@ int awiwi_hand_tendon_lengths(const double q[19], const double wrist[2], double 
  * Source: eq. 5.6, 5.9, 5.21.
  *   in   q[19] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727, -0.3491, -0.1745, -0.08727, -0.08727, -0.3491, -0.1745, -0.08727, -0.08727, -0.3491, -0.1745, -0.08727, -0.5236, -0.3491, -0.1745, -0.08727] to [0.6109, 0.6109, 1.396, 1.396, 0.3491, 1.484, 1.571, 1.396, 0.3491, 1.484, 1.571, 1.396, 0.3491, 1.484, 1.571, 0.6981, 0.3491, 1.484, 1.571]
  *   out  P[38][19] in m/rad
- * Cost: 43 add, 54 mul, 4 div, 1 neg, 4 sqrt, 2 sincos.
+ * Cost: 44 add, 50 mul, 4 div, 4 sqrt, 2 sincos.
  */
 void awiwi_hand_coupling(const double q[19], double P[722]);
 
@@ -1376,7 +1376,7 @@ void awiwi_hand_coupling(const double q[19], double P[722]);
  *   in   q[19] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727, -0.3491, -0.1745, -0.08727, -0.08727, -0.3491, -0.1745, -0.08727, -0.08727, -0.3491, -0.1745, -0.08727, -0.5236, -0.3491, -0.1745, -0.08727] to [0.6109, 0.6109, 1.396, 1.396, 0.3491, 1.484, 1.571, 1.396, 0.3491, 1.484, 1.571, 1.396, 0.3491, 1.484, 1.571, 0.6981, 0.3491, 1.484, 1.571]
  *   in   f[38] in N, 0 to 100
  *   out  tau[19] in N m
- * Cost: 87 add, 72 mul, 4 div, 4 sqrt, 2 sincos.
+ * Cost: 85 add, 69 mul, 4 div, 1 neg, 4 sqrt, 2 sincos.
  */
 void awiwi_hand_joint_torque(const double q[19], const double f[38], double tau[19]);
 
@@ -1388,7 +1388,7 @@ void awiwi_hand_joint_torque(const double q[19], const double f[38], double tau[
  *   in   f[38] in N, 0 to 100
  *   in   k[38] in N/m, 1000 to 50000
  *   out  K[19][19] in N m/rad
- * Cost: 150 add, 164 mul, 4 div, 4 sqrt, 2 sincos.
+ * Cost: 150 add, 156 mul, 4 div, 4 sqrt, 2 sincos.
  */
 void awiwi_hand_joint_stiffness(const double q[19], const double f[38], const double k[38], double K[361]);
 
@@ -1490,7 +1490,7 @@ void awiwi_motor_damping(const double thd[1], double damping[1]);
  * Source: eq. 3.4, 3.5.
  *   in   theta[1] in rad, -5 to 5
  *   out  tau[1] in N m
- * Cost: 11 add, 14 mul, 2 sincos.
+ * Cost: 11 add, 12 mul, 2 sincos.
  */
 void awiwi_motor_ripple(const double theta[1], double tau[1]);
 
@@ -1501,7 +1501,7 @@ void awiwi_motor_ripple(const double theta[1], double tau[1]);
  *   in   theta[1] in rad, -5 to 5
  *   in   thd[1] in rad/s, -20 to 20
  *   out  tau[1] in N m
- * Cost: 13 add, 17 mul, 2 sincos, 1 calls.
+ * Cost: 13 add, 15 mul, 2 sincos, 1 calls.
  */
 void awiwi_motor_compensation(const double theta[1], const double thd[1], double tau[1]);
 
@@ -1513,7 +1513,7 @@ void awiwi_motor_compensation(const double theta[1], const double thd[1], double
  *   in   tau[1] in N m, -3 to 3
  *   in   f[1] in N, 0 to 100
  *   out  thdd[1] in rad/s^2
- * Cost: 15 add, 19 mul, 2 sincos, 1 calls.
+ * Cost: 15 add, 17 mul, 2 sincos, 1 calls.
  */
 void awiwi_motor_acceleration(const double theta[1], const double thd[1], const double tau[1], const double f[1], double thdd[1]);
 
@@ -1525,7 +1525,7 @@ void awiwi_motor_acceleration(const double theta[1], const double thd[1], const 
  *   in   thdd[1] in rad/s^2, -1000 to 1000
  *   in   f[1] in N, 0 to 100
  *   out  tau[1] in N m
- * Cost: 15 add, 19 mul, 2 sincos, 1 calls.
+ * Cost: 15 add, 17 mul, 2 sincos, 1 calls.
  */
 void awiwi_motor_torque(const double theta[1], const double thd[1], const double thdd[1], const double f[1], double tau[1]);
 
@@ -1539,7 +1539,7 @@ void awiwi_motor_torque(const double theta[1], const double thd[1], const double
  * Returns 0 where the roller is clear of the motor's pulley and the roller is clear of the fixed
  * pulley and the tendon turns the lever towards its taut end and the spring is stretched; elsewhere 1,
  * and what is not defined is NaN.
- * Cost: 40 add, 54 mul, 7 div, 1 neg, 3 sqrt, 1 sincos, 2 calls.
+ * Cost: 38 add, 54 mul, 7 div, 1 neg, 3 sqrt, 1 sincos, 2 calls.
  */
 int awiwi_spring_lever(const double theta[1], double dL[1], double force[1], double stiffness[1]);
 
@@ -1587,7 +1587,7 @@ int awiwi_spring_elongation(const double f[1], double x[1]);
  *   out  stiffness[38] in N/m
  * Returns 0 where the argument is within the lever's travel, give or take a hundredth; elsewhere 1,
  * and what is not defined is NaN.
- * Cost: 1062 add, 1138 mul, 37 calls.
+ * Cost: 1062 add, 1137 mul, 1 neg, 37 calls.
  */
 int awiwi_calibration_readings(const double readings[38], double dL[38], double force[38], double stiffness[38]);
 
@@ -1606,7 +1606,7 @@ int awiwi_calibration_readings(const double readings[38], double dL[38], double 
  *   out  stiffness[1] in N/m
  * Returns 0 where the argument is within the lever's travel, give or take a hundredth; elsewhere 1,
  * and what is not defined is NaN.
- * Cost: 23 add, 19 mul, 1 div.
+ * Cost: 22 add, 20 mul, 1 div.
  */
 int awiwi_calibration_polynomials(const double counts[1], const double ends[2], const double length_powers[7], const double force_powers[7], const double stiffness_powers[7], double dL[1], double force[1], double stiffness[1]);
 
@@ -1666,7 +1666,7 @@ int awiwi_stiffness_correction(const double K_eff[16], const double K_mech[16], 
  *   out  sensitivity[1] in 1
  * Returns 0 where k_eff is positive and k_mech - k_eff is positive; elsewhere 1, and what is not
  * defined is NaN.
- * Cost: 1 add, 4 mul, 2 div, 3 neg.
+ * Cost: 1 add, 5 mul, 2 div, 3 neg.
  */
 int awiwi_stiffness_correction_scalar(const double k_eff[1], const double k_mech[1], double k_imp[1], double sensitivity[1]);
 
@@ -1820,7 +1820,7 @@ int awiwi_tendon_force_pd(const double f[1], const double fd[1], const double f_
  * Returns 0 where the pulley's radius is positive and the motor's inertia is positive and the tendon's
  * stiffness is positive and the target's frequency is positive and the target's damping ratio is
  * positive and the proportional gain is positive; elsewhere 1, and what is not defined is NaN.
- * Cost: 6 add, 17 mul, 1 div.
+ * Cost: 6 add, 15 mul, 1 div.
  */
 int awiwi_tendon_force_scheduled(const double f[1], const double fd[1], const double f_des[1], const double fd_des[1], const double f_hat[1], const double friction[1], const double r[1], const double b[1], const double stiffness[1], const double stiffness_rate[1], const double omega0[1], const double xi0[1], double tau[1], double gains[2]);
 
@@ -1980,7 +1980,7 @@ void awiwi_backstepping_academic_lyapunov(const double x[2], const double k[2], 
  * Returns 0 where the link's inertia is positive and the motor's inertia is positive and the stiffness
  * is positive and k1 is positive and k2 is positive and k3 is positive and k4 is positive and c2 is
  * positive and c3 is positive and c4 is positive; elsewhere 1, and what is not defined is NaN.
- * Cost: 22 add, 16 mul, 4 div.
+ * Cost: 22 add, 17 mul, 4 div.
  */
 int awiwi_backstepping_position(const double motion[4], const double desired[5], const double plant[3], const double rates[4], const double scales[3], double tau_m[1]);
 
@@ -2052,7 +2052,7 @@ void awiwi_backstepping_impedance_lyapunov(const double state[4], const double d
  * Returns 0 where the link's inertia is positive and the motor's inertia is positive and the spring's
  * slope is positive and K_p is positive and K_d is positive and K_3 is positive and K_4 is positive
  * and C_t is positive and C_s is positive; elsewhere 1, and what is not defined is NaN.
- * Cost: 23 add, 21 mul, 4 div.
+ * Cost: 23 add, 20 mul, 4 div, 3 neg.
  */
 int awiwi_backstepping_nonlinear(const double state[4], const double desired[5], const double external[2], const double bodies[2], const double spring[2], const double gains[4], const double weights[2], double tau_m[1]);
 
@@ -2078,7 +2078,7 @@ int awiwi_backstepping_nonlinear(const double state[4], const double desired[5],
  * positive and C_s of motor 1 is positive and K_3 of motor 2 is positive and K_4 of motor 2 is
  * positive and C_t of motor 2 is positive and C_s of motor 2 is positive; elsewhere 1, and what is not
  * defined is NaN.
- * Cost: 42 add, 34 mul, 7 div.
+ * Cost: 42 add, 32 mul, 7 div, 5 neg.
  */
 int awiwi_backstepping_antagonistic(const double joint[2], const double torques[4], const double desired[5], const double pretension[3], const double external[2], const double inertias[3], const double springs[4], const double impedance[2], const double tunings[8], double tau_m[2]);
 
@@ -2122,7 +2122,7 @@ void awiwi_backstepping_antagonistic_lyapunov(const double joint[2], const doubl
  * positive and C_s of motor 1 is positive and K_3 of motor 2 is positive and K_4 of motor 2 is
  * positive and C_t of motor 2 is positive and C_s of motor 2 is positive; elsewhere 1, and what is not
  * defined is NaN.
- * Cost: 48 add, 42 mul, 7 div.
+ * Cost: 48 add, 40 mul, 7 div, 3 neg.
  */
 int awiwi_backstepping_antagonistic_decoupled(const double joint[2], const double torques[4], const double desired[5], const double pretension[3], const double external[2], const double inertias[3], const double springs[4], const double impedance[2], const double tunings[8], double tau_m[2]);
 
@@ -2160,8 +2160,10 @@ void awiwi_backstepping_state_gains_derivatives(const double plant[3], const dou
  *   in   impedance[2] in N m/rad, N m s/rad, from [0.07, 0.0007] to [0.13, 0.0013]
  *   in   weights[2] in rad/(N m), rad s^2/(N m), from [7, 0.007] to [13, 0.013]
  *   out  rates[2] in 1/s
- * Returns 0 where K_3 and K_4 are real and differ and their sum is positive and their product is
- * positive; elsewhere 1, and what is not defined is NaN.
+ * Returns 0 where the link's inertia is positive and the motor's inertia is positive and the stiffness
+ * is positive and K_p is positive and K_d is positive and C_t is positive and C_s is positive and K_3
+ * and K_4 are real and differ and their sum is positive and their product is positive; elsewhere 1,
+ * and what is not defined is NaN.
  * Cost: 7 add, 8 mul, 5 div, 3 neg, 1 sqrt.
  */
 int awiwi_optimal_backstepping_rates(const double K_opt[4], const double plant[3], const double impedance[2], const double weights[2], double rates[2]);
@@ -2176,16 +2178,18 @@ int awiwi_optimal_backstepping_rates(const double K_opt[4], const double plant[3
  *   in   impedance[2] in N m/rad, N m s/rad, from [0.9, 0.000828] to [1.1, 0.001012]
  *   out  rates[2] in 1/s
  *   out  weights[2] in rad/(N m), rad s^2/(N m)
- * Returns 0 where C_t is positive and K_3 is positive and K_4 is positive and C_s is positive;
- * elsewhere 1, and what is not defined is NaN.
+ * Returns 0 where the link's inertia is positive and the motor's inertia is positive and the stiffness
+ * is positive and K_p is positive and K_d is positive and C_t is positive and K_3 is positive and K_4
+ * is positive and C_s is positive; elsewhere 1, and what is not defined is NaN.
  * Cost: 8 add, 10 mul, 5 div, 7 neg.
  */
 int awiwi_optimal_backstepping_weights(const double K_opt[4], const double plant[3], const double impedance[2], double rates[2], double weights[2]);
 
 /*
  * (K_p, K_d) and (K_3, K_4) whose feedback gains are nearest to K_opt, by relative errors; start is a
- * guess. Status 0: they are equal. 1: no positive gains have them, these come nearest. 2: these are
- * the nearest found.
+ * guess. Status 0: they are equal. 1: no positive gains have them, these come nearest; or something
+ * given is not positive, and start is returned. 2: these are the nearest found. 3: something given is
+ * not a number; the result is zero.
  * Source: eq. 16.4.
  *   in   K_opt[4] in N m/rad, N m s/rad, 1, s, 1e-09 to 1e+09
  *   in   plant[3] in kg m^2, N m/rad, from [5e-07, 0.0001, 0.05] to [0.001, 0.01, 50]
@@ -2211,7 +2215,7 @@ int awiwi_optimal_backstepping(const double K_opt[4], const double plant[3], con
  *   out  motion_next[5] in rad, rad/s, rad/s^2, rad/s^3, rad/s^4
  * Returns 0 where the delay is positive and the period is positive; elsewhere 1, and what is not
  * defined is NaN.
- * Cost: 45 add, 64 mul, 5 div.
+ * Cost: 45 add, 50 mul, 5 div.
  */
 int awiwi_reference_filter(const double motion[5], const double desired[5], const double delay[1], const double period[1], double motion_next[5]);
 
@@ -2242,7 +2246,7 @@ int awiwi_reference_filter(const double motion[5], const double desired[5], cons
  *   out  load[1] in N m
  *   out  modelled[2] in N m
  *   out  resistance[2] in N m
- * Cost: 119 add, 134 mul, 13 div, 4 neg, 12 calls.
+ * Cost: 119 add, 132 mul, 13 div, 4 neg, 12 calls.
  */
 void awiwi_antagonistic_observer(const double memory[13], const double thetas[2], const double stretches[2], const double measured[2], const double acted[2], const double acting[2], const double inertias[3], const double tendons[6], const double damping[1], const double friction[3], const double bandwidths[4], const double period[1], double memory_next[13], double joint[2], double motors[4], double torques[4], double springs[4], double load[1], double modelled[2], double resistance[2]);
 
@@ -2320,7 +2324,7 @@ void awiwi_antagonistic_sharing(const double torque[1], const double pretension[
  * positive and C_s of motor 1 is positive and K_3 of motor 2 is positive and K_4 of motor 2 is
  * positive and C_t of motor 2 is positive and C_s of motor 2 is positive; elsewhere 1, and what is not
  * defined is NaN.
- * Cost: 49 add, 39 mul, 7 div.
+ * Cost: 49 add, 37 mul, 7 div, 3 neg.
  */
 int awiwi_backstepping_adaptive(const double joint[2], const double torques[4], const double desired[5], const double pretension[3], const double external[2], const double inertias[3], const double springs[4], const double damping[1], const double impedance[2], const double tunings[8], const double resistance[2], double tau_m[2]);
 

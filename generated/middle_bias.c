@@ -6,7 +6,7 @@
  *   in   qd[4] in rad/s, -20 to 20
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  bias[4] in N m
- * Cost: 55 add, 75 mul, 4 sincos.
+ * Cost: 55 add, 73 mul, 4 sincos.
  * Inputs: sha256 1d14df31080c22a6b2a63985ab825994c4f9fca5775b0188bae4408ea91fd96e.
  */
 #include "trig.h"
@@ -30,22 +30,24 @@ void awiwi_middle_bias(const double q[restrict 4], const double qd[restrict 4], 
     const double t12 = 0.044*a0.cos[1];
     const double t13 = t12 + 0.006;
     const double t14 = 1.3e-06*a0.cos[2] + 0.0002426*a0.sin[2];
-    const double t15 = 1.2477079619846946e-06*a0.sin[3];
-    const double t16 = t13*t14 + a0.sin[2]*(6.78634e-06*a0.cos[2] - 2.56e-08*a0.sin[2] - t15) + 1.28e-08;
-    const double t17 = 0.033*a0.cos[2];
-    const double t18 = 3.780933218135438e-05*a0.cos[3];
-    const double t19 = (t13 + t17)*t18 + a0.cos[3]*(1.0925468904244817e-08*a0.cos[3] - 4.735141006910168e-07*a0.sin[3]) - 5.4627344521224085e-09;
-    const double t20 = 3.3e-06*a0.cos[1] + 0.0007128*a0.sin[1];
-    const double t21 = 0.006*t20 + a0.sin[1]*(2.771021e-05*a0.cos[1] + 0.044*t9 - 8.92e-08*a0.sin[1]) + 4.46e-08;
-    const double t22 = 2.806e-05*t2 + t3*(1.16724e-06*a0.cos[1] - 1.166e-08*a0.sin[1]) + t5*(7.1078e-07*a0.cos[2] - 6.56e-09*a0.sin[2]) + (g[0]*a0.sin[0] - g[1]*a0.cos[0])*(t6 + t9 + 0.0001347) - t11*(1.0664033896870507e-09*a0.cos[3] + 1.5960308558361416e-07*a0.sin[3]) - 2.0*qd[0]*(t4*t16 + t10*t19 + qd[1]*t21);
-    const double t23 = 0.044*a0.sin[1];
+    const double t15 = t13*t14 + a0.sin[2]*(6.78634e-06*a0.cos[2] - 2.56e-08*a0.sin[2] - 1.2477079619846946e-06*a0.sin[3]) + 1.28e-08;
+    const double t16 = 0.033*a0.cos[2];
+    const double t17 = 3.780933218135438e-05*a0.cos[3];
+    const double t18 = (t13 + t16)*t17 + a0.cos[3]*(1.0925468904244817e-08*a0.cos[3] - 4.735141006910168e-07*a0.sin[3]) - 5.4627344521224085e-09;
+    const double t19 = 3.3e-06*a0.cos[1] + 0.0007128*a0.sin[1];
+    const double t20 = 0.006*t19 + a0.sin[1]*(2.771021e-05*a0.cos[1] + 0.044*t9 - 8.92e-08*a0.sin[1]) + 4.46e-08;
+    const double t21 = 2.806e-05*t2 + t3*(1.16724e-06*a0.cos[1] - 1.166e-08*a0.sin[1]) + t5*(7.1078e-07*a0.cos[2] - 6.56e-09*a0.sin[2]) + (g[0]*a0.sin[0] - g[1]*a0.cos[0])*(t6 + t9 + 0.0001347) - t11*(1.0664033896870507e-09*a0.cos[3] + 1.5960308558361416e-07*a0.sin[3]) - 2.0*qd[0]*(t4*t15 + t10*t18 + qd[1]*t20);
+    const double t22 = 0.044*a0.sin[1];
+    const double t23 = t11*t8;
     const double t24 = t2 + t3*t12;
     const double t25 = qd[0]*qd[0];
-    const double t26 = g[2] + t3*t23;
-    const double t27 = (0.033*t5*a0.sin[2] + t26)*t8 + (t24 + t5*t17)*t18 + t25*t19;
-    const double t28 = t24*t14 + t25*t16 + t27 - t26*t7 - t11*(1.2477079619846946e-06*a0.cos[2]*a0.cos[3] + a0.sin[2]*t15);
-    bias[0] = t22;
-    bias[1] = t20*t2 + t23*(t5*t7 - t11*t8) + t28 + t25*t21 - g[2]*t6 - t12*(t5*t14 + t11*t18);
-    bias[2] = t28;
-    bias[3] = t27;
+    const double t26 = g[2] + t3*t22;
+    const double t27 = 0.033*a0.sin[2];
+    const double t28 = (t26 + t5*t27)*t8 + (t24 + t5*t16)*t17 + t25*t18;
+    const double t29 = t11*t17;
+    const double t30 = t24*t14 + t25*t15 + t28 - t26*t7 - t16*t29 - t27*t23;
+    bias[0] = t21;
+    bias[1] = t19*t2 + t22*(t5*t7 - t23) + t30 + t25*t20 - g[2]*t6 - t12*(t5*t14 + t29);
+    bias[2] = t30;
+    bias[3] = t28;
 }

@@ -5,7 +5,7 @@
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   qd[4] in rad/s, -20 to 20
  *   out  C[4][4] in N m s/rad
- * Cost: 46 add, 50 mul, 4 neg, 3 sincos.
+ * Cost: 46 add, 49 mul, 4 neg, 3 sincos.
  * Inputs: sha256 27e22bc7c4ee6e86004522d8f50690fdd8de460926c911ade00c68bec4af2ee2.
  */
 #include "trig.h"
@@ -22,7 +22,7 @@ void awiwi_middle_coriolis_matrix(const double q[restrict 4], const double qd[re
     const double t5 = 5.72e-08*a0.cos[1] + 1.06744e-05*a0.sin[1];
     const double t6 = t2*t5 + a0.sin[1]*(6.78634e-06*a0.cos[1] - 2.56e-08*a0.sin[1] - 1.2477079619846946e-06*a0.sin[2]) + t4 + 1.28e-08;
     const double t7 = 1.06744e-05*a0.cos[1] - 5.72e-08*a0.sin[1] - 1.6636106159795927e-06*a0.sin[2];
-    const double t8 = 1.98e-08*(a0.cos[0] + 216.0*a0.sin[0]) + a0.sin[0]*(2.771021e-05*a0.cos[0] + t7 - 8.92e-08*a0.sin[0]) + t6 + 4.46e-08;
+    const double t8 = 1.98e-08*a0.cos[0] + t6 + a0.sin[0]*(2.771021e-05*a0.cos[0] + t7 - 8.92e-08*a0.sin[0] + 4.2768e-06) + 4.46e-08;
     const double t9 = qd[1] + qd[2];
     const double t10 = qd[3] + t9;
     const double t11 = t10*(1.0664033896870507e-09*a0.cos[2] + 1.5960308558361416e-07*a0.sin[2]);

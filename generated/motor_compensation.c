@@ -6,19 +6,19 @@
  *   in   theta[1] in rad, -5 to 5
  *   in   thd[1] in rad/s, -20 to 20
  *   out  tau[1] in N m
- * Cost: 13 add, 17 mul, 2 sincos, 1 calls.
+ * Cost: 13 add, 15 mul, 2 sincos, 1 calls.
  * Inputs: sha256 4ac7c242f09df3b78e0f5c0776a7286d65f6e0b1d3d9afc8e4e505e87a15808c.
  */
-#include <math.h>
+#include "elementary.h"
 #include "trig.h"
 #include "kernels.h"
 
 void awiwi_motor_compensation(const double theta[restrict 1], const double thd[restrict 1], double tau[restrict 1])
 {
-    const double t0 = 100.0*theta[0];
+    const double t0 = 100.0*theta[0] - 0.8726646259971648;
     const awiwi_turn2 a0 = awiwi_sincos2(theta[0], t0);
-    const double t1 = a0.sin[0]*a0.sin[0];
-    const double t2 = t1 - 0.5;
-    const double t3 = 0.14633273398898625*a0.cos[0] + 0.8298941738866922*a0.sin[0] + 1.2910861400881652*a0.sin[1] + 1.3566373964734104*(a0.sin[1]*a0.sin[1] - 0.5) + a0.cos[1]*(0.3635098948069112*a0.sin[1] + 1.0833499039660774) - 0.5838373508659137*(a0.cos[0]*(t1 + t2)) - 0.33707865168539325*(a0.sin[0]*(a0.cos[0]*a0.cos[0] - t2));
-    tau[0] = 0.03204*(thd[0] + 15.691011235955056*atan(10.0*thd[0]) + t3);
+    const double t1 = a0.sin[0]*a0.sin[0] - 0.5;
+    const double t2 = 0.018706148721743875*t1 + a0.sin[0]*(0.0108*a0.cos[0] + 0.018706148721743875*a0.sin[0]) - 0.004688500797007119;
+    const double t3 = 0.03204*thd[0] + 0.50274*awiwi_atan(10.0*thd[0]) + a0.sin[0]*(0.0108*t1 + 0.02658980933132962) + a0.cos[1]*(0.019017821778331473*a0.cos[1] + 0.040783850416649246*a0.sin[1] + 0.054) - a0.cos[0]*t2 - 0.009508910889165736;
+    tau[0] = t3;
 }

@@ -4,7 +4,7 @@
  * Source: eq. 3.4, 3.5.
  *   in   theta[1] in rad, -5 to 5
  *   out  tau[1] in N m
- * Cost: 11 add, 14 mul, 2 sincos.
+ * Cost: 11 add, 12 mul, 2 sincos.
  * Inputs: sha256 ea0ff5458d9ba8020bdc719c73a89bcf85a500a02d7d6ad99a02f15127a4839a.
  */
 #include "trig.h"
@@ -12,10 +12,10 @@
 
 void awiwi_motor_ripple(const double theta[restrict 1], double tau[restrict 1])
 {
-    const double t0 = 100.0*theta[0];
+    const double t0 = 100.0*theta[0] - 0.8726646259971648;
     const awiwi_turn2 a0 = awiwi_sincos2(theta[0], t0);
-    const double t1 = a0.sin[0]*a0.sin[0];
-    const double t2 = t1 - 0.5;
-    const double t3 = 0.005209445330007911*a0.cos[0] + 0.029544232590366242*a0.sin[0] + 0.045962666587138684*a0.sin[1] + 0.04829629131445341*(a0.sin[1]*a0.sin[1] - 0.5) + a0.cos[1]*(0.012940952255126039*a0.sin[1] + 0.03856725658119236) - 0.020784609690826527*(a0.cos[0]*(t1 + t2)) - 0.012*(a0.sin[0]*(a0.cos[0]*a0.cos[0] - t2));
+    const double t1 = a0.sin[0]*a0.sin[0] - 0.5;
+    const double t2 = 0.020784609690826527*t1 + a0.sin[0]*(0.012*a0.cos[0] + 0.020784609690826527*a0.sin[0]) - 0.005209445330007911;
+    const double t3 = a0.sin[0]*(0.012*t1 + 0.029544232590366242) + a0.cos[1]*(0.02113091308703497*a0.cos[1] + 0.0453153893518325*a0.sin[1] + 0.06) - a0.cos[0]*t2 - 0.010565456543517485;
     tau[0] = t3;
 }

@@ -7,19 +7,19 @@
  *   in   thdd[1] in rad/s^2, -1000 to 1000
  *   in   f[1] in N, 0 to 100
  *   out  tau[1] in N m
- * Cost: 15 add, 19 mul, 2 sincos, 1 calls.
+ * Cost: 15 add, 17 mul, 2 sincos, 1 calls.
  * Inputs: sha256 7084e234668ca468d45c39abb733d38309f0ac7101d19ea59d2d77b39478c1d3.
  */
-#include <math.h>
+#include "elementary.h"
 #include "trig.h"
 #include "kernels.h"
 
 void awiwi_motor_torque(const double theta[restrict 1], const double thd[restrict 1], const double thdd[restrict 1], const double f[restrict 1], double tau[restrict 1])
 {
-    const double t0 = 100.0*theta[0];
+    const double t0 = 100.0*theta[0] - 0.8726646259971648;
     const awiwi_turn2 a0 = awiwi_sincos2(theta[0], t0);
-    const double t1 = a0.sin[0]*a0.sin[0];
-    const double t2 = t1 - 0.5;
-    const double t3 = 0.004*f[0] + 0.0356*thd[0] + 0.002001*thdd[0] + 0.005209445330007911*a0.cos[0] + 0.029544232590366242*a0.sin[0] + 0.5586*atan(10.0*thd[0]) + 0.045962666587138684*a0.sin[1] + 0.04829629131445341*(a0.sin[1]*a0.sin[1] - 0.5) + a0.cos[1]*(0.012940952255126039*a0.sin[1] + 0.03856725658119236) - 0.020784609690826527*(a0.cos[0]*(t1 + t2)) - 0.012*(a0.sin[0]*(a0.cos[0]*a0.cos[0] - t2));
+    const double t1 = a0.sin[0]*a0.sin[0] - 0.5;
+    const double t2 = 0.020784609690826527*t1 + a0.sin[0]*(0.012*a0.cos[0] + 0.020784609690826527*a0.sin[0]) - 0.005209445330007911;
+    const double t3 = 0.004*f[0] + 0.0356*thd[0] + 0.002001*thdd[0] + 0.5586*awiwi_atan(10.0*thd[0]) + a0.sin[0]*(0.012*t1 + 0.029544232590366242) + a0.cos[1]*(0.02113091308703497*a0.cos[1] + 0.0453153893518325*a0.sin[1] + 0.06) - a0.cos[0]*t2 - 0.010565456543517485;
     tau[0] = t3;
 }

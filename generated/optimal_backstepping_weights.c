@@ -9,8 +9,9 @@
  *   in   impedance[2] in N m/rad, N m s/rad, from [0.9, 0.000828] to [1.1, 0.001012]
  *   out  rates[2] in 1/s
  *   out  weights[2] in rad/(N m), rad s^2/(N m)
- * Returns 0 where C_t is positive and K_3 is positive and K_4 is positive and C_s is positive;
- * elsewhere 1, and what is not defined is NaN.
+ * Returns 0 where the link's inertia is positive and the motor's inertia is positive and the stiffness
+ * is positive and K_p is positive and K_d is positive and C_t is positive and K_3 is positive and K_4
+ * is positive and C_s is positive; elsewhere 1, and what is not defined is NaN.
  * Cost: 8 add, 10 mul, 5 div, 7 neg.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
@@ -30,5 +31,5 @@ int awiwi_optimal_backstepping_weights(const double K_opt[restrict 4], const dou
     rates[1] = -t5;
     weights[0] = -t4;
     weights[1] = -(t4/t7);
-    return -t3 > 0.0 && -t6 > 0.0 && -t5 > 0.0 && t7 > 0.0 ? 0 : 1;
+    return plant[0] > 0.0 && plant[1] > 0.0 && plant[2] > 0.0 && impedance[0] > 0.0 && impedance[1] > 0.0 && -t3 > 0.0 && -t6 > 0.0 && -t5 > 0.0 && t7 > 0.0 ? 0 : 1;
 }

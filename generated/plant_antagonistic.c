@@ -19,6 +19,7 @@
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
 #include <math.h>
+#include "elementary.h"
 #include "kernels.h"
 
 void awiwi_plant_antagonistic(const double x[restrict 6], const double u[restrict 2], const double load[restrict 1], const double inertias[restrict 3], const double tendons[restrict 6], const double damping[restrict 1], const double friction[restrict 3], double xd[restrict 6], double stretches[restrict 2], double tau[restrict 2])
@@ -33,9 +34,9 @@ void awiwi_plant_antagonistic(const double x[restrict 6], const double u[restric
     xd[0] = x[1];
     xd[1] = (load[0] - damping[0]*x[1] - t3 - t6)/inertias[0];
     xd[2] = x[3];
-    xd[3] = (u[0] + t3 - friction[2]*x[3] - friction[1]*atan(friction[0]*x[3]))/inertias[1];
+    xd[3] = (u[0] + t3 - friction[2]*x[3] - friction[1]*awiwi_atan(friction[0]*x[3]))/inertias[1];
     xd[4] = x[5];
-    xd[5] = (u[1] - friction[2]*x[5] - friction[1]*atan(friction[0]*x[5]) - t6)/inertias[2];
+    xd[5] = (u[1] - friction[2]*x[5] - friction[1]*awiwi_atan(friction[0]*x[5]) - t6)/inertias[2];
     stretches[0] = -t1;
     stretches[1] = t4;
     tau[0] = -t3;

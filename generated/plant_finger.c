@@ -14,7 +14,7 @@
  * Cost: 24 add, 40 mul, 1 div, 8 calls.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
-#include <math.h>
+#include "elementary.h"
 #include "kernels.h"
 
 void awiwi_plant_finger(const double qd[restrict 4], const double qdd[restrict 4], const double thds[restrict 8], const double f[restrict 8], const double u[restrict 8], const double motor[restrict 2], const double friction[restrict 3], double xd[restrict 24])
@@ -36,12 +36,12 @@ void awiwi_plant_finger(const double qd[restrict 4], const double qdd[restrict 4
     xd[13] = thds[5];
     xd[14] = thds[6];
     xd[15] = thds[7];
-    xd[16] = t0*(u[0] - f[0]*motor[1] - friction[2]*thds[0] - friction[1]*atan(friction[0]*thds[0]));
-    xd[17] = t0*(u[1] - f[1]*motor[1] - friction[2]*thds[1] - friction[1]*atan(friction[0]*thds[1]));
-    xd[18] = t0*(u[2] - f[2]*motor[1] - friction[2]*thds[2] - friction[1]*atan(friction[0]*thds[2]));
-    xd[19] = t0*(u[3] - f[3]*motor[1] - friction[2]*thds[3] - friction[1]*atan(friction[0]*thds[3]));
-    xd[20] = t0*(u[4] - f[4]*motor[1] - friction[2]*thds[4] - friction[1]*atan(friction[0]*thds[4]));
-    xd[21] = t0*(u[5] - f[5]*motor[1] - friction[2]*thds[5] - friction[1]*atan(friction[0]*thds[5]));
-    xd[22] = t0*(u[6] - f[6]*motor[1] - friction[2]*thds[6] - friction[1]*atan(friction[0]*thds[6]));
-    xd[23] = t0*(u[7] - f[7]*motor[1] - friction[2]*thds[7] - friction[1]*atan(friction[0]*thds[7]));
+    xd[16] = t0*(u[0] - f[0]*motor[1] - friction[2]*thds[0] - friction[1]*awiwi_atan(friction[0]*thds[0]));
+    xd[17] = t0*(u[1] - f[1]*motor[1] - friction[2]*thds[1] - friction[1]*awiwi_atan(friction[0]*thds[1]));
+    xd[18] = t0*(u[2] - f[2]*motor[1] - friction[2]*thds[2] - friction[1]*awiwi_atan(friction[0]*thds[2]));
+    xd[19] = t0*(u[3] - f[3]*motor[1] - friction[2]*thds[3] - friction[1]*awiwi_atan(friction[0]*thds[3]));
+    xd[20] = t0*(u[4] - f[4]*motor[1] - friction[2]*thds[4] - friction[1]*awiwi_atan(friction[0]*thds[4]));
+    xd[21] = t0*(u[5] - f[5]*motor[1] - friction[2]*thds[5] - friction[1]*awiwi_atan(friction[0]*thds[5]));
+    xd[22] = t0*(u[6] - f[6]*motor[1] - friction[2]*thds[6] - friction[1]*awiwi_atan(friction[0]*thds[6]));
+    xd[23] = t0*(u[7] - f[7]*motor[1] - friction[2]*thds[7] - friction[1]*awiwi_atan(friction[0]*thds[7]));
 }

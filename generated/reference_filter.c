@@ -12,7 +12,7 @@
  *   out  motion_next[5] in rad, rad/s, rad/s^2, rad/s^3, rad/s^4
  * Returns 0 where the delay is positive and the period is positive; elsewhere 1, and what is not
  * defined is NaN.
- * Cost: 45 add, 64 mul, 5 div.
+ * Cost: 45 add, 50 mul, 5 div.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
 #include "kernels.h"
@@ -31,27 +31,21 @@ int awiwi_reference_filter(const double motion[restrict 5], const double desired
     const double t9 = desired[4] - motion[4];
     const double t10 = desired[4] - t9;
     const double t11 = 0.041666666666666664*period[0]*t7;
-    const double t12 = 1.0/delay[0];
+    const double t12 = 15.0/delay[0];
     const double t13 = delay[0]*delay[0];
-    const double t14 = 1.0/t13;
+    const double t14 = 105.0/t13;
     const double t15 = delay[0]*t13;
-    const double t16 = 1.0/t15;
-    const double t17 = 945.0*t0;
-    const double t18 = delay[0]*t15;
-    const double t19 = 1.0/t18;
-    const double t20 = 1.0/(delay[0]*t18);
-    const double t21 = t12*(15.0*t9) + t14*(105.0*t5) + 420.0*t1*t16 + t17*t19 + 945.0*(desired[0] - motion[0])*t20;
-    const double t22 = 945.0*t1;
-    const double t23 = 15.0*t12;
-    const double t24 = t14*(105.0*t9) + 420.0*t5*t16 + t22*t19 + t17*t20 - t23*t21;
-    const double t25 = 945.0*t5;
-    const double t26 = 105.0*t14;
-    const double t27 = 420.0*t9*t16 + t25*t19 + t22*t20 - t26*t21 - t23*t24;
-    const double t28 = motion[4] + period[0]*t21 + t4*t24 + t8*t27 + t11*(945.0*t9*t19 + t25*t20 - 420.0*t16*t21 - t26*t24 - t23*t27);
+    const double t16 = 420.0/t15;
+    const double t17 = delay[0]*t15;
+    const double t18 = 945.0/t17;
+    const double t19 = 945.0/(delay[0]*t17);
+    const double t20 = t9*t12 + t5*t14 + t1*t16 + t0*t18 + (desired[0] - motion[0])*t19;
+    const double t21 = t9*t14 + t5*t16 + t1*t18 + t0*t19 - t12*t20;
+    const double t22 = t9*t16 + t5*t18 + t1*t19 - t14*t20 - t12*t21;
     motion_next[0] = motion[0] + period[0]*(desired[1] - t0) + t2*t4 + t6*t8 + t10*t11;
-    motion_next[1] = motion[1] + period[0]*t2 + t6*t4 + t10*t8 + t11*t21;
-    motion_next[2] = motion[2] + period[0]*t6 + t10*t4 + t8*t21 + t11*t24;
-    motion_next[3] = motion[3] + period[0]*t10 + t4*t21 + t8*t24 + t11*t27;
-    motion_next[4] = t28;
+    motion_next[1] = motion[1] + period[0]*t2 + t6*t4 + t10*t8 + t11*t20;
+    motion_next[2] = motion[2] + period[0]*t6 + t10*t4 + t8*t20 + t11*t21;
+    motion_next[3] = motion[3] + period[0]*t10 + t4*t20 + t8*t21 + t11*t22;
+    motion_next[4] = motion[4] + period[0]*t20 + t4*t21 + t8*t22 + t11*(t9*t18 + t5*t19 - t16*t20 - t14*t21 - t12*t22);
     return delay[0] > 0.0 && period[0] > 0.0 ? 0 : 1;
 }

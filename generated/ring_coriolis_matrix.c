@@ -5,7 +5,7 @@
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   in   qd[3] in rad/s, -20 to 20
  *   out  C[3][3] in N m s/rad
- * Cost: 52 add, 58 mul, 1 neg, 3 sincos.
+ * Cost: 51 add, 58 mul, 1 neg, 3 sincos.
  * Inputs: sha256 ed3232564f274d4be5483571e47101a84f2df0a316cf4e98203aa0bde8d76c89.
  */
 #include "trig.h"
@@ -22,7 +22,7 @@ void awiwi_ring_coriolis_matrix(const double q[restrict 3], const double qd[rest
     const double t5 = 1.4763643994624091e-06*a0.cos[2];
     const double t6 = (t3 + 0.7439024390243902*a0.cos[1])*t5 + a0.cos[2]*(9.304540967423494e-09*a0.cos[2] - 4.4336434353405724e-07*a0.sin[2]) - 4.652270483711747e-09;
     const double t7 = t3*t4 + a0.sin[1]*(5.463e-06*a0.cos[1] - 2.352e-08*a0.sin[1] - 1.0982710776488653e-06*a0.sin[2]) + t6 + 1.176e-08;
-    const double t8 = 1.8e-08*(a0.cos[0] + 205.0*a0.sin[0]) + a0.sin[0]*(2.23216e-05*a0.cos[0] + t2 - 7.9e-08*a0.sin[0]) + t7 + 3.95e-08;
+    const double t8 = 1.8e-08*a0.cos[0] + a0.sin[0]*(2.23216e-05*a0.cos[0] + t2 + 3.69e-06 - 7.9e-08*a0.sin[0]) + t7 + 3.95e-08;
     const double t9 = 0.7857142857142857*t6;
     const double t10 = qd[1] + qd[2];
     const double t11 = t10 + 0.7857142857142857*qd[2];
@@ -32,21 +32,21 @@ void awiwi_ring_coriolis_matrix(const double q[restrict 3], const double qd[rest
     const double t15 = qd[0]*t7;
     const double t16 = a0.cos[0]*(t4 + t5) - a0.sin[0]*t2;
     const double t17 = qd[1]*t16;
-    const double t18 = a0.cos[1]*a0.cos[2] + a0.sin[1]*a0.sin[2];
-    const double t19 = 1.0982710776488653e-06*t18;
-    const double t20 = t10*t19;
-    const double t21 = t11*t19;
-    const double t22 = t20 - t21;
-    const double t23 = 1.4763643994624091e-06*(a0.cos[0]*a0.cos[2] + a0.sin[0]*a0.sin[2]);
-    const double t24 = t11*t23;
-    const double t25 = t22 + t10*(t23 - t16) - t24;
+    const double t18 = t10 - t11;
+    const double t19 = a0.cos[1]*a0.cos[2] + a0.sin[1]*a0.sin[2];
+    const double t20 = 1.0982710776488653e-06*t19;
+    const double t21 = t18*t20;
+    const double t22 = a0.cos[0]*a0.cos[2] + a0.sin[0]*a0.sin[2];
+    const double t23 = 1.4763643994624091e-06*t22;
+    const double t24 = t21 + t10*(t23 - t16) - t11*t23;
+    const double t25 = 8.629272752955371e-07*t19;
     C[0] = -(qd[1]*t8) - qd[2]*(t7 + t9);
     C[1] = qd[1]*(1.0264e-06*a0.cos[0] - 9.6e-09*a0.sin[0]) + t13 - t14;
     C[2] = t13 - t15 - 0.7857142857142857*(t12 + qd[0]*t6);
     C[3] = t14;
-    C[4] = t17 + t25;
-    C[5] = t25 - 0.7857142857142857*(t24 + t21);
+    C[4] = t17 + t24;
+    C[5] = t24 - 0.7857142857142857*t11*(t23 + t20);
     C[6] = t15 + qd[0]*t9;
-    C[7] = t22 + t17 + 0.7857142857142857*(qd[1]*t23 + t20);
-    C[8] = 8.629272752955371e-07*(t10 - t11)*t18 + t22;
+    C[7] = 1.160000599577607e-06*qd[1]*t22 + t10*t25 + t21 + t17;
+    C[8] = t18*t25 + t21;
 }

@@ -8,7 +8,7 @@
  *   out  M[3][3] in kg m^2
  *   out  C[3][3] in N m s/rad
  *   out  gravity[3] in N m
- * Cost: 89 add, 95 mul, 1 neg, 4 sincos.
+ * Cost: 87 add, 97 mul, 1 neg, 4 sincos.
  * Inputs: sha256 d2fd8ea8122210c370a876d04ecdbc1ca49df3b198ba198458bb7b3639479b1a.
  */
 #include "trig.h"
@@ -42,7 +42,7 @@ void awiwi_ring_dynamics(const double q[restrict 3], const double qd[restrict 3]
     const double t22 = t21 + 4.8416e-07;
     const double t23 = t21 + t22 + 5.53848e-06;
     const double t24 = t18 + t23;
-    const double t25 = t24 + 0.7857142857142857*(t13*t2 + t14*t16 + t22);
+    const double t25 = 0.032214285714285716*(a0.cos[0]*t2 + a0.sin[0]*t16) + 0.7857142857142857*t22 + t24;
     const double t26 = 0.7857142857142857*qd[2];
     const double t27 = t13 + 0.006;
     const double t28 = (t27 + t19)*t16 + 7.765062493990363e-09 - a0.sin[2]*t9;
@@ -54,18 +54,15 @@ void awiwi_ring_dynamics(const double q[restrict 3], const double qd[restrict 3]
     const double t34 = t33*(1.518649189246812e-07*a0.sin[2]);
     const double t35 = t32*(6.2216e-07*a0.cos[1] - 5.44e-09*a0.sin[1]) - t34;
     const double t36 = qd[0]*t31;
-    const double t37 = qd[0]*t28;
-    const double t38 = qd[0]*t29;
-    const double t39 = t13*t17 - t14*t3;
-    const double t40 = qd[1]*t39;
-    const double t41 = t19*t16 - t20*t2;
-    const double t42 = t32*t41;
-    const double t43 = t33*t41;
-    const double t44 = t42 - t43;
-    const double t45 = t13*t16 - t14*t2;
-    const double t46 = t33*t45;
-    const double t47 = t44 + t32*(t45 - t39) - t46;
-    const double t48 = g[0]*a0.cos[3] + g[1]*a0.sin[3];
+    const double t37 = 0.7857142857142857*(qd[0]*t28) + qd[0]*t29;
+    const double t38 = t13*t17 - t14*t3;
+    const double t39 = qd[1]*t38;
+    const double t40 = t19*t16 - t20*t2;
+    const double t41 = t32*t40;
+    const double t42 = t41 - t33*t40;
+    const double t43 = t13*t16 - t14*t2;
+    const double t44 = t42 + t32*(t43 - t38) - t33*t43;
+    const double t45 = g[0]*a0.cos[3] + g[1]*a0.sin[3];
     M[0] = 0.012*t4 + a0.cos[1]*(t5 + t6) + a0.cos[0]*(t7 + t8) + 1.5839649744566975e-06 - a0.cos[2]*t9;
     M[1] = t11;
     M[2] = t12;
@@ -74,17 +71,17 @@ void awiwi_ring_dynamics(const double q[restrict 3], const double qd[restrict 3]
     M[5] = t25;
     M[6] = t12;
     M[7] = t25;
-    M[8] = t23 + 0.7857142857142857*(t22 + (t22 + 3.804114285714286e-07));
+    M[8] = t23 + 1.5714285714285714*t22 + 2.9889469387755104e-07;
     C[0] = -(t26*t28) - qd[2]*t29 - qd[1]*t31;
     C[1] = qd[1]*(1.0264e-06*a0.cos[0] - 9.6e-09*a0.sin[0]) + t35 - t36;
-    C[2] = t35 - 0.7857142857142857*(t34 + t37) - t38;
+    C[2] = t35 - 0.7857142857142857*t34 - t37;
     C[3] = t36;
-    C[4] = t40 + t47;
-    C[5] = t47 - 0.7857142857142857*(t46 + t43);
-    C[6] = 0.7857142857142857*t37 + t38;
-    C[7] = t44 + t40 + 0.7857142857142857*(qd[1]*t45 + t42);
-    C[8] = t44 + (t32 - t33)*(0.7857142857142857*t41);
-    gravity[0] = 2.64e-05*t48 + (g[0]*a0.sin[3] - g[1]*a0.cos[3])*(t4 + 0.0001245);
-    gravity[1] = t48*(t30 + t17) - g[2]*t4;
-    gravity[2] = t48*t17 - g[2]*t3 - 0.7857142857142857*(g[2]*t2 - t48*t16);
+    C[4] = t39 + t44;
+    C[5] = t44 - 0.7857142857142857*(t33*(t43 + t40));
+    C[6] = t37;
+    C[7] = t42 + t39 + 0.7857142857142857*(qd[1]*t43 + t41);
+    C[8] = t42 + (t32 - t33)*(0.7857142857142857*t40);
+    gravity[0] = 2.64e-05*t45 + (g[0]*a0.sin[3] - g[1]*a0.cos[3])*(t4 + 0.0001245);
+    gravity[1] = t45*(t30 + t17) - g[2]*t4;
+    gravity[2] = t45*t17 - g[2]*t3 - 0.7857142857142857*(g[2]*t2 - t45*t16);
 }

@@ -7,7 +7,7 @@
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  kinetic[1] in J
  *   out  potential[1] in J
- * Cost: 51 add, 59 mul, 4 sincos.
+ * Cost: 43 add, 59 mul, 4 sincos.
  * Inputs: sha256 002a38e3700c4633fdb4a7f5f3af58489ec3ef1c8d6654b8a99f77e3122edefa.
  */
 #include "trig.h"
@@ -17,23 +17,22 @@ void awiwi_ring_energy(const double q[restrict 3], const double qd[restrict 3], 
 {
     const double t0 = q[1] + q[2];
     const double t1 = t0 + 0.7857142857142857*q[2] - 1.5485777614681775;
+    const double t2 = qd[1] + qd[2];
+    const double t3 = t2 + 0.7857142857142857*qd[2];
+    const double t4 = 0.041*qd[1];
     const awiwi_turn4 a0 = awiwi_sincos4(q[1], t0, t1, q[0]);
-    const double t2 = 1.5186117470838444e-07*a0.cos[2] - 1.0664033896870507e-09*a0.sin[2];
-    const double t3 = 5.44e-09*a0.cos[1] + 6.2216e-07*a0.sin[1] + t2;
-    const double t4 = a0.cos[1]*(0.2447405203928034*a0.cos[1] - 0.001053687907676869*a0.sin[1] - 0.09840433281206233*a0.sin[2]);
-    const double t5 = 0.000615*a0.cos[0] - 3e-06*a0.sin[0];
-    const double t6 = 0.0002108*a0.cos[1] - 1.2e-06*a0.sin[1] - 3.600888779176608e-05*a0.sin[2];
-    const double t7 = t4 + 537.5958712637087*(t5 + t6) + a0.cos[0]*(a0.cos[0] + 3673.571786968676*t6 - 0.003539172819152749*a0.sin[0]) + 0.07096499228402214 - a0.cos[2]*(0.019862570045787814*a0.cos[2] + 0.0004168402340075754*a0.sin[2]);
-    const double t8 = qd[1]*(9.6e-09*a0.cos[0] + 1.0264e-06*a0.sin[0] + t3) + qd[2]*(t3 + 0.7857142857142857*t2) + 1.11608e-05*qd[0]*t7;
-    const double t9 = 1.2e-06*a0.cos[1] + 0.0002108*a0.sin[1] + 3.600888779176608e-05*a0.cos[2];
-    const double t10 = 0.041*(a0.cos[0]*t6 + a0.sin[0]*t9);
-    const double t11 = 1.0982710776488653e-06*(a0.cos[1]*a0.sin[2] - a0.sin[1]*a0.cos[2]);
-    const double t12 = t11 - 4.8416e-07;
-    const double t13 = t11 + t12 - 5.53848e-06;
-    const double t14 = t13 - t10;
-    const double t15 = qd[2]*(t14 + 0.7857142857142857*(1.4763643994624091e-06*(a0.cos[0]*a0.sin[2] - a0.sin[0]*a0.cos[2]) + t12));
-    const double t16 = qd[0]*t8 + qd[1]*(0.5*qd[1]*(t10 + 2.25034e-05 - t14) - t15) - 0.5*qd[2]*qd[2]*(t13 + 0.7857142857142857*(t12 + (t12 - 3.804114285714286e-07)));
-    const double t17 = 2.64e-05*(g[0]*a0.sin[3] - g[1]*a0.cos[3]) - g[2]*(3e-06*a0.cos[0] + 0.000615*a0.sin[0] + t9) - (g[0]*a0.cos[3] + g[1]*a0.sin[3])*(t5 + t6 + 0.0001245);
-    kinetic[0] = t16;
-    potential[0] = t17;
+    const double t5 = 0.0305*t2;
+    const double t6 = 3.600888779176608e-05*a0.cos[2];
+    const double t7 = 3.600888779176608e-05*a0.sin[2];
+    const double t8 = 0.0002108*a0.cos[1] - 1.2e-06*a0.sin[1];
+    const double t9 = 1.2e-06*a0.cos[1] + 0.0002108*a0.sin[1];
+    const double t10 = a0.cos[1]*(0.2447405203928034*a0.cos[1] - 0.001053687907676869*a0.sin[1] - 0.09840433281206233*a0.sin[2]);
+    const double t11 = 0.000615*a0.cos[0] - 3e-06*a0.sin[0];
+    const double t12 = t8 - t7;
+    const double t13 = t10 + 537.5958712637087*(t11 + t12) + a0.cos[0]*(a0.cos[0] + 3673.571786968676*t12 - 0.003539172819152749*a0.sin[0]) + 0.07096499228402214 - a0.cos[2]*(0.019862570045787814*a0.cos[2] + 0.0004168402340075754*a0.sin[2]);
+    const double t14 = qd[1]*(9.6e-09*a0.cos[0] + 1.0264e-06*a0.sin[0]) + t2*(5.44e-09*a0.cos[1] + 6.2216e-07*a0.sin[1]) + t3*(1.5186117470838444e-07*a0.cos[2] - 1.0664033896870507e-09*a0.sin[2]) + 1.11608e-05*qd[0]*t13;
+    const double t15 = 1.12517e-05*qd[1]*qd[1] + t3*(2.4208e-07*t3 + (t4*a0.sin[0] + t5*a0.sin[1])*t6 - (a0.cos[0]*t4 + a0.cos[1]*t5)*t7) + t2*(2.76924e-06*t2 + t4*(a0.cos[0]*t8 + a0.sin[0]*t9)) + qd[0]*t14;
+    const double t16 = 2.64e-05*(g[0]*a0.sin[3] - g[1]*a0.cos[3]) - g[2]*(3e-06*a0.cos[0] + 0.000615*a0.sin[0] + t9 + t6) - (g[0]*a0.cos[3] + g[1]*a0.sin[3])*(t11 + t12 + 0.0001245);
+    kinetic[0] = t15;
+    potential[0] = t16;
 }

@@ -7,7 +7,7 @@
  *   in   tau[3] in N m, -1 to 1
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  qdd[3] in rad/s^2
- * Cost: 96 add, 110 mul, 3 div, 1 neg, 4 sincos.
+ * Cost: 95 add, 111 mul, 3 div, 1 neg, 4 sincos.
  * Inputs: sha256 d2fd8ea8122210c370a876d04ecdbc1ca49df3b198ba198458bb7b3639479b1a.
  */
 #include "trig.h"
@@ -58,11 +58,11 @@ void awiwi_ring_forward_dynamics(const double q[restrict 3], const double qd[res
     const double t39 = t7*t12 + t29*t8;
     const double t40 = t39 + 4.8416e-07;
     const double t41 = t39 + t40 + 5.53848e-06;
-    const double t42 = 1.0/(t41 + 0.7857142857142857*(t40 + (t40 + 3.804114285714286e-07)));
+    const double t42 = 1.0/(t41 + 1.5714285714285714*t40 + 2.9889469387755104e-07);
     const double t43 = t38*t42;
     const double t44 = t5*t18 + t27*(t11 + t8);
     const double t45 = t44 + t41;
-    const double t46 = t45 + 0.7857142857142857*(t5*t12 + t27*t8 + t40);
+    const double t46 = 0.032214285714285716*(a0.cos[1]*t12 + a0.sin[1]*t8) + 0.7857142857142857*t40 + t45;
     const double t47 = t46*t42;
     const double t48 = tau[1] + g[2]*t25 + t5*(t24*t11 + t33) + t35 - t16*t22 - t27*(t24*t17 + t34) - t31*t21 - t36*t47;
     const double t49 = 9.6e-09*a0.cos[1] + 1.0264e-06*a0.sin[1] + t37 - t46*t43;
@@ -74,5 +74,5 @@ void awiwi_ring_forward_dynamics(const double q[restrict 3], const double qd[res
     const double t55 = t48*t50 + t51*t54;
     qdd[0] = -t54;
     qdd[1] = t55;
-    qdd[2] = t36*t42 + t43*t54 - t47*t55;
+    qdd[2] = t42*t36 + t43*t54 - t47*t55;
 }

@@ -9,7 +9,7 @@
  *   out  curvature[6] in 1/(N m)
  * Returns 0 where every tension is on its spring's curve, give or take a hundredth; elsewhere 1, and
  * what is not defined is NaN.
- * Cost: 148 add, 172 mul, 5 calls.
+ * Cost: 148 add, 171 mul, 1 neg, 5 calls.
  * Inputs: sha256 b64c46b637f0a464ed4766b60f7050b3f882b2c8a66fc18598209e2c9ff07328.
  */
 #include <math.h>
@@ -53,15 +53,16 @@ int awiwi_ring_tendon_stiffness(const double tension[restrict 6], double k[restr
     const double t33 = t10*(t10*(t10*(24.53899769445488*t9 - 2332.303829653054) - 3595.5249875986037) + 6371.352269919792) - 1588.663036259213;
     const double t34 = t14*(t14*(t14*(24.53899769445488*t13 - 2332.303829653054) - 3595.5249875986037) + 6371.352269919792) - 1588.663036259213;
     const double t35 = t18*(t18*(t18*(24.53899769445488*t17 - 2332.303829653054) - 3595.5249875986037) + 6371.352269919792) - 1588.663036259213;
-    const double t36 = t13*t13;
-    const double t37 = t9*t9;
-    const double t38 = t6*t6;
-    const double t39 = t0*t0;
-    const double t40 = t3*t3;
-    const double t41 = 5.3945636387324395e-05*(t39 + t40) + 0.5*fabs(0.00010789127277464879*(t39 - t40));
-    const double t42 = 5.3945636387324395e-05*t38 + 0.5*(t41 + fabs(0.00010789127277464879*t38 - t41));
-    const double t43 = 5.3945636387324395e-05*t37 + 0.5*(t42 + fabs(0.00010789127277464879*t37 - t42));
-    const double t44 = 5.3945636387324395e-05*t36 + 0.5*(t43 + fabs(0.00010789127277464879*t36 - t43));
+    const double t36 = t18*t18;
+    const double t37 = t14*t14;
+    const double t38 = t10*t10;
+    const double t39 = t7*t7;
+    const double t40 = t1*t1;
+    const double t41 = t4*t4;
+    const double t42 = 0.5*t40 + 0.5*t41 + 0.5*fabs(t40 - t41);
+    const double t43 = 0.5*t39 + 0.5*t42 + 0.5*fabs(t39 - t42);
+    const double t44 = 0.5*t38 + 0.5*t43 + 0.5*fabs(t38 - t43);
+    const double t45 = 0.5*t37 + 0.5*t44 + 0.5*fabs(t37 - t44);
     k[0] = t1*(t1*(t1*(t1*t2 - 949.2257281588977) + 2486.208403491702) + 6612.930601228865) + 8724.567610373055;
     k[1] = t4*(t4*(t4*(t4*t5 - 949.2257281588977) + 2486.208403491702) + 6612.930601228865) + 8724.567610373055;
     k[2] = t7*(t7*(t7*(t7*t8 - 949.2257281588977) + 2486.208403491702) + 6612.930601228865) + 8724.567610373055;
@@ -80,5 +81,5 @@ int awiwi_ring_tendon_stiffness(const double tension[restrict 6], double k[restr
     curvature[3] = 0.00043156509109859516*(t10*(t10*t33 - 5695.354368953386) + 4972.416806983404);
     curvature[4] = 0.00043156509109859516*(t14*(t14*t34 - 5695.354368953386) + 4972.416806983404);
     curvature[5] = 0.00043156509109859516*(t18*(t18*t35 - 5695.354368953386) + 4972.416806983404);
-    return 1.015625 - 5.3945636387324395e-05*t17*t17 - 0.5*(t44 + fabs(0.00010789127277464879*(t17*t17) - t44)) > 0.0 ? 0 : 1;
+    return -(0.5*t36) - 0.5*t45 - 0.5*fabs(t36 - t45) + 1.015625 > 0.0 ? 0 : 1;
 }

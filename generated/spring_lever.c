@@ -9,10 +9,11 @@
  * Returns 0 where the roller is clear of the motor's pulley and the roller is clear of the fixed
  * pulley and the tendon turns the lever towards its taut end and the spring is stretched; elsewhere 1,
  * and what is not defined is NaN.
- * Cost: 40 add, 54 mul, 7 div, 1 neg, 3 sqrt, 1 sincos, 2 calls.
+ * Cost: 38 add, 54 mul, 7 div, 1 neg, 3 sqrt, 1 sincos, 2 calls.
  * Inputs: sha256 6a5695bb7e492700563a99433621bd21f8005fce81d41ed26a0365bf35bb62e3.
  */
 #include <math.h>
+#include "elementary.h"
 #include "trig.h"
 #include "kernels.h"
 
@@ -35,11 +36,11 @@ int awiwi_spring_lever(const double theta[restrict 1], double dL[restrict 1], do
     const double t13 = 1.0/t10;
     const double t14 = t13*(0.007*t1 - t9*t12);
     const double t15 = t13*(0.007*t9 + t1*t12);
-    const double t16 = atan2(0.9230595836428319*t14 + 0.3846569966153245*t15, 0.9230595836428319*t15 - 0.3846569966153245*t14);
+    const double t16 = awiwi_atan2(0.9230595836428319*t14 + 0.3846569966153245*t15, 0.9230595836428319*t15 - 0.3846569966153245*t14);
     const double t17 = 1.0/t6;
     const double t18 = t17*(0.006*t5 - t1*t8);
     const double t19 = t17*(0.006*t1 + t5*t8);
-    const double t20 = atan2(0.4601093262074292*t18 - 0.8878622685624981*t19, -(0.4601093262074292*t19) - 0.8878622685624981*t18);
+    const double t20 = awiwi_atan2(0.4601093262074292*t18 - 0.8878622685624981*t19, -(0.4601093262074292*t19) - 0.8878622685624981*t18);
     const double t21 = 0.03*a0.cos;
     const double t22 = t21 + 0.024;
     const double t23 = 0.03*a0.sin;
@@ -51,12 +52,11 @@ int awiwi_spring_lever(const double theta[restrict 1], double dL[restrict 1], do
     const double t29 = t27*t28;
     const double t30 = t3*(t18 - t15) + t0*(t19 - t14);
     const double t31 = 7000.0*t26*(t29/t30);
-    const double t32 = t27*t28*t29;
-    const double t33 = t3*t19 - t0*t18;
-    const double t34 = t3*t14 - t0*t15;
-    const double t35 = 7000.0*(t32 - t26*t28*(t21*t22 + t23*t24 + t32 - 0.0009)) + (t33*(t33/t8 - 1.0) + t34*(t34/t12 + 1.0))*t31;
-    dL[0] = t8 + t12 + 0.004*t16 - 0.003*(t20 + (t20 - t16 - 2.268638125012232));
+    const double t32 = t3*t19 - t0*t18;
+    const double t33 = t3*t14 - t0*t15;
+    const double t34 = 7000.0*(t28*(t27*t29 - t26*(t21*t22 + t23*t24 + t29*t29 - 0.0009))) + (t32*(t32/t8 - 1.0) + t33*(t33/t12 + 1.0))*t31;
+    dL[0] = t8 + t12 + 0.007*t16 + 0.006805914375036696 - 0.006*t20;
     force[0] = t31;
-    stiffness[0] = t35/(t30*t30);
+    stiffness[0] = t34/(t30*t30);
     return t11 > 0.0 && t7 > 0.0 && 0.37*t30 > 0.0 && t26 > 0.0 ? 0 : 1;
 }

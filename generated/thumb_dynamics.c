@@ -8,7 +8,7 @@
  *   out  M[4][4] in kg m^2
  *   out  C[4][4] in N m s/rad
  *   out  gravity[4] in N m
- * Cost: 156 add, 174 mul, 8 neg, 4 sincos.
+ * Cost: 156 add, 172 mul, 8 neg, 4 sincos.
  * Inputs: sha256 eb684d40ad53461219ce6205f05b311d2262086fa4be9e6eb81e8ea245c94e57.
  */
 #include "trig.h"
@@ -71,40 +71,39 @@ void awiwi_thumb_dynamics(const double q[restrict 4], const double qd[restrict 4
     const double t51 = t50*t2;
     const double t52 = t50*t34;
     const double t53 = t7*t51 + qd[2]*t33 - t52;
-    const double t54 = t50*t8;
-    const double t55 = qd[2]*t28 - t54;
-    const double t56 = 1.08e-05*a0.cos[2] + a0.sin[2]*t21;
-    const double t57 = t50*t38;
-    const double t58 = qd[2]*t37 + t57;
-    const double t59 = t5*t54 + t52 - qd[2]*(t31 + t30);
-    const double t60 = 0.045*t55 - t59;
-    const double t61 = t53 - 0.006*(a0.cos[2]*t55 + qd[1]*t56) - a0.cos[2]*(a0.sin[2]*t58 + a0.cos[2]*t60) - qd[1]*(t26 - a0.sin[2]*t27);
-    const double t62 = qd[0]*a0.cos[2];
-    const double t63 = qd[0]*a0.sin[2];
-    const double t64 = t63*t26;
-    const double t65 = t62*t26;
-    const double t66 = a0.sin[2]*(4.5686e-07*t62 + qd[1]*t40 + t7*t54 + t64 + qd[2]*(t47 + t9) - t50*t48) - 0.006*(1.08e-05*t62 + t63*t21) - a0.cos[2]*(t65 + t63*t20 - qd[1]*t36);
-    const double t67 = t62*t29;
-    const double t68 = t55 + t67;
-    const double t69 = t63*t35;
-    const double t70 = t59 + t53;
-    const double t71 = t62*t8;
-    const double t72 = t54 + t71;
-    const double t73 = t5*t72 + t7*(t51 + t62*t2);
-    const double t74 = t63*t34;
-    const double t75 = qd[1]*t8 + t63*t2;
-    const double t76 = t50*t24;
-    const double t77 = qd[2]*t23 + t76;
-    const double t78 = 0.006*qd[0]*t56 + a0.sin[2]*(t5*t51 + 0.045*(qd[2]*t1 + t51) + qd[2]*(t15 + t6) + t62*t20 - t64 - t50*t18) - a0.cos[2]*(4.5686e-07*t63 - t77 - t65);
-    const double t79 = t62*t25 - qd[1]*t35;
-    const double t80 = t62*t24 + qd[1]*t34;
-    const double t81 = 0.045*qd[1];
-    const double t82 = (qd[2] + t62)*(t32 + t30);
-    const double t83 = t81 + (qd[1]*t5 + t7*t63);
-    const double t84 = -(0.006*t71) - a0.cos[2]*(qd[1]*t24 + 0.045*t71 + t82 - t63*t38) - a0.sin[2]*(t83*t2 - qd[1]*t18 - t74);
-    const double t85 = g[0]*a0.cos[3] + g[1]*a0.sin[3];
-    const double t86 = g[0]*a0.sin[3] - g[1]*a0.cos[3];
-    const double t87 = g[2]*a0.sin[2] + a0.cos[2]*t85;
+    const double t54 = t50*t38;
+    const double t55 = qd[2]*t37 + t54;
+    const double t56 = t50*t8;
+    const double t57 = qd[2]*t28 - t56;
+    const double t58 = t5*t56 + t52 - qd[2]*(t31 + t30);
+    const double t59 = 0.045*t57 - t58;
+    const double t60 = 0.006*(1.08e-05*a0.cos[2] + a0.sin[2]*t21);
+    const double t61 = qd[0]*a0.cos[2];
+    const double t62 = qd[0]*a0.sin[2];
+    const double t63 = t62*t26;
+    const double t64 = t61*t26;
+    const double t65 = a0.sin[2]*(4.5686e-07*t61 + qd[1]*t40 + t7*t56 + t63 + qd[2]*(t47 + t9) - t50*t48) - 6.48e-08*t61 - 0.006*(t62*t21) - a0.cos[2]*(t64 + t62*t20 - qd[1]*t36);
+    const double t66 = t61*t29;
+    const double t67 = t57 + t66;
+    const double t68 = t62*t35;
+    const double t69 = t58 + t53;
+    const double t70 = t61*t8;
+    const double t71 = t56 + t70;
+    const double t72 = t5*t71 + t7*(t51 + t61*t2);
+    const double t73 = t62*t34;
+    const double t74 = qd[1]*t8 + t62*t2;
+    const double t75 = t50*t24;
+    const double t76 = qd[2]*t23 + t75;
+    const double t77 = qd[0]*t60 + a0.sin[2]*(t5*t51 + 0.045*(qd[2]*t1 + t51) + qd[2]*(t15 + t6) + t61*t20 - t63 - t50*t18) - a0.cos[2]*(4.5686e-07*t62 - t76 - t64);
+    const double t78 = t61*t25 - qd[1]*t35;
+    const double t79 = t61*t24 + qd[1]*t34;
+    const double t80 = 0.045*qd[1];
+    const double t81 = (qd[2] + t61)*(t32 + t30);
+    const double t82 = t80 + (qd[1]*t5 + t7*t62);
+    const double t83 = -(0.006*t70) - a0.cos[2]*(qd[1]*t24 + 0.045*t70 + t81 - t62*t38) - a0.sin[2]*(t82*t2 - qd[1]*t18 - t73);
+    const double t84 = g[0]*a0.cos[3] + g[1]*a0.sin[3];
+    const double t85 = g[0]*a0.sin[3] - g[1]*a0.cos[3];
+    const double t86 = g[2]*a0.sin[2] + a0.cos[2]*t84;
     M[0] = t12 + 1.5405e-06 - t20 - 0.012*t22 - a0.cos[2]*t27;
     M[1] = t41;
     M[2] = t43;
@@ -121,24 +120,24 @@ void awiwi_thumb_dynamics(const double q[restrict 4], const double qd[restrict 4
     M[13] = -t38;
     M[14] = t44;
     M[15] = 1.09224e-06;
-    C[0] = t61;
-    C[1] = t66;
-    C[2] = -(0.006*t68) - a0.sin[2]*(t58 + t62*t39 - qd[1]*t49 - t69) - a0.cos[2]*(0.045*t68 - t70);
-    C[3] = 0.006*t72 + a0.cos[2]*(0.045*t72 + t73) - a0.sin[2]*(t57 + t62*t38 + qd[1]*t48 + t74 - t7*t75);
-    C[4] = t78;
-    C[5] = -t60;
-    C[6] = t77 + t63*t19 + t79 - 0.045*(qd[1]*t29 - t63*t3);
-    C[7] = t76 + (t5 + 0.045)*t75 + t80 - t63*t18;
-    C[8] = 0.006*t67 - a0.sin[2]*(t81*t3 + qd[1]*t19 + t69) - a0.cos[2]*(qd[1]*t25 - t63*t39 - 0.045*t67 - t70);
-    C[9] = t81*t29 - t79 - t63*(t49 + t42);
-    C[10] = t70;
-    C[11] = t73;
-    C[12] = t84;
-    C[13] = t63*(t48 - t45) - t83*t8 - t80;
-    C[14] = -t82;
+    C[0] = t53 - a0.cos[2]*(a0.sin[2]*t55 + 0.006*t57 + a0.cos[2]*t59) - qd[1]*(t60 + (t26 - a0.sin[2]*t27));
+    C[1] = t65;
+    C[2] = -(0.006*t67) - a0.sin[2]*(t55 + t61*t39 - qd[1]*t49 - t68) - a0.cos[2]*(0.045*t67 - t69);
+    C[3] = 0.006*t71 + a0.cos[2]*(0.045*t71 + t72) - a0.sin[2]*(t54 + t61*t38 + qd[1]*t48 + t73 - t7*t74);
+    C[4] = t77;
+    C[5] = -t59;
+    C[6] = t76 + t62*t19 + t78 - 0.045*(qd[1]*t29 - t62*t3);
+    C[7] = t75 + (t5 + 0.045)*t74 + t79 - t62*t18;
+    C[8] = 0.006*t66 - a0.sin[2]*(t80*t3 + qd[1]*t19 + t68) - a0.cos[2]*(qd[1]*t25 - t62*t39 - 0.045*t66 - t69);
+    C[9] = t80*t29 - t78 - t62*(t49 + t42);
+    C[10] = t69;
+    C[11] = t72;
+    C[12] = t83;
+    C[13] = t62*(t48 - t45) - t82*t8 - t79;
+    C[14] = -t81;
     C[15] = 0.0;
-    gravity[0] = t85*(t29 + 9e-06) - t86*(t22 - 0.000204);
-    gravity[1] = 1.08e-05*t87 - (g[2]*a0.cos[2] - a0.sin[2]*t85)*t21;
-    gravity[2] = t86*t3 + t87*t29;
-    gravity[3] = t86*t2 - t87*t8;
+    gravity[0] = t84*(t29 + 9e-06) - t85*(t22 - 0.000204);
+    gravity[1] = 1.08e-05*t86 - (g[2]*a0.cos[2] - a0.sin[2]*t84)*t21;
+    gravity[2] = t85*t3 + t86*t29;
+    gravity[3] = t85*t2 - t86*t8;
 }

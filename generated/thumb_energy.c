@@ -7,7 +7,7 @@
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  kinetic[1] in J
  *   out  potential[1] in J
- * Cost: 65 add, 81 mul, 4 sincos.
+ * Cost: 65 add, 80 mul, 4 sincos.
  * Inputs: sha256 46e4c11520cb35f8c8b39b4a5f744de13eafc538dda122a909bd753de6881cc0.
  */
 #include "trig.h"
@@ -17,30 +17,32 @@ void awiwi_thumb_energy(const double q[restrict 4], const double qd[restrict 4],
 {
     const double t0 = q[2] + q[3] + 0.982793723247329;
     const awiwi_turn4 a0 = awiwi_sincos4(q[2], t0, q[1], q[0]);
-    const double t1 = 3.7608673304070534e-05*a0.cos[1] + 5.424967919082741e-05*a0.sin[1];
-    const double t2 = 5.424967919082741e-05*a0.cos[1] - 3.7608673304070534e-05*a0.sin[1];
-    const double t3 = a0.cos[0]*t1 - a0.sin[0]*t2;
-    const double t4 = 0.064*t3 + 1.02773e-05;
-    const double t5 = 0.032*t3 + 1.09224e-06;
-    const double t6 = 3.6055512754639894e-09*a0.cos[1];
-    const double t7 = 4.46e-09*a0.cos[0] + t6 - 3.59e-08*a0.sin[0];
-    const double t8 = 8.96344e-06*a0.cos[0] - 5.97e-08*a0.sin[0];
-    const double t9 = 3.613846153846154e-07*a0.cos[1] - 9.15163076923077e-07*a0.sin[1];
-    const double t10 = a0.cos[0]*t8 - a0.cos[1]*t9;
-    const double t11 = 0.0003315*a0.cos[0] - 2.7e-06*a0.sin[0] + t1;
-    const double t12 = 0.09*t11;
-    const double t13 = t12 + t4 + 4.258586e-05;
-    const double t14 = 2.7e-06*a0.cos[0] + 0.0003315*a0.sin[0] - t2;
-    const double t15 = a0.sin[0]*t8 + 0.045*t14 - a0.sin[1]*t9 - 0.032*(a0.cos[0]*t2 - a0.sin[0]*t1) - 2.6973153846153845e-07;
-    const double t16 = 3.6055512754639894e-09*a0.sin[1];
-    const double t17 = 3.59e-08*a0.cos[0] + 4.46e-09*a0.sin[0] + t16;
-    const double t18 = 0.064*a0.cos[0]*t1 + t10 + t12 + 4.296662230769231e-05;
-    const double t19 = t11 + 0.001071;
-    const double t20 = t18 + 0.012*(1.08e-05*a0.sin[2] - a0.cos[2]*t19) + a0.cos[2]*(2.0*a0.sin[2]*(t17 + 2.19e-07) - a0.cos[2]*(t18 - 4.5686e-07)) - t13 - 1.5405e-06;
-    const double t21 = qd[1]*(a0.cos[2]*(t7 - 2.95e-08) - a0.sin[2]*t15) + qd[2]*(a0.sin[2]*t17 - 0.006*t11 - a0.cos[2]*(0.045*t11 + t4)) + qd[3]*(a0.sin[2]*t16 - 0.006*t1 - a0.cos[2]*(0.045*t1 + t5)) + 0.5*qd[0]*t20;
-    const double t22 = 5.4612e-07*qd[3]*qd[3] + qd[2]*(0.5*qd[2]*t4 + qd[3]*t5) - qd[1]*(qd[3]*t6 + qd[2]*t7 - 0.5*qd[1]*(0.064*a0.sin[0]*t2 + t10 + t13 - 9.439677692307693e-06)) - qd[0]*t21;
-    const double t23 = g[0]*a0.cos[3] + g[1]*a0.sin[3];
-    const double t24 = (g[0]*a0.sin[3] - g[1]*a0.cos[3])*(t14 + 9e-06) - 0.000204*t23 - 1.08e-05*(g[2]*a0.cos[2] - a0.sin[2]*t23) - (g[2]*a0.sin[2] + a0.cos[2]*t23)*t19;
-    kinetic[0] = t22;
-    potential[0] = t24;
+    const double t1 = 0.032*a0.cos[0];
+    const double t2 = 3.7608673304070534e-05*a0.cos[1] + 5.424967919082741e-05*a0.sin[1];
+    const double t3 = 0.032*a0.sin[0];
+    const double t4 = 5.424967919082741e-05*a0.cos[1] - 3.7608673304070534e-05*a0.sin[1];
+    const double t5 = t1*t2 - t3*t4;
+    const double t6 = t5 + 1.09224e-06;
+    const double t7 = 2.0*t5 + 1.02773e-05;
+    const double t8 = 3.6055512754639894e-09*a0.cos[1];
+    const double t9 = 4.46e-09*a0.cos[0] + t8 - 3.59e-08*a0.sin[0];
+    const double t10 = 8.96344e-06*a0.cos[0] - 5.97e-08*a0.sin[0];
+    const double t11 = 3.613846153846154e-07*a0.cos[1] - 9.15163076923077e-07*a0.sin[1];
+    const double t12 = a0.cos[0]*t10 - a0.cos[1]*t11;
+    const double t13 = 0.0003315*a0.cos[0] - 2.7e-06*a0.sin[0] + t2;
+    const double t14 = 0.09*t13;
+    const double t15 = t14 + t7 + 4.258586e-05;
+    const double t16 = 2.7e-06*a0.cos[0] + 0.0003315*a0.sin[0] - t4;
+    const double t17 = a0.cos[2]*(t9 - 2.95e-08) - a0.sin[2]*(a0.sin[0]*t10 + t3*t2 + 0.045*t16 - t1*t4 - a0.sin[1]*t11 - 2.6973153846153845e-07);
+    const double t18 = 3.6055512754639894e-09*a0.sin[1];
+    const double t19 = 3.59e-08*a0.cos[0] + 4.46e-09*a0.sin[0] + t18;
+    const double t20 = 0.064*a0.cos[0]*t2 + t12 + t14 + 4.296662230769231e-05;
+    const double t21 = t13 + 0.001071;
+    const double t22 = 1.296e-07*a0.sin[2] + t20 - t15 - a0.cos[2]*(0.012*t21 + (a0.cos[2]*(t20 - 4.5686e-07) - 2.0*a0.sin[2]*(t19 + 2.19e-07))) - 1.5405e-06;
+    const double t23 = qd[1]*t17 + qd[3]*(a0.sin[2]*t18 - 0.006*t2 - a0.cos[2]*(0.045*t2 + t6)) + qd[2]*(a0.sin[2]*t19 - 0.006*t13 - a0.cos[2]*(0.045*t13 + t7)) + 0.5*qd[0]*t22;
+    const double t24 = 5.4612e-07*qd[3]*qd[3] + qd[2]*(qd[3]*t6 + 0.5*qd[2]*t7) - qd[1]*(qd[3]*t8 + qd[2]*t9 - 0.5*qd[1]*(0.064*a0.sin[0]*t4 + t12 + t15 - 9.439677692307693e-06)) - qd[0]*t23;
+    const double t25 = g[0]*a0.cos[3] + g[1]*a0.sin[3];
+    const double t26 = (g[0]*a0.sin[3] - g[1]*a0.cos[3])*(t16 + 9e-06) - 0.000204*t25 - 1.08e-05*(g[2]*a0.cos[2] - a0.sin[2]*t25) - (g[2]*a0.sin[2] + a0.cos[2]*t25)*t21;
+    kinetic[0] = t24;
+    potential[0] = t26;
 }

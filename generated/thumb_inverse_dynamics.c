@@ -7,7 +7,7 @@
  *   in   qdd[4] in rad/s^2, -2000 to 2000
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  tau[4] in N m
- * Cost: 135 add, 144 mul, 2 neg, 4 sincos.
+ * Cost: 135 add, 145 mul, 2 neg, 4 sincos.
  * Inputs: sha256 b7fe551f96056cda15630ccc8e1048458a04fd2c391240ea725523ad5d20e299.
  */
 #include "trig.h"
@@ -56,7 +56,7 @@ void awiwi_thumb_inverse_dynamics(const double q[restrict 4], const double qd[re
     const double t37 = t18*t26 + t27;
     const double t38 = t34*t35 + t36*t37;
     const double t39 = 0.006*qdd[0] + t2;
-    const double t40 = qd[0]*a0.cos[1]*t3;
+    const double t40 = t3*t3;
     const double t41 = 3.59e-08*a0.cos[2] + 4.46e-09*a0.sin[2];
     const double t42 = qdd[2] - t12;
     const double t43 = 3.6055512754639894e-09*a0.sin[3];
@@ -68,7 +68,7 @@ void awiwi_thumb_inverse_dynamics(const double q[restrict 4], const double qd[re
     const double t49 = 0.032*a0.cos[2];
     const double t50 = t49*t24 + t32 - t33*t28;
     const double t51 = 1.58e-07*t6 + 4.5686e-07*t9 + 2.19e-07*t12 + t13*(t14 - t16) + t17*(t14 - t20) + t22*t24 + (t25 - 9.07425e-06)*t28 + t29*t32 + t33*t38 - 1.08e-05*t39 - 2.95e-08*(t14 - t40) - t41*t42 - t43*t45 - t34*t47 - t37*(t48 + 3.654276923076923e-07) - t36*t50;
-    const double t52 = qd[0]*a0.sin[1]*t4;
+    const double t52 = t4*t4;
     const double t53 = t40 + t52;
     const double t54 = 2.0*t3;
     const double t55 = qd[2]*(qd[2] + t54);
@@ -92,8 +92,8 @@ void awiwi_thumb_inverse_dynamics(const double q[restrict 4], const double qd[re
     const double t73 = t61*t17 + t43*t9 + t64*t47 + t36*(t67 + t49*(t65 + t55) + t33*t69) - 1.09224e-06*t70 - t62*t71 - t35*(t72 + t49*t42 - t33*t56);
     const double t74 = t13*t61 + t41*t9 + t62*t63 + t73 - t64*t22 - 9.18506e-06*t69 - t29*t67 - t57*t72 - t49*t59 - t33*(t35*(t65 + t58) - t36*t70);
     const double t75 = 8.4258e-05*t10 + 2.19e-07*t9 + 0.045*t60 + t74 - 2.95e-08*t61 - 0.001071*t39 - 1.58e-07*t64 - 4.2129e-05*t68;
-    const double t76 = 1.5405e-06*qdd[0] + 9e-06*t1 + 0.000204*t2 + a0.sin[1]*t51 - 0.006*(1.08e-05*t9 + 0.001071*t12 + t60) - a0.cos[1]*t75;
-    const double t77 = 4.5686e-07*t61 + 4.2129e-05*t6 + 2.19e-07*(t40 - t52) + 2.95e-08*t68 + t63*t24 + 1.08e-05*t66 + t57*t32 + t37*t47 + t49*t38 + t35*t50 + 0.045*(t57*t24 + t38 - t29*t28) - 1.58e-07*t27 - t41*(t52 - t16) - t43*(t52 - t20) - 0.001071*t31 - t13*t69 - t17*t70 - t22*t28 - t34*t71;
+    const double t76 = 1.5405e-06*qdd[0] + 9e-06*t1 + 0.000204*t2 + a0.sin[1]*t51 - 6.48e-08*t9 - 6.426e-06*t12 - 0.006*t60 - a0.cos[1]*t75;
+    const double t77 = 4.5686e-07*t61 + 4.2129e-05*t6 + 2.95e-08*t68 + 2.19e-07*(qd[0]*(a0.cos[1]*t3 - a0.sin[1]*t4)) + t63*t24 + 1.08e-05*t66 + t57*t32 + t37*t47 + t49*t38 + t35*t50 + 0.045*(t57*t24 + t38 - t29*t28) - 1.58e-07*t27 - t41*(t52 - t16) - t43*(t52 - t20) - 0.001071*t31 - t13*t69 - t17*t70 - t22*t28 - t34*t71;
     tau[0] = t76;
     tau[1] = t77;
     tau[2] = -t74;

@@ -5,7 +5,7 @@
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   in   f[8] in N, 0 to 100
  *   out  tau[4] in N m
- * Cost: 62 add, 57 mul, 4 div, 4 sqrt, 2 sincos.
+ * Cost: 60 add, 54 mul, 4 div, 1 neg, 4 sqrt, 2 sincos.
  * Inputs: sha256 587a65bca3163563dc3b07fe3ba2c07934dd21d567d7f82f1bc6b0fb691a7376.
  */
 #include <math.h>
@@ -15,55 +15,53 @@
 void awiwi_thumb_joint_torque(const double q[restrict 4], const double f[restrict 8], double tau[restrict 4])
 {
     const awiwi_turn2 a0 = awiwi_sincos2(q[0], q[1]);
-    const double t0 = 0.047*a0.cos[1];
-    const double t1 = 0.006*a0.cos[0] + a0.cos[0]*t0;
-    const double t2 = 0.003*a0.sin[0];
-    const double t3 = 0.0025*a0.sin[1];
-    const double t4 = a0.cos[0]*t3;
-    const double t5 = t2 - t4;
-    const double t6 = 0.003*a0.cos[0];
-    const double t7 = t6 - 0.03;
-    const double t8 = a0.sin[0]*t3;
-    const double t9 = 0.006*a0.sin[0] + a0.sin[0]*t0;
-    const double t10 = t8 - t9;
-    const double t11 = t7 + t10;
-    const double t12 = t1 - 0.002;
-    const double t13 = t5 + t12;
-    const double t14 = 0.047*a0.sin[1];
-    const double t15 = 0.0025*a0.cos[1] - 0.025;
-    const double t16 = t14 + t15;
-    const double t17 = t16*t16;
-    const double t18 = f[3]/sqrt(t17 + t11*t11 + t13*t13);
-    const double t19 = t2 + t4;
-    const double t20 = t8 + t9;
-    const double t21 = t7 - t20;
-    const double t22 = t19 + t12;
-    const double t23 = t14 - t15;
-    const double t24 = t23*t23;
-    const double t25 = f[2]/sqrt(t24 + t21*t21 + t22*t22);
-    const double t26 = t7 + t20;
-    const double t27 = t5 - t12;
-    const double t28 = f[0]/sqrt(t24 + t26*t26 + t27*t27);
-    const double t29 = t7 - t10;
-    const double t30 = t19 - t12;
-    const double t31 = f[1]/sqrt(t17 + t29*t29 + t30*t30);
-    const double t32 = ((t1 + t5)*t11 - (t6 + t10)*t13)*t18 + ((t1 + t19)*t21 - (t6 - t20)*t22)*t25 - ((t1 - t5)*t26 + (t6 + t20)*t27)*t28 - ((t1 - t19)*t29 + (t6 - t10)*t30)*t31;
-    const double t33 = 18.8*a0.cos[1];
-    const double t34 = (a0.sin[1] - t33)*t16;
-    const double t35 = a0.cos[0]*a0.cos[1];
-    const double t36 = 18.8*a0.sin[1];
-    const double t37 = a0.cos[0]*t36;
-    const double t38 = t35 + t37;
-    const double t39 = a0.cos[1]*a0.sin[0];
-    const double t40 = a0.sin[0]*t36;
-    const double t41 = t39 + t40;
-    const double t42 = (a0.sin[1] + t33)*t23;
-    const double t43 = t39 - t40;
-    const double t44 = t35 - t37;
-    const double t45 = (t34 + (t38*t13 - t41*t11))*t18 + (t34 + (t41*t29 - t38*t30))*t31 - (t42 + (t43*t26 - t44*t27))*t28 - (t42 + (t44*t22 - t43*t21))*t25;
-    const double t46 = f[6] - f[7];
-    tau[0] = t32;
-    tau[1] = 0.0025*t45;
-    tau[2] = -0.008*(f[4] - f[5] - t46);
-    tau[3] = -0.006*t46;
+    const double t0 = 0.003*a0.cos[0] - 0.03;
+    const double t1 = 0.0025*a0.sin[1];
+    const double t2 = 0.047*a0.cos[1] + 0.006;
+    const double t3 = t1 - t2;
+    const double t4 = a0.sin[0]*t3;
+    const double t5 = t0 - t4;
+    const double t6 = 0.047*a0.sin[1];
+    const double t7 = 0.0025*a0.cos[1] - 0.025;
+    const double t8 = t6 + t7;
+    const double t9 = t8*t8;
+    const double t10 = 0.003*a0.sin[0];
+    const double t11 = a0.cos[0]*t3 + 0.002;
+    const double t12 = t10 + t11;
+    const double t13 = f[1]/sqrt(t9 + t5*t5 + t12*t12);
+    const double t14 = t5*t13;
+    const double t15 = t0 + t4;
+    const double t16 = t10 - t11;
+    const double t17 = f[3]/sqrt(t9 + t15*t15 + t16*t16);
+    const double t18 = t15*t17;
+    const double t19 = t1 + t2;
+    const double t20 = a0.sin[0]*t19;
+    const double t21 = t0 - t20;
+    const double t22 = t6 - t7;
+    const double t23 = t22*t22;
+    const double t24 = a0.cos[0]*t19 - 0.002;
+    const double t25 = t10 + t24;
+    const double t26 = f[2]/sqrt(t23 + t21*t21 + t25*t25);
+    const double t27 = t21*t26;
+    const double t28 = t0 + t20;
+    const double t29 = t10 - t24;
+    const double t30 = f[0]/sqrt(t23 + t28*t28 + t29*t29);
+    const double t31 = t28*t30;
+    const double t32 = t16*t17;
+    const double t33 = t12*t13;
+    const double t34 = t29*t30;
+    const double t35 = t25*t26;
+    const double t36 = a0.sin[0]*(0.003*(t14 + t18 + t27 + t31) - t3*(t32 - t33) - t19*(t34 - t35)) - a0.cos[0]*(0.003*(t32 + t33 + t34 + t35) - t3*(t14 - t18) - t19*(t27 - t31));
+    const double t37 = t22*(t30 + t26);
+    const double t38 = t8*(t13 + t17);
+    const double t39 = a0.cos[0]*t32 - a0.sin[0]*t18;
+    const double t40 = a0.sin[0]*t14 - a0.cos[0]*t33;
+    const double t41 = a0.cos[0]*t34 - a0.sin[0]*t31;
+    const double t42 = a0.cos[0]*t35 - a0.sin[0]*t27;
+    const double t43 = -(a0.cos[1]*(0.047*(t37 + t38) - 0.0025*(t39 + t40 + t41 - t42))) - a0.sin[1]*(0.0025*(t37 - t38) - 0.047*(t39 + t40 + t42 - t41));
+    const double t44 = f[6] - f[7];
+    tau[0] = t36;
+    tau[1] = t43;
+    tau[2] = -0.008*(f[4] - f[5] - t44);
+    tau[3] = -0.006*t44;
 }

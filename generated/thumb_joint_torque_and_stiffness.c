@@ -7,7 +7,7 @@
  *   in   k[8] in N/m, 1000 to 50000
  *   out  tau[4] in N m
  *   out  K[4][4] in N m/rad
- * Cost: 134 add, 157 mul, 4 div, 1 neg, 4 sqrt, 2 sincos.
+ * Cost: 134 add, 145 mul, 4 div, 1 neg, 4 sqrt, 2 sincos.
  * Inputs: sha256 587a65bca3163563dc3b07fe3ba2c07934dd21d567d7f82f1bc6b0fb691a7376.
  */
 #include <math.h>
@@ -76,14 +76,14 @@ void awiwi_thumb_joint_torque_and_stiffness(const double q[restrict 4], const do
     const double t56 = a0.cos[0]*t20;
     const double t57 = a0.cos[0]*t19;
     const double t58 = t56 + t57;
-    const double t59 = t52 + (t55*t14 - t58*t17);
-    const double t60 = t52 + (t58*t47 - t55*t45);
+    const double t59 = t52 + t55*t14 - t58*t17;
+    const double t60 = t52 + t58*t47 - t55*t45;
     const double t61 = t0 + t4;
     const double t62 = t61*t33;
     const double t63 = t53 - t54;
     const double t64 = t56 - t57;
-    const double t65 = t62 + (t63*t38 - t64*t40);
-    const double t66 = t62 + (t64*t31 - t63*t29);
+    const double t65 = t62 + t63*t38 - t64*t40;
+    const double t66 = t62 + t64*t31 - t63*t29;
     const double t67 = f[6] - f[7];
     const double t68 = t42*t42;
     const double t69 = t41*t68;
@@ -105,23 +105,23 @@ void awiwi_thumb_joint_torque_and_stiffness(const double q[restrict 4], const do
     const double t85 = t30 - t29;
     const double t86 = t7 - t17;
     const double t87 = t15 - t14;
-    const double t88 = k[0]*t70 + k[1]*t73 + k[2]*t76 + k[3]*t79 + f[0]*(t42*(t37*t80 + t39*t81 - t70)) + f[1]*(t49*(t44*t82 + t46*t83 - t73)) + f[2]*(t35*(t27*t84 + t30*t85 - t76)) + f[3]*(t24*(t7*t86 + t15*t87 - t79));
+    const double t88 = k[0]*t70 + k[1]*t73 + k[2]*t76 + k[3]*t79 + t43*(t37*t80 + t39*t81 - t70) + t50*(t44*t82 + t46*t83 - t73) + t36*(t27*t84 + t30*t85 - t76) + t25*(t7*t86 + t15*t87 - t79);
     const double t89 = k[0]*t65;
     const double t90 = k[1]*t60;
     const double t91 = k[2]*t66;
     const double t92 = k[3]*t59;
-    const double t93 = t89*t69 + t90*t72 - t91*t75 - t92*t78 + f[1]*(t49*(t58*t83 - t55*t82 - t60*t72)) + f[2]*(t35*(t64*t85 + t63*t84 + t66*t75)) - f[0]*(t42*(t64*t81 - t63*t80 + t65*t69)) - f[3]*(t24*(t58*t87 + t55*t86 - t59*t78));
+    const double t93 = t89*t69 + t90*t72 + t50*(t58*t83 - t55*t82 - t60*t72) + t36*(t64*t85 + t63*t84 + t66*t75) - t91*t75 - t92*t78 - t43*(t64*t81 + t65*t69 - t63*t80) - t25*(t58*t87 + t55*t86 - t59*t78);
     const double t94 = t65*t68;
     const double t95 = t60*t71;
     const double t96 = t66*t74;
     const double t97 = t59*t77;
-    const double t98 = t64*t64 + (t61*t61 + ((t20 - t19)*t33 + t63*t63));
+    const double t98 = t61*t61 + (t20 - t19)*t33 + t64*t64 + t63*t63;
     const double t99 = t1 + t5;
     const double t100 = t11 + t10;
-    const double t101 = t58*t58 + (t51*t51 + (t55*t55 - (t20 + t19)*t22));
+    const double t101 = t51*t51 + t58*t58 + t55*t55 - (t20 + t19)*t22;
     const double t102 = t1 - t5;
     const double t103 = t11 - t10;
-    const double t104 = t89*t94 + t90*t95 + t91*t96 + t92*t97 + f[0]*(t42*(t98 + (t99*t40 - t100*t38) - t65*t94)) + f[1]*(t49*(t101 + (t102*t47 - t103*t45) - t60*t95)) + f[2]*(t35*(t98 + (t100*t29 - t99*t31) - t66*t96)) + f[3]*(t24*(t101 + (t103*t14 - t102*t17) - t59*t97));
+    const double t104 = t89*t94 + t90*t95 + t91*t96 + t92*t97 + t43*(t98 + t99*t40 - t100*t38 - t65*t94) + t50*(t101 + t102*t47 - t103*t45 - t60*t95) + t36*(t98 + t100*t29 - t99*t31 - t66*t96) + t25*(t101 + t103*t14 - t102*t17 - t59*t97);
     const double t105 = k[6] + k[7];
     const double t106 = -4.8e-05*t105;
     tau[0] = t18*t25 + t32*t36 - t41*t43 - t48*t50;

@@ -4,7 +4,7 @@
  * Source: eq. 2.17, 5.4.
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   out  M[4][4] in kg m^2
- * Cost: 48 add, 49 mul, 4 neg, 3 sincos.
+ * Cost: 48 add, 46 mul, 5 neg, 3 sincos.
  * Inputs: sha256 eb684d40ad53461219ce6205f05b311d2262086fa4be9e6eb81e8ea245c94e57.
  */
 #include "trig.h"
@@ -14,41 +14,41 @@ void awiwi_thumb_mass_matrix(const double q[restrict 4], double M[restrict 16])
 {
     const double t0 = q[2] + q[3] + 0.982793723247329;
     const awiwi_turn3 a0 = awiwi_sincos3(q[2], t0, q[1]);
-    const double t1 = 1.692390298683174e-06*a0.cos[1] + 2.4412355635872335e-06*a0.sin[1];
-    const double t2 = 1.49175e-05*a0.cos[0] + t1 - 1.215e-07*a0.sin[0];
-    const double t3 = 2.0*t2;
-    const double t4 = 2.4412355635872335e-06*a0.cos[1] - 1.692390298683174e-06*a0.sin[1];
+    const double t1 = 1.2034775457302571e-06*a0.cos[1] + 1.7359897341064771e-06*a0.sin[1];
+    const double t2 = 1.0608e-05*a0.cos[0] + t1 - 8.64e-08*a0.sin[0];
+    const double t3 = 2.8125*t2;
+    const double t4 = 1.7359897341064771e-06*a0.cos[1] - 1.2034775457302571e-06*a0.sin[1];
     const double t5 = a0.cos[0]*t1 - a0.sin[0]*t4;
-    const double t6 = 1.4222222222222223*t5 + 1.02773e-05;
+    const double t6 = 2.0*t5 + 1.02773e-05;
     const double t7 = t3 + t6 + 4.258586e-05;
     const double t8 = 8.96344e-06*a0.cos[0] - 5.97e-08*a0.sin[0];
     const double t9 = 3.613846153846154e-07*a0.cos[1] - 9.15163076923077e-07*a0.sin[1];
     const double t10 = a0.cos[0]*t8 - a0.cos[1]*t9;
-    const double t11 = 1.4222222222222223*a0.cos[0]*t1 + t10 + t3 + 4.296662230769231e-05;
+    const double t11 = 2.0*a0.cos[0]*t1 + t10 + t3 + 4.296662230769231e-05;
     const double t12 = 3.6055512754639894e-09*a0.sin[1];
     const double t13 = 3.59e-08*a0.cos[0] + 4.46e-09*a0.sin[0] + t12;
-    const double t14 = t7 + 1.5405e-06 - t11 - 0.26666666666666666*(4.86e-07*a0.sin[2] - a0.cos[2]*(t2 + 4.8195e-05)) - a0.cos[2]*(2.0*a0.sin[2]*(t13 + 2.19e-07) - a0.cos[2]*(t11 - 4.5686e-07));
-    const double t15 = a0.sin[0]*t8 + (1.215e-07*a0.cos[0] + 1.49175e-05*a0.sin[0] - t4) - a0.sin[1]*t9 - 0.7111111111111111*(a0.cos[0]*t4 - a0.sin[0]*t1) - 2.6973153846153845e-07;
-    const double t16 = 3.6055512754639894e-09*a0.cos[1];
-    const double t17 = 4.46e-09*a0.cos[0] + t16 - 3.59e-08*a0.sin[0];
-    const double t18 = a0.sin[2]*t15 - a0.cos[2]*(t17 - 2.95e-08);
-    const double t19 = 0.13333333333333333*t2 + a0.cos[2]*(t2 + t6) - a0.sin[2]*t13;
-    const double t20 = 0.7111111111111111*t5 + 1.09224e-06;
-    const double t21 = 0.13333333333333333*t1 + a0.cos[2]*(t1 + t20) - a0.sin[2]*t12;
-    M[0] = t14;
+    const double t14 = a0.cos[2]*(0.375*(t2 + 3.4272e-05) + (a0.cos[2]*(t11 - 4.5686e-07) - 2.0*a0.sin[2]*(t13 + 2.19e-07)));
+    const double t15 = 3.6055512754639894e-09*a0.cos[1];
+    const double t16 = 4.46e-09*a0.cos[0] + t15 - 3.59e-08*a0.sin[0];
+    const double t17 = 1.40625*t4 + a0.sin[1]*t9 + a0.cos[0]*(t4 - 1.215e-07) + 2.6973153846153845e-07 - a0.sin[0]*(t8 + t1 + 1.49175e-05);
+    const double t18 = -(a0.cos[2]*(t16 - 2.95e-08)) - a0.sin[2]*t17;
+    const double t19 = 0.1875*t2 + a0.cos[2]*(1.40625*t2 + t6) - a0.sin[2]*t13;
+    const double t20 = t5 + 1.09224e-06;
+    const double t21 = 0.1875*t1 + a0.cos[2]*(1.40625*t1 + t20) - a0.sin[2]*t12;
+    M[0] = t7 + t14 + 1.5405e-06 - 1.296e-07*a0.sin[2] - t11;
     M[1] = t18;
     M[2] = t19;
     M[3] = t21;
     M[4] = t18;
-    M[5] = 1.4222222222222223*a0.sin[0]*t4 + t10 + t7 - 9.439677692307693e-06;
-    M[6] = -t17;
-    M[7] = -t16;
+    M[5] = 2.0*a0.sin[0]*t4 + t10 + t7 - 9.439677692307693e-06;
+    M[6] = -t16;
+    M[7] = -t15;
     M[8] = t19;
-    M[9] = -t17;
+    M[9] = -t16;
     M[10] = t6;
     M[11] = t20;
     M[12] = t21;
-    M[13] = -t16;
+    M[13] = -t15;
     M[14] = t20;
     M[15] = 1.09224e-06;
 }

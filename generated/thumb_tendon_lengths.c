@@ -4,7 +4,7 @@
  * Source: eq. 5.5, 5.18, 5.22.
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   out  h[8] in m
- * Cost: 28 add, 23 mul, 2 neg, 4 sqrt, 2 sincos.
+ * Cost: 26 add, 22 mul, 2 neg, 4 sqrt, 2 sincos.
  * Inputs: sha256 5e272fcaf53c5cd633ef6975d3c6c087a59d1d03e13b9a940e6fbe1831dd74a7.
  */
 #include <math.h>
@@ -20,34 +20,32 @@ void awiwi_thumb_tendon_lengths(const double q[restrict 4], double h[restrict 8]
     const double t3 = t2*t2;
     const double t4 = 0.003*a0.cos[1] - 0.03;
     const double t5 = 0.0025*a0.sin[0];
-    const double t6 = a0.sin[1]*t5;
-    const double t7 = 0.047*a0.cos[0];
-    const double t8 = a0.sin[1]*(t7 + 0.006);
-    const double t9 = t6 + t8;
-    const double t10 = t4 + t9;
-    const double t11 = a0.cos[1]*t5;
-    const double t12 = 0.003*a0.sin[1];
-    const double t13 = 0.006*a0.cos[1] + (a0.cos[1]*t7 - 0.002);
-    const double t14 = t12 - t13;
-    const double t15 = t11 - t14;
-    const double t16 = t0 + t1;
-    const double t17 = t16*t16;
-    const double t18 = t6 - t8;
-    const double t19 = t4 - t18;
-    const double t20 = t11 + t14;
-    const double t21 = t4 - t9;
-    const double t22 = t12 + t13;
-    const double t23 = t11 + t22;
-    const double t24 = t4 + t18;
-    const double t25 = t11 - t22;
-    const double t26 = 0.008*q[2];
-    const double t27 = t26 - 0.006*q[3];
-    h[0] = sqrt(t3 + t10*t10 + t15*t15);
-    h[1] = sqrt(t17 + t19*t19 + t20*t20);
-    h[2] = sqrt(t3 + t21*t21 + t23*t23);
-    h[3] = sqrt(t17 + t24*t24 + t25*t25);
-    h[4] = t26;
-    h[5] = -t26;
-    h[6] = -t27;
-    h[7] = t27;
+    const double t6 = 0.047*a0.cos[0] + 0.006;
+    const double t7 = t5 + t6;
+    const double t8 = a0.sin[1]*t7;
+    const double t9 = t4 + t8;
+    const double t10 = 0.003*a0.sin[1];
+    const double t11 = a0.cos[1]*t7 - 0.002;
+    const double t12 = t10 - t11;
+    const double t13 = t0 + t1;
+    const double t14 = t13*t13;
+    const double t15 = t5 - t6;
+    const double t16 = a0.sin[1]*t15;
+    const double t17 = t4 - t16;
+    const double t18 = a0.cos[1]*t15 + 0.002;
+    const double t19 = t10 + t18;
+    const double t20 = t4 - t8;
+    const double t21 = t10 + t11;
+    const double t22 = t4 + t16;
+    const double t23 = t10 - t18;
+    const double t24 = 0.008*q[2];
+    const double t25 = t24 - 0.006*q[3];
+    h[0] = sqrt(t3 + t9*t9 + t12*t12);
+    h[1] = sqrt(t14 + t17*t17 + t19*t19);
+    h[2] = sqrt(t3 + t20*t20 + t21*t21);
+    h[3] = sqrt(t14 + t22*t22 + t23*t23);
+    h[4] = t24;
+    h[5] = -t24;
+    h[6] = -t25;
+    h[7] = t25;
 }

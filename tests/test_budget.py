@@ -16,6 +16,7 @@ from awiwi_gen.errors import BudgetError
 from awiwi_gen.hand import Hand
 from awiwi_gen.pipeline import Job, generate
 from awiwi_gen.records import make_records
+from bench.sizes import excesses
 
 BEFORE = (("derivation", 100, 100), ("share", 80, 80), ("factor", 70, 70))
 
@@ -88,3 +89,13 @@ def test_parts_of_another_structure_are_not_compared(tmp_path):
     (tmp_path / BUDGET).write_text(json.dumps({"one": row}))
 
     require_budget(tmp_path, json.dumps({"one": {"part": "new", "steps": [["derivation", 9, 9]]}}))
+
+
+def test_sizes_beyond_their_grain_are_excesses():
+    old = {"f": [100, 64], "g": [1000, 0]}
+
+    assert excesses(old, {"f": (116, 64), "g": (1020, 0), "new": (9999, 9999)}) == []
+    assert excesses(old, {"f": (100, 96), "g": (1040, 0)}) == [
+        "f takes 96 bytes of stack, committed are 64",
+        "g takes 1040 bytes of code, committed are 1000",
+    ]

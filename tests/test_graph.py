@@ -20,10 +20,11 @@ from awiwi_gen.ir.passes.flatten import flatten
 from awiwi_gen.ir.passes.gather import gather
 from awiwi_gen.ir.passes.scale import scale
 from awiwi_gen.ir.passes.share import share_products, share_sums
+from awiwi_gen.ir.passes.signs import signs
 from awiwi_gen.ir.passes.turn import turn
 from awiwi_gen.verify.reference import ball_values, disagreement
 
-PASSES = (flatten, turn, share_products, share_sums, factor, scale, quotients, orient, schedule, gather)
+PASSES = (flatten, turn, share_products, share_sums, factor, scale, quotients, orient, signs, schedule, gather)
 STEPS = st.lists(
     st.tuples(
         st.sampled_from(["add", "sub", "mul", "div", "neg", "sin", "cos", "sqrt"]),

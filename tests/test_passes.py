@@ -12,8 +12,10 @@ from awiwi_gen.ir.builder import Builder
 from awiwi_gen.ir.cost import cost
 from awiwi_gen.ir.graph import Graph, Output, Ref
 from awiwi_gen.ir.passes import optimise
+from awiwi_gen.ir.passes.finish import orient
 from awiwi_gen.ir.passes.flatten import flatten
 from awiwi_gen.ir.passes.scale import scale
+from awiwi_gen.ir.passes.signs import signs
 from awiwi_gen.ir.passes.turn import turn
 from awiwi_gen.verify.reference import ball_values, disagreement
 
@@ -129,3 +131,24 @@ def test_results_and_arguments_of_functions_keep_their_scale():
     graph = builder.graph([Output("y", (2,), (builder.call("sin", angle), builder.mul((builder.const(3), angle))))])
 
     assert scale(graph) == graph
+
+
+@settings(deadline=None, max_examples=60)
+@given(BODIES, USES)
+def test_choosing_signs_saves_negations_and_nothing_else_changes(bodies, uses):
+    graph = orient(moments(bodies, uses))
+    before, after = cost(graph), cost(signs(graph))
+
+    assert values_differ(graph, signs(graph)) < 1e-50
+    assert after.neg <= before.neg
+    assert (after.add, after.mul, after.sincos) == (before.add, before.mul, before.sincos)
+
+
+def test_a_level_arm_whose_products_are_all_negative_is_computed_negative():
+    builder = Builder()
+    x, y, z = (builder.input("x", i) for i in range(3))
+    lever = builder.add((builder.mul((builder.const(2), x)), builder.mul((builder.const(3), y))))
+    graph = builder.graph([Output("y", (3,), (lever, ~builder.mul((lever, x)), ~builder.mul((lever, z))))])
+
+    assert cost(graph).neg == 2
+    assert cost(signs(graph)).neg == 1

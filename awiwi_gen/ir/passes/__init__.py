@@ -12,6 +12,7 @@ from awiwi_gen.ir.passes.flatten import flatten
 from awiwi_gen.ir.passes.gather import gather
 from awiwi_gen.ir.passes.scale import scale
 from awiwi_gen.ir.passes.share import share_products, share_sums
+from awiwi_gen.ir.passes.signs import signs
 from awiwi_gen.ir.passes.turn import turn
 
 Pass = Callable[[Graph], Graph]
@@ -24,7 +25,7 @@ BEGINNINGS: tuple[tuple[Pass, ...], ...] = (
     (),
 )
 AGAIN: tuple[Pass, ...] = (flatten, share_products, share_sums, factor, scale)  # as long as it helps
-END: tuple[Pass, ...] = (quotients, orient, schedule, gather)
+END: tuple[Pass, ...] = (quotients, orient, signs, schedule, gather)
 
 Stages = list[tuple[str, Graph]]
 
