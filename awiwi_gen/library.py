@@ -18,9 +18,10 @@ from awiwi_gen.errors import BuildError, InputError
 Array = np.ndarray[Any, Any]
 Pointers = list[tuple[Any, int]]  # where samples begin, and the step from one to the next
 
+C_TYPES = {"d": "double", "f": "float", "i": "int"}  # by NumPy's characters
 VECTORISE_AFTER = 100_000  # samples of a kernel
 SINCOS, CALL = 60, 20  # operations that a sine and cosine, and a call, are worth
-WORTH_A_THREAD = 10_000_000  # operations: some milliseconds against a tenth for starting a thread
+WORTH_A_THREAD = 30_000_000  # operations: a millisecond in vector units, against a tenth for starting a thread
 
 
 @cache
@@ -67,11 +68,11 @@ class KernelFunction:
         self._params: tuple[Any, ...] = () if params is None else (params,)
         self._names = [port["name"] for port in self.inputs]
         self._shapes = [tuple(port["shape"]) for port in self.inputs]
-        self._results = [(tuple(port["shape"]), self.dtype) for port in self.outputs]
+        self._results = [(tuple(port["shape"]), prod(port["shape"]), self.dtype) for port in self.outputs]
         self._work = self.cost["operations"] + SINCOS * self.cost["sincos"] + CALL
         fields = [o["name"] for o in self.outputs]
         if entry["status"]:
-            self._results.append(((), np.dtype(np.intc)))
+            self._results.append(((), 1, np.dtype(np.intc)))
             fields.append("status")
         self._result = result_type(self.name, tuple(fields))
 
@@ -95,11 +96,9 @@ class KernelFunction:
         several = {lead for lead in leads if lead}
         lead = self._common(leads, arrays) if len(several) > 1 else several.pop() if several else ()
         samples = [_samples(a, own, lead, shape) for a, own, shape in zip(arrays, leads, self._shapes, strict=True)]
-        results = [np.empty(lead + shape, dtype) for shape, dtype in self._results]
+        results = [np.empty(lead + shape, dtype) for shape, _, dtype in self._results]
         pointers = [(self._library.pointer(array), step) for array, step in samples]
-        targets = [
-            (self._library.pointer(r), prod(shape)) for r, (shape, _) in zip(results, self._results, strict=True)
-        ]
+        targets = [(self._library.pointer(r), size) for r, (_, size, _) in zip(results, self._results, strict=True)]
         self._run(prod(lead), pointers, targets)
         return results[0] if len(results) == 1 else self._result(*results)
 
@@ -152,7 +151,7 @@ class KernelFunction:
             array: Array = np.asarray(value, self.dtype)
         except (TypeError, ValueError):
             raise InputError(f"{self.name}: {name} = {value!r} is not an array of numbers") from None
-        if array.shape[max(array.ndim - len(shape), 0) :] != shape:
+        if array.shape != shape and array.shape[max(array.ndim - len(shape), 0) :] != shape:
             wanted = ", ".join(["...", *map(str, shape)])
             raise InputError(f"{self.name}: {name} has shape {array.shape}, expected ({wanted})")
         return array
@@ -161,7 +160,8 @@ class KernelFunction:
 def _samples(array: Array, own: tuple[int, ...], lead: tuple[int, ...], shape: tuple[int, ...]) -> tuple[Array, int]:
     """An input as samples that are evenly apart: an array to point at, and the step from one to the next."""
     size = prod(shape)
-    packed = array.flags.c_contiguous and array.flags.aligned
+    flags = array.flags
+    packed = flags.c_contiguous and flags.aligned
     if packed and (own == lead or not own):
         return array, size if own else 0
     if not prod(lead):
@@ -188,8 +188,7 @@ class Library(Mapping[str, KernelFunction]):
     def __init__(
         self, manifest: Mapping[str, Any], lib: Any, ffi: Any, vectorised: Callable[[Mapping[str, Any]], Any]
     ) -> None:
-        self.c_type: str = manifest["c_type"]
-        self.dtype = np.dtype(np.float64 if self.c_type == "double" else np.float32)
+        self.dtype = np.dtype(np.float64 if manifest["c_type"] == "double" else np.float32)
         prefix = manifest["prefix"]
         self.manifest = manifest
         self.c, self.ffi = lib, ffi
@@ -205,7 +204,7 @@ class Library(Mapping[str, KernelFunction]):
 
     def pointer(self, array: Array) -> Any:
         """Where an array's first element is; the array must outlive the pointer."""
-        kind = "int" if array.dtype == np.intc else self.c_type
+        kind = C_TYPES[array.dtype.char]
         if array.flags.c_contiguous:
             return self.ffi.from_buffer(kind + "[]", array)
         return self.ffi.cast(kind + " *", array.ctypes.data)

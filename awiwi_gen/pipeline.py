@@ -37,7 +37,9 @@ GENERATOR = (
     "templates",
 )
 Progress = Callable[[str, int, int], None]
-Task = tuple[Any, Mapping[str, Any], str]  # a kernel, the graphs or records its record is made from, and its key
+Task = tuple[
+    Any, Mapping[str, Any], str
+]  # a kernel, what its record is made from (of graphs their fingerprints), and its key
 
 
 def silent(stage: str, done: int, total: int) -> None:
@@ -146,14 +148,14 @@ def make_records(job: Job) -> dict[str, Record]:
 
     Kernels with solvers come second: they are built from the records of the kernels they call.
     """
-    from awiwi_gen.records import load_graphs, record_key, solver_key
+    from awiwi_gen.records import fingerprints, record_key, solver_key
 
     derive_missing(job)
     closed = [kernel for kernel in job.kernels if kernel.solver is None]
     tasks: list[Task] = []
     for kernel in closed:
-        graphs = load_graphs(kernel, job.store)
-        tasks.append((kernel, graphs, record_key(kernel, graphs, job.hand.prefix, job.options)))
+        prints = fingerprints(kernel, job.store)
+        tasks.append((kernel, prints, record_key(kernel, prints, job.hand.prefix, job.options)))
     made = dict(zip((kernel.name for kernel in closed), _kept_records(job, "emit", tasks), strict=True))
     iterating = [kernel for kernel in job.kernels if kernel.solver is not None]
     solving: list[Task] = []
@@ -180,15 +182,16 @@ def _kept_records(job: Job, stage: str, tasks: Sequence[Task]) -> list[Any]:
 
 def _size(task: Task) -> int:
     """Number of nodes of the graphs a record is made from."""
-    return sum(len(getattr(graph, "nodes", ())) for graph in task[1].values())
+    return sum(getattr(graph, "size", 0) for graph in task[1].values())
 
 
 def _record_task(task: tuple[list[Task], str, Options, Cache]) -> None:
-    from awiwi_gen.records import make_records, make_solver_record
+    from awiwi_gen.records import load_graphs, make_records, make_solver_record
 
     members, prefix, options, store = task
     if members[0][0].solver is None:
-        made = make_records(members, prefix, options)
+        loaded = [(kernel, load_graphs(kernel, store), digest) for kernel, _, digest in members]
+        made = make_records(loaded, prefix, options)
     else:
         made = [make_solver_record(*member, prefix, options) for member in members]
     for record in made:

@@ -10,6 +10,7 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import partial
 from typing import Any
 
 from awiwi_gen.build import load
@@ -49,7 +50,7 @@ class Record:
     """What is known of a kernel before it is compiled; ``digest`` names what it was made from.
 
     ``values`` are the numbers of the hand that its graph reads when it runs; ``costs``, after each pass, its
-    operations and their weight.
+    operations and their weight; ``inputs`` are the samples of its reference where a problem chose them.
     """
 
     digest: str
@@ -62,6 +63,7 @@ class Record:
     reference: Reference
     values: Mapping[str, Fraction] = field(default_factory=dict)
     costs: tuple[tuple[str, int, int], ...] = ()
+    inputs: Mapping[str, Any] = field(default_factory=dict)
 
 
 def derivation_key(kernel: Kernel, route: str) -> str:
@@ -73,7 +75,27 @@ def derivation_key(kernel: Kernel, route: str) -> str:
     return key(kernel.structure, function.__module__, name, ports, kernel.guards, code, libraries())
 
 
-def record_key(kernel: Kernel, graphs: Mapping[str, Graph], prefix: str, options: Options) -> str:
+@dataclass(frozen=True)
+class Fingerprint:
+    """What the key of a record needs of a graph, so that the graph itself is read only if the record is missing."""
+
+    digest: str
+    params: tuple[str, ...]
+    size: int
+
+
+def fingerprints(kernel: Kernel, cache: Cache) -> dict[str, Fingerprint]:
+    """Those of a kernel's derivations by all its routes."""
+
+    def taken(route: str) -> Fingerprint:
+        graph = load_graphs(kernel, cache, route)[route]
+        return Fingerprint(graph.digest, graph.params, len(graph.nodes))
+
+    keys = {route: derivation_key(kernel, route) for route in kernel.routes}
+    return {route: cache.memo("fingerprints", digest, partial(taken, route)) for route, digest in keys.items()}
+
+
+def record_key(kernel: Kernel, graphs: Mapping[str, Fingerprint], prefix: str, options: Options) -> str:
     """What a record depends on: the derivations, the numbers in them, the ports, the compiler's own code."""
     values = _values(kernel)
     used = {path: str(values[path]) for graph in graphs.values() for path in graph.params}
@@ -88,10 +110,10 @@ def solver_key(kernel: Kernel, used: Mapping[str, Record], prefix: str, options:
     return key(record_key(kernel, {}, prefix, options), *(record.digest for record in used.values()))
 
 
-def load_graphs(kernel: Kernel, cache: Cache) -> dict[str, Graph]:
-    """The derivations of a kernel by all its routes, from the cache."""
+def load_graphs(kernel: Kernel, cache: Cache, *routes: str) -> dict[str, Graph]:
+    """The derivations of a kernel by the given routes or by all, from the cache."""
     found: dict[str, Graph] = {}
-    for route in kernel.routes:
+    for route in routes or kernel.routes:
         graph = cache.get("derived", derivation_key(kernel, route))
         if not isinstance(graph, Graph):
             raise VerificationError(f"{kernel.name}: its derivation by {route} is missing from the cache")
@@ -211,9 +233,9 @@ def make_solver_record(
     functions = {family: record.function for family, record in used.items()}
     function, text = solver_function(kernel, solver, prefix, options, functions, runtime)
     problem = _problem(kernel, used)
-    exact = problem.solve(problem.sample(draw(kernel.inputs, kernel.path, options.dtype)))
+    inputs = problem.sample(draw(kernel.inputs, kernel.path, options.dtype))
     costs = (("solver", function.cost.operations, round(function.cost.weight)),)
-    return Record(digest, None, function, text, "solver", 0.0, 0.0, exact, costs=costs)
+    return Record(digest, None, function, text, "solver", 0.0, 0.0, problem.solve(inputs), costs=costs, inputs=inputs)
 
 
 def _problem(kernel: Kernel, used: Mapping[str, Record]) -> Problem:
@@ -255,9 +277,8 @@ def judge_record(
     """Levels 1 and 3 for one compiled kernel, joined with levels 2 and 4 of its record."""
     if record.graph is None:
         problem, tolerance = _problem(kernel, used), _solver(kernel).tolerance[options.scalar]
-        inputs = problem.sample(draw(kernel.inputs, kernel.path, options.dtype))
-        mirror = problem.mirror(inputs, options.math == "own")
-        return judge_solver(kernel.name, record.reference, mirror, inputs, function, tolerance, SEED)
+        mirror = problem.mirror(record.inputs, options.math == "own")
+        return judge_solver(kernel.name, record.reference, mirror, record.inputs, function, tolerance, SEED)
     return judge(
         kernel.name,
         record.graph,

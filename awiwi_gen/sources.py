@@ -24,10 +24,12 @@ EFFECTS = ""  # the name of the statements that bind none: they run whenever the
 
 def code_of(*roots: Any) -> str:
     """Digest of all that these functions, classes or callable objects depend on in the package's source."""
-    total = hashlib.sha256()
-    for place in sorted(reached(*roots)):
-        total.update(_digest(place))
-    return total.hexdigest()
+    return _code_of(frozenset(place for root in roots for place in _origins(root)))
+
+
+@cache
+def _code_of(origins: frozenset[Place]) -> str:
+    return hashlib.sha256(b"".join(map(_digest, sorted(_reached(origins))))).hexdigest()
 
 
 @cache
@@ -37,7 +39,11 @@ def _digest(place: Place) -> bytes:
 
 def reached(*roots: Any) -> frozenset[Place]:
     """Every statement that these functions, classes or callable objects lead to."""
-    return frozenset().union(*map(_closure, sorted({place for root in roots for place in _origins(root)})))
+    return _reached(frozenset(place for root in roots for place in _origins(root)))
+
+
+def _reached(origins: frozenset[Place]) -> frozenset[Place]:
+    return frozenset().union(*map(_closure, origins))
 
 
 def _origins(root: Any) -> Iterator[Place]:

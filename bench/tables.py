@@ -54,13 +54,18 @@ def goals(results: dict[str, Any]) -> list[Row]:
             peers = [r for r in mine if group_of(r["contender"]) != "ours"]
             mine = [r for r in mine if group_of(r["contender"]) == "ours"]
             entry = {"hand": hand, "quantity": name}
+            most = quantity.goal.operations if hand == "index" else None  # a count belongs to a finger, ratios to all
             counts = {c: per[name] for c, per in result["operations"].items() if name in per}
             own = counts[mine[0]["contender"]]["operations"]
             theirs = {c: n["operations"] for c, n in counts.items() if group_of(c) != "ours"}
             least = min(theirs, key=lambda c: theirs[c]) if theirs else None
             rows.append(
                 {**entry, "measure": "operations", "ours": own, "peer": least and theirs[least], "name": least}
-                | {"goal": quantity.goal.operations, "met": _met(own, quantity.goal.operations)}
+                | {
+                    "goal": most,
+                    "aim": quantity.goal.aim if most else None,
+                    "met": _met(own, most),
+                }
             )
             for measure, goal, portable in _measures(quantity.goal):
                 key = "ns" if measure.startswith("time") else "instructions"
@@ -87,18 +92,18 @@ def _measures(goal: Any) -> list[tuple[str, float, bool]]:
 
 def print_goals(rows: list[Row]) -> None:
     """Kernel, measure, ours, best peer, ratio, goal."""
-    head = f"{'hand':8}{'quantity':20}{'measure':16}{'ours':>8}{'best peer':>11}  {'which':18}{'ratio':>6}{'goal':>7}"
+    head = f"{'hand':8}{'quantity':20}{'measure':16}{'ours':>8}{'best peer':>11}  {'which':18}{'ratio':>6}{'goal':>14}"
     print(head)
     for row in rows:
         ratio = row.get("ratio") or (row["peer"] / row["ours"] if row["peer"] else None)
         digits = 1 if row["measure"].startswith("time") else 0
-        goal = (
-            "" if row["goal"] is None else (f"{row['goal']}" if row["measure"] == "operations" else f"{row['goal']}x")
-        )
+        unit = "" if row["measure"] == "operations" else "x"
+        goal = "" if row["goal"] is None else f"{row['goal']}{unit}"
+        goal += f", aim {row['aim']}" if row.get("aim") else ""
         said = {True: "met", False: "MISSED", None: ""}[row["met"]]
         text = f"{row['hand']:8}{row['quantity']:20}{row['measure']:16}{row['ours']:8.{digits}f}"
         text += f"{(row['peer'] or 0):11.{digits}f}  {row['name'] or '':18}"
-        print(f"{text}{(f'{ratio:.2f}' if ratio else ''):>6}{goal:>7}  {said}")
+        print(f"{text}{(f'{ratio:.2f}' if ratio else ''):>6}{goal:>14}  {said}")
 
 
 def _met(value: float, goal: float | None) -> bool | None:

@@ -1,4 +1,5 @@
-/* The one header of the firmware interface. Preprocessed, it is also what Python is told. */
+/* The one header of the firmware interface. Preprocessed, it is also what Python is told.
+ * Every function takes one sample; for many at once on a host with vector units see docs/compiler.md. */
 #ifndef AWIWI_H
 #define AWIWI_H
 

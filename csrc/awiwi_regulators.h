@@ -11,15 +11,16 @@ extern "C" {
 enum { AWIWI_MOST_STATES = 4 };
 
 /* Gains K[n] of u = -K x that minimise the integral of x'Q x + R u^2, and S[n][n] with
-   x'S x = the least cost from x: the stabilising solution of S A + A'S - S b b'S/R + Q = 0. Arrays are row by row, n is
-   at most AWIWI_MOST_STATES, of Q the symmetric part counts. Doubles at most `iterations` times from each of at most 3
-   starts, and refines each at most 12 times with twice the digits.
-   `residual` is the largest entry of the left side for the S that is returned, evaluated with twice the digits, relative
-   to the largest sum of its terms' magnitudes, both in coordinates that the solver balances. Returns
+   x'S x = the least cost from x: the stabilising solution of S A + A'S - S b b'S/R + Q = 0. Arrays are row by row, n
+   is at most AWIWI_MOST_STATES, of Q the symmetric part counts. Doubles at most `iterations` times from each of at
+   most 3 starts, and refines each at most 12 times with twice the digits.
+   `residual` is the largest entry of the left side for the S that is returned, evaluated with twice the digits,
+   relative to the largest sum of its terms' magnitudes, both in coordinates that the solver balances. Returns
    AWIWI_OK             the loop A - b K is stable and K is the optimum's but for its last digit;
    AWIWI_OUT_OF_DOMAIN  R is not positive, some motion is rewarded by Q, b cannot stabilise A, or a motion that does not
                         decay costs nothing: (A, Q) is not detectable;
-   AWIWI_NOT_CONVERGED  no such loop was found: K, S and their residual are the best there are, perhaps zero;
+   AWIWI_NOT_CONVERGED  no such loop was found: K, S and their residual are the best there are, perhaps zero; or they
+                        are beyond the range of numbers, and zero;
    AWIWI_NOT_FINITE     an input is not a number.
    Where it is neither of the first nor of the third, K and S are zero, and the residual of that is 1. */
 int awiwi_riccati(int n, const awiwi_real *A, const awiwi_real *b, const awiwi_real *Q, awiwi_real R, int iterations,

@@ -20,10 +20,10 @@ typedef struct plant {
 } plant;
 
 /* A candidate with twice the digits: S, its gains, the closed loop A - b K of what is returned of them; the equation's
-   left side E, and how large that is against its terms. */
+   left side E, and how large that is against its terms; how far the last step moved K, against its largest. */
 typedef struct solution {
     awiwi_twofold S[N * N], K[N], loop[N * N];
-    awiwi_real E[N * N], residual;
+    awiwi_real E[N * N], residual, moved;
 } solution;
 
 /* Scale every coordinate by a power of two, so that its row and its column of the Hamiltonian matrix weigh alike. */
@@ -253,18 +253,31 @@ static int double_up(const plant *p, awiwi_real pole, int iterations, solution *
 static void refine_all(const plant *p, solution *x)
 {
     solution here = *x;
+    x->moved = AWIWI_REAL_MAX;
     for (int k = 0; k < REFINEMENTS && refine(p->n, &here); k++) {
+        awiwi_real before[N], after[N];
+        for (int i = 0; i < p->n; i++)
+            before[i] = here.K[i].high;
         weigh(p, &here);
-        if (!(here.residual < x->residual) && k > 0)
-            break;
+        for (int i = 0; i < p->n; i++) {
+            after[i] = here.K[i].high;
+            before[i] -= after[i];
+        }
+        here.moved = awiwi_largest(before, p->n);
+        if (here.moved > 0)
+            here.moved /= awiwi_largest(after, p->n);
+        x->moved = here.moved;
         if (here.residual < x->residual)
             *x = here;
+        else if (k > 0)
+            break;
     }
 }
 
+/* A step as short as that leaves K right but for rounding, for each is much shorter than the one before it. */
 static int holds(const plant *p, const solution *x)
 {
-    return x->residual <= 16 * AWIWI_REAL_EPSILON && awiwi_is_stable(p->n, x->loop);
+    return x->moved <= AWIWI_REAL_EPSILON && x->residual <= 16 * AWIWI_REAL_EPSILON && awiwi_is_stable(p->n, x->loop);
 }
 
 static int search(plant *p, int iterations, solution *x)
@@ -310,12 +323,18 @@ int awiwi_riccati(int n, const awiwi_real *A, const awiwi_real *b, const awiwi_r
         status = AWIWI_NOT_FINITE;
     else if (R > 0)
         status = search(&p, iterations, &x);
-    const int known = status == AWIWI_OK || (status == AWIWI_NOT_CONVERGED && x.residual < 1);
+    int known = status == AWIWI_OK || (status == AWIWI_NOT_CONVERGED && x.residual < 1);
     for (int i = 0; i < n; i++) { /* back to the caller's coordinates */
-        K[i] = known ? x.K[i].high / p.d[i] : 0;
+        K[i] = x.K[i].high / p.d[i];
         for (int j = 0; j < n; j++)
-            S[i * n + j] = known ? x.S[i * n + j].high / (p.d[i] * p.d[j]) : 0;
+            S[i * n + j] = x.S[i * n + j].high / (p.d[i] * p.d[j]);
+    }
+    known = known && awiwi_all_finite(K, n) && awiwi_all_finite(S, n * n);
+    for (int i = 0; i < n && !known; i++) {
+        K[i] = 0;
+        for (int j = 0; j < n; j++)
+            S[i * n + j] = 0;
     }
     *residual = known ? x.residual : 1;
-    return status;
+    return status == AWIWI_OK && !known ? AWIWI_NOT_CONVERGED : status;
 }

@@ -77,12 +77,11 @@ static int stiffness_cost(const task *s, const vector f, model *c)
 {
     const int n = s->t->n;
     vector k, slope, curvature;
-    awiwi_real terms = 0;
     for (int i = 0; i < s->count; i++)
         s->f[s->t->searched_tendons[i]] = f[i];
     if (s->t->curve(s->t->context, s->f, k, slope, curvature))
         return AWIWI_OUT_OF_DOMAIN;
-    c->cost = 0;
+    c->cost = c->blur = 0;
     for (int i = 0; i < s->count; i++) {
         c->gradient[i] = c->curvature[i] = 0;
         for (int l = 0; l <= i; l++)
@@ -94,16 +93,18 @@ static int stiffness_cost(const task *s, const vector f, model *c)
             awiwi_real excess = -(s->K[a * n + b] + s->K[b * n + a]) / 2, growth[AWIWI_MOST_TENDONS];
             if (!s->touched[a] || !s->touched[b])
                 continue;
-            terms += awiwi_size(excess) * awiwi_size(excess);
+            awiwi_real terms = awiwi_size(excess);
             for (int i = 0; i < s->count; i++) {
                 const int tendon = s->t->searched_tendons[i];
                 const awiwi_real pp = s->p[i][a] * s->p[i][b];
                 const awiwi_real bend = s->t->dP ? s->t->dP[(tendon * n + a) * n + b] : 0;
                 excess += k[tendon] * pp + f[i] * bend;
                 growth[i] = slope[tendon] * pp + bend;
-                terms += k[tendon] * k[tendon] * pp * pp;
+                terms += awiwi_size(k[tendon] * pp) + awiwi_size(f[i] * bend);
             }
+            const awiwi_real rounding = 4 * AWIWI_REAL_EPSILON * terms;
             c->cost += both * excess * excess / 2;
+            c->blur += both * rounding * (awiwi_size(excess) + rounding);
             for (int i = 0; i < s->count; i++) {
                 c->gradient[i] += both * excess * growth[i];
                 c->curvature[i] += both * excess * curvature[s->t->searched_tendons[i]] * s->p[i][a] * s->p[i][b];
@@ -115,8 +116,6 @@ static int stiffness_cost(const task *s, const vector f, model *c)
     for (int i = 0; i < s->count; i++)
         for (int l = 0; l < i; l++)
             c->hessian[l][i] = c->hessian[i][l];
-    /* an excess is known up to rounding of its terms: so is the cost, to first and second order */
-    c->blur = 4 * AWIWI_REAL_EPSILON * (2 * c->cost + 4 * AWIWI_REAL_EPSILON * terms);
     return 0;
 }
 

@@ -16,9 +16,9 @@ import awiwi_gen
 from awiwi_gen import library as library_module
 from awiwi_gen.build import BATCH_FLAGS, FUSED, UNFUSED, WARNINGS, compile_objects, compiler, load, native
 from awiwi_gen.cache import Cache
-from awiwi_gen.emit.batch import batch_file
+from awiwi_gen.emit.batch import batch_source
 from awiwi_gen.emit.options import Options
-from awiwi_gen.errors import BuildError
+from awiwi_gen.errors import BuildError, InputError
 from awiwi_gen.pipeline import Job, cached_tree
 from awiwi_gen.resources import CSRC
 
@@ -125,16 +125,11 @@ def test_each_sample_has_a_status_of_its_own(hand):
 def test_the_loop_is_vectorised_by_the_compiler(tmp_path):
     if native()[0] != ("-march=native",) or "__AVX__" not in native()[1] or "clang" in compiler().version:
         pytest.skip("reads the assembly of gcc for x86 with AVX")
-    manifest = load(tree()).manifest
-    for entry in manifest["kernels"]:
-        if entry["name"] not in ("jaw_mass_matrix", "jaw_inverse_dynamics", "jaw_forward_dynamics"):
-            continue
-        assembly = compiled(
-            entry, manifest, tree(), tmp_path, *BATCH_FLAGS, *native()[0], *UNFUSED[0], "-S"
-        ).read_text()
+    for name in ("jaw_mass_matrix", "jaw_inverse_dynamics", "jaw_forward_dynamics"):
+        assembly = compiled(name, tree(), tmp_path, *BATCH_FLAGS, *native()[0], *UNFUSED[0], "-S").read_text()
         loops = re.findall(r"\bv(?:add|sub|mul|div)(pd|sd)\b", assembly)
 
-        assert loops.count("pd") >= loops.count("sd") > 0, entry["name"]  # what is over is done one by one, once each
+        assert loops.count("pd") >= loops.count("sd") > 0, name  # what is over is done one by one, once each
 
 
 @pytest.mark.parametrize(
@@ -163,24 +158,27 @@ def test_a_compiler_that_fuses_them_all_the_same_is_not_used(monkeypatch):
 @pytest.mark.parametrize("options", VARIANTS.values(), ids=VARIANTS)
 def test_the_c_of_a_batch_is_clean_and_links_with_everything_else(options, tmp_path):
     directory = tree(options)
-    manifest = load(directory).manifest
-    batches = [
-        compiled(entry, manifest, directory, tmp_path, "-std=c99", "-O1", "-fPIC", *WARNINGS, "-c")
-        for entry in manifest["kernels"]
-        if entry["route"] != "solver"
-    ]
+    kernels = [entry for entry in load(directory).manifest["kernels"] if entry["route"] != "solver"]
+    flags = ("-std=c99", "-O1", "-fPIC", *WARNINGS, "-c")
+    batches = [compiled(entry["name"], directory, tmp_path, *flags) for entry in kernels]
     others = compile_objects(directory, Cache())
     compiler().run("-shared", *map(str, batches + others), "-o", str(tmp_path / "all.so"), "-lm")
 
     assert len(batches) > 10
 
 
-def compiled(entry, manifest, directory: Path, scratch: Path, *flags: str) -> Path:
-    text = (directory / f"{entry['name']}.c").read_text()
-    source, made = scratch / f"{entry['name']}_batch.c", scratch / f"{entry['name']}_batch.o"
-    source.write_text(batch_file(entry, manifest["prefix"], manifest["c_type"], text))
+def compiled(name: str, directory: Path, scratch: Path, *flags: str) -> Path:
+    source, made = scratch / f"{name}_batch.c", scratch / f"{name}_batch.o"
+    source.write_text(batch_source(directory, name))
     compiler().run(*flags, f"-I{directory}", f"-I{CSRC}", str(source), "-o", str(made))
     return made
+
+
+def test_a_kernel_that_was_not_generated_has_no_batch(tmp_path):
+    with pytest.raises(InputError, match="no kernel 'jaw_mass_matrx'; did you mean jaw_mass_matrix"):
+        batch_source(tree(), "jaw_mass_matrx")
+    with pytest.raises(InputError, match="no kernel 'jaw_mass_matrix'"):
+        batch_source(tmp_path, "jaw_mass_matrix")
 
 
 def test_few_samples_are_not_worth_compiling_for(jaw):

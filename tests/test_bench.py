@@ -119,10 +119,10 @@ def test_code_is_measured_by_its_symbol(tmp_path):
 
 
 def test_costs_of_calls_are_read_from_the_profile():
-    profile = "\n".join(
+    profile = (
         "ob=(1) /a.so|fn=(1) loop_bias|3 10|cob=(2) /b.so|cfn=(2) sin|calls=4 7|3 400|"
-        "cfn=(3) kernel|calls=1 9|3 60|ob=(2)|fn=(2)|7 400||ob=(1)|fn=(1)|3 5".split("|")
-    )
+        "cfn=(3) kernel|calls=1 9|3 60|ob=(2)|fn=(2)|7 400||ob=(1)|fn=(1)|3 5"
+    ).replace("|", "\n")
 
     assert called_costs(profile) == {("/a.so", "loop_bias"): 460}
 

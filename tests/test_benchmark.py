@@ -13,6 +13,7 @@ from awiwi_gen.studies.benchmark.clock import clocked, require_clocked, running_
 from awiwi_gen.studies.benchmark.compare import compare
 from awiwi_gen.studies.benchmark.joint import joint_of, loop_around, values_of
 from awiwi_gen.studies.benchmark.laws import LAWS
+from awiwi_gen.studies.benchmark.printed_gains import printed_gains
 from awiwi_gen.studies.benchmark.scenarios import FORCES, PLANTS
 
 BEST = LAWS["backstepping_adaptive"]
@@ -112,7 +113,8 @@ def test_gains_that_cannot_run_are_refused_with_the_reason_and_the_nearest_that_
     assert found.runs
     assert found.margin > 0.9 / 3000  # with something to spare
     assert "unstable at 3000 Hz and one sample of delay" in str(refused.value)
-    assert f"the nearest that run have kp = {found.gains['kp']:.4g}" in str(refused.value)
+    changed = [f"{name} = {value:.4g}" for name, value in found.gains.items() if value != gains[name]]
+    assert f"the nearest that run have {', '.join(changed)} (" in str(refused.value)
 
 
 def test_gains_that_only_amplify_noise_are_refused_too(lib, joint):
@@ -187,3 +189,38 @@ def test_a_sensor_that_fails_for_a_while_commands_nothing_and_is_recovered_from(
     assert trace.refused == 30
     assert trace["u"][302:330] == pytest.approx(0)
     assert np.abs(trace["x"][-300:, 0]).max() < 0.01
+
+
+# -- printed gains ------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def printed(lib):
+    return {(each.where, each.plant): each for each in printed_gains(lib)}
+
+
+def test_the_printed_impedance_cannot_run_on_the_clock_for_its_damping_asks_for_a_pole_at_k_d_over_m(printed):
+    for where in ("figure 15.16", "figure 15.17"):
+        for plant in ("table 15.1", "table 16.1"):
+            found = printed[where, plant]
+
+            assert not found.report.implementable
+            assert found.report.delay_margin == pytest.approx(22.5e-6, rel=0.01)
+            assert np.abs(found.report.poles).max() == pytest.approx(0.05 / 7.2e-7, rel=0.01)
+
+
+def test_of_figure_15_13_one_plant_bears_a_sample_of_delay_and_the_other_does_not(printed):
+    assert printed["figure 15.13", "table 15.1"].report.delay_margin == pytest.approx(0.399e-3, rel=0.01)
+    assert printed["figure 15.13", "table 15.1"].report.radius == pytest.approx(1.107, abs=1e-3)
+    assert printed["figure 15.13", "table 16.1"].report.implementable
+
+
+def test_near_the_printed_sets_run_such_with_a_damping_of_a_thousandth_unless_the_spring_is_too_stiff(printed):
+    refused = [each for each in printed.values() if not each.report.implementable]
+
+    assert len(refused) == 6
+    assert all(each.cells()[-1] == "refused" for each in refused)
+    assert [each.plant for each in refused if each.nearest is None] == ["table 15.1"] * 3  # it rings at 840 Hz
+    near = printed["figure 15.16", "table 16.1"].nearest
+    assert near.gains["K_p"] == 0.5
+    assert 5e-4 < near.gains["K_d"] < 2e-3

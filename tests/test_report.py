@@ -22,6 +22,7 @@ from awiwi_gen.studies.figures import all_figures
 from awiwi_gen.studies.figures import fingers as figures_fingers
 from awiwi_gen.studies.figures.fingers import coriolis, released
 from awiwi_gen.studies.printed.number import compared
+from awiwi_gen.studies.table import Table
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +32,7 @@ def figures(lib, hand):
 
 @pytest.fixture(scope="module")
 def results(figures, some_proof):
-    return page.Results(figures, NUMBERS, some_proof[0])
+    return page.Results(figures, NUMBERS, some_proof[0], COMPARED)
 
 
 @pytest.fixture(scope="module")
@@ -43,6 +44,9 @@ def some_proof(hand):
 
 
 NUMBERS = [compared("eq. 9.9", "2.5", 2.4999, "a < b"), compared("eq. 9.10", "2.5", 2.6, "a slip")]
+
+
+COMPARED = [Table("Laws & clocks", ("law", "verdict"), [("some <law>", "reached"), ("another", "refused")])]
 
 
 class Tags(HTMLParser):
@@ -97,6 +101,13 @@ def test_the_page_is_whole_and_needs_no_other_file(text, figures):
 def test_the_page_shows_every_printed_number_beside_ours(text):
     assert '<td>eq. 9.9</td><td>2.5</td><td>2.4999</td><td class="agrees">agrees</td><td>a &lt; b</td>' in text
     assert '<td class="misprint">misprint</td>' in text
+
+
+def test_the_page_compares_laws(text):
+    assert "Laws &amp; clocks" in text
+    assert "some &lt;law&gt;" in text
+    assert '<td class="reached">reached</td>' in text
+    assert '<td class="refused">refused</td>' in text
 
 
 def test_the_page_shows_the_proof_of_every_kernel(text, some_proof):

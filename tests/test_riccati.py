@@ -145,6 +145,14 @@ def test_a_mode_that_decays_by_itself_may_cost_nothing(lib):
     assert np.abs(got.S[:, 3]).max() < 1e-12 * np.abs(got.S).max()
 
 
+def test_a_stable_plant_that_costs_nothing_is_left_alone(lib):
+    got = lib.lqr(np.diag([-1.0, -2.0, -3.0, -4.0]), np.ones(4), np.zeros((4, 4)), 1.0)
+
+    assert got.status == OK
+    assert not got.K.any()
+    assert not got.S.any()
+
+
 def test_costs_that_reward_a_motion_are_refused(lib):
     random = np.random.default_rng(5)
     Q = random.normal(size=(500, 4, 4))

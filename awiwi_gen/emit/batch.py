@@ -10,9 +10,12 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from math import prod
+from pathlib import Path
 from typing import Any
 
 from awiwi_gen.emit.files import banner, render
+from awiwi_gen.emit.tree import read_manifest
+from awiwi_gen.errors import unknown
 
 COMMENT = (
     "{name} of n samples, for hosts with vector units. Compile this file instead of {source}, or with it:",
@@ -22,6 +25,19 @@ COMMENT = (
 )
 LIBRARY_CALL = re.compile(r"\b(sin|cos|tan|asin|acos|atan|atan2|exp|log|pow)f?\(")
 SINCOS = 60  # operations of one sine and cosine
+
+
+def batch_source(directory: Path, kernel: str) -> str:
+    """The C of a kernel over many samples, to be compiled with a generated directory on the include path.
+
+    Raises InputError where nothing, or no such kernel, was generated.
+    """
+    manifest = read_manifest(directory)
+    entries = {entry["name"]: entry for entry in manifest["kernels"]} if manifest else {}
+    if manifest is None or kernel not in entries:
+        raise unknown("kernel", kernel, entries)
+    text = (directory / f"{kernel}.c").read_text(encoding="utf-8")
+    return batch_file(entries[kernel], manifest["prefix"], manifest["c_type"], text)
 
 
 def batch_file(entry: Mapping[str, Any], prefix: str, c_type: str, text: str) -> str:

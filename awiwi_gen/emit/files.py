@@ -170,6 +170,7 @@ def own_files(prefix: str, options: Options) -> dict[str, str]:
             k=texts,
             limit=f"{others.limit:.0f}",
             half_bits=others.half_bits,
+            top=bits - 1,
             digits=others.digits,
             **common,
         ),

@@ -86,12 +86,13 @@ def numbers(dtype: type) -> Elementary:
 
 
 def atan2(y: Any, x: Any, dtype: type) -> Any:
-    """Angle of the point (x, y), bit for bit what the emitted C computes; NaN at the origin and at infinity."""
+    """Angle of the point (x, y), bit for bit what the emitted C computes.
+
+    NaN at infinity and where both are zero or less than every normal number.
+    """
     k, one, two = numbers(dtype), dtype(1), dtype(2)
     y, x = np.broadcast_arrays(np.asarray(y, dtype), np.asarray(x, dtype))
-    down, left = (y < 0).astype(dtype), (x < 0).astype(dtype)
-    u, v = (one - two * down) * y, (one - two * left) * x
-    steep = (u > v).astype(dtype)
+    u, v = np.abs(y), np.abs(x)
     small, big = np.where(u > v, v, u), np.where(u > v, u, v)
     middle = (small > dtype(k.eighth) * big).astype(dtype)
     less, more = middle * big, middle * small
@@ -100,15 +101,18 @@ def atan2(y: Any, x: Any, dtype: type) -> Any:
     r = above / below
     (r_high, r_low), (b_high, b_low) = halves(r, k, dtype), halves(below, k, dtype)
     remainder = (((above - r_high * b_high) - r_high * b_low) - r_low * b_high) - r_low * b_low
-    tail = (remainder + (lost - r * missed)) / below
+    tail = (remainder + (lost - r * missed)) * (one / below)
     z = r * r
     rest = r * (z * polynomial(k.arctan, z, z * z, dtype)) + (tail - z * tail)
-    back, turned = one - two * left, one - two * steep
-    quarters = two * (one - back) + back * (two * steep + turned * middle)
-    whole, part = quarters * dtype(k.quarter_pi[0]), back * turned * r
+    back = np.where(np.signbit(x), -one, one)
+    flat = np.where(u > v, -one, one)
+    sign = back * flat
+    quarters = (two - back * (one + flat)) + sign * middle
+    whole, part = quarters * dtype(k.quarter_pi[0]), sign * r
     total = whole + part
-    lower = quarters * dtype(k.quarter_pi[1]) + back * turned * rest
-    return ((one - two * down) * (total + ((part - (total - whole)) + lower)))[()]
+    lower = quarters * dtype(k.quarter_pi[1]) + sign * rest
+    angle = total + ((part - (total - whole)) + lower)
+    return np.where(np.signbit(y), -angle, angle)[()]
 
 
 def halves(x: Any, k: Elementary, dtype: type) -> tuple[Any, Any]:

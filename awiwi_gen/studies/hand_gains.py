@@ -16,7 +16,7 @@ from awiwi_gen.cache import Cache, code_digest, key
 from awiwi_gen.errors import Fault, InputError
 from awiwi_gen.hand import Hand
 from awiwi_gen.studies.joint_loops import Plant
-from awiwi_gen.studies.nearest import WIDEST, nearest
+from awiwi_gen.studies.nearest import nearest
 from awiwi_gen.studies.pair_loops import Pair, pair_loop
 from awiwi_gen.studies.sampling import PERIOD
 from awiwi_gen.studies.tune import GAINS, plants
@@ -73,8 +73,11 @@ def way_out(library: Any, both: list[Plant], gains: dict[str, float]) -> str:
     def works(chosen: Mapping[str, float]) -> bool:
         return all(radius(library, plant, chosen, delay) < 1 for plant in both for delay in (1, 2))
 
-    found = nearest(gains, POWERS, works)
+    def widest(chosen: Mapping[str, float]) -> float:
+        return max(radius(library, plant, chosen, 2) for plant in both)
+
+    found = nearest(gains, POWERS, works, widest)
     if found is None:
-        return f"neither another bandwidth nor any gain alone mends that within a factor of {WIDEST:g}"
+        return "neither another bandwidth nor a change of gains was found to mend that"
     told = ", ".join(f'{name} = "{value:.6g} {GAINS[name]}"' for name, value in found.gains.items())
     return f"the nearest that run are {told}"

@@ -16,12 +16,12 @@ from awiwi_gen.emit.files import render
 from awiwi_gen.errors import InputError
 from awiwi_gen.hand import Hand
 from awiwi_gen.report import COLUMNS, proof_rows
-from awiwi_gen.studies.benchmark.compare import Table, all_tables
 from awiwi_gen.studies.figures import all_figures
 from awiwi_gen.studies.figures.absent import ABSENT
 from awiwi_gen.studies.figures.figure import Figure
 from awiwi_gen.studies.printed import all_numbers
 from awiwi_gen.studies.printed.number import Printed, Verdict
+from awiwi_gen.studies.table import Table
 
 if TYPE_CHECKING:
     from awiwi_gen.pipeline import Job, Proof
@@ -76,6 +76,8 @@ def publish(job: Job, path: Path) -> Results:
     missing = [name for name in ("matplotlib", "scipy") if importlib.util.find_spec(name) is None]
     if missing:
         raise InputError(f"{' and '.join(missing)} needed for figures; install them: pip install 'awiwi_gen[studies]'")
+    from awiwi_gen.studies.benchmark.compare import all_tables
+
     directory = cached_tree(job)
     library = load(directory, job.store)
     results = Results(

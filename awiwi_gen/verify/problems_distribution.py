@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
@@ -26,7 +26,8 @@ UNREACHABLE = 0.05  # how far a stiffness is from what the tendons can do, in pa
 UNREACHABLE_TORQUE = 0.2  # [N m]
 MILDEST = 12  # halvings of a miss
 RAYS, POINTS = 48, 24  # along which it is looked for forces that are as near, and how many on each
-ROUNDS = 8  # of Newton's method with a derivative in floats: each gains ten digits at least
+ROUNDS = 8  # of Newton's method with a derivative in floats, at most: each gains ten digits at least
+SETTLED = 1e-40  # largest step [N] after which the next would change nothing that two doubles show
 
 
 @dataclass(frozen=True)
@@ -52,11 +53,12 @@ class Distribution:
     solver: Solver
     graphs: Mapping[str, Graph]
     values: Mapping[str, Fraction]
+    _known: dict[bytes, list[Answer]] = field(default_factory=dict, init=False, compare=False)
 
     def sample(self, drawn: dict[str, Array]) -> dict[str, Array]:
         """Poses and limits as drawn, with demands for them."""
         dtype, (low, high) = drawn["q"].dtype, (drawn[end][:, 0] for end in ("f_min", "f_max"))
-        answers = list(self.answers(drawn["q"], low, high))
+        answers = self.answers(drawn["q"], low, high)
         tau, K = (np.array([getattr(a, name) for a in answers]).astype(dtype) for name in ("tau", "K"))
         return {"q": drawn["q"], "tau": tau, "K": K, "f_min": low, "f_max": high}
 
@@ -66,13 +68,16 @@ class Distribution:
 
     # -- demands ----------------------------------------------------------------------------------------------
 
-    def answers(self, q: Array, low: Array, high: Array) -> Iterator[Answer]:
-        """One for every sample; the same for the same arguments."""
-        samples = len(q)
-        random = np.random.default_rng(samples)
-        P, dP = self.tendons(q)
-        for s in range(samples):
-            yield self._answer(s % 4, P[s], dP[s], (float(low[s]), float(high[s])), random)
+    def answers(self, q: Array, low: Array, high: Array) -> list[Answer]:
+        """One for every sample; the same for the same arguments, and then looked for once."""
+        given = b"".join(each.tobytes() for each in (q, low, high))
+        if given not in self._known:
+            random = np.random.default_rng(len(q))
+            P, dP = self.tendons(q)
+            self._known[given] = [
+                self._answer(s % 4, P[s], dP[s], (float(low[s]), float(high[s])), random) for s in range(len(q))
+            ]
+        return self._known[given]
 
     def _answer(self, kind: int, P: Array, dP: Array, ends: Ends, random: Any) -> Answer:
         """Forces, and the demand that they answer best.
@@ -162,7 +167,7 @@ class Distribution:
     def solve(self, inputs: Mapping[str, Array]) -> Reference:
         """Where the free forces leave no slope along the moves that keep the torque; those at limits stay there."""
         q, samples = inputs["q"], len(inputs["q"])
-        answers = list(self.answers(q, inputs["f_min"], inputs["f_max"]))
+        answers = self.answers(q, inputs["f_min"], inputs["f_max"])
         balls = Balls(samples)
         given = [[arb(float(x)) for x in column] for column in q.T]
         P = evaluate(self.graphs["coupling"], balls, lambda node: given[node[2]])["P"]
@@ -181,11 +186,14 @@ class Distribution:
             for s, answer in enumerate(answers)
         ]  # fmt: skip
         for _ in range(ROUNDS):
-            curves = [list(each) for each in self.curve(f, balls)]
+            curves, steps = [list(each) for each in self.curve(f, balls)], [0.0]
             for s, system in enumerate(systems):
                 here = system.improved([row[s] for row in f], [c[s] for c in curves[0]], [c[s] for c in curves[1]])
+                steps += [float(abs(force - row[s])) for row, force in zip(f, here, strict=True)]
                 for row, force in zip(f, here, strict=True):
                     row[s] = force
+            if max(steps) < SETTLED:
+                break
         status = [[arb(0 if answer.feasible else INFEASIBLE) for answer in answers]]
         return reference({"f": f, "status": status})
 

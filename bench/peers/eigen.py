@@ -1,4 +1,4 @@
-"""Where Eigen is: CasADi's wheel ships its headers, which SymForce's and Pinocchio's code needs."""
+"""Where Eigen is: CasADi's wheel ships its headers, which Pinocchio's need."""
 
 from __future__ import annotations
 

@@ -7,8 +7,9 @@ a constant would lose it by one more such equation. Those that the others leave 
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, defaultdict
 from fractions import Fraction
+from functools import cache
 
 from flint import arb, ctx, fmpq
 
@@ -26,6 +27,7 @@ class _System:
 
     def __init__(self) -> None:
         self.solved: dict[int, tuple[Row, Powers]] = {}
+        self._in: defaultdict[int, set[int]] = defaultdict(set)  # in whose solutions a free unknown stands
 
     def reduced(self, row: Row, powers: Powers) -> tuple[Row, Powers]:
         """The same equation in the unknowns that are still free."""
@@ -44,12 +46,15 @@ class _System:
         pivot = max(row)
         factor = row.pop(pivot)
         solution = {unknown: -f / factor for unknown, f in row.items()}, {k: e / factor for k, e in powers.items()}
-        for unknown, (form, value) in self.solved.items():
-            if pivot in form:
-                share = form.pop(pivot)
-                _add(form, solution[0], share)
-                _add(value, solution[1], share)
-                self.solved[unknown] = form, value
+        for unknown in self._in.pop(pivot, set()):
+            form, value = self.solved[unknown]
+            share = form.pop(pivot)
+            _add(form, solution[0], share)
+            _add(value, solution[1], share)
+            for other in solution[0]:
+                (self._in[other].add if other in form else self._in[other].discard)(unknown)
+        for other in solution[0]:
+            self._in[other].add(pivot)
         self.solved[pivot] = solution
         return True
 
@@ -123,15 +128,22 @@ def _equation(graph: Graph, group: list[int], index: int, node: Node) -> tuple[R
 
 def _fulfil(system: _System, wishes: list[tuple[Row, Powers]]) -> int:
     """Add the equations that most constants wish for, until none is left open; returns how many were added."""
+    wishes = [system.reduced(*wish) for wish in wishes]
+    names = [_normal(*wish) if wish[0] else () for wish in wishes]
+    counts = Counter(name for name in names if name)
     added = 0
-    while wishes:
-        wishes = [wish for wish in (system.reduced(*wish) for wish in wishes) if wish[0]]
-        counts = Counter(_normal(*wish) for wish in wishes)
-        if not counts:
-            break
+    while counts:
         best = max(counts.values())
-        chosen = next(wish for wish in wishes if counts[_normal(*wish)] == best)
-        added += system.require(*chosen)
+        row, powers = next(wish for wish, name in zip(wishes, names, strict=True) if name and counts[name] == best)
+        added += system.require(row, powers)
+        for index, wish in enumerate(wishes):
+            if max(row) in wish[0]:  # what the new equation has settled; no other wish has changed
+                counts[names[index]] -= 1
+                wishes[index] = system.reduced(*wish)
+                names[index] = _normal(*wishes[index]) if wishes[index][0] else ()
+                counts[names[index]] += 1
+        counts = +counts
+        del counts[()]
     return added
 
 
@@ -142,6 +154,7 @@ def _normal(row: Row, powers: Powers) -> tuple[object, ...]:
     return (*((u, row[u] / pivot) for u in sorted(row)), round(value, 9))
 
 
+@cache
 def _log(value: Fraction) -> float:
     with ctx.workprec(64):
         return float(arb(fmpq(value.numerator, value.denominator)).log().mid())

@@ -17,6 +17,7 @@ from awiwi_gen.studies.benchmark.clock import require_clocked
 from awiwi_gen.studies.benchmark.joint import joint_of
 from awiwi_gen.studies.benchmark.laws import LAWS, law_of
 from awiwi_gen.studies.benchmark.scenarios import BEFORE, FORCES, PLANTS, run
+from awiwi_gen.studies.table import Table
 
 SHOWN = 30  # ticks from one shown line of a run to the next
 
@@ -26,7 +27,7 @@ class Shown:
     """A result for programs, and as tables for people."""
 
     data: Any
-    tables: Sequence[compare.Table]
+    tables: Sequence[Table]
 
     def show(self, as_json: bool) -> None:
         """Print one or the other."""
@@ -97,5 +98,5 @@ def one_run(hand_file: Path | None, name: str, gains: str, scenario: str, force:
             "law": name, "scenario": scenario, "plant": plant, "force": force, "gains": own, "refused": trace.refused,
             "status": trace.status, "time": time.tolist(), **{name: c.tolist() for name, c in columns.items()},
         },
-        [compare.Table(f"{name}: {scenario}, {plant}", head, rows)],
+        [Table(f"{name}: {scenario}, {plant}", head, rows)],
     )  # fmt: skip

@@ -14,21 +14,13 @@ from awiwi_gen.studies.benchmark.laws import LAWS, STIFFNESS, Law
 from awiwi_gen.studies.benchmark.printed_gains import COLUMNS as PRINTED_COLUMNS
 from awiwi_gen.studies.benchmark.printed_gains import printed_gains
 from awiwi_gen.studies.benchmark.scenarios import FORCES, PLANTS, Score, run, score
+from awiwi_gen.studies.table import Table
 
 COLUMNS = (
     "law", "pretension", "plant", "settling", "overshoot", "steady error", "stiffness error", "sine error", "slack",
     "energy", "chatter", "goal",
 )  # fmt: skip
 CLOCK_COLUMNS = ("law", "pretension", "spectral radius", "delay margin", "noise", "verdict")
-
-
-@dataclass(frozen=True)
-class Table:
-    """Columns and rows of text, the last of them a verdict."""
-
-    title: str
-    columns: tuple[str, ...]
-    rows: list[tuple[str, ...]]
 
 
 @dataclass(frozen=True)

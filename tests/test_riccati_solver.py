@@ -1,0 +1,108 @@
+"""The Riccati solver's C by itself: any number of states up to four, single precision, and numbers beyond reason."""
+
+from __future__ import annotations
+
+import ctypes
+
+import numpy as np
+import pytest
+from tendon_solvers import REAL
+from test_riccati import random_plants
+
+from awiwi_gen.build import FLAGS, compiler
+from awiwi_gen.resources import CSRC
+from awiwi_gen.verify.problems_riccati import optimum
+
+OK, OUT_OF_DOMAIN, NOT_CONVERGED, NOT_FINITE = range(4)
+SINGLE = """#pragma once
+typedef float awiwi_real;
+#define AWIWI_REAL_MAX 3.4028235e+38f
+#define AWIWI_REAL_EPSILON 1.1920929e-07f
+"""
+ROUNDING = {np.float64: 2.0**-53, np.float32: 2.0**-24}
+
+
+@pytest.fixture(scope="module")
+def solve(tmp_path_factory):
+    """Status, K, S and residual in a precision, for plants that are taken as exact."""
+    libraries = {}
+    for dtype, real in ((np.float64, REAL), (np.float32, SINGLE)):
+        directory = tmp_path_factory.mktemp("riccati")
+        (directory / "real.h").write_text(real)
+        sources = [str(CSRC / f"{name}.c") for name in ("riccati", "poles", "dense")]
+        target = directory / "riccati.so"
+        compiler().run(*FLAGS, f"-I{directory}", f"-I{CSRC}", "-shared", *sources, "-lm", "-o", str(target))
+        libraries[dtype] = ctypes.CDLL(str(target)).awiwi_riccati
+
+    def solve(dtype, A, b, Q, r, doublings=32):
+        A, b, Q = (np.ascontiguousarray(part, dtype) for part in (A, b, Q))
+        K, S, residual = np.full(len(b), np.nan, dtype), np.full(A.shape, np.nan, dtype), np.full(1, np.nan, dtype)
+        scalar = ctypes.c_double if dtype is np.float64 else ctypes.c_float
+        A, b, Q, *out = (part.ctypes.data_as(ctypes.c_void_p) for part in (A, b, Q, K, S, residual))
+        return libraries[dtype](len(K), A, b, Q, scalar(r), doublings, *out), K, S, float(residual[0])
+
+    return solve
+
+
+def rounded(dtype, plant):
+    A, b, Q, r = plant
+    return *(np.asarray(part, dtype).astype(float) for part in (A, b, Q)), float(dtype(r))
+
+
+@pytest.mark.parametrize("dtype", ROUNDING, ids=lambda dtype: dtype.__name__)
+@pytest.mark.parametrize("states", [1, 2, 3, 4])
+def test_gains_and_least_cost_are_right_to_the_last_digit(solve, dtype, states):
+    random = np.random.default_rng(states)
+    for _ in range(30):
+        C = random.normal(size=(states, states))
+        given = random.normal(size=(states, states)), random.normal(size=states), C.T @ C + 0.1 * np.eye(states), 0.5
+        plant = rounded(dtype, given)
+        K, S = ([float(x) for x in part] for part in optimum(*plant))
+        status, found, cost, residual = solve(dtype, *plant)
+
+        assert status == OK
+        assert found.tolist() == pytest.approx(K, rel=1.01 * ROUNDING[dtype], abs=0)
+        assert cost.ravel().tolist() == pytest.approx(S, rel=1.01 * ROUNDING[dtype], abs=0)
+        assert residual < 1e4 * ROUNDING[dtype]
+
+
+def test_single_precision_solves_nearly_all_plants_and_says_which_it_does_not(solve):
+    good = 0
+    for given in random_plants(200, seed=21):
+        plant = rounded(np.float32, given)
+        status, K, S, residual = solve(np.float32, *plant)
+        exact = np.array([float(x) for x in optimum(*plant)[0]])
+        good += status == OK
+
+        assert status in (OK, NOT_CONVERGED)
+        assert np.isfinite(K).all()
+        assert np.isfinite(S).all()
+        assert status == NOT_CONVERGED or np.abs(K - exact).max() < 1.01 * ROUNDING[np.float32] * np.abs(exact).max()
+        assert 0 <= residual <= 1
+    assert good >= 196
+
+
+@pytest.mark.parametrize("dtype", ROUNDING, ids=lambda dtype: dtype.__name__)
+@pytest.mark.parametrize("which", range(4))
+@pytest.mark.parametrize("share", [1e-3, 0.9])
+def test_numbers_at_either_end_of_the_range_give_a_status_and_finite_results(solve, dtype, which, share):
+    end = np.log10(float(np.finfo(dtype).max)) * share
+    for sign in (-1, 1):
+        for given in random_plants(40, seed=22):
+            plant = [np.array(part, float) for part in given]
+            plant[which] = plant[which] * 10.0 ** (sign * end - np.log10(np.abs(plant[which]).max()))
+            status, K, S, residual = solve(dtype, *rounded(dtype, plant))
+
+            assert status in (OK, OUT_OF_DOMAIN, NOT_CONVERGED)
+            assert np.isfinite(K).all()
+            assert np.isfinite(S).all()
+            assert 0 <= residual <= 1
+
+
+def test_without_doublings_the_best_known_is_returned_with_its_residual(solve):
+    plant = next(random_plants(1))
+    status, K, _, residual = solve(np.float64, *plant, doublings=0)
+
+    assert status in (OK, NOT_CONVERGED)
+    assert np.isfinite(K).all()
+    assert (residual < 1e-10) == (status == OK)
