@@ -17,12 +17,11 @@ from awiwi_gen.ir.passes.turn import turn
 
 Pass = Callable[[Graph], Graph]
 
-# Tried in turn, the cheapest result wins: whether brackets pay depends on what products share.
+# Tried in turn, and nothing but the end; the cheapest result wins: whether brackets pay depends on what products share.
 BEGINNINGS: tuple[tuple[Pass, ...], ...] = (
     (flatten, turn, share_products, share_sums, factor, scale),
     (flatten, share_products, turn, factor, share_products, share_sums, scale),
     (flatten, turn, factor, scale, share_products, share_sums),
-    (),
 )
 AGAIN: tuple[Pass, ...] = (flatten, share_products, share_sums, factor, scale)  # as long as it helps
 END: tuple[Pass, ...] = (quotients, orient, signs, schedule, gather)
@@ -45,14 +44,15 @@ def stages(graph: Graph, passes: tuple[Pass, ...], known: dict[tuple[Pass, ...],
 def optimise(graph: Graph) -> Stages:
     """The stages of the cheapest way; the last one is what is emitted."""
     known: dict[tuple[Pass, ...], Graph] = {}
-    ways = [[("", graph), *stages(graph, passes, known)] for passes in BEGINNINGS]
-    best = min(ways, key=_weight)
+    way = min((stages(graph, passes, known) for passes in BEGINNINGS), key=_rough)
     while True:
-        further = [*best, *stages(best[-1][1], AGAIN)]
-        if _weight(further) >= _weight(best):
-            return [*best, *stages(best[-1][1], END)][1:]
-        best = further
+        further = [*way, *stages(way[-1][1], AGAIN)]
+        if _rough(further) >= _rough(way):
+            break
+        way = further
+    return min(stages(graph, END), [*way, *stages(way[-1][1], END)], key=lambda ended: cost(ended[-1][1]).weight)
 
 
-def _weight(way: Stages) -> float:
-    return cost(way[-1][1]).weight
+def _rough(way: Stages) -> float:
+    """What the end of a way will cost, but for the last few signs."""
+    return cost(orient(quotients(way[-1][1]))).weight
