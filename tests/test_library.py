@@ -227,7 +227,8 @@ def test_several_outputs_come_as_a_named_tuple(lib):
     assert result._fields == ("M", "C", "gravity")
     assert type(result).__name__ == "index_dynamics"
     assert result.M is result[0]
-    assert np.array_equal(result.M, lib.index_mass_matrix(np.zeros(4)))
+    M = lib.index_mass_matrix(np.zeros(4))  # a kernel of its own, which may round otherwise
+    assert np.abs(result.M - M).max() <= 1e-15 * M.max()
 
 
 def test_a_kernel_that_can_fail_adds_its_status(lib):
