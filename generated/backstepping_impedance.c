@@ -25,9 +25,9 @@ int awiwi_backstepping_impedance(const double state[restrict 4], const double de
     const double t0 = 1.0/plant[0];
     const double t1 = (external[0] + state[2])*t0;
     const double t2 = desired[2] - t1;
-    const double t3 = desired[1] - state[1];
-    const double t4 = (gains[2]*gains[3] + weights[0]/weights[1])*(state[2] - desired[2]*plant[0] - gains[0]*(desired[0] - state[0]) - gains[1]*t3);
-    const double t5 = desired[4]*plant[0] + gains[0]*t2 + gains[1]*(desired[3] - (external[1] + state[3])*t0) + (gains[3]*t3 + t2)/weights[0] - t4 - (gains[2] + gains[3])*(state[3] - desired[3]*plant[0] - gains[0]*t3 - gains[1]*t2);
-    tau_m[0] = state[2] + plant[1]*(t1 + t5/plant[2]);
+    const double t3 = state[1] - desired[1];
+    const double t4 = (gains[2]*gains[3] + weights[0]/weights[1])*(state[2] + (gains[0]*(state[0] - desired[0]) - desired[2]*plant[0] + gains[1]*t3));
+    const double t5 = gains[1]*(desired[3] - (external[1] + state[3])*t0) + (desired[4]*plant[0] + gains[0]*t2) - (t4 + (gains[2] + gains[3])*(state[3] + (gains[0]*t3 - desired[3]*plant[0] - gains[1]*t2)));
+    tau_m[0] = state[2] + plant[1]*(t1 + ((t2 - gains[3]*t3)/weights[0] + t5)/plant[2]);
     return plant[0] > 0.0 && plant[1] > 0.0 && plant[2] > 0.0 && gains[0] > 0.0 && gains[1] > 0.0 && gains[2] > 0.0 && gains[3] > 0.0 && weights[0] > 0.0 && weights[1] > 0.0 ? 0 : 1;
 }

@@ -12,7 +12,7 @@
  * Returns 0 where the link's inertia is positive and the motor's inertia is positive and the stiffness
  * is positive and k1 is positive and k2 is positive and k3 is positive and k4 is positive and c2 is
  * positive and c3 is positive and c4 is positive; elsewhere 1, and what is not defined is NaN.
- * Cost: 22 add, 17 mul, 4 div.
+ * Cost: 22 add, 16 mul, 4 div.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
 #include "kernels.h"
@@ -22,11 +22,12 @@ int awiwi_backstepping_position(const double motion[restrict 4], const double de
     const double t0 = rates[0] + rates[1];
     const double t1 = rates[2] + t0;
     const double t2 = scales[1]/scales[2];
-    const double t3 = 1.0/scales[0] + rates[0]*rates[1];
-    const double t4 = scales[0]/scales[1];
-    const double t5 = t3 + rates[2]*t0 + t4;
-    const double t6 = rates[0]*t4 + rates[2]*t3;
-    const double t7 = desired[4] + (desired[3] - motion[3])*(rates[3] + t1) + (desired[2] - motion[2])*(t2 + t5 + rates[3]*t1) + (desired[1] - motion[1])*(t0*t2 + t6 + rates[3]*t5) + (desired[0] - motion[0])*(t3*t2 + rates[3]*t6);
-    tau_m[0] = motion[2]*(plant[0] + plant[1]) + plant[0]*plant[1]*(1.0/plant[2])*t7;
+    const double t3 = scales[0]/scales[1];
+    const double t4 = 1.0/scales[0] + rates[0]*rates[1];
+    const double t5 = t3 + (t4 + rates[2]*t0);
+    const double t6 = rates[0]*t3 + rates[2]*t4;
+    const double t7 = (desired[0] - motion[0])*(t4*t2 + rates[3]*t6) + (desired[1] - motion[1])*(t0*t2 + (t6 + rates[3]*t5));
+    const double t8 = desired[4] + ((desired[3] - motion[3])*(rates[3] + t1) + ((desired[2] - motion[2])*(t2 + (rates[3]*t1 + t5)) + t7));
+    tau_m[0] = motion[2]*(plant[0] + plant[1]) + plant[0]*plant[1]/plant[2]*t8;
     return plant[0] > 0.0 && plant[1] > 0.0 && plant[2] > 0.0 && rates[0] > 0.0 && rates[1] > 0.0 && rates[2] > 0.0 && rates[3] > 0.0 && scales[0] > 0.0 && scales[1] > 0.0 && scales[2] > 0.0 ? 0 : 1;
 }

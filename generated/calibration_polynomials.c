@@ -14,19 +14,19 @@
  *   out  stiffness[1] in N/m
  * Returns 0 where the argument is within the lever's travel, give or take a hundredth; elsewhere 1,
  * and what is not defined is NaN.
- * Cost: 22 add, 20 mul, 1 div.
+ * Cost: 23 add, 19 mul, 1 div.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
 #include "kernels.h"
 
 int awiwi_calibration_polynomials(const double counts[restrict 1], const double ends[restrict 2], const double length_powers[restrict 7], const double force_powers[restrict 7], const double stiffness_powers[restrict 7], double dL[restrict 1], double force[restrict 1], double stiffness[restrict 1])
 {
-    const double t0 = (ends[0] + ends[1] - 2.0*counts[0])/(ends[0] - ends[1]);
-    const double t1 = length_powers[2] + t0*(length_powers[3] + t0*(length_powers[4] + t0*(length_powers[5] + length_powers[6]*t0)));
-    const double t2 = force_powers[2] + t0*(force_powers[3] + t0*(force_powers[4] + t0*(force_powers[5] + force_powers[6]*t0)));
-    const double t3 = t0*(stiffness_powers[3] + t0*(stiffness_powers[4] + t0*(stiffness_powers[5] + stiffness_powers[6]*t0)));
-    dL[0] = length_powers[0] + t0*(length_powers[1] + t0*t1);
-    force[0] = force_powers[0] + t0*(force_powers[1] + t0*t2);
-    stiffness[0] = stiffness_powers[0] + t0*(stiffness_powers[1] + t0*(stiffness_powers[2] + t3));
+    const double t0 = (counts[0] - ends[0] + (counts[0] - ends[1]))/(ends[0] - ends[1]);
+    const double t1 = length_powers[2] - t0*(length_powers[3] - t0*(length_powers[4] - t0*(length_powers[5] - length_powers[6]*t0)));
+    const double t2 = force_powers[2] - t0*(force_powers[3] - t0*(force_powers[4] - t0*(force_powers[5] - force_powers[6]*t0)));
+    const double t3 = t0*(stiffness_powers[3] - t0*(stiffness_powers[4] - t0*(stiffness_powers[5] - stiffness_powers[6]*t0)));
+    dL[0] = length_powers[0] - t0*(length_powers[1] - t0*t1);
+    force[0] = force_powers[0] - t0*(force_powers[1] - t0*t2);
+    stiffness[0] = stiffness_powers[0] - t0*(stiffness_powers[1] - t0*(stiffness_powers[2] - t3));
     return 1.015625 - t0*t0 > 0.0 ? 0 : 1;
 }

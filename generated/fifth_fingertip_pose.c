@@ -4,7 +4,7 @@
  * Source: eq. 5.2, 5.3, table 5.1.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   out  T[4][4] in 1, m
- * Cost: 28 add, 46 mul, 1 div, 3 neg, 1 sqrt, 5 sincos.
+ * Cost: 29 add, 45 mul, 1 div, 3 neg, 1 sqrt, 5 sincos.
  * Inputs: sha256 28edf41a51f84ef24222facbdc6e1021f809ccdd8b122d41df2ba55b8d1b95d9.
  */
 #include <math.h>
@@ -16,35 +16,36 @@ void awiwi_fifth_fingertip_pose(const double q[restrict 4], double T[restrict 16
     const double t0 = q[2] + q[3];
     const double t1 = t0 + 0.7692307692307693*q[3];
     const double t2 = q[0] + 1.0471975511965979;
-    const awiwi_turn4 a0 = awiwi_sincos4(q[1], t1, t2, q[2]);
-    const double t3 = a0.cos[0]*a0.cos[1];
-    const double t4 = a0.cos[2] - 1.0166666666666666;
-    const double t5 = 1.0/t4;
-    const double t6 = t4 + 0.26979166666666665;
+    const awiwi_turn4 a0 = awiwi_sincos4(t1, q[1], t2, q[2]);
+    const double t3 = 0.00024*a0.cos[2] - 0.000244;
+    const double t4 = 1.0/t3;
+    const double t5 = 0.01*a0.sin[2];
+    const double t6 = 0.5*(t3 - 5.625e-05 + 0.000121);
     const double t7 = 0.01*a0.cos[2];
     const double t8 = t7 - 0.012;
-    const double t9 = sqrt(-1.44e-08*t6*t6 - 1.35e-08*t4);
-    const double t10 = 1.2e-06*a0.sin[2]*t6 + t8*t9;
-    const double t11 = t6*t8 - 83.33333333333333*a0.sin[2]*t9;
-    const double t12 = t5*(479784.442228385*t10 + 33.610469291294464*t11);
-    const double t13 = t5*(280087.2440941205*t10 - 57.5741330674062*t11);
-    const double t14 = a0.cos[0]*a0.sin[1];
+    const double t9 = sqrt(-5.625e-05*t3 - t6*t6);
+    const double t10 = t4*(t5*t6 + t8*t9);
+    const double t11 = t4*(t8*t6 - t5*t9);
+    const double t12 = 115.1482661348124*t10 + 67.22093858258893*t11;
+    const double t13 = a0.cos[1]*t12;
+    const double t14 = 67.22093858258893*t10 - 115.1482661348124*t11;
     const awiwi_turn a1 = awiwi_sincos(t0);
-    const double t15 = 0.033*a0.sin[3] + 0.022*a1.sin + 0.018*a0.sin[1] - 0.006;
-    const double t16 = 0.033*a0.cos[3] + 0.022*a1.cos + 0.018*a0.cos[1] + 0.006;
-    const double t17 = 0.0036*a0.sin[0] - a0.cos[0]*t16 - 0.004;
-    T[0] = t3*t12 - a0.sin[1]*t13;
-    T[1] = -(a0.cos[1]*t13) - t14*t12;
-    T[2] = a0.sin[0]*t12;
-    T[3] = t7 - t15*t13 - t17*t12;
-    T[4] = a0.sin[0]*a0.cos[1];
-    T[5] = -(a0.sin[0]*a0.sin[1]);
-    T[6] = -a0.cos[0];
-    T[7] = 0.0036*a0.cos[0] + a0.sin[0]*t16;
-    T[8] = a0.sin[1]*t12 + t3*t13;
-    T[9] = a0.cos[1]*t12 - t14*t13;
-    T[10] = a0.sin[0]*t13;
-    T[11] = 0.01*a0.sin[2] + t15*t12 - t17*t13;
+    const double t15 = 0.033*a0.sin[3] + (0.022*a1.sin + 0.018*a0.sin[0]) - 0.006;
+    const double t16 = 0.033*a0.cos[3] + (0.022*a1.cos + 0.018*a0.cos[0]) + 0.006;
+    const double t17 = 0.0036*a0.sin[1] - a0.cos[1]*t16 - 0.004;
+    const double t18 = a0.cos[1]*t14;
+    T[0] = a0.cos[0]*t13 - a0.sin[0]*t14;
+    T[1] = -(a0.cos[0]*t14) - a0.sin[0]*t13;
+    T[2] = a0.sin[1]*t12;
+    T[3] = t7 - (t15*t14 + t17*t12);
+    T[4] = a0.sin[1]*a0.cos[0];
+    T[5] = -(a0.sin[1]*a0.sin[0]);
+    T[6] = -a0.cos[1];
+    T[7] = 0.0036*a0.cos[1] + a0.sin[1]*t16;
+    T[8] = a0.sin[0]*t12 + a0.cos[0]*t18;
+    T[9] = a0.cos[0]*t12 - a0.sin[0]*t18;
+    T[10] = a0.sin[1]*t14;
+    T[11] = t5 + (t15*t12 - t17*t14);
     T[12] = 0.0;
     T[13] = 0.0;
     T[14] = 0.0;

@@ -50,7 +50,7 @@ void awiwi_index_dynamics(const double q[restrict 4], const double qd[restrict 4
     const double t30 = 0.006*t29 + t28 + a0.sin[0]*t8 + 3.86e-08;
     const double t31 = qd[1] + qd[2];
     const double t32 = qd[3] + t31;
-    const double t33 = t32*(1.6668238539209836e-07*a0.sin[2]);
+    const double t33 = 1.6668238539209836e-07*t32*a0.sin[2];
     const double t34 = t31*(7.5326e-07*a0.cos[1] - 5.8e-09*a0.sin[1]) - t33;
     const double t35 = qd[0]*t30;
     const double t36 = qd[0]*t28;

@@ -76,7 +76,7 @@ void awiwi_thumb_mass_matrix(const double q[4], double M[16]);
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   in   qd[4] in rad/s, -20 to 20
  *   out  C[4][4] in N m s/rad
- * Cost: 132 add, 137 mul, 1 neg, 3 sincos.
+ * Cost: 133 add, 138 mul, 1 neg, 3 sincos.
  */
 void awiwi_thumb_coriolis_matrix(const double q[4], const double qd[4], double C[16]);
 
@@ -386,7 +386,7 @@ void awiwi_index_inverse_dynamics(const double q[4], const double qd[4], const d
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  dtau_dq[4][4] in N m/rad
  *   out  dtau_dqd[4][4] in N m s/rad
- * Cost: 164 add, 198 mul, 1 neg, 4 sincos.
+ * Cost: 164 add, 197 mul, 1 neg, 4 sincos.
  */
 void awiwi_index_inverse_dynamics_derivatives(const double q[4], const double qd[4], const double qdd[4], const double g[3], double dtau_dq[16], double dtau_dqd[16]);
 
@@ -638,7 +638,7 @@ void awiwi_middle_inverse_dynamics(const double q[4], const double qd[4], const 
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  dtau_dq[4][4] in N m/rad
  *   out  dtau_dqd[4][4] in N m s/rad
- * Cost: 164 add, 198 mul, 1 neg, 4 sincos.
+ * Cost: 164 add, 197 mul, 1 neg, 4 sincos.
  */
 void awiwi_middle_inverse_dynamics_derivatives(const double q[4], const double qd[4], const double qdd[4], const double g[3], double dtau_dq[16], double dtau_dqd[16]);
 
@@ -915,7 +915,7 @@ void awiwi_ring_forward_dynamics(const double q[3], const double qd[3], const do
  *   out  M[3][3] in kg m^2
  *   out  C[3][3] in N m s/rad
  *   out  gravity[3] in N m
- * Cost: 87 add, 97 mul, 4 sincos.
+ * Cost: 87 add, 96 mul, 4 sincos.
  */
 void awiwi_ring_dynamics(const double q[3], const double qd[3], const double g[3], double M[9], double C[9], double gravity[3]);
 
@@ -1049,7 +1049,7 @@ int awiwi_fifth_tendon_stiffness(const double tension[8], double k[8], double sl
  * Source: eq. 5.2, 5.3, table 5.1.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   out  T[4][4] in 1, m
- * Cost: 28 add, 46 mul, 1 div, 3 neg, 1 sqrt, 5 sincos.
+ * Cost: 29 add, 45 mul, 1 div, 3 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_fingertip_pose(const double q[4], double T[16]);
 
@@ -1320,7 +1320,7 @@ int awiwi_wrist_points(const double q71[1], const double q73[1], double A[3], do
  *   out  T[4][4] in 1, m
  * Returns 0 where the side bars are short of the line B0C0 (q73 between 0 and pi) and their plane is
  * short of A0 and bar AA0 reaches; elsewhere 1, and what is not defined is NaN.
- * Cost: 24 add, 48 mul, 2 div, 2 neg, 1 sqrt, 2 sincos.
+ * Cost: 24 add, 48 mul, 2 div, 1 neg, 1 sqrt, 2 sincos.
  */
 int awiwi_wrist_palm_pose(const double q71[1], const double q73[1], double T[16]);
 
@@ -1332,7 +1332,7 @@ int awiwi_wrist_palm_pose(const double q71[1], const double q73[1], double T[16]
  *   out  h[38] in m
  * Returns 0 where the side bars are short of the line B0C0 (q73 between 0 and pi) and their plane is
  * short of A0 and bar AA0 reaches; elsewhere 1, and what is not defined is NaN.
- * Cost: 180 add, 145 mul, 2 div, 39 sqrt, 2 sincos.
+ * Cost: 180 add, 144 mul, 2 div, 39 sqrt, 2 sincos.
  */
 int awiwi_wrist_tendon_lengths(const double q71[1], const double q73[1], double h[38]);
 
@@ -1357,7 +1357,7 @@ int awiwi_wrist_coupling(const double q71[1], const double q73[1], double dh[76]
  *   out  h[38] in m
  * Returns 0 where the side bars are short of the line B0C0 (q73 between 0 and pi) and their plane is
  * short of A0 and bar AA0 reaches; elsewhere 1, and what is not defined is NaN.
- * Cost: 254 add, 182 mul, 2 div, 43 sqrt, 4 sincos.
+ * Cost: 254 add, 181 mul, 2 div, 43 sqrt, 4 sincos.
  */
 int awiwi_hand_tendon_lengths(const double q[19], const double wrist[2], double h[38]);
 
@@ -1606,7 +1606,7 @@ int awiwi_calibration_readings(const double readings[38], double dL[38], double 
  *   out  stiffness[1] in N/m
  * Returns 0 where the argument is within the lever's travel, give or take a hundredth; elsewhere 1,
  * and what is not defined is NaN.
- * Cost: 22 add, 20 mul, 1 div.
+ * Cost: 23 add, 19 mul, 1 div.
  */
 int awiwi_calibration_polynomials(const double counts[1], const double ends[2], const double length_powers[7], const double force_powers[7], const double stiffness_powers[7], double dL[1], double force[1], double stiffness[1]);
 
@@ -1666,7 +1666,7 @@ int awiwi_stiffness_correction(const double K_eff[16], const double K_mech[16], 
  *   out  sensitivity[1] in 1
  * Returns 0 where k_eff is positive and k_mech - k_eff is positive; elsewhere 1, and what is not
  * defined is NaN.
- * Cost: 1 add, 5 mul, 2 div, 3 neg.
+ * Cost: 1 add, 4 mul, 2 div, 3 neg.
  */
 int awiwi_stiffness_correction_scalar(const double k_eff[1], const double k_mech[1], double k_imp[1], double sensitivity[1]);
 
@@ -1980,7 +1980,7 @@ void awiwi_backstepping_academic_lyapunov(const double x[2], const double k[2], 
  * Returns 0 where the link's inertia is positive and the motor's inertia is positive and the stiffness
  * is positive and k1 is positive and k2 is positive and k3 is positive and k4 is positive and c2 is
  * positive and c3 is positive and c4 is positive; elsewhere 1, and what is not defined is NaN.
- * Cost: 22 add, 17 mul, 4 div.
+ * Cost: 22 add, 16 mul, 4 div.
  */
 int awiwi_backstepping_position(const double motion[4], const double desired[5], const double plant[3], const double rates[4], const double scales[3], double tau_m[1]);
 

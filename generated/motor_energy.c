@@ -11,5 +11,5 @@
 
 void awiwi_motor_energy(const double thd[restrict 1], double energy[restrict 1])
 {
-    energy[0] = 0.0010005*thd[0]*thd[0];
+    energy[0] = 0.0010005*(thd[0]*thd[0]);
 }

@@ -8,7 +8,7 @@
  *   out  M[3][3] in kg m^2
  *   out  C[3][3] in N m s/rad
  *   out  gravity[3] in N m
- * Cost: 87 add, 97 mul, 4 sincos.
+ * Cost: 87 add, 96 mul, 4 sincos.
  * Inputs: sha256 d2fd8ea8122210c370a876d04ecdbc1ca49df3b198ba198458bb7b3639479b1a.
  */
 #include "trig.h"
@@ -51,10 +51,10 @@ void awiwi_ring_dynamics(const double q[restrict 3], const double qd[restrict 3]
     const double t31 = 0.006*t30 + t29 + a0.sin[0]*t8 + 3.95e-08;
     const double t32 = qd[1] + qd[2];
     const double t33 = t32 + t26;
-    const double t34 = t33*(1.518649189246812e-07*a0.sin[2]);
-    const double t35 = t32*(6.2216e-07*a0.cos[1] - 5.44e-09*a0.sin[1]) - t34;
+    const double t34 = t33*a0.sin[2];
+    const double t35 = t32*(6.2216e-07*a0.cos[1] - 5.44e-09*a0.sin[1]) - 1.518649189246812e-07*t34;
     const double t36 = qd[0]*t31;
-    const double t37 = -0.7857142857142857*(qd[0]*t28) + qd[0]*t29;
+    const double t37 = qd[0]*(t29 - 0.7857142857142857*t28);
     const double t38 = t13*t17 - t14*t3;
     const double t39 = qd[1]*t38;
     const double t40 = t19*t16 - t20*t2;
@@ -74,13 +74,13 @@ void awiwi_ring_dynamics(const double q[restrict 3], const double qd[restrict 3]
     M[8] = t23 + 1.5714285714285714*t22 + 2.9889469387755104e-07;
     C[0] = t26*t28 - qd[2]*t29 - qd[1]*t31;
     C[1] = qd[1]*(1.0264e-06*a0.cos[0] - 9.6e-09*a0.sin[0]) + t35 - t36;
-    C[2] = t35 - 0.7857142857142857*t34 - t37;
+    C[2] = t35 - t37 - 1.193224362979638e-07*t34;
     C[3] = t36;
     C[4] = t39 + t44;
-    C[5] = t44 - 0.7857142857142857*(t33*(t43 + t40));
+    C[5] = t44 - 0.7857142857142857*t33*(t43 + t40);
     C[6] = t37;
     C[7] = t42 + t39 + 0.7857142857142857*(qd[1]*t43 + t41);
-    C[8] = t42 + (t32 - t33)*(0.7857142857142857*t40);
+    C[8] = 0.7857142857142857*(t32 - t33)*t40 + t42;
     gravity[0] = 2.64e-05*t45 + (g[0]*a0.sin[3] - g[1]*a0.cos[3])*(t4 + 0.0001245);
     gravity[1] = t45*(t30 + t17) - g[2]*t4;
     gravity[2] = t45*t17 - g[2]*t3 - 0.7857142857142857*(g[2]*t2 - t45*t16);

@@ -9,7 +9,7 @@
  *   out  sensitivity[1] in 1
  * Returns 0 where k_eff is positive and k_mech - k_eff is positive; elsewhere 1, and what is not
  * defined is NaN.
- * Cost: 1 add, 5 mul, 2 div, 3 neg.
+ * Cost: 1 add, 4 mul, 2 div, 3 neg.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
 #include "kernels.h"
@@ -18,6 +18,6 @@ int awiwi_stiffness_correction_scalar(const double k_eff[restrict 1], const doub
 {
     const double t0 = k_eff[0] - k_mech[0];
     k_imp[0] = -(k_eff[0]*k_mech[0]*(1.0/t0));
-    sensitivity[0] = -(k_eff[0]*k_eff[0]*(1.0/(t0*t0)));
+    sensitivity[0] = -(k_eff[0]*k_eff[0]/(t0*t0));
     return k_eff[0] > 0.0 && -t0 > 0.0 ? 0 : 1;
 }

@@ -5,7 +5,7 @@
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   in   qd[4] in rad/s, -20 to 20
  *   out  C[4][4] in N m s/rad
- * Cost: 132 add, 137 mul, 1 neg, 3 sincos.
+ * Cost: 133 add, 138 mul, 1 neg, 3 sincos.
  * Inputs: sha256 7b84cff4d714f7801a015d67dddafc5b225e2074838058dae8e0fa66262823e0.
  */
 #include "trig.h"
@@ -64,44 +64,43 @@ void awiwi_thumb_coriolis_matrix(const double q[restrict 4], const double qd[res
     const double t47 = t40*t28;
     const double t48 = t19 - t8;
     const double t49 = t22 + t10 - t12;
-    const double t50 = t48 + t49;
-    const double t51 = a0.sin[2]*(4.5686e-07*t40 + qd[1]*(t41 - 2.95e-08) + t43 + qd[2]*(t44 + t45) + t2*(t45 - t46)) - 0.13333333333333333*t42*t31 - a0.cos[2]*(6.48e-08*qd[0] + t47 + t42*t38 - qd[1]*(t50 + 1.58e-07));
-    const double t52 = t23 + t14;
-    const double t53 = t21 + t40*t48;
-    const double t54 = t44 + 1.4222222222222223*a0.sin[0]*t8 - t46;
-    const double t55 = t42*t49;
-    const double t56 = t20 + t40*t8;
-    const double t57 = 0.7111111111111111*(a0.cos[0]*t56 + a0.sin[0]*(t4 + t40*t3));
-    const double t58 = t42*t12;
-    const double t59 = qd[1]*t8 + t42*t3;
-    const double t60 = 0.13333333333333333*t56 + a0.cos[2]*(t56 + t57) - a0.sin[2]*(t17 + t40*t16 + qd[1]*t46 + t58 - t1*t59);
-    const double t61 = 0.13333333333333333*qd[0];
-    const double t62 = t7*t3;
-    const double t63 = t2*t26;
-    const double t64 = qd[2]*t25 + t63;
-    const double t65 = t61*t32 + a0.sin[2]*(t4 + qd[2]*(t29 + t34 + t62) + t2*(t62 - t36) + t40*t38 - t43) - a0.cos[2]*(4.5686e-07*t42 - t64 - t47);
-    const double t66 = t30 + t37;
-    const double t67 = qd[1]*t50 - t40*t27;
-    const double t68 = t40*t26 + qd[1]*t12;
-    const double t69 = a0.cos[2]*(t61*t48 + qd[0]*(a0.sin[2]*t41 + a0.cos[2]*t48) + t52 - qd[1]*t27) - a0.sin[2]*(t55 + qd[1]*t66);
-    const double t70 = t62 - t45;
-    const double t71 = 0.7111111111111111*(qd[1]*a0.cos[0] + a0.sin[0]*t42);
-    const double t72 = qd[2] + t40;
-    const double t73 = qd[1]*t26 + t61*t8 + 0.7111111111111111*t72*(a0.cos[0]*t8 + a0.sin[0]*t3) - qd[0]*(a0.sin[2]*t16 - a0.cos[2]*t8);
+    const double t50 = a0.sin[2]*(4.5686e-07*t40 + qd[1]*(t41 - 2.95e-08) + t43 + qd[2]*(t44 + t45) + t2*(t45 - t46)) - 0.13333333333333333*t42*t31 - a0.cos[2]*(6.48e-08*qd[0] + t47 + t42*t38 - qd[1]*(t48 + t49 + 1.58e-07));
+    const double t51 = t23 + t14;
+    const double t52 = t21 + t40*t48;
+    const double t53 = t44 + 1.4222222222222223*a0.sin[0]*t8 - t46;
+    const double t54 = t42*t49;
+    const double t55 = t20 + t40*t8;
+    const double t56 = 0.7111111111111111*(a0.cos[0]*t55 + a0.sin[0]*(t4 + t40*t3));
+    const double t57 = t42*t12;
+    const double t58 = qd[1]*t8 + t42*t3;
+    const double t59 = 0.13333333333333333*t55 + a0.cos[2]*(t55 + t56) - a0.sin[2]*(t17 + t40*t16 + qd[1]*t46 + t57 - t1*t58);
+    const double t60 = 0.13333333333333333*qd[0];
+    const double t61 = t7*t3;
+    const double t62 = t2*t26;
+    const double t63 = qd[2]*t25 + t62;
+    const double t64 = t60*t32 + a0.sin[2]*(t4 + qd[2]*(t29 + (t34 + t61)) + t2*(t61 - t36) + t40*t38 - t43) - a0.cos[2]*(4.5686e-07*t42 - t63 - t47);
+    const double t65 = t30 + t37;
+    const double t66 = qd[1]*t48 + (qd[1]*t49 - t40*t27);
+    const double t67 = t40*t26 + qd[1]*t12;
+    const double t68 = a0.cos[2]*(t60*t48 + qd[0]*(a0.sin[2]*t41 + a0.cos[2]*t48) + t51 - qd[1]*t27) - a0.sin[2]*(t54 + qd[1]*t65);
+    const double t69 = t61 - t45;
+    const double t70 = 0.7111111111111111*(qd[1]*a0.cos[0] + a0.sin[0]*t42);
+    const double t71 = qd[2] + t40;
+    const double t72 = qd[1]*t26 + t60*t8 + 0.7111111111111111*t71*(a0.cos[0]*t8 + a0.sin[0]*t3) - qd[0]*(a0.sin[2]*t16 - a0.cos[2]*t8);
     C[0] = t39;
-    C[1] = t51;
-    C[2] = a0.cos[2]*(t52 - t53) - 0.13333333333333333*t53 - a0.sin[2]*(t18 + t40*t41 - qd[1]*t54 - t55);
-    C[3] = t60;
-    C[4] = t65;
+    C[1] = t50;
+    C[2] = a0.cos[2]*(t51 - t52) - 0.13333333333333333*t52 - a0.sin[2]*(t18 + t40*t41 - qd[1]*t53 - t54);
+    C[3] = t59;
+    C[4] = t64;
     C[5] = t24;
-    C[6] = t64 + t42*t66 - t67;
-    C[7] = t63 + (t7 + 1.0)*t59 + t68 - t42*t36;
-    C[8] = t69;
-    C[9] = t67 - t42*(t30 + t54 + 2.0*t70 + 1.02773e-05);
-    C[10] = t52;
-    C[11] = t57;
-    C[12] = a0.sin[2]*(t58 - t3*t71 - qd[1]*(t3 - t36)) - a0.cos[2]*t73;
-    C[13] = t42*(t46 - t3 - t70 - 1.09224e-06) - t8*(qd[1] + t71) - t68;
-    C[14] = t72*(-t9 - t22);
+    C[6] = t63 + t42*t65 - t66;
+    C[7] = t62 + (t7 + 1.0)*t58 + t67 - t42*t36;
+    C[8] = t68;
+    C[9] = t66 - t42*(t30 + t53 + 2.0*t69 + 1.02773e-05);
+    C[10] = t51;
+    C[11] = t56;
+    C[12] = a0.sin[2]*(t57 - t3*t70 - qd[1]*(t3 - t36)) - a0.cos[2]*t72;
+    C[13] = t42*(t46 - t3 - t69 - 1.09224e-06) - t8*(qd[1] + t70) - t67;
+    C[14] = t71*(-t9 - t22);
     C[15] = 0.0;
 }

@@ -51,9 +51,9 @@ void awiwi_thumb_coupling_derivative(const double q[restrict 4], double dP[restr
     const double t34 = t32 - t33;
     const double t35 = t9 + t7;
     const double t36 = t35*t3;
-    const double t37 = t36 + (t31*t13 - t34*t20);
+    const double t37 = t36 + t31*t13 - t34*t20;
     const double t38 = t21*(t31*t23 - t34*t25 - t37*t28);
-    const double t39 = t34*t34 + (t35*t35 + ((t1 - t0)*t3 + t31*t31));
+    const double t39 = t35*t35 + (t1 - t0)*t3 + t34*t34 + t31*t31;
     const double t40 = t17 + t15;
     const double t41 = t10 + t8;
     const double t42 = t0 + t2;
@@ -74,9 +74,9 @@ void awiwi_thumb_coupling_derivative(const double q[restrict 4], double dP[restr
     const double t57 = t29 + t30;
     const double t58 = t9 - t7;
     const double t59 = t58*t42;
-    const double t60 = t59 + (t56*t47 - t57*t45);
+    const double t60 = t59 + t56*t47 - t57*t45;
     const double t61 = t48*(t56*t52 - t57*t50 - t60*t55);
-    const double t62 = t56*t56 + (t58*t58 + (t57*t57 - (t1 + t0)*t42));
+    const double t62 = t58*t58 + t56*t56 + t57*t57 - (t1 + t0)*t42;
     const double t63 = t17 - t15;
     const double t64 = t10 - t8;
     const double t65 = t6 - t12;
@@ -89,7 +89,7 @@ void awiwi_thumb_coupling_derivative(const double q[restrict 4], double dP[restr
     const double t72 = t68*t65 - t70*t66;
     const double t73 = t67*t67;
     const double t74 = t72*t73;
-    const double t75 = t36 + (t34*t66 - t31*t65);
+    const double t75 = t36 + t34*t66 - t31*t65;
     const double t76 = t67*(t34*t71 + t31*t69 + t75*t74);
     const double t77 = t6 + t44;
     const double t78 = t16 + t19;
@@ -101,14 +101,14 @@ void awiwi_thumb_coupling_derivative(const double q[restrict 4], double dP[restr
     const double t84 = t80*t77 - t82*t78;
     const double t85 = t79*t79;
     const double t86 = t84*t85;
-    const double t87 = t59 + (t57*t77 - t56*t78);
-    const double t88 = t79*(t87*t86 - (t56*t83 + t57*t81));
+    const double t87 = t59 + t57*t77 - t56*t78;
+    const double t88 = t79*(t87*t86 - t56*t83 - t57*t81);
     dP[0] = t21*(t22*t23 + t24*t25 - t26*t28);
     dP[1] = t38;
     dP[2] = 0.0;
     dP[3] = 0.0;
     dP[4] = t38;
-    dP[5] = t21*(t39 + (t40*t20 - t41*t13) - t37*t37*t27);
+    dP[5] = t21*(t39 + t40*t20 - t41*t13 - t37*t37*t27);
     dP[6] = 0.0;
     dP[7] = 0.0;
     dP[8] = 0.0;
@@ -124,7 +124,7 @@ void awiwi_thumb_coupling_derivative(const double q[restrict 4], double dP[restr
     dP[18] = 0.0;
     dP[19] = 0.0;
     dP[20] = t61;
-    dP[21] = t48*(t62 + (t63*t47 - t64*t45) - t60*t60*t54);
+    dP[21] = t48*(t62 + t63*t47 - t64*t45 - t60*t60*t54);
     dP[22] = 0.0;
     dP[23] = 0.0;
     dP[24] = 0.0;
@@ -140,7 +140,7 @@ void awiwi_thumb_coupling_derivative(const double q[restrict 4], double dP[restr
     dP[34] = 0.0;
     dP[35] = 0.0;
     dP[36] = t76;
-    dP[37] = t67*(t39 + (t41*t65 - t40*t66) - t75*t75*t73);
+    dP[37] = t67*(t39 + t41*t65 - t40*t66 - t75*t75*t73);
     dP[38] = 0.0;
     dP[39] = 0.0;
     dP[40] = 0.0;
@@ -156,7 +156,7 @@ void awiwi_thumb_coupling_derivative(const double q[restrict 4], double dP[restr
     dP[50] = 0.0;
     dP[51] = 0.0;
     dP[52] = t88;
-    dP[53] = t79*(t62 + (t64*t77 - t63*t78) - t87*t87*t85);
+    dP[53] = t79*(t62 + t64*t77 - t63*t78 - t87*t87*t85);
     dP[54] = 0.0;
     dP[55] = 0.0;
     dP[56] = 0.0;

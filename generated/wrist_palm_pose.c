@@ -7,7 +7,7 @@
  *   out  T[4][4] in 1, m
  * Returns 0 where the side bars are short of the line B0C0 (q73 between 0 and pi) and their plane is
  * short of A0 and bar AA0 reaches; elsewhere 1, and what is not defined is NaN.
- * Cost: 24 add, 48 mul, 2 div, 2 neg, 1 sqrt, 2 sincos.
+ * Cost: 24 add, 48 mul, 2 div, 1 neg, 1 sqrt, 2 sincos.
  * Inputs: sha256 f3c3c5f8b9f1a1e1c692bd3c2cc78649d46a5699c6bfe9fac97394eae1cedb18.
  */
 #include <math.h>
@@ -17,48 +17,49 @@
 int awiwi_wrist_palm_pose(const double q71[restrict 1], const double q73[restrict 1], double T[restrict 16])
 {
     const awiwi_turn2 a0 = awiwi_sincos2(q71[0], q73[0]);
-    const double t0 = 0.072*a0.cos[0];
-    const double t1 = t0*t0;
-    const double t2 = 0.074565407529229*a0.cos[1];
-    const double t3 = 1.0/(1.650024824145215*a0.cos[1] - 1.9293993677555321);
-    const double t4 = (t2 - 0.042)*t3;
-    const double t5 = t2 - t4;
-    const double t6 = t5 - 0.042;
-    const double t7 = 0.074565407529229*a0.sin[1];
-    const double t8 = t7*t3;
-    const double t9 = 23.80952380952381*(t7 + t8);
-    const double t10 = t7 - t8;
+    const double t0 = 0.005184*a0.cos[0]*a0.cos[0];
+    const double t1 = 0.074565407529229*a0.cos[1];
+    const double t2 = 1.0/(1.650024824145215*a0.cos[1] - 1.9293993677555321);
+    const double t3 = (t1 - 0.042)*t2;
+    const double t4 = t1 - t3;
+    const double t5 = t4 - 0.042;
+    const double t6 = 0.074565407529229*a0.sin[1];
+    const double t7 = t6*t2;
+    const double t8 = t6 + t7;
+    const double t9 = 23.80952380952381*t8;
+    const double t10 = t6 - t7;
     const double t11 = 0.072*a0.sin[0] - t10;
-    const double t12 = 23.80952380952381*(t2 + t4);
-    const double t13 = t6*t9 + t11*t12;
-    const double t14 = t1 + t13*t13;
-    const double t15 = 1.0/t14;
-    const double t16 = 6.944444444444445*(t1 + (t6*t6 + t11*t11) - 0.01);
-    const double t17 = t14 - t16*t16;
-    const double t18 = sqrt(t17);
-    const double t19 = t15*(t13*t16 - t0*t18);
-    const double t20 = t0*t16 + t13*t18;
-    const double t21 = t15*t20;
-    const double t22 = t12*t21;
-    const double t23 = t12*t19;
-    const double t24 = 0.5*t10 + 0.018*t23;
-    const double t25 = 0.018*t15*t20;
-    const double t26 = t9*t19;
-    T[0] = -(a0.sin[0]*t19) - a0.cos[0]*t22;
+    const double t12 = t1 + t3;
+    const double t13 = 23.80952380952381*t12;
+    const double t14 = t5*t9 + t11*t13;
+    const double t15 = t0 + t14*t14;
+    const double t16 = 1.0/t15;
+    const double t17 = t0 + t5*t5 + t11*t11 - 0.01;
+    const double t18 = t15 - 48.22530864197531*t17*t17;
+    const double t19 = sqrt(t18);
+    const double t20 = t16*(6.944444444444445*t14*t17 - 0.072*a0.cos[0]*t19);
+    const double t21 = -a0.sin[0]*t20;
+    const double t22 = t16*(0.5*a0.cos[0]*t17 + t14*t19);
+    const double t23 = a0.cos[0]*t22;
+    const double t24 = a0.sin[0]*t22;
+    const double t25 = a0.cos[0]*t20;
+    const double t26 = 0.42857142857142855*t20;
+    const double t27 = 0.5*t10 + t12*t26;
+    T[0] = t21 - t13*t23;
     T[1] = a0.cos[0]*t9;
-    T[2] = a0.sin[0]*t21 - a0.cos[0]*t23;
-    T[3] = a0.cos[0]*t24 - a0.sin[0]*t25;
-    T[4] = t9*t21;
-    T[5] = t12;
-    T[6] = t26;
-    T[7] = 0.5*t5 - 0.018*t26;
-    T[8] = a0.cos[0]*t19 - a0.sin[0]*t22;
+    T[2] = t24 - t13*t25;
+    T[3] = a0.cos[0]*t27 - 0.018*t24;
+    T[4] = t9*t22;
+    T[5] = t13;
+    T[6] = t9*t20;
+    T[7] = 0.5*t4 - t8*t26;
+    T[8] = t25 - t13*t24;
     T[9] = a0.sin[0]*t9;
-    T[10] = -(a0.cos[0]*t21) - a0.sin[0]*t23;
-    T[11] = a0.cos[0]*t25 + a0.sin[0]*t24;
+    T[10] = t13*t21 - t23;
+    T[11] = 0.018*t23 + a0.sin[0]*t27;
     T[12] = 0.0;
     T[13] = 0.0;
     T[14] = 0.0;
     T[15] = 1.0;
-    return a0.sin[1] > 0.0 && 0.002592*a0.cos[0] > 0.0 && t17 > 0.0 ? 0 : 1;
+    return a0.sin[1] > 0.0 && 0.002592*a0.cos[0] > 0.0 && t18 > 0.0 ? 0 : 1;
 }
