@@ -6,7 +6,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from awiwi_gen.ir.builder import Builder
@@ -132,6 +132,8 @@ def test_passes_keep_the_value_one_after_the_other(passes, steps):
 
 @settings(deadline=None, max_examples=30)
 @given(steps=STEPS)
+@example([("mul", 0, 0), ("add", 0, 0), ("add", 0, 0), ("div", 7, 0)])
+@example([("add", 0, 0), ("add", 1, 1), ("add", 0, 0), ("div", 33868, 0), ("add", 0, 0)])
 def test_optimising_keeps_the_value_and_never_costs_more(steps):
     graph = grow(steps)
     best = optimise(graph)[-1][1]

@@ -74,7 +74,7 @@ def swap_two_outputs(text: str) -> str:
 
 
 def swap_sine_and_cosine(text: str) -> str:
-    return text.replace(" sin_q1 =", " @ =").replace(" cos_q1 =", " sin_q1 =").replace(" @ =", " cos_q1 =")
+    return re.sub(r"\.(sin|cos)\[1\]", lambda found: ".cos[1]" if found[1] == "sin" else ".sin[1]", text)
 
 
 MUTATIONS: list[tuple[Callable[[str], str], str]] = [
