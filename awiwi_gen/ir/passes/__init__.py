@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from awiwi_gen.ir.cost import cost
+from awiwi_gen.ir.cost import Cost, cost
 from awiwi_gen.ir.graph import Graph
 from awiwi_gen.ir.passes.factor import factor
 from awiwi_gen.ir.passes.finish import orient, quotients, schedule
@@ -44,15 +44,21 @@ def stages(graph: Graph, passes: tuple[Pass, ...], known: dict[tuple[Pass, ...],
 def optimise(graph: Graph) -> Stages:
     """The stages of the cheapest way; the last one is what is emitted."""
     known: dict[tuple[Pass, ...], Graph] = {}
-    way = min((stages(graph, passes, known) for passes in BEGINNINGS), key=_rough)
+    ways = [stages(graph, passes, known) for passes in BEGINNINGS]
+    rough, way = min(((_rough(way[-1][1]).weight, way) for way in ways), key=lambda found: found[0])
     while True:
         further = [*way, *stages(way[-1][1], AGAIN)]
-        if _rough(further) >= _rough(way):
+        weight = _rough(further[-1][1]).weight
+        if weight >= rough:
             break
-        way = further
-    return min(stages(graph, END), [*way, *stages(way[-1][1], END)], key=lambda ended: cost(ended[-1][1]).weight)
+        rough, way = weight, further
+    way = [*way, *stages(way[-1][1], END)]
+    plain = _rough(graph)
+    if plain.weight - plain.neg > cost(way[-1][1]).weight:  # the end takes away negations, and nothing else
+        return way
+    return min(stages(graph, END), way, key=lambda ended: cost(ended[-1][1]).weight)
 
 
-def _rough(way: Stages) -> float:
+def _rough(graph: Graph) -> Cost:
     """What the end of a way will cost, but for the last few signs."""
-    return cost(orient(quotients(way[-1][1]))).weight
+    return cost(orient(quotients(graph)))
