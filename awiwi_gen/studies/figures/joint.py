@@ -144,7 +144,7 @@ def observer(library: Any) -> Figure:
         claim="Compensating the observed friction clearly improves the tracking.",
         found=(
             f"The error falls from {errors[False] * 1e3:.0f} to {errors[True] * 1e3:.1f} mrad (r.m.s.), and the torque "
-            f"travels {busy[True] / busy[False]:.1f} times as far: the violent reaction that the text reports is not seen here."
+            f"travels {busy[True] / busy[False]:.1f} times as far; the text has it react violently."
         ),
         holds=errors[True] < errors[False] / 3,
         draw=draw,
@@ -246,7 +246,8 @@ def joint_steps(joint: Joint) -> list[Figure]:
         ),
         Figure(
             "11.3", "A step of the joint at two pretensions (simulated)", "Stiffer tendons oscillate less.",
-            f"The overshoot goes from {beyond[2]:.1%} to {beyond[3]:.1%} from {LOW_TENSION:g} to {HIGH_TENSION:g} N. {CHOSEN}",
+            f"The overshoot goes from {beyond[2]:.1%} to {beyond[3]:.1%} from {LOW_TENSION:g} to "
+            f"{HIGH_TENSION:g} N. {CHOSEN}",
             bool(beyond[3] < beyond[2] - 0.01), draw(2, [f"pretension {f:g} N" for f in tensions[2:]]),
         ),
     ]  # fmt: skip
