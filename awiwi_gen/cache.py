@@ -47,6 +47,7 @@ def _inside(path: str, room: str) -> bool:
     return not room or path == room or path.startswith(room.rstrip("/") + "/")
 
 
+@cache
 def libraries() -> str:
     """The libraries whose versions decide what is derived."""
     return ", ".join(f"{name} {version(name)}" for name in ("sympy", "casadi", "python-flint"))

@@ -15,6 +15,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass, field
 from functools import cached_property, partial
+from math import ceil
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -174,10 +175,22 @@ def _kept_records(job: Job, stage: str, tasks: Sequence[Task]) -> list[Any]:
         if digest in absent:
             group = kernel.path if kernel.solver is None else kernel.name
             parts.setdefault(group, []).append((kernel, given, digest))
-    work = [(members, job.hand.prefix, job.options, job.store) for members in parts.values()]
+    work = [(members, job.hand.prefix, job.options, job.store) for members in _shares(list(parts.values()))]
     work.sort(key=lambda task: -sum(map(_size, task[0])))  # the long ones first, so that no core waits in the end
     job.parallel(stage, _record_task, work)
     return [job.store.get("records", digest) for _, _, digest in tasks]
+
+
+def _shares(parts: Sequence[list[Task]]) -> list[list[Task]]:
+    """The same tasks with parts that would keep one core busy while others wait cut into pieces."""
+    sizes = [sum(map(_size, members)) for members in parts]
+    fair = max(1.0, sum(sizes) / (os.cpu_count() or 1))
+    return [
+        members[first::pieces]
+        for members, size in zip(parts, sizes, strict=True)
+        for pieces in [min(len(members), ceil(size / fair) or 1)]
+        for first in range(pieces)
+    ]
 
 
 def _size(task: Task) -> int:

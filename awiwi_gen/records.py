@@ -42,7 +42,7 @@ from awiwi_gen.verify.verdict import Verdict, judge, judge_solver
 
 ROUTES_AGREE = 1e-40  # level 4
 PASSES_AGREE = 1e-50  # level 2
-HOPELESS = 2  # passes seldom halve a cost
+HOPELESS = 1.3  # passes seldom make up for more
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
+from awiwi_gen.cache import Cache, key
 from awiwi_gen.resources import PACKAGE
 
 Place = tuple[str, str]  # a module, and a name that a statement of its top level binds
@@ -29,7 +30,20 @@ def code_of(*roots: Any) -> str:
 
 @cache
 def _code_of(origins: frozenset[Place]) -> str:
-    return hashlib.sha256(b"".join(map(_digest, sorted(_reached(origins))))).hexdigest()
+    """The digest of what some statements lead to; kept between runs, for reading the package takes a while."""
+
+    def digest() -> str:
+        return hashlib.sha256(b"".join(map(_digest, sorted(_reached(origins))))).hexdigest()
+
+    return Cache().memo("code", key(_package(), sorted(origins)), digest)
+
+
+@cache
+def _package() -> str:
+    """Digest of the text of all modules."""
+    files = sorted(path.relative_to(PACKAGE.parent) for path in PACKAGE.rglob("*.py"))
+    names = [".".join(file.with_suffix("").parts).removesuffix(".__init__") for file in files]
+    return key(*(f"{name} {module_text(name)}" for name in names))
 
 
 @cache

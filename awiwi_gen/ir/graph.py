@@ -71,6 +71,17 @@ class Graph:
             counts[node_of(ref)] += 1
         return tuple(counts)
 
+    @cached_property
+    def last_uses(self) -> tuple[int, ...]:
+        """The last node that refers to each node; beyond all of them for what is an output."""
+        last = [-1] * len(self.nodes)
+        for index, node in enumerate(self.nodes):
+            for ref in operands(node):
+                last[node_of(ref)] = index
+        for ref in self.roots:
+            last[node_of(ref)] = len(self.nodes)
+        return tuple(last)
+
     @property
     def roots(self) -> Iterator[Ref]:
         """The references of all output elements, in order."""

@@ -33,7 +33,7 @@ def evaluate(graph: Graph, algebra: Algebra[T], leaf: Callable[[Node], T]) -> di
     ``leaf`` gives the value of an ``("input", port, element)`` or ``("param", path)`` node.
     """
     values: list[T] = []
-    last = _last_uses(graph)
+    last = graph.last_uses
     gone: Any = None
 
     def at(ref: Ref) -> T:
@@ -45,17 +45,6 @@ def evaluate(graph: Graph, algebra: Algebra[T], leaf: Callable[[Node], T]) -> di
             if last[node_of(ref)] == index:
                 values[node_of(ref)] = gone
     return {output.name: [at(ref) for ref in output.elements] for output in graph.outputs}
-
-
-def _last_uses(graph: Graph) -> list[int]:
-    """The last node that reads each node; beyond all for what is an output."""
-    last = [-1] * len(graph.nodes)
-    for index, node in enumerate(graph.nodes):
-        for ref in operands(node):
-            last[node_of(ref)] = index
-    for ref in graph.roots:
-        last[node_of(ref)] = len(graph.nodes)
-    return last
 
 
 def _node(node: Node, algebra: Algebra[T], leaf: Callable[[Node], T], values: list[T], at: Callable[[Ref], T]) -> T:

@@ -95,28 +95,32 @@ class Distribution:
         miss = random.normal(size=dP.shape[1:])
         miss = (miss + miss.T) * UNREACHABLE
         for milder in 0.5 ** np.arange(MILDEST) * (kind > 1):
-            f, at, excess = self._out_of_reach(share, held, P, dP, ends, miss * milder, bool(push.any()))
-            answer = Answer(f, at, push - P.T @ f, self._stiffness(f, P, dP) - excess, not push.any())
+            f, at, excess, K = self._out_of_reach(share, held, P, dP, ends, miss * milder, bool(push.any()))
+            answer = Answer(f, at, push - P.T @ f, K - excess, not push.any())
             if self._is_nearest(answer, P, dP, ends):
                 return answer
         raise ValueError("no demand is answered best by the forces it was made from")
 
     def _out_of_reach(
         self, share: Array, held: Array, P: Array, dP: Array, ends: Ends, miss: Array, pushed: bool
-    ) -> tuple[Array, Array, Array]:
-        """Forces, which of them are at a limit, and a miss of the stiffness that no small move makes less."""
-        f = _forces(share, held, ends)
-        miss = miss * np.abs(self._stiffness(f, P, dP)).max()
+    ) -> tuple[Array, Array, Array, Array]:
+        """Forces, which are at a limit, a miss of the stiffness that no small move makes less, and the stiffness."""
+        f, K, growth = self._pulled(_forces(share, held, ends), P, dP)
+        miss = miss * np.abs(K).max()
         for _ in range(2):  # which limit a held tendon is at depends on where the stiffness is out of reach
-            slope = self.curve(f[:, None])[1]
-            growth = slope[:, 0, None, None] * np.einsum("ia,ib->iab", P, P) + dP
             excess = _out_of_reach(P, growth, held, miss)
             prices = np.where(held != 0, _prices(P, growth, held, excess), 0)
             if pushed or not np.any(held * prices > 0):
-                return f, held, excess
+                return f, held, excess, K
             held = -np.sign(prices).astype(int)
-            f = _forces(share, held, ends)
-        return f, held, excess * 0
+            f, K, growth = self._pulled(_forces(share, held, ends), P, dP)
+        return f, held, excess * 0, K
+
+    def _pulled(self, f: Array, P: Array, dP: Array) -> tuple[Array, Array, Array]:
+        """Forces (m,), the joint stiffness (n, n) that they give, and how it grows with each of them (m, n, n)."""
+        k, slope, _ = (each[:, 0] for each in self.curve(f[:, None]))
+        pairs = np.einsum("ia,ib->iab", P, P)
+        return f, np.tensordot(k, pairs, 1) + np.tensordot(f, dP, 1), slope[:, None, None] * pairs + dP
 
     def _is_nearest(self, answer: Answer, P: Array, dP: Array, ends: Ends) -> bool:
         """Whether no forces along rays from the answer, through all that gives the same torque, are as near.
@@ -179,16 +183,17 @@ class Distribution:
             for s, answer in enumerate(answers):
                 if answer.held[i]:
                     row[s] = arb(float(inputs["f_min" if answer.held[i] < 0 else "f_max"][s]))
-        floats = self.tendons(q)
+        floats, curves = self.tendons(q), self.curve(np.array([a.f for a in answers]).T)
         systems = [
             _System(answer, inputs["tau"][s], inputs["K"][s], [c[s] for c in P], [c[s] for c in dP],
-                    (floats[0][s], floats[1][s]), self.curve(answer.f[:, None]))
+                    (floats[0][s], floats[1][s]), [each[:, s] for each in curves])
             for s, answer in enumerate(answers)
         ]  # fmt: skip
         for _ in range(ROUNDS):
-            curves, steps = [list(each) for each in self.curve(f, balls)], [0.0]
+            k, slope, _ = (list(each) for each in self.curve(f, balls))
+            steps = [0.0]
             for s, system in enumerate(systems):
-                here = system.improved([row[s] for row in f], [c[s] for c in curves[0]], [c[s] for c in curves[1]])
+                here = system.improved([row[s] for row in f], [c[s] for c in k], [c[s] for c in slope])
                 steps += [float(abs(force - row[s])) for row, force in zip(f, here, strict=True)]
                 for row, force in zip(f, here, strict=True):
                     row[s] = force
@@ -212,7 +217,7 @@ class _System:
         self.K = [arb(float(x)) for x in (K.astype(np.float64) + K.T.astype(np.float64)).flat]
         coupling, bend = floats
         self.rows = _independent(coupling[self.free])
-        k, slope, curvature = (each[:, 0] for each in curve)
+        k, slope, curvature = curve
         pp = np.einsum("ia,ib->iab", coupling, coupling)
         growth = slope[:, None, None] * pp + bend
         excess = np.tensordot(k, pp, 1) + np.tensordot(answer.f, bend, 1) - (K + K.T) / 2
