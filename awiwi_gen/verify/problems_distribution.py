@@ -42,6 +42,26 @@ class Answer:
 
 
 @dataclass(frozen=True)
+class _Wish:
+    """What a demand of some kind is made from: forces as shares of their range, tendons at limits, torque, stiffness."""
+
+    kind: int
+    share: Array
+    held: Array
+    push: Array
+    miss: Array
+
+
+@dataclass(frozen=True)
+class _Pull:
+    """Forces (m,), the joint stiffness (n, n) that they give, and how it grows with each of them (m, n, n)."""
+
+    f: Array
+    K: Array
+    growth: Array
+
+
+@dataclass(frozen=True)
 class Distribution:
     """Demands made from their answers: forces first, then a torque and a stiffness for which nothing is better.
 
@@ -74,53 +94,43 @@ class Distribution:
         if given not in self._known:
             random = np.random.default_rng(len(q))
             P, dP = self.tendons(q)
-            self._known[given] = [
-                self._answer(s % 4, P[s], dP[s], (float(low[s]), float(high[s])), random) for s in range(len(q))
-            ]
+            wishes = [_wish(s % 4, P[s], random) for s in range(len(q))]
+            ends = [(float(low[s]), float(high[s])) for s in range(len(q))]
+            first = [_forces(wish.share, wish.held, each) for wish, each in zip(wishes, ends, strict=True)]
+            k, slope, _ = self.curve(np.array(first).T)
+            pulls = [_pull(first[s], k[:, s], slope[:, s], P[s], dP[s]) for s in range(len(q))]
+            self._known[given] = [self._answer(wishes[s], pulls[s], P[s], dP[s], ends[s]) for s in range(len(q))]
         return self._known[given]
 
-    def _answer(self, kind: int, P: Array, dP: Array, ends: Ends, random: Any) -> Answer:
+    def _answer(self, wish: _Wish, pull: _Pull, P: Array, dP: Array, ends: Ends) -> Answer:
         """Forces, and the demand that they answer best.
 
         The stiffness is moved out of reach as far as nothing else comes as near: the distance is not convex in the
         forces, so that beyond some miss others are nearer.
         """
-        held, push = np.zeros(len(P), int), np.zeros(P.shape[1])
-        share = random.uniform(size=len(P))
-        if kind in (1, 2):
-            held = _some_held(P, random)
-        elif kind == 3:
-            push = _push(P, random)
-            held = -np.sign(np.where(np.abs(P @ push) > 1e-9, P @ push, 0)).astype(int)
-        miss = random.normal(size=dP.shape[1:])
-        miss = (miss + miss.T) * UNREACHABLE
-        for milder in 0.5 ** np.arange(MILDEST) * (kind > 1):
-            f, at, excess, K = self._out_of_reach(share, held, P, dP, ends, miss * milder, bool(push.any()))
-            answer = Answer(f, at, push - P.T @ f, K - excess, not push.any())
+        pushed = bool(wish.push.any())
+        for milder in 0.5 ** np.arange(MILDEST) * (wish.kind > 1):
+            pulled, at, excess = self._out_of_reach(wish, pull, P, dP, ends, milder)
+            answer = Answer(pulled.f, at, wish.push - P.T @ pulled.f, pulled.K - excess, not pushed)
             if self._is_nearest(answer, P, dP, ends):
                 return answer
         raise ValueError("no demand is answered best by the forces it was made from")
 
     def _out_of_reach(
-        self, share: Array, held: Array, P: Array, dP: Array, ends: Ends, miss: Array, pushed: bool
-    ) -> tuple[Array, Array, Array, Array]:
-        """Forces, which are at a limit, a miss of the stiffness that no small move makes less, and the stiffness."""
-        f, K, growth = self._pulled(_forces(share, held, ends), P, dP)
-        miss = miss * np.abs(K).max()
+        self, wish: _Wish, pull: _Pull, P: Array, dP: Array, ends: Ends, milder: float
+    ) -> tuple[_Pull, Array, Array]:
+        """Forces, which of them are at a limit, and a miss of the stiffness that no small move makes less."""
+        held, miss = wish.held, wish.miss * milder * np.abs(pull.K).max()
         for _ in range(2):  # which limit a held tendon is at depends on where the stiffness is out of reach
-            excess = _out_of_reach(P, growth, held, miss)
-            prices = np.where(held != 0, _prices(P, growth, held, excess), 0)
-            if pushed or not np.any(held * prices > 0):
-                return f, held, excess, K
+            excess = _out_of_reach(P, pull.growth, held, miss)
+            prices = np.where(held != 0, _prices(P, pull.growth, held, excess), 0)
+            if wish.push.any() or not np.any(held * prices > 0):
+                return pull, held, excess
             held = -np.sign(prices).astype(int)
-            f, K, growth = self._pulled(_forces(share, held, ends), P, dP)
-        return f, held, excess * 0, K
-
-    def _pulled(self, f: Array, P: Array, dP: Array) -> tuple[Array, Array, Array]:
-        """Forces (m,), the joint stiffness (n, n) that they give, and how it grows with each of them (m, n, n)."""
-        k, slope, _ = (each[:, 0] for each in self.curve(f[:, None]))
-        pairs = np.einsum("ia,ib->iab", P, P)
-        return f, np.tensordot(k, pairs, 1) + np.tensordot(f, dP, 1), slope[:, None, None] * pairs + dP
+            f = _forces(wish.share, held, ends)
+            k, slope, _ = (each[:, 0] for each in self.curve(f[:, None]))
+            pull = _pull(f, k, slope, P, dP)
+        return pull, held, excess * 0
 
     def _is_nearest(self, answer: Answer, P: Array, dP: Array, ends: Ends) -> bool:
         """Whether no forces along rays from the answer, through all that gives the same torque, are as near.
@@ -252,6 +262,24 @@ class _System:
         self.prices = [(price - step).mid() for price, step in zip(self.prices, steps[len(self.free) :], strict=True)]
         moved = dict(zip(self.free, steps, strict=False))
         return [(force - moved[i]).mid() if i in moved else force for i, force in enumerate(f)]
+
+
+def _wish(kind: int, P: Array, random: Any) -> _Wish:
+    held, push = np.zeros(len(P), int), np.zeros(P.shape[1])
+    share = random.uniform(size=len(P))
+    if kind in (1, 2):
+        held = _some_held(P, random)
+    elif kind == 3:
+        push = _push(P, random)
+        held = -np.sign(np.where(np.abs(P @ push) > 1e-9, P @ push, 0)).astype(int)
+    miss = random.normal(size=(P.shape[1], P.shape[1]))
+    return _Wish(kind, share, held, push, (miss + miss.T) * UNREACHABLE)
+
+
+def _pull(f: Array, k: Array, slope: Array, P: Array, dP: Array) -> _Pull:
+    pairs = np.einsum("ia,ib->iab", P, P)
+    K = np.tensordot(k, pairs, 1) + np.tensordot(f, dP, 1)
+    return _Pull(f, K, slope[:, None, None] * pairs + dP)
 
 
 def _forces(share: Array, held: Array, ends: Ends) -> Array:
