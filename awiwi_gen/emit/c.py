@@ -19,6 +19,8 @@ from awiwi_gen.ir.graph import LEAVES, Graph, Node, Ref, node_of, operands
 from awiwi_gen.ir.passes.gather import angle_groups
 from awiwi_gen.kernel import GUARDS
 
+ZERO = ("const", Fraction(0))
+SPARSE = 64  # this many zeros in an output are written by a loop
 LINE = 100  # longer expressions are cut into named parts
 ATOM, PRODUCT, SUM = 3, 2, 1  # how tightly a printed expression binds
 
@@ -102,7 +104,7 @@ class Printer:
 
     def statements(self) -> list[str]:
         """Declarations in order of evaluation, then the assignments to the outputs."""
-        uses = self.graph.uses
+        uses, nought = self.graph.uses, self.options.literal(Fraction(0))
         argument = {node_of(r) for node in self.graph.nodes if node[0] in ("sin", "cos") for r in node[1:]}
         for index, node in enumerate(self.graph.nodes):
             if node[0] in ("sin", "cos") and self.options.math == "own":
@@ -115,13 +117,16 @@ class Printer:
             self.texts.append(self.declare(node, text[0]) if named else text)
         for output in self.graph.outputs:
             if output.name == GUARDS:
-                positive = [
-                    f"{self.operand(ref, SUM)} > {self.options.literal(Fraction(0))}" for ref in output.elements
-                ]
+                positive = [f"{self.operand(ref, SUM)} > {nought}" for ref in output.elements]
                 self.lines.append(f"return {' && '.join(positive)} ? 0 : 1;")
                 continue
+            zeros = [position for position, ref in enumerate(output.elements) if self.graph.nodes[node_of(ref)] == ZERO]
+            sparse = len(zeros) >= SPARSE
+            if sparse:
+                self.lines.append(f"for (int i = 0; i < {len(output.elements)}; i++) {output.name}[i] = {nought};")
             for position, ref in enumerate(output.elements):
-                self.lines.append(f"{output.name}[{position}] = {self.operand(ref, SUM)};")
+                if not sparse or position not in zeros:
+                    self.lines.append(f"{output.name}[{position}] = {self.operand(ref, SUM)};")
         return self.lines
 
     def turn(self, angle: Ref, function: str) -> str:
