@@ -8,6 +8,7 @@
  * Inputs: sha256 9b14a568be888c30da7a1d93aeeb047b23eb439117ee5d381d329e389e84ed49.
  */
 #include <math.h>
+#include <string.h>
 #include "trig.h"
 #include "kernels.h"
 
@@ -60,7 +61,7 @@ void awiwi_hand_coupling(const double q[restrict 19], double P[restrict 722])
     const double t43 = t42 - 0.002;
     const double t44 = t41 - 0.03;
     const double t45 = 1.0/sqrt(t31 + t44*t44 + t43*t43);
-    for (int i = 0; i < 722; i++) P[i] = 0.0;
+    memset(P, 0, 722 * sizeof P[0]);
     P[0] = (t6*t10 - t9*t11)*t17;
     P[1] = (t18*t11 - t19 - t20*t10)*t17;
     P[19] = (t24*t27 - t26*t28)*t32;

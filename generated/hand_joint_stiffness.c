@@ -11,6 +11,7 @@
  * Inputs: sha256 9b14a568be888c30da7a1d93aeeb047b23eb439117ee5d381d329e389e84ed49.
  */
 #include <math.h>
+#include <string.h>
 #include "trig.h"
 #include "kernels.h"
 
@@ -143,7 +144,7 @@ void awiwi_hand_joint_stiffness(const double q[restrict 19], const double f[rest
     const double t123 = k[33] + k[34];
     const double t124 = t122 + t123;
     const double t125 = 4.8e-05*(t122 - t123);
-    for (int i = 0; i < 361; i++) K[i] = 0.0;
+    memset(K, 0, 361 * sizeof K[0]);
     K[0] = t71;
     K[1] = t92;
     K[19] = t92;

@@ -8,6 +8,7 @@
  * Inputs: sha256 4c7ea1578dc942e36d6e563cd97831da5179a3ff0e24a017614ea16cdc764ec6.
  */
 #include <math.h>
+#include <string.h>
 #include "trig.h"
 #include "kernels.h"
 
@@ -103,7 +104,7 @@ void awiwi_thumb_coupling_derivative(const double q[restrict 4], double dP[restr
     const double t86 = t84*t85;
     const double t87 = t59 + t57*t77 - t56*t78;
     const double t88 = t79*(t87*t86 - t56*t83 - t57*t81);
-    for (int i = 0; i < 128; i++) dP[i] = 0.0;
+    memset(dP, 0, 128 * sizeof dP[0]);
     dP[0] = t21*(t22*t23 + t24*t25 - t26*t28);
     dP[1] = t38;
     dP[4] = t38;

@@ -53,7 +53,8 @@ def grow(steps: list[tuple[str, int, int]], shuffled: bool = False) -> Graph:
             refs.append(builder.call("sqrt", builder.add((builder.const(1), builder.mul((a, a))))))
         else:
             refs.append(~a if operation == "neg" else builder.call(operation, a))
-    return builder.graph([Output("y", (3,), tuple(refs[-3:])), Output("z", (), (~refs[-1],))])
+    one = builder.const(1)  # so that what is zero only by cancellation is small beside something
+    return builder.graph([Output("y", (4,), (*refs[-3:], one)), Output("z", (2,), (~refs[-1], one))])
 
 
 def points(count: int = 5) -> dict[str, np.ndarray]:

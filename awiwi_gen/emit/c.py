@@ -19,8 +19,7 @@ from awiwi_gen.ir.graph import LEAVES, Graph, Node, Ref, node_of, operands
 from awiwi_gen.ir.passes.gather import angle_groups
 from awiwi_gen.kernel import GUARDS
 
-ZERO = ("const", Fraction(0))
-SPARSE = 64  # this many zeros in an output are written by a loop
+SPARSE = 64  # this many zeros in an output are written at once
 LINE = 100  # longer expressions are cut into named parts
 ATOM, PRODUCT, SUM = 3, 2, 1  # how tightly a printed expression binds
 
@@ -65,14 +64,16 @@ def c_function(
     own = functions & OWN.keys() if options.math == "own" else set()
     headers = {'"trig.h"' if function in ("sin", "cos") else '"elementary.h"' for function in own}
     unused = tuple(f"(void){port};" for port in inputs if port not in read)
+    statements = printer.statements()
+    clears = any(line.startswith("memset") for line in statements)
     return CFunction(
         name=name,
         prototype=prototype,
         definition=definition,
         comment=comment,
-        statements=unused + tuple(printer.statements()),
+        statements=(*unused, *statements),
         cost=cost(graph),
-        includes=("<math.h>",) * bool(functions - own) + tuple(sorted(headers)),
+        includes=("<math.h>",) * bool(functions - own) + ("<string.h>",) * clears + tuple(sorted(headers)),
     )
 
 
@@ -120,14 +121,17 @@ class Printer:
                 positive = [f"{self.operand(ref, SUM)} > {nought}" for ref in output.elements]
                 self.lines.append(f"return {' && '.join(positive)} ? 0 : 1;")
                 continue
-            zeros = [position for position, ref in enumerate(output.elements) if self.graph.nodes[node_of(ref)] == ZERO]
-            sparse = len(zeros) >= SPARSE
-            if sparse:
-                self.lines.append(f"for (int i = 0; i < {len(output.elements)}; i++) {output.name}[i] = {nought};")
+            cleared = sum(self.is_zero(ref) for ref in output.elements) >= SPARSE
+            if cleared:
+                self.lines.append(f"memset({output.name}, 0, {len(output.elements)} * sizeof {output.name}[0]);")
             for position, ref in enumerate(output.elements):
-                if not sparse or position not in zeros:
+                if not (cleared and self.is_zero(ref)):
                     self.lines.append(f"{output.name}[{position}] = {self.operand(ref, SUM)};")
         return self.lines
+
+    def is_zero(self, ref: Ref) -> bool:
+        """Whether a reference is the number nought."""
+        return self.graph.nodes[node_of(ref)] == ("const", 0)
 
     def turn(self, angle: Ref, function: str) -> str:
         """A sine or cosine; those of all angles of its group are computed when the first is asked for."""

@@ -24,7 +24,7 @@ class Builder:
 
     def const(self, value: Fraction | int) -> Ref:
         """A constant; any sign."""
-        value = shorten(Fraction(value))
+        value = shorten(value if isinstance(value, Fraction) else Fraction(value))
         return self._intern(("const", value)) if value >= 0 else ~self._intern(("const", -value))
 
     def input(self, port: str, element: int) -> Ref:
@@ -89,7 +89,7 @@ class Builder:
 
     def mul(self, refs: Sequence[Ref]) -> Ref:
         """The product of any number of references; powers are collected, numbers multiplied."""
-        coefficient = Fraction(1)
+        coefficient: Fraction | int = 1
         powers: dict[int, int] = {}
         numbers = [ref for ref in refs if self.nodes[node_of(ref)][0] == "const"]
         for ref in refs:
@@ -185,11 +185,10 @@ class Builder:
         node = self.nodes[base]
         return self._product(coefficient, list(node[1:]) if node[0] == "mul" else [base])
 
-    def _product(self, coefficient: Fraction, factors: list[Ref]) -> Ref:
+    def _product(self, coefficient: Fraction | int, factors: list[Ref]) -> Ref:
         if coefficient < 0:
             return ~self._product(-coefficient, factors)
         ordered = sorted(factors)
-        coefficient = shorten(coefficient)
         if coefficient != 1:
             ordered = [self.const(coefficient), *ordered]
         if not ordered:

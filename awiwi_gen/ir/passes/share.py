@@ -6,13 +6,14 @@ Greedy: the pair that most nodes contain is taken out first, until every pair is
 from __future__ import annotations
 
 import heapq
-from collections import Counter
+from collections import defaultdict
 from itertools import combinations
 
 from awiwi_gen.ir.builder import Builder, copy_node
 from awiwi_gen.ir.graph import Graph, Output, Ref, node_of, operands
 
 Pair = tuple[Ref, Ref]
+Places = defaultdict[Pair, dict[int, int]]  # which groups hold a pair, and how often
 
 
 def share_sums(graph: Graph) -> Graph:
@@ -40,10 +41,10 @@ def _normal(a: Ref, b: Ref) -> tuple[Pair, bool]:
 
 def _extract(groups: dict[int, list[Ref]], first_free: int) -> dict[int, Pair]:
     """Take pairs out of the groups in place; returns the pair behind each new node number."""
-    where: dict[Pair, Counter[int]] = {}
+    where: Places = defaultdict(dict)
     for index, terms in groups.items():
         for a, b in combinations(terms, 2):
-            where.setdefault(_normal(a, b)[0], Counter())[index] += 1
+            _count(where, a, b, index, 1)
     heap = [(-len(nodes), pair) for pair, nodes in where.items() if len(nodes) > 1]
     heapq.heapify(heap)
     pairs: dict[int, Pair] = {}
@@ -56,37 +57,36 @@ def _extract(groups: dict[int, list[Ref]], first_free: int) -> dict[int, Pair]:
             continue
         new = first_free + len(pairs)
         pairs[new] = pair
-        touched: set[Pair] = set()
+        touched = {pair}  # a group may hold it more than once
         for index in holders:
-            touched |= _replace(groups, where, index, pair, new)
+            touched |= _replace(groups[index], where, index, pair, new)
         for other in sorted(touched):
             if len(where[other]) > 1:
                 heapq.heappush(heap, (-len(where[other]), other))
     return pairs
 
 
-def _replace(
-    groups: dict[int, list[Ref]], where: dict[Pair, Counter[int]], index: int, pair: Pair, new: int
-) -> set[Pair]:
+def _count(where: Places, a: Ref, b: Ref, index: int, change: int) -> Pair:
+    """Note that a group has a pair once more, or once less; returns the pair in its normal form."""
+    pair, _ = _normal(a, b)
+    holders = where[pair]
+    holders[index] = holders.get(index, 0) + change
+    if not holders[index]:
+        del holders[index]
+    return pair
+
+
+def _replace(terms: list[Ref], where: Places, index: int, pair: Pair, new: int) -> set[Pair]:
     """Write one group with ``new`` in place of the pair; returns the pairs that it newly contains."""
-    terms = groups[index]
-    for a, b in combinations(terms, 2):
-        other = _normal(a, b)[0]
-        where[other][index] -= 1
-        if not where[other][index]:
-            del where[other][index]
-    for sign in (False, True):
-        first, second = (~pair[0], ~pair[1]) if sign else pair
-        if first in terms and second in terms and (first != second or terms.count(first) > 1):
-            terms.remove(first)
-            terms.remove(second)
-            terms.append(~new if sign else new)
-            break
-    touched = set()
-    for a, b in combinations(terms, 2):
-        other = _normal(a, b)[0]
-        where.setdefault(other, Counter())[index] += 1
-        touched.add(other)
+    first, second = pair
+    plain = first in terms and second in terms and (first != second or terms.count(first) > 1)
+    for gone in pair if plain else (~first, ~second):
+        terms.remove(gone)
+        for other in terms:
+            _count(where, gone, other, index, -1)
+    added = new if plain else ~new
+    touched = {_count(where, added, other, index, 1) for other in terms}
+    terms.append(added)
     return touched
 
 
