@@ -19,7 +19,7 @@ The floating-point meaning of a node is fixed too: operands are combined from le
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -171,17 +171,19 @@ def canonical(graph: Graph) -> Graph:
 def prune(graph: Graph) -> Graph:
     """Drop the nodes no output depends on; the order of the others stays."""
     marked = reachable(graph)
-    if all(marked):
-        return graph
-    position = {index: new for new, index in enumerate(i for i, kept in enumerate(marked) if kept)}
+    return graph if all(marked) else reordered(graph, [index for index, kept in enumerate(marked) if kept])
+
+
+def reordered(graph: Graph, order: Sequence[int]) -> Graph:
+    """The same graph with its nodes, or those of them that outputs depend on, in another order; operands come first."""
+    position = {old: new for new, old in enumerate(order)}
 
     def new(ref: Ref) -> Ref:
         return position[ref] if ref >= 0 else ~position[~ref]
 
     nodes = tuple(
         node if node[0] in LEAVES else (node[0], *(new(r) for r in node[1:]))
-        for index, node in enumerate(graph.nodes)
-        if marked[index]
+        for node in (graph.nodes[i] for i in order)
     )
     outputs = tuple(Output(o.name, o.shape, tuple(new(r) for r in o.elements)) for o in graph.outputs)
     return Graph(nodes, outputs)

@@ -5,7 +5,7 @@ These leave the canonical form on purpose: from here on the order of operands is
 
 from __future__ import annotations
 
-from awiwi_gen.ir.graph import LEAVES, Graph, Node, Output, Ref, node_of, operands, prune
+from awiwi_gen.ir.graph import LEAVES, Graph, Node, Output, Ref, node_of, operands, prune, reordered
 
 
 def quotients(graph: Graph) -> Graph:
@@ -95,14 +95,4 @@ def schedule(graph: Graph) -> Graph:
             continue
         stack.append((index, True))
         stack += [(node_of(ref), False) for ref in reversed(operands(graph.nodes[index])) if not placed[node_of(ref)]]
-    position = {old: new for new, old in enumerate(order)}
-
-    def new(ref: Ref) -> Ref:
-        return position[ref] if ref >= 0 else ~position[~ref]
-
-    nodes = tuple(
-        node if node[0] in LEAVES else (node[0], *(new(r) for r in node[1:]))
-        for node in (graph.nodes[i] for i in order)
-    )
-    outputs = tuple(Output(o.name, o.shape, tuple(new(r) for r in o.elements)) for o in graph.outputs)
-    return Graph(nodes, outputs)
+    return reordered(graph, order)

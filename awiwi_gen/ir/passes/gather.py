@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from awiwi_gen.ir.graph import LEAVES, Graph, Output, Ref, node_of, operands
+from awiwi_gen.ir.graph import Graph, Ref, node_of, operands, reordered
 
 LANES = 4
 
@@ -44,14 +44,4 @@ def gather(graph: Graph) -> Graph:
             due = depth[index] if node[0] in ("sin", "cos") else last
             turn[node_of(ref)] = min(turn[node_of(ref)], turn[index], due)
     order = sorted(range(len(graph.nodes)), key=lambda index: (turn[index], index))
-    position = {old: new for new, old in enumerate(order)}
-
-    def new(ref: Ref) -> Ref:
-        return position[ref] if ref >= 0 else ~position[~ref]
-
-    nodes = tuple(
-        node if node[0] in LEAVES else (node[0], *(new(r) for r in node[1:]))
-        for node in (graph.nodes[i] for i in order)
-    )
-    outputs = tuple(Output(o.name, o.shape, tuple(new(r) for r in o.elements)) for o in graph.outputs)
-    return Graph(nodes, outputs)
+    return reordered(graph, order)
