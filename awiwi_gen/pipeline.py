@@ -38,9 +38,8 @@ GENERATOR = (
     "templates",
 )
 Progress = Callable[[str, int, int], None]
-Task = tuple[
-    Any, Mapping[str, Any], str
-]  # a kernel, what its record is made from (of graphs their fingerprints), and its key
+# A kernel, what its record is made from (of graphs their fingerprints), and its key.
+Task = tuple[Any, Mapping[str, Any], str]
 
 
 def silent(stage: str, done: int, total: int) -> None:

@@ -74,13 +74,10 @@ def prototype(quantity: Quantity, symbol: str, language: str) -> str:
 def make_all(
     contender: Contender, finger: dict[str, Any], generate: Callable[[Quantity, dict[str, Any]], tuple[str, str]]
 ) -> None:
-    """Every quantity by ``generate``, which returns the tool's text and a call of it; says what failed and goes on."""
+    """Every quantity by ``generate``, which returns the tool's text and a call of it."""
     for quantity in QUANTITIES.values():
         start = time.perf_counter()
-        try:
-            text, call = generate(quantity, finger)
-        except NotImplementedError:
-            continue
+        text, call = generate(quantity, finger)
         contender.add(quantity, text, call, time.perf_counter() - start)
     contender.finish()
 
