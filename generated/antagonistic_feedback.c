@@ -22,8 +22,6 @@ void awiwi_antagonistic_feedback(const double x[restrict 6], const double x_des[
     const double t3 = x[3] - x_des[3];
     const double t4 = x[4] - x_des[4];
     const double t5 = x[5] - x_des[5];
-    const double t6 = resistance[0] + u_des[0] - feedback[0]*t0 - feedback[1]*t1 - feedback[2]*t2 - feedback[3]*t3 - feedback[4]*t4 - feedback[5]*t5;
-    const double t7 = resistance[1] + u_des[1] - feedback[6]*t0 - feedback[7]*t1 - feedback[8]*t2 - feedback[9]*t3 - feedback[10]*t4 - feedback[11]*t5;
-    tau_m[0] = t6;
-    tau_m[1] = t7;
+    tau_m[0] = resistance[0] + u_des[0] - feedback[0]*t0 - feedback[1]*t1 - feedback[2]*t2 - feedback[3]*t3 - feedback[4]*t4 - feedback[5]*t5;
+    tau_m[1] = resistance[1] + u_des[1] - feedback[6]*t0 - feedback[7]*t1 - feedback[8]*t2 - feedback[9]*t3 - feedback[10]*t4 - feedback[11]*t5;
 }

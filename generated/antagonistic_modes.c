@@ -15,10 +15,10 @@ void awiwi_antagonistic_modes(const double motors[restrict 4], double against[re
 {
     const double t0 = 0.5*motors[0];
     const double t1 = 0.5*motors[2];
+    against[0] = t0 - t1;
+    together[0] = t0 + t1;
     const double t2 = 0.5*motors[1];
     const double t3 = 0.5*motors[3];
-    against[0] = t0 - t1;
     against[1] = t2 - t3;
-    together[0] = t0 + t1;
     together[1] = t2 + t3;
 }

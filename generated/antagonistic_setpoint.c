@@ -19,19 +19,25 @@
 
 int awiwi_antagonistic_setpoint(const double desired[restrict 5], const double pretension[restrict 3], const double elongations[restrict 2], const double slopes[restrict 2], const double inertias[restrict 3], const double damping[restrict 1], double x_des[restrict 6], double u_des[restrict 2])
 {
-    const double t0 = damping[0]*desired[1] + desired[2]*inertias[0];
-    const double t1 = 0.5/slopes[0];
-    const double t2 = damping[0]*desired[2] + desired[3]*inertias[0];
-    const double t3 = -0.5/slopes[1];
-    const double t4 = 0.5*t0;
-    const double t5 = damping[0]*desired[3] + desired[4]*inertias[0];
     x_des[0] = desired[0];
     x_des[1] = desired[1];
-    x_des[2] = desired[0] + elongations[0] + t0*t1;
-    x_des[3] = desired[1] + t2*t1;
-    x_des[4] = elongations[1] + t0*t3 - desired[0];
-    x_des[5] = t2*t3 - desired[1];
-    u_des[0] = pretension[0] + t4 + inertias[1]*(desired[2] + t5*t1);
-    u_des[1] = pretension[0] - t4 - inertias[2]*(desired[2] - t5*t3);
+    const double t0 = 0.5/slopes[0];
+    double s1 = elongations[0] + desired[0];
+    double s2 = elongations[1] - desired[0];
+    const double t3 = -0.5/slopes[1];
+    const double t4 = damping[0]*desired[1] + desired[2]*inertias[0];
+    s1 += t4*t0;
+    x_des[2] = s1;
+    s2 += t4*t3;
+    x_des[4] = s2;
+    const double t5 = 0.5*t4;
+    const double t6 = damping[0]*desired[2] + desired[3]*inertias[0];
+    x_des[3] = desired[1] + t6*t0;
+    x_des[5] = t6*t3 - desired[1];
+    const double t7 = damping[0]*desired[3] + desired[4]*inertias[0];
+    double s8 = inertias[1]*(t7*t0 + desired[2]) + t5;
+    s8 += pretension[0];
+    u_des[0] = s8;
+    u_des[1] = pretension[0] - t5 - inertias[2]*(desired[2] - t7*t3);
     return slopes[0] > 0.0 && slopes[1] > 0.0 ? 0 : 1;
 }

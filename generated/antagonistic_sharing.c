@@ -13,6 +13,6 @@
 void awiwi_antagonistic_sharing(const double torque[restrict 1], const double pretension[restrict 3], double shares[restrict 2])
 {
     const double t0 = 0.5*torque[0];
-    shares[0] = pretension[0] + t0;
+    shares[0] = t0 + pretension[0];
     shares[1] = pretension[0] - t0;
 }

@@ -19,17 +19,17 @@ void awiwi_antagonistic_springs(const double stretches[restrict 2], const double
     const double t0 = 0.5*(stretches[0] + fabs(stretches[0]));
     const double t1 = tendons[2]*t0;
     const double t2 = 2.0*tendons[1];
+    torques[0] = t0*(t0*(t1 + tendons[1]) + tendons[0]);
     const double t3 = tendons[0] + t0*(t2 + 3.0*t1);
+    springs[0] = t3;
+    torques[1] = speeds[0]*t3;
+    springs[1] = t2 + 6.0*t1;
     const double t4 = 0.5*(stretches[1] + fabs(stretches[1]));
     const double t5 = tendons[5]*t4;
     const double t6 = 2.0*tendons[4];
+    torques[2] = t4*(t4*(t5 + tendons[4]) + tendons[3]);
     const double t7 = tendons[3] + t4*(t6 + 3.0*t5);
-    torques[0] = t0*(tendons[0] + t0*(tendons[1] + t1));
-    torques[1] = speeds[0]*t3;
-    torques[2] = t4*(tendons[3] + t4*(tendons[4] + t5));
-    torques[3] = speeds[1]*t7;
-    springs[0] = t3;
-    springs[1] = t2 + 6.0*t1;
     springs[2] = t7;
+    torques[3] = speeds[1]*t7;
     springs[3] = t6 + 6.0*t5;
 }

@@ -16,6 +16,6 @@ int awiwi_backstepping_academic(const double x[restrict 2], const double k[restr
     const double t0 = x[0]*x[0];
     const double t1 = x[1] + t0;
     const double t2 = t1 - x[0]*t0;
-    u[0] = x[0]*(-2.0*t2 - 1.0) - k[0]*t2 - k[1]*(k[0]*x[0] + t1);
+    u[0] = x[0]*(-2.0*t2 - 1.0) - k[0]*t2 - k[1]*(t1 + k[0]*x[0]);
     return k[0] > 0.0 && k[1] > 0.0 ? 0 : 1;
 }

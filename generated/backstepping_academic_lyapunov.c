@@ -16,9 +16,9 @@ void awiwi_backstepping_academic_lyapunov(const double x[restrict 2], const doub
 {
     const double t0 = x[0]*x[0];
     const double t1 = k[0]*x[0] + t0;
+    controls[0] = -t1;
     const double t2 = x[1] + t1;
     const double t3 = t2*t2;
     V[0] = 0.5*(t0 + t3);
     Vdot[0] = -(t0*(k[0] + t0)) - k[1]*t3;
-    controls[0] = -t1;
 }

@@ -22,12 +22,21 @@
 
 int awiwi_backstepping_impedance(const double state[restrict 4], const double desired[restrict 5], const double external[restrict 2], const double plant[restrict 3], const double gains[restrict 4], const double weights[restrict 2], double tau_m[restrict 1])
 {
-    const double t0 = 1.0/plant[0];
-    const double t1 = (external[0] + state[2])*t0;
-    const double t2 = desired[2] - t1;
-    const double t3 = state[1] - desired[1];
-    const double t4 = (gains[2]*gains[3] + weights[0]/weights[1])*(state[2] + (gains[0]*(state[0] - desired[0]) - desired[2]*plant[0] + gains[1]*t3));
-    const double t5 = gains[1]*(desired[3] - (external[1] + state[3])*t0) + (desired[4]*plant[0] + gains[0]*t2) - (t4 + (gains[2] + gains[3])*(state[3] + (gains[0]*t3 - desired[3]*plant[0] - gains[1]*t2)));
-    tau_m[0] = state[2] + plant[1]*(t1 + ((t2 - gains[3]*t3)/weights[0] + t5)/plant[2]);
+    const double t0 = state[1] - desired[1];
+    double s1 = state[2] + gains[0]*(state[0] - desired[0]);
+    double s2 = state[3] + gains[0]*t0;
+    s1 += gains[1]*t0;
+    const double t3 = 1.0/plant[0];
+    const double t4 = (external[0] + state[2])*t3;
+    const double t5 = desired[2] - t4;
+    s1 -= desired[2]*plant[0];
+    s2 -= gains[1]*t5;
+    double s6 = (t5 - gains[3]*t0)/weights[0] + desired[4]*plant[0];
+    s2 -= desired[3]*plant[0];
+    s6 += gains[1]*(desired[3] - (external[1] + state[3])*t3);
+    s6 += gains[0]*t5;
+    s6 -= (gains[2]*gains[3] + weights[0]/weights[1])*s1;
+    s6 -= (gains[3] + gains[2])*s2;
+    tau_m[0] = state[2] + plant[1]*(t4 + s6/plant[2]);
     return plant[0] > 0.0 && plant[1] > 0.0 && plant[2] > 0.0 && gains[0] > 0.0 && gains[1] > 0.0 && gains[2] > 0.0 && gains[3] > 0.0 && weights[0] > 0.0 && weights[1] > 0.0 ? 0 : 1;
 }

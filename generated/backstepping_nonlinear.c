@@ -21,14 +21,24 @@
 
 int awiwi_backstepping_nonlinear(const double state[restrict 4], const double desired[restrict 5], const double external[restrict 2], const double bodies[restrict 2], const double spring[restrict 2], const double gains[restrict 4], const double weights[restrict 2], double tau_m[restrict 1])
 {
-    const double t0 = 1.0/bodies[0];
-    const double t1 = (external[0] + state[2])*t0;
-    const double t2 = 1.0/spring[0];
-    const double t3 = state[3]*t2;
-    const double t4 = t1 - desired[2];
-    const double t5 = desired[1] - state[1];
-    const double t6 = (gains[2]*gains[3] + weights[0]/weights[1])*(state[2] + (gains[0]*(state[0] - desired[0]) - bodies[0]*desired[2] - gains[1]*t5));
-    const double t7 = gains[0]*t4 - bodies[0]*desired[4] - gains[1]*(desired[3] - (external[1] + state[3])*t0) + (t6 + (gains[2] + gains[3])*(state[3] + (gains[1]*t4 - (bodies[0]*desired[3] + gains[0]*t5))));
-    tau_m[0] = state[2] + bodies[1]*(t1 - t2*(spring[1]*(t3*t3) + (t7 - (gains[3]*t5 - t4)/weights[0])));
+    const double t0 = 1.0/spring[0];
+    const double t1 = state[3]*t0;
+    const double t2 = desired[1] - state[1];
+    double s3 = state[2] + gains[0]*(state[0] - desired[0]);
+    double s4 = state[3] - gains[0]*t2;
+    s3 -= gains[1]*t2;
+    double s5 = spring[1]*(t1*t1) - bodies[0]*desired[4];
+    const double t6 = 1.0/bodies[0];
+    const double t7 = (external[0] + state[2])*t6;
+    const double t8 = t7 - desired[2];
+    s3 -= bodies[0]*desired[2];
+    s4 += gains[1]*t8;
+    s4 -= bodies[0]*desired[3];
+    s5 += gains[0]*t8;
+    s5 -= gains[1]*(desired[3] - (external[1] + state[3])*t6);
+    s5 += (gains[2]*gains[3] + weights[0]/weights[1])*s3;
+    s5 += (gains[3] + gains[2])*s4;
+    s5 -= (gains[3]*t2 - t8)/weights[0];
+    tau_m[0] = state[2] + bodies[1]*(t7 - t0*s5);
     return bodies[0] > 0.0 && bodies[1] > 0.0 && spring[0] > 0.0 && gains[0] > 0.0 && gains[1] > 0.0 && gains[2] > 0.0 && gains[3] > 0.0 && weights[0] > 0.0 && weights[1] > 0.0 ? 0 : 1;
 }

@@ -20,14 +20,18 @@
 int awiwi_backstepping_position(const double motion[restrict 4], const double desired[restrict 5], const double plant[restrict 3], const double rates[restrict 4], const double scales[restrict 3], double tau_m[restrict 1])
 {
     const double t0 = rates[0] + rates[1];
-    const double t1 = rates[2] + t0;
-    const double t2 = scales[1]/scales[2];
-    const double t3 = scales[0]/scales[1];
-    const double t4 = 1.0/scales[0] + rates[0]*rates[1];
-    const double t5 = t3 + (t4 + rates[2]*t0);
-    const double t6 = rates[0]*t3 + rates[2]*t4;
-    const double t7 = (desired[0] - motion[0])*(t4*t2 + rates[3]*t6) + (desired[1] - motion[1])*(t0*t2 + (t6 + rates[3]*t5));
-    const double t8 = desired[4] + ((desired[3] - motion[3])*(rates[3] + t1) + ((desired[2] - motion[2])*(t2 + (rates[3]*t1 + t5)) + t7));
-    tau_m[0] = motion[2]*(plant[0] + plant[1]) + plant[0]*plant[1]/plant[2]*t8;
+    const double t1 = t0 + rates[2];
+    double s2 = desired[4] + (desired[3] - motion[3])*(t1 + rates[3]);
+    const double t3 = rates[0]*rates[1] + 1.0/scales[0];
+    const double t4 = scales[0]/scales[1];
+    const double t5 = scales[1]/scales[2];
+    double s6 = rates[3]*t1 + t5;
+    const double t7 = t4 + t3 + rates[2]*t0;
+    s6 += t7;
+    const double t8 = rates[0]*t4 + rates[2]*t3;
+    s2 += (desired[2] - motion[2])*s6;
+    s2 += (desired[0] - motion[0])*(t3*t5 + rates[3]*t8);
+    s2 += (desired[1] - motion[1])*(t0*t5 + t8 + rates[3]*t7);
+    tau_m[0] = motion[2]*(plant[0] + plant[1]) + plant[0]*plant[1]/plant[2]*s2;
     return plant[0] > 0.0 && plant[1] > 0.0 && plant[2] > 0.0 && rates[0] > 0.0 && rates[1] > 0.0 && rates[2] > 0.0 && rates[3] > 0.0 && scales[0] > 0.0 && scales[1] > 0.0 && scales[2] > 0.0 ? 0 : 1;
 }

@@ -13,29 +13,31 @@
 
 void awiwi_backstepping_state_gains_derivatives(const double plant[restrict 3], const double gains[restrict 4], const double weights[restrict 2], double dK[restrict 16])
 {
-    const double t0 = plant[1]/plant[2];
-    const double t1 = t0*(gains[2]*gains[3] + weights[0]/weights[1]);
-    const double t2 = gains[3]*t0;
-    const double t3 = gains[2]*t0;
-    const double t4 = (gains[2] + gains[3])*t0;
-    const double t5 = gains[0]*t0;
-    const double t6 = 1.0/plant[0];
-    const double t7 = t6*t0;
-    const double t8 = t6*(gains[1]*t0);
-    dK[0] = t1;
     dK[1] = 0.0;
-    dK[2] = gains[0]*t2;
-    dK[3] = gains[0]*t3;
-    dK[4] = t4;
-    dK[5] = t1;
-    dK[6] = t5 + gains[1]*t2;
-    dK[7] = t5 + (t0/weights[0] + gains[1]*t3);
-    dK[8] = t7;
-    dK[9] = t6*t4;
-    dK[10] = t2 + t8;
-    dK[11] = t3 + t8;
     dK[12] = 0.0;
-    dK[13] = t7;
+    const double t0 = plant[1]/plant[2];
     dK[14] = t0;
     dK[15] = t0;
+    const double t1 = 1.0/plant[0];
+    const double t2 = t1*t0;
+    dK[8] = t2;
+    dK[13] = t2;
+    const double t3 = t0*(weights[0]/weights[1] + gains[2]*gains[3]);
+    dK[0] = t3;
+    dK[5] = t3;
+    const double t4 = gains[3]*t0;
+    const double t5 = gains[2]*t0;
+    const double t6 = (gains[3] + gains[2])*t0;
+    dK[4] = t6;
+    dK[9] = t1*t6;
+    double s7 = t0/weights[0] + gains[1]*t5;
+    const double t8 = t1*(gains[1]*t0);
+    const double t9 = gains[0]*t0;
+    dK[6] = gains[1]*t4 + t9;
+    s7 += t9;
+    dK[7] = s7;
+    dK[2] = gains[0]*t4;
+    dK[3] = gains[0]*t5;
+    dK[10] = t4 + t8;
+    dK[11] = t5 + t8;
 }

@@ -21,12 +21,14 @@
 
 int awiwi_calibration_polynomials(const double counts[restrict 1], const double ends[restrict 2], const double length_powers[restrict 7], const double force_powers[restrict 7], const double stiffness_powers[restrict 7], double dL[restrict 1], double force[restrict 1], double stiffness[restrict 1])
 {
-    const double t0 = (counts[0] - ends[0] + (counts[0] - ends[1]))/(ends[0] - ends[1]);
-    const double t1 = length_powers[2] - t0*(length_powers[3] - t0*(length_powers[4] - t0*(length_powers[5] - length_powers[6]*t0)));
-    const double t2 = force_powers[2] - t0*(force_powers[3] - t0*(force_powers[4] - t0*(force_powers[5] - force_powers[6]*t0)));
-    const double t3 = t0*(stiffness_powers[3] - t0*(stiffness_powers[4] - t0*(stiffness_powers[5] - stiffness_powers[6]*t0)));
-    dL[0] = length_powers[0] - t0*(length_powers[1] - t0*t1);
-    force[0] = force_powers[0] - t0*(force_powers[1] - t0*t2);
-    stiffness[0] = stiffness_powers[0] - t0*(stiffness_powers[1] - t0*(stiffness_powers[2] - t3));
-    return 1.015625 - t0*t0 > 0.0 ? 0 : 1;
+    double s0 = counts[0] + counts[0] - ends[0];
+    s0 -= ends[1];
+    const double t1 = s0/(ends[0] - ends[1]);
+    const double t2 = length_powers[2] - t1*(length_powers[3] - t1*(length_powers[4] - t1*(length_powers[5] - length_powers[6]*t1)));
+    dL[0] = length_powers[0] - t1*(length_powers[1] - t1*t2);
+    const double t3 = force_powers[2] - t1*(force_powers[3] - t1*(force_powers[4] - t1*(force_powers[5] - force_powers[6]*t1)));
+    force[0] = force_powers[0] - t1*(force_powers[1] - t1*t3);
+    const double t4 = t1*(stiffness_powers[3] - t1*(stiffness_powers[4] - t1*(stiffness_powers[5] - stiffness_powers[6]*t1)));
+    stiffness[0] = stiffness_powers[0] - t1*(stiffness_powers[1] - t1*(stiffness_powers[2] - t4));
+    return 1.015625 - t1*t1 > 0.0 ? 0 : 1;
 }

@@ -28,7 +28,10 @@
 
 int awiwi_cascade(const double f[restrict 1], const double xd[restrict 1], const double stiffness[restrict 1], const double slope[restrict 1], const double hdd[restrict 1], const double f_des[restrict 1], const double fd_des[restrict 1], const double fdd_des[restrict 1], const double friction[restrict 1], const double r[restrict 1], const double B[restrict 1], const double force_kp[restrict 1], const double force_kd[restrict 1], double tau[restrict 1])
 {
-    const double t0 = (fdd_des[0] + force_kd[0]*(fd_des[0] - stiffness[0]*xd[0]) - force_kp[0]*(f[0] - f_des[0]))/stiffness[0];
-    tau[0] = friction[0] + f[0]*r[0] - B[0]*(1.0/r[0])*(hdd[0] + slope[0]*(xd[0]*xd[0]) - t0);
+    double s0 = fdd_des[0] - force_kp[0]*(f[0] - f_des[0]);
+    double s1 = hdd[0] + slope[0]*(xd[0]*xd[0]);
+    s0 += force_kd[0]*(fd_des[0] - stiffness[0]*xd[0]);
+    s1 -= s0/stiffness[0];
+    tau[0] = friction[0] + f[0]*r[0] - B[0]*(1.0/r[0])*s1;
     return stiffness[0] > 0.0 && r[0] > 0.0 && B[0] > 0.0 && force_kp[0] > 0.0 && force_kd[0] > 0.0 ? 0 : 1;
 }

@@ -13,9 +13,9 @@
 void awiwi_fifth_joint_estimate(const double h[restrict 8], const double start[restrict 4], double q[restrict 4])
 {
     (void)start;
+    q[0] = 62.5*(h[0] - h[1]);
     const double t0 = h[2] - h[5];
     const double t1 = h[3] - h[4];
-    q[0] = 62.5*(h[0] - h[1]);
     q[1] = 31.25*(t0 + t1);
     q[2] = 41.666666666666664*(t0 - t1);
     q[3] = 100.0*(h[6] - h[7]);

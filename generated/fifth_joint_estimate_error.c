@@ -15,24 +15,24 @@
 void awiwi_fifth_joint_estimate_error(const double q[restrict 4], const double noise[restrict 1], double covariance[restrict 16], double worst[restrict 4])
 {
     (void)q;
-    const double t0 = noise[0]*noise[0];
-    const double t1 = 125.0*noise[0];
-    covariance[0] = 7812.5*t0;
     covariance[1] = 0.0;
     covariance[2] = 0.0;
     covariance[3] = 0.0;
     covariance[4] = 0.0;
-    covariance[5] = 3906.25*t0;
     covariance[6] = 0.0;
     covariance[7] = 0.0;
     covariance[8] = 0.0;
     covariance[9] = 0.0;
-    covariance[10] = 6944.444444444444*t0;
     covariance[11] = 0.0;
     covariance[12] = 0.0;
     covariance[13] = 0.0;
     covariance[14] = 0.0;
+    const double t0 = noise[0]*noise[0];
+    covariance[0] = 7812.5*t0;
+    covariance[5] = 3906.25*t0;
+    covariance[10] = 6944.444444444444*t0;
     covariance[15] = 20000.0*t0;
+    const double t1 = 125.0*noise[0];
     worst[0] = t1;
     worst[1] = t1;
     worst[2] = 166.66666666666666*noise[0];

@@ -15,24 +15,24 @@ void awiwi_fifth_joint_stiffness(const double q[restrict 4], const double f[rest
 {
     (void)q;
     (void)f;
-    const double t0 = k[2] + k[5];
-    const double t1 = k[3] + k[4];
-    const double t2 = t0 + t1;
-    const double t3 = 4.8e-05*(t0 - t1);
-    K[0] = 6.4e-05*(k[0] + k[1]);
     K[1] = 0.0;
     K[2] = 0.0;
     K[3] = 0.0;
     K[4] = 0.0;
-    K[5] = 6.4e-05*t2;
-    K[6] = t3;
     K[7] = 0.0;
     K[8] = 0.0;
-    K[9] = t3;
-    K[10] = 3.6e-05*t2;
     K[11] = 0.0;
     K[12] = 0.0;
     K[13] = 0.0;
     K[14] = 0.0;
+    K[0] = 6.4e-05*(k[0] + k[1]);
+    const double t0 = k[2] + k[5];
+    const double t1 = k[3] + k[4];
+    const double t2 = t0 + t1;
+    const double t3 = 4.8e-05*(t0 - t1);
+    K[6] = t3;
+    K[9] = t3;
+    K[5] = 6.4e-05*t2;
+    K[10] = 3.6e-05*t2;
     K[15] = 2.5e-05*(k[6] + k[7]);
 }

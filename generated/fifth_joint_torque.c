@@ -13,9 +13,9 @@
 void awiwi_fifth_joint_torque(const double q[restrict 4], const double f[restrict 8], double tau[restrict 4])
 {
     (void)q;
+    tau[0] = -0.008*(f[0] - f[1]);
     const double t0 = f[2] - f[5];
     const double t1 = f[3] - f[4];
-    tau[0] = -0.008*(f[0] - f[1]);
     tau[1] = -0.008*(t0 + t1);
     tau[2] = -0.006*(t0 - t1);
     tau[3] = -0.005*(f[6] - f[7]);

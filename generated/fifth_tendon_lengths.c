@@ -12,17 +12,17 @@
 void awiwi_fifth_tendon_lengths(const double q[restrict 4], double h[restrict 8])
 {
     const double t0 = 0.008*q[0];
+    h[0] = t0;
+    h[1] = -t0;
     const double t1 = 0.008*q[1];
     const double t2 = 0.006*q[2];
     const double t3 = t1 + t2;
-    const double t4 = t1 - t2;
-    const double t5 = 0.005*q[3];
-    h[0] = t0;
-    h[1] = -t0;
     h[2] = t3;
+    h[5] = -t3;
+    const double t4 = t1 - t2;
     h[3] = t4;
     h[4] = -t4;
-    h[5] = -t3;
+    const double t5 = 0.005*q[3];
     h[6] = t5;
     h[7] = -t5;
 }

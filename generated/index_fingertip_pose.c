@@ -12,24 +12,27 @@
 
 void awiwi_index_fingertip_pose(const double q[restrict 4], double T[restrict 16])
 {
-    const double t0 = q[1] + q[2];
-    const double t1 = q[3] + t0;
-    const awiwi_turn4 a0 = awiwi_sincos4(q[0], t1, q[1], t0);
-    const double t2 = 0.04038*a0.cos[2] + 0.0298*a0.cos[3] + 0.00201*a0.cos[1] + 0.006;
-    T[0] = a0.cos[0]*a0.cos[1];
-    T[1] = -(a0.cos[0]*a0.sin[1]);
-    T[2] = a0.sin[0];
-    T[3] = a0.cos[0]*t2 - 0.0057*a0.sin[0];
-    T[4] = a0.sin[0]*a0.cos[1];
-    T[5] = -(a0.sin[0]*a0.sin[1]);
-    T[6] = -a0.cos[0];
-    T[7] = 0.0057*a0.cos[0] + a0.sin[0]*t2;
-    T[8] = a0.sin[1];
-    T[9] = a0.cos[1];
     T[10] = 0.0;
-    T[11] = 0.04038*a0.sin[2] + 0.0298*a0.sin[3] + 0.00201*a0.sin[1];
     T[12] = 0.0;
     T[13] = 0.0;
     T[14] = 0.0;
     T[15] = 1.0;
+    const double t0 = q[2] + q[1];
+    const double t1 = q[3] + t0;
+    const awiwi_turn4 a0 = awiwi_sincos4(t1, q[1], t0, q[0]);
+    T[9] = a0.cos[0];
+    T[8] = a0.sin[0];
+    double s2 = 0.04038*a0.cos[1] + 0.00201*a0.cos[0] + 0.006;
+    double s3 = 0.04038*a0.sin[1] + 0.00201*a0.sin[0];
+    s2 += 0.0298*a0.cos[2];
+    s3 += 0.0298*a0.sin[2];
+    T[11] = s3;
+    T[6] = -a0.cos[3];
+    T[2] = a0.sin[3];
+    T[0] = a0.cos[3]*a0.cos[0];
+    T[4] = a0.sin[3]*a0.cos[0];
+    T[1] = -(a0.cos[3]*a0.sin[0]);
+    T[5] = -(a0.sin[3]*a0.sin[0]);
+    T[3] = a0.cos[3]*s2 - 0.0057*a0.sin[3];
+    T[7] = 0.0057*a0.cos[3] + a0.sin[3]*s2;
 }

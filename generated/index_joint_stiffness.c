@@ -15,26 +15,26 @@ void awiwi_index_joint_stiffness(const double q[restrict 4], const double f[rest
 {
     (void)q;
     (void)f;
-    const double t0 = k[0] + k[3];
-    const double t1 = k[1] + k[2];
-    const double t2 = t0 + t1;
-    const double t3 = 5.85e-05*(t0 - t1);
-    const double t4 = k[6] + k[7];
-    const double t5 = -2.7e-05*t4;
-    K[0] = 8.1e-05*t2;
-    K[1] = t3;
     K[2] = 0.0;
     K[3] = 0.0;
-    K[4] = t3;
-    K[5] = 4.225e-05*t2;
     K[6] = 0.0;
     K[7] = 0.0;
     K[8] = 0.0;
     K[9] = 0.0;
-    K[10] = 3.6e-05*(k[4] + k[5] + t4);
-    K[11] = t5;
     K[12] = 0.0;
     K[13] = 0.0;
+    const double t0 = k[0] + k[3];
+    const double t1 = k[1] + k[2];
+    const double t2 = t0 + t1;
+    const double t3 = 5.85e-05*(t0 - t1);
+    K[1] = t3;
+    K[4] = t3;
+    K[0] = 8.1e-05*t2;
+    K[5] = 4.225e-05*t2;
+    const double t4 = k[6] + k[7];
+    K[10] = 3.6e-05*(k[4] + k[5] + t4);
+    const double t5 = -2.7e-05*t4;
+    K[11] = t5;
     K[14] = t5;
     K[15] = 2.025e-05*t4;
 }

@@ -15,9 +15,9 @@ void awiwi_middle_joint_estimate(const double h[restrict 8], const double start[
     (void)start;
     const double t0 = h[0] - h[3];
     const double t1 = h[1] - h[2];
-    const double t2 = h[4] - h[5];
     q[0] = 27.77777777777778*(t0 + t1);
     q[1] = 38.46153846153846*(t0 - t1);
+    const double t2 = h[4] - h[5];
     q[2] = 83.33333333333333*t2;
-    q[3] = -111.11111111111111*(h[6] - h[7] - t2);
+    q[3] = -111.11111111111111*(h[6] - t2 - h[7]);
 }

@@ -15,22 +15,22 @@
 void awiwi_middle_joint_estimate_error(const double q[restrict 4], const double noise[restrict 1], double covariance[restrict 16], double worst[restrict 4])
 {
     (void)q;
-    const double t0 = noise[0]*noise[0];
-    const double t1 = 18518.51851851852*t0;
-    covariance[0] = 3086.41975308642*t0;
     covariance[1] = 0.0;
     covariance[2] = 0.0;
     covariance[3] = 0.0;
     covariance[4] = 0.0;
-    covariance[5] = 5917.15976331361*t0;
     covariance[6] = 0.0;
     covariance[7] = 0.0;
     covariance[8] = 0.0;
     covariance[9] = 0.0;
-    covariance[10] = 13888.888888888889*t0;
-    covariance[11] = t1;
     covariance[12] = 0.0;
     covariance[13] = 0.0;
+    const double t0 = noise[0]*noise[0];
+    covariance[0] = 3086.41975308642*t0;
+    covariance[5] = 5917.15976331361*t0;
+    covariance[10] = 13888.888888888889*t0;
+    const double t1 = 18518.51851851852*t0;
+    covariance[11] = t1;
     covariance[14] = t1;
     covariance[15] = 49382.71604938272*t0;
     worst[0] = 111.11111111111111*noise[0];

@@ -15,9 +15,9 @@ void awiwi_middle_joint_torque(const double q[restrict 4], const double f[restri
     (void)q;
     const double t0 = f[0] - f[3];
     const double t1 = f[1] - f[2];
-    const double t2 = f[6] - f[7];
     tau[0] = -0.009*(t0 + t1);
     tau[1] = -0.0065*(t0 - t1);
+    const double t2 = f[6] - f[7];
     tau[2] = -0.006*(f[4] + t2 - f[5]);
     tau[3] = 0.0045*t2;
 }

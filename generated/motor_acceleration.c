@@ -16,10 +16,13 @@
 
 void awiwi_motor_acceleration(const double theta[restrict 1], const double thd[restrict 1], const double tau[restrict 1], const double f[restrict 1], double thdd[restrict 1])
 {
-    const double t0 = 100.0*theta[0] + 2.2689280275926285;
+    const double t0 = 2.2689280275926285 + 100.0*theta[0];
     const awiwi_turn2 a0 = awiwi_sincos2(theta[0], t0);
     const double t1 = a0.sin[0]*a0.sin[0] - 0.5;
-    const double t2 = 0.020784609690826527*t1 + a0.sin[0]*(0.012*a0.cos[0] + 0.020784609690826527*a0.sin[0]) - 0.005209445330007911;
-    const double t3 = tau[0] + a0.cos[0]*t2 + 0.010565456543517485 - 0.004*f[0] - 0.0356*thd[0] - 0.5586*awiwi_atan(10.0*thd[0]) - a0.sin[0]*(0.012*t1 + 0.029544232590366242) - a0.cos[1]*(0.02113091308703497*a0.cos[1] + 0.0453153893518325*a0.sin[1] - 0.06);
-    thdd[0] = 499.7501249375312*t3;
+    const double t2 = a0.sin[0]*(0.012*a0.cos[0] + 0.020784609690826527*a0.sin[0]) + 0.020784609690826527*t1 - 0.005209445330007911;
+    double s3 = a0.cos[0]*t2 + tau[0] + 0.010565456543517485 - 0.004*f[0] - a0.sin[0]*(0.012*t1 + 0.029544232590366242);
+    s3 -= a0.cos[1]*(0.0453153893518325*a0.sin[1] + 0.02113091308703497*a0.cos[1] - 0.06);
+    s3 -= 0.0356*thd[0];
+    s3 -= 0.5586*awiwi_atan(10.0*thd[0]);
+    thdd[0] = 499.7501249375312*s3;
 }

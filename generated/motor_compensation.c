@@ -18,7 +18,12 @@ void awiwi_motor_compensation(const double theta[restrict 1], const double thd[r
     const double t0 = 100.0*theta[0] - 0.8726646259971648;
     const awiwi_turn2 a0 = awiwi_sincos2(theta[0], t0);
     const double t1 = a0.sin[0]*a0.sin[0] - 0.5;
-    const double t2 = 0.018706148721743875*t1 + a0.sin[0]*(0.0108*a0.cos[0] + 0.018706148721743875*a0.sin[0]) - 0.004688500797007119;
-    const double t3 = 0.03204*thd[0] + 0.50274*awiwi_atan(10.0*thd[0]) + a0.sin[0]*(0.0108*t1 + 0.02658980933132962) + a0.cos[1]*(0.019017821778331473*a0.cos[1] + 0.040783850416649246*a0.sin[1] + 0.054) - a0.cos[0]*t2 - 0.009508910889165736;
-    tau[0] = t3;
+    double s2 = 0.018706148721743875*t1 - 0.004688500797007119;
+    double s3 = a0.sin[0]*(0.0108*t1 + 0.02658980933132962) - 0.009508910889165736;
+    s3 += a0.cos[1]*(0.040783850416649246*a0.sin[1] + 0.019017821778331473*a0.cos[1] + 0.054);
+    s2 += a0.sin[0]*(0.0108*a0.cos[0] + 0.018706148721743875*a0.sin[0]);
+    s3 -= a0.cos[0]*s2;
+    s3 += 0.03204*thd[0];
+    s3 += 0.50274*awiwi_atan(10.0*thd[0]);
+    tau[0] = s3;
 }

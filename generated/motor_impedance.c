@@ -22,6 +22,6 @@
 
 int awiwi_motor_impedance(const double theta[restrict 1], const double thd[restrict 1], const double theta_des[restrict 1], const double f_des[restrict 1], const double friction[restrict 1], const double r[restrict 1], const double motor_kp[restrict 1], const double motor_kd[restrict 1], double tau[restrict 1])
 {
-    tau[0] = friction[0] + f_des[0]*r[0] - motor_kd[0]*thd[0] - motor_kp[0]*(theta[0] - theta_des[0]);
+    tau[0] = friction[0] + f_des[0]*r[0] - motor_kp[0]*(theta[0] - theta_des[0]) - motor_kd[0]*thd[0];
     return r[0] > 0.0 && motor_kp[0] > 0.0 && motor_kd[0] > 0.0 ? 0 : 1;
 }

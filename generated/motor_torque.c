@@ -19,7 +19,12 @@ void awiwi_motor_torque(const double theta[restrict 1], const double thd[restric
     const double t0 = 100.0*theta[0] - 0.8726646259971648;
     const awiwi_turn2 a0 = awiwi_sincos2(theta[0], t0);
     const double t1 = a0.sin[0]*a0.sin[0] - 0.5;
-    const double t2 = 0.020784609690826527*t1 + a0.sin[0]*(0.012*a0.cos[0] + 0.020784609690826527*a0.sin[0]) - 0.005209445330007911;
-    const double t3 = 0.004*f[0] + 0.0356*thd[0] + 0.002001*thdd[0] + 0.5586*awiwi_atan(10.0*thd[0]) + a0.sin[0]*(0.012*t1 + 0.029544232590366242) + a0.cos[1]*(0.02113091308703497*a0.cos[1] + 0.0453153893518325*a0.sin[1] + 0.06) - a0.cos[0]*t2 - 0.010565456543517485;
-    tau[0] = t3;
+    double s2 = 0.020784609690826527*t1 - 0.005209445330007911;
+    double s3 = a0.sin[0]*(0.012*t1 + 0.029544232590366242) + 0.004*f[0] + 0.002001*thdd[0] - 0.010565456543517485;
+    s3 += a0.cos[1]*(0.0453153893518325*a0.sin[1] + 0.02113091308703497*a0.cos[1] + 0.06);
+    s2 += a0.sin[0]*(0.012*a0.cos[0] + 0.020784609690826527*a0.sin[0]);
+    s3 -= a0.cos[0]*s2;
+    s3 += 0.0356*thd[0];
+    s3 += 0.5586*awiwi_atan(10.0*thd[0]);
+    tau[0] = s3;
 }

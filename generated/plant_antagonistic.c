@@ -24,21 +24,30 @@
 
 void awiwi_plant_antagonistic(const double x[restrict 6], const double u[restrict 2], const double load[restrict 1], const double inertias[restrict 3], const double tendons[restrict 6], const double damping[restrict 1], const double friction[restrict 3], double xd[restrict 6], double stretches[restrict 2], double tau[restrict 2])
 {
-    const double t0 = 0.5*x[0];
-    const double t1 = x[0] - x[2];
-    const double t2 = t0 - 0.5*(x[2] + fabs(t1));
-    const double t3 = t2*(t2*(tendons[1] - tendons[2]*t2) - tendons[0]);
-    const double t4 = x[0] + x[4];
-    const double t5 = t0 + 0.5*(x[4] + fabs(t4));
-    const double t6 = t5*(tendons[3] + t5*(tendons[4] + tendons[5]*t5));
     xd[0] = x[1];
-    xd[1] = (load[0] + t3 - damping[0]*x[1] - t6)/inertias[0];
     xd[2] = x[3];
-    xd[3] = (u[0] - t3 - friction[2]*x[3] - friction[1]*awiwi_atan(friction[0]*x[3]))/inertias[1];
     xd[4] = x[5];
-    xd[5] = (u[1] - friction[2]*x[5] - friction[1]*awiwi_atan(friction[0]*x[5]) - t6)/inertias[2];
-    stretches[0] = -t1;
-    stretches[1] = t4;
-    tau[0] = t3;
-    tau[1] = t6;
+    double s0 = load[0] - damping[0]*x[1];
+    const double t1 = 0.5*x[0];
+    const double t2 = x[0] - x[2];
+    stretches[0] = -t2;
+    const double t3 = t1 - 0.5*(x[2] + fabs(t2));
+    const double t4 = t3*(t3*(tendons[1] - tendons[2]*t3) - tendons[0]);
+    tau[0] = t4;
+    s0 += t4;
+    double s5 = u[0] - t4;
+    const double t6 = x[0] + x[4];
+    stretches[1] = t6;
+    const double t7 = t1 + 0.5*(x[4] + fabs(t6));
+    const double t8 = t7*(tendons[3] + t7*(tendons[4] + tendons[5]*t7));
+    tau[1] = t8;
+    s0 -= t8;
+    xd[1] = s0/inertias[0];
+    double s9 = u[1] - t8;
+    s5 -= friction[2]*x[3];
+    s9 -= friction[2]*x[5];
+    s5 -= friction[1]*awiwi_atan(friction[0]*x[3]);
+    xd[3] = s5/inertias[1];
+    s9 -= friction[1]*awiwi_atan(friction[0]*x[5]);
+    xd[5] = s9/inertias[2];
 }

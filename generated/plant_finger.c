@@ -19,7 +19,6 @@
 
 void awiwi_plant_finger(const double qd[restrict 4], const double qdd[restrict 4], const double thds[restrict 8], const double f[restrict 8], const double u[restrict 8], const double motor[restrict 2], const double friction[restrict 3], double xd[restrict 24])
 {
-    const double t0 = 1.0/motor[0];
     xd[0] = qd[0];
     xd[1] = qd[1];
     xd[2] = qd[2];
@@ -36,12 +35,37 @@ void awiwi_plant_finger(const double qd[restrict 4], const double qdd[restrict 4
     xd[13] = thds[5];
     xd[14] = thds[6];
     xd[15] = thds[7];
-    xd[16] = t0*(u[0] - f[0]*motor[1] - friction[2]*thds[0] - friction[1]*awiwi_atan(friction[0]*thds[0]));
-    xd[17] = t0*(u[1] - f[1]*motor[1] - friction[2]*thds[1] - friction[1]*awiwi_atan(friction[0]*thds[1]));
-    xd[18] = t0*(u[2] - f[2]*motor[1] - friction[2]*thds[2] - friction[1]*awiwi_atan(friction[0]*thds[2]));
-    xd[19] = t0*(u[3] - f[3]*motor[1] - friction[2]*thds[3] - friction[1]*awiwi_atan(friction[0]*thds[3]));
-    xd[20] = t0*(u[4] - f[4]*motor[1] - friction[2]*thds[4] - friction[1]*awiwi_atan(friction[0]*thds[4]));
-    xd[21] = t0*(u[5] - f[5]*motor[1] - friction[2]*thds[5] - friction[1]*awiwi_atan(friction[0]*thds[5]));
-    xd[22] = t0*(u[6] - f[6]*motor[1] - friction[2]*thds[6] - friction[1]*awiwi_atan(friction[0]*thds[6]));
-    xd[23] = t0*(u[7] - f[7]*motor[1] - friction[2]*thds[7] - friction[1]*awiwi_atan(friction[0]*thds[7]));
+    const double t0 = 1.0/motor[0];
+    double s1 = u[0] - f[0]*motor[1];
+    double s2 = u[1] - f[1]*motor[1];
+    double s3 = u[2] - f[2]*motor[1];
+    double s4 = u[3] - f[3]*motor[1];
+    double s5 = u[4] - f[4]*motor[1];
+    double s6 = u[5] - f[5]*motor[1];
+    double s7 = u[6] - f[6]*motor[1];
+    double s8 = u[7] - f[7]*motor[1];
+    s1 -= friction[2]*thds[0];
+    s1 -= friction[1]*awiwi_atan(friction[0]*thds[0]);
+    xd[16] = t0*s1;
+    s2 -= friction[2]*thds[1];
+    s2 -= friction[1]*awiwi_atan(friction[0]*thds[1]);
+    xd[17] = t0*s2;
+    s3 -= friction[2]*thds[2];
+    s3 -= friction[1]*awiwi_atan(friction[0]*thds[2]);
+    xd[18] = t0*s3;
+    s4 -= friction[2]*thds[3];
+    s4 -= friction[1]*awiwi_atan(friction[0]*thds[3]);
+    xd[19] = t0*s4;
+    s5 -= friction[2]*thds[4];
+    s5 -= friction[1]*awiwi_atan(friction[0]*thds[4]);
+    xd[20] = t0*s5;
+    s6 -= friction[2]*thds[5];
+    s6 -= friction[1]*awiwi_atan(friction[0]*thds[5]);
+    xd[21] = t0*s6;
+    s7 -= friction[2]*thds[6];
+    s7 -= friction[1]*awiwi_atan(friction[0]*thds[6]);
+    xd[22] = t0*s7;
+    s8 -= friction[2]*thds[7];
+    s8 -= friction[1]*awiwi_atan(friction[0]*thds[7]);
+    xd[23] = t0*s8;
 }

@@ -18,28 +18,28 @@
 
 void awiwi_plant_finger_forces(const double thetas[restrict 8], const double path[restrict 8], const double slack[restrict 8], const double motor[restrict 2], const double line[restrict 3], double f[restrict 8])
 {
-    const double t0 = path[0] - slack[0] + motor[1]*thetas[0];
+    const double t0 = path[0] + motor[1]*thetas[0] - slack[0];
     const double t1 = 0.5*(t0 + fabs(t0));
-    const double t2 = path[1] - slack[1] + motor[1]*thetas[1];
+    const double t2 = path[1] + motor[1]*thetas[1] - slack[1];
     const double t3 = 0.5*(t2 + fabs(t2));
-    const double t4 = path[2] - slack[2] + motor[1]*thetas[2];
+    const double t4 = path[2] + motor[1]*thetas[2] - slack[2];
     const double t5 = 0.5*(t4 + fabs(t4));
-    const double t6 = path[3] - slack[3] + motor[1]*thetas[3];
+    const double t6 = path[3] + motor[1]*thetas[3] - slack[3];
     const double t7 = 0.5*(t6 + fabs(t6));
-    const double t8 = path[4] - slack[4] + motor[1]*thetas[4];
+    const double t8 = path[4] + motor[1]*thetas[4] - slack[4];
     const double t9 = 0.5*(t8 + fabs(t8));
-    const double t10 = path[5] - slack[5] + motor[1]*thetas[5];
+    const double t10 = path[5] + motor[1]*thetas[5] - slack[5];
     const double t11 = 0.5*(t10 + fabs(t10));
-    const double t12 = path[6] - slack[6] + motor[1]*thetas[6];
-    const double t13 = 0.5*(t12 + fabs(t12));
-    const double t14 = path[7] - slack[7] + motor[1]*thetas[7];
-    const double t15 = 0.5*(t14 + fabs(t14));
-    f[0] = t1*(line[0] + t1*(line[1] + line[2]*t1));
-    f[1] = t3*(line[0] + t3*(line[1] + line[2]*t3));
-    f[2] = t5*(line[0] + t5*(line[1] + line[2]*t5));
-    f[3] = t7*(line[0] + t7*(line[1] + line[2]*t7));
-    f[4] = t9*(line[0] + t9*(line[1] + line[2]*t9));
-    f[5] = t11*(line[0] + t11*(line[1] + line[2]*t11));
-    f[6] = t13*(line[0] + t13*(line[1] + line[2]*t13));
+    const double t12 = path[6] + motor[1]*thetas[6] - slack[6];
+    const double t13 = motor[1]*thetas[7] + path[7] - slack[7];
+    const double t14 = 0.5*(t12 + fabs(t12));
+    const double t15 = 0.5*(t13 + fabs(t13));
+    f[0] = t1*(t1*(line[1] + line[2]*t1) + line[0]);
+    f[1] = t3*(t3*(line[1] + line[2]*t3) + line[0]);
+    f[2] = t5*(t5*(line[1] + line[2]*t5) + line[0]);
+    f[3] = t7*(t7*(line[1] + line[2]*t7) + line[0]);
+    f[4] = t9*(t9*(line[1] + line[2]*t9) + line[0]);
+    f[5] = t11*(t11*(line[1] + line[2]*t11) + line[0]);
+    f[6] = t14*(t14*(line[1] + line[2]*t14) + line[0]);
     f[7] = t15*(line[0] + t15*(line[1] + line[2]*t15));
 }

@@ -17,11 +17,15 @@
 
 void awiwi_plant_joint_linear(const double x[restrict 4], const double u[restrict 1], const double load[restrict 1], const double plant[restrict 3], const double damping[restrict 2], double xd[restrict 4], double tau[restrict 2])
 {
-    const double t0 = plant[2]*(x[2] - x[0]);
     xd[0] = x[1];
-    xd[1] = (load[0] + t0 - damping[0]*x[1])/plant[0];
     xd[2] = x[3];
-    xd[3] = (u[0] - t0 - damping[1]*x[3])/plant[1];
+    const double t0 = plant[2]*(x[2] - x[0]);
     tau[0] = t0;
+    double s1 = load[0] + t0;
+    double s2 = u[0] - t0;
+    s1 -= damping[0]*x[1];
+    xd[1] = s1/plant[0];
+    s2 -= damping[1]*x[3];
+    xd[3] = s2/plant[1];
     tau[1] = plant[2]*(x[3] - x[1]);
 }

@@ -19,17 +19,21 @@
 
 void awiwi_plant_joint_nonlinear(const double x[restrict 4], const double u[restrict 1], const double load[restrict 1], const double bodies[restrict 2], const double curve[restrict 2], const double damping[restrict 2], double xd[restrict 4], double tau[restrict 2], double spring[restrict 2])
 {
+    xd[0] = x[1];
+    xd[2] = x[3];
     const double t0 = x[0] - x[2];
     const double t1 = curve[1]*t0;
     const double t2 = t0*t1;
-    const double t3 = t0*(curve[0] + t2);
-    const double t4 = curve[0] + 3.0*t2;
-    xd[0] = x[1];
-    xd[1] = (load[0] - damping[0]*x[1] - t3)/bodies[0];
-    xd[2] = x[3];
-    xd[3] = (u[0] + t3 - damping[1]*x[3])/bodies[1];
-    tau[0] = -t3;
-    tau[1] = (x[3] - x[1])*t4;
-    spring[0] = t4;
     spring[1] = -6.0*t1;
+    const double t3 = t0*(t2 + curve[0]);
+    tau[0] = -t3;
+    const double t4 = 3.0*t2 + curve[0];
+    spring[0] = t4;
+    double s5 = load[0] - t3;
+    double s6 = t3 + u[0];
+    s5 -= damping[0]*x[1];
+    xd[1] = s5/bodies[0];
+    s6 -= damping[1]*x[3];
+    xd[3] = s6/bodies[1];
+    tau[1] = (x[3] - x[1])*t4;
 }

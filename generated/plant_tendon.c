@@ -22,10 +22,10 @@
 
 void awiwi_plant_tendon(const double x[restrict 2], const double u[restrict 1], const double path[restrict 1], const double motor[restrict 2], const double line[restrict 3], const double friction[restrict 3], double xd[restrict 2], double f[restrict 1])
 {
+    xd[0] = x[1];
     const double t0 = path[0] + motor[1]*x[0];
     const double t1 = 0.5*(t0 + fabs(t0));
-    const double t2 = t1*(line[0] + t1*(line[1] + line[2]*t1));
-    xd[0] = x[1];
-    xd[1] = (u[0] - friction[2]*x[1] - friction[1]*awiwi_atan(friction[0]*x[1]) - motor[1]*t2)/motor[0];
+    const double t2 = t1*(t1*(line[1] + line[2]*t1) + line[0]);
     f[0] = t2;
+    xd[1] = (u[0] - motor[1]*t2 - friction[2]*x[1] - friction[1]*awiwi_atan(friction[0]*x[1]))/motor[0];
 }

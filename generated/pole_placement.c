@@ -23,15 +23,17 @@
 int awiwi_pole_placement(const double m[restrict 1], const double b[restrict 1], const double k[restrict 1], const double dq[restrict 1], const double dtheta[restrict 1], const double omega[restrict 2], const double xi[restrict 2], double K[restrict 4])
 {
     const double t0 = 1.0/k[0];
-    const double t1 = omega[0]*omega[1];
-    const double t2 = b[0]*m[0]*t1;
-    const double t3 = 1.0/m[0];
-    const double t4 = b[0]*(2.0*(omega[0]*xi[0] + omega[1]*xi[1]) - dq[0]*t3);
-    const double t5 = t4 - dtheta[0];
-    const double t6 = b[0]*(omega[0]*omega[0] + omega[1]*omega[1] + 4.0*xi[0]*xi[1]*t1) - t3*(k[0]*(b[0] + m[0]) + dq[0]*(dtheta[0] + t5));
-    K[0] = omega[0]*omega[1]*t0*t2 - t6;
-    K[1] = t0*(2.0*(omega[0]*xi[1] + omega[1]*xi[0])*t2 - dq[0]*t6) - t4 - dq[0];
-    K[2] = t6;
-    K[3] = t5;
+    double s1 = omega[0]*omega[0] + omega[1]*omega[1];
+    const double t2 = omega[0]*omega[1];
+    s1 += 4.0*xi[0]*xi[1]*t2;
+    const double t3 = b[0]*m[0]*t2;
+    const double t4 = 1.0/m[0];
+    const double t5 = b[0]*(2.0*(omega[0]*xi[0] + omega[1]*xi[1]) - dq[0]*t4);
+    const double t6 = t5 - dtheta[0];
+    K[3] = t6;
+    const double t7 = b[0]*s1 - t4*(k[0]*(m[0] + b[0]) + dq[0]*(dtheta[0] + t6));
+    K[2] = t7;
+    K[0] = omega[0]*omega[1]*t0*t3 - t7;
+    K[1] = t0*(2.0*(omega[0]*xi[1] + omega[1]*xi[0])*t3 - dq[0]*t7) - t5 - dq[0];
     return m[0] > 0.0 && b[0] > 0.0 && k[0] > 0.0 && omega[0] > 0.0 && omega[1] > 0.0 && xi[0] > 0.0 && xi[1] > 0.0 ? 0 : 1;
 }

@@ -15,6 +15,9 @@
 
 void awiwi_pole_placement_law(const double K[restrict 4], const double x[restrict 4], const double x_des[restrict 4], const double u_des[restrict 1], double u[restrict 1])
 {
-    const double t0 = u_des[0] - K[0]*(x[0] - x_des[0]) - K[1]*(x[1] - x_des[1]) - K[2]*(x[2] - x_des[2]) - K[3]*(x[3] - x_des[3]);
-    u[0] = t0;
+    double s0 = u_des[0] - K[0]*(x[0] - x_des[0]);
+    s0 -= K[1]*(x[1] - x_des[1]);
+    s0 -= K[2]*(x[2] - x_des[2]);
+    s0 -= K[3]*(x[3] - x_des[3]);
+    u[0] = s0;
 }

@@ -15,15 +15,15 @@
 void awiwi_ring_joint_estimate_error(const double q[restrict 3], const double noise[restrict 1], double covariance[restrict 9], double worst[restrict 3])
 {
     (void)q;
-    const double t0 = noise[0]*noise[0];
-    covariance[0] = 3086.41975308642*t0;
     covariance[1] = 0.0;
     covariance[2] = 0.0;
     covariance[3] = 0.0;
-    covariance[4] = 5917.15976331361*t0;
     covariance[5] = 0.0;
     covariance[6] = 0.0;
     covariance[7] = 0.0;
+    const double t0 = noise[0]*noise[0];
+    covariance[0] = 3086.41975308642*t0;
+    covariance[4] = 5917.15976331361*t0;
     covariance[8] = 16528.92561983471*t0;
     worst[0] = 111.11111111111111*noise[0];
     worst[1] = 153.84615384615384*noise[0];

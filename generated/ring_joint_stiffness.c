@@ -15,17 +15,17 @@ void awiwi_ring_joint_stiffness(const double q[restrict 3], const double f[restr
 {
     (void)q;
     (void)f;
+    K[2] = 0.0;
+    K[5] = 0.0;
+    K[6] = 0.0;
+    K[7] = 0.0;
     const double t0 = k[0] + k[3];
     const double t1 = k[1] + k[2];
     const double t2 = t0 + t1;
     const double t3 = 5.85e-05*(t0 - t1);
-    K[0] = 8.1e-05*t2;
     K[1] = t3;
-    K[2] = 0.0;
     K[3] = t3;
+    K[0] = 8.1e-05*t2;
     K[4] = 4.225e-05*t2;
-    K[5] = 0.0;
-    K[6] = 0.0;
-    K[7] = 0.0;
     K[8] = 3.025e-05*(k[4] + k[5]);
 }

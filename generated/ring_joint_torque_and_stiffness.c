@@ -15,22 +15,22 @@
 void awiwi_ring_joint_torque_and_stiffness(const double q[restrict 3], const double f[restrict 6], const double k[restrict 6], double tau[restrict 3], double K[restrict 9])
 {
     (void)q;
+    K[2] = 0.0;
+    K[5] = 0.0;
+    K[6] = 0.0;
+    K[7] = 0.0;
     const double t0 = f[0] - f[3];
     const double t1 = f[1] - f[2];
+    tau[0] = -0.009*(t0 + t1);
+    tau[1] = -0.0065*(t0 - t1);
+    tau[2] = -0.0055*(f[4] - f[5]);
     const double t2 = k[0] + k[3];
     const double t3 = k[1] + k[2];
     const double t4 = t2 + t3;
     const double t5 = 5.85e-05*(t2 - t3);
-    tau[0] = -0.009*(t0 + t1);
-    tau[1] = -0.0065*(t0 - t1);
-    tau[2] = -0.0055*(f[4] - f[5]);
-    K[0] = 8.1e-05*t4;
     K[1] = t5;
-    K[2] = 0.0;
     K[3] = t5;
+    K[0] = 8.1e-05*t4;
     K[4] = 4.225e-05*t4;
-    K[5] = 0.0;
-    K[6] = 0.0;
-    K[7] = 0.0;
     K[8] = 3.025e-05*(k[4] + k[5]);
 }

@@ -12,28 +12,35 @@
 
 void awiwi_ring_mass_matrix(const double q[restrict 3], double M[restrict 9])
 {
-    const double t0 = q[1] + q[2];
-    const double t1 = t0 + 0.7857142857142857*q[2] - 1.5485777614681775;
-    const awiwi_turn3 a0 = awiwi_sincos3(t0, t1, q[1]);
-    const double t2 = a0.sin[0] + 30.007406493138397*a0.sin[1] - 175.66666666666666*a0.cos[0];
-    const double t3 = a0.cos[0]*(5.463e-06*a0.cos[0] - 2.352e-08*a0.sin[0] - 2.1965421552977306e-06*a0.sin[1]) + a0.cos[2]*(2.23216e-05*a0.cos[2] - 7.9e-08*a0.sin[2] - 9.84e-08*t2 + 7.38e-06) + 1.5840521717670286e-06 - 3.6e-08*a0.sin[2] - 1.44e-08*t2 - a0.cos[1]*(4.4336434353405724e-07*a0.cos[1] + 9.304540967423494e-09*a0.sin[1]);
+    double s0 = 0.7857142857142857*q[2] - 1.5485777614681775;
+    const double t1 = q[2] + q[1];
+    s0 += t1;
+    const awiwi_turn3 a0 = awiwi_sincos3(t1, s0, q[1]);
+    double s2 = a0.cos[0]*(5.463e-06*a0.cos[0] - 2.352e-08*a0.sin[0] - 2.1965421552977306e-06*a0.sin[1]) + 1.5840521717670286e-06;
+    s2 -= 3.6e-08*a0.sin[2];
+    const double t3 = a0.sin[0] + 30.007406493138397*a0.sin[1] - 175.66666666666666*a0.cos[0];
+    s2 -= 1.44e-08*t3;
+    s2 += a0.cos[2]*(2.23216e-05*a0.cos[2] + 7.38e-06 - 7.9e-08*a0.sin[2] - 9.84e-08*t3);
+    s2 -= a0.cos[1]*(4.4336434353405724e-07*a0.cos[1] + 9.304540967423494e-09*a0.sin[1]);
+    M[0] = s2;
     const double t4 = 1.5186117470838444e-07*a0.cos[1] - 1.0664033896870507e-09*a0.sin[1];
     const double t5 = 5.44e-09*a0.cos[0] + 6.2216e-07*a0.sin[0] + t4;
-    const double t6 = 9.6e-09*a0.cos[2] + 1.0264e-06*a0.sin[2] + t5;
-    const double t7 = t5 + 0.7857142857142857*t4;
+    const double t6 = 0.7857142857142857*t4 + t5;
+    M[2] = t6;
+    M[6] = t6;
+    const double t7 = t5 + 9.6e-09*a0.cos[2] + 1.0264e-06*a0.sin[2];
+    M[1] = t7;
+    M[3] = t7;
     const double t8 = 1.0982710776488653e-06*(a0.cos[0]*a0.sin[1] - a0.sin[0]*a0.cos[1]);
-    const double t9 = t8 - 4.8416e-07;
-    const double t10 = 5.53848e-06 - t8 - t9;
-    const double t11 = 4.92e-08*(a0.cos[2]*t2 - a0.sin[2]*(a0.cos[0] + 175.66666666666666*a0.sin[0] + 30.007406493138397*a0.cos[1]));
-    const double t12 = t10 - t11;
-    const double t13 = t12 - 1.160000599577607e-06*(a0.cos[2]*a0.sin[1] - a0.sin[2]*a0.cos[1]) - 0.7857142857142857*t9;
-    M[0] = t3;
-    M[1] = t6;
-    M[2] = t7;
-    M[3] = t6;
-    M[4] = t12 + 2.25034e-05 - t11;
-    M[5] = t13;
-    M[6] = t7;
-    M[7] = t13;
-    M[8] = t10 + 2.9889469387755104e-07 - 1.5714285714285714*t9;
+    const double t9 = 4.92e-08*(a0.cos[2]*t3 - a0.sin[2]*(a0.cos[0] + 175.66666666666666*a0.sin[0] + 30.007406493138397*a0.cos[1]));
+    const double t10 = t8 - 4.8416e-07;
+    const double t11 = 5.53848e-06 - t8 - t10;
+    double s12 = t11 - 1.5714285714285714*t10;
+    const double t13 = t11 - t9;
+    M[4] = t13 + 2.25034e-05 - t9;
+    const double t14 = t13 - 1.160000599577607e-06*(a0.cos[2]*a0.sin[1] - a0.sin[2]*a0.cos[1]) - 0.7857142857142857*t10;
+    M[5] = t14;
+    M[7] = t14;
+    s12 += 2.9889469387755104e-07;
+    M[8] = s12;
 }

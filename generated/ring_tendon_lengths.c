@@ -14,12 +14,12 @@ void awiwi_ring_tendon_lengths(const double q[restrict 3], double h[restrict 6])
     const double t0 = 0.009*q[0];
     const double t1 = 0.0065*q[1];
     const double t2 = t0 + t1;
-    const double t3 = t0 - t1;
-    const double t4 = 0.0055*q[2];
     h[0] = t2;
+    h[3] = -t2;
+    const double t3 = t0 - t1;
     h[1] = t3;
     h[2] = -t3;
-    h[3] = -t2;
+    const double t4 = 0.0055*q[2];
     h[4] = t4;
     h[5] = -t4;
 }

@@ -24,16 +24,18 @@
 int awiwi_sdre_tendon(const double theta[restrict 1], const double thd[restrict 1], const double theta_des[restrict 1], const double b[restrict 1], const double dtheta[restrict 1], const double spring[restrict 3], const double weights[restrict 2], const double R[restrict 1], double K[restrict 2], double u[restrict 1])
 {
     const double t0 = 1.0/b[0];
-    const double t1 = spring[1] + spring[2]*theta_des[0];
-    const double t2 = spring[0] + theta_des[0]*t1;
-    const double t3 = t0*(t2 + theta[0]*(spring[2]*theta[0] + t1));
-    const double t4 = 1.0/(R[0]*(b[0]*b[0]));
-    const double t5 = t3 - sqrt(weights[0]*t4 + t3*t3);
-    const double t6 = b[0]*t5;
-    const double t7 = dtheta[0]*t0;
-    const double t8 = b[0]*(t7 - sqrt(weights[1]*t4 + (t7*t7 - 2.0*t5)));
-    K[0] = -t6;
-    K[1] = -t8;
-    u[0] = theta_des[0]*t2 + ((theta[0] - theta_des[0])*t6 + thd[0]*t8);
+    const double t1 = 1.0/(R[0]*(b[0]*b[0]));
+    const double t2 = dtheta[0]*t0;
+    double s3 = weights[1]*t1 + t2*t2;
+    const double t4 = spring[1] + spring[2]*theta_des[0];
+    const double t5 = spring[0] + theta_des[0]*t4;
+    const double t6 = t0*(theta[0]*(t4 + spring[2]*theta[0]) + t5);
+    const double t7 = t6 - sqrt(weights[0]*t1 + t6*t6);
+    s3 -= 2.0*t7;
+    const double t8 = b[0]*t7;
+    K[0] = -t8;
+    const double t9 = b[0]*(t2 - sqrt(s3));
+    K[1] = -t9;
+    u[0] = theta_des[0]*t5 + (theta[0] - theta_des[0])*t8 + thd[0]*t9;
     return b[0] > 0.0 && R[0] > 0.0 && weights[0] > 0.0 && weights[1] > 0.0 ? 0 : 1;
 }

@@ -16,6 +16,6 @@ void awiwi_secant_stiffness(const double spring[restrict 3], const double deflex
 {
     const double t0 = spring[1] + deflexion_des[0]*spring[2];
     const double t1 = spring[0] + deflexion_des[0]*t0;
-    k[0] = t1 + deflexion[0]*(deflexion[0]*spring[2] + t0);
+    k[0] = deflexion[0]*(t0 + deflexion[0]*spring[2]) + t1;
     torque[0] = deflexion_des[0]*t1;
 }

@@ -23,6 +23,8 @@
 
 int awiwi_tendon_force_pd(const double f[restrict 1], const double fd[restrict 1], const double f_des[restrict 1], const double fd_des[restrict 1], const double f_hat[restrict 1], const double friction[restrict 1], const double r[restrict 1], const double kp[restrict 1], const double kd[restrict 1], double tau[restrict 1])
 {
-    tau[0] = friction[0] + f_hat[0]*r[0] - kd[0]*(fd[0] - fd_des[0]) - kp[0]*(f[0] - f_des[0]);
+    double s0 = friction[0] + f_hat[0]*r[0] - kd[0]*(fd[0] - fd_des[0]);
+    s0 -= kp[0]*(f[0] - f_des[0]);
+    tau[0] = s0;
     return r[0] > 0.0 && kp[0] > 0.0 && kd[0] > 0.0 ? 0 : 1;
 }

@@ -30,12 +30,12 @@ int awiwi_tendon_force_scheduled(const double f[restrict 1], const double fd[res
 {
     const double t0 = 2.0*xi0[0];
     const double t1 = stiffness[0]*t0;
-    const double t2 = b[0]*omega0[0]/(r[0]*r[0]*stiffness[0]*stiffness[0]);
-    const double t3 = omega0[0]*stiffness[0] - stiffness_rate[0]*t0;
-    const double t4 = r[0]*t2;
-    const double t5 = t3*t4;
-    tau[0] = friction[0] + r[0]*(f_hat[0] - (fd[0] - fd_des[0])*t1*t2) - (f[0] - f_des[0])*t5;
+    const double t2 = omega0[0]*stiffness[0] - stiffness_rate[0]*t0;
+    const double t3 = b[0]*omega0[0]/(r[0]*r[0]*stiffness[0]*stiffness[0]);
+    const double t4 = r[0]*t3;
+    const double t5 = t2*t4;
     gains[0] = t5;
+    tau[0] = r[0]*(f_hat[0] - (fd[0] - fd_des[0])*t1*t3) + friction[0] - (f[0] - f_des[0])*t5;
     gains[1] = t1*t4;
-    return r[0] > 0.0 && b[0] > 0.0 && stiffness[0] > 0.0 && omega0[0] > 0.0 && xi0[0] > 0.0 && t3 > 0.0 ? 0 : 1;
+    return r[0] > 0.0 && b[0] > 0.0 && stiffness[0] > 0.0 && omega0[0] > 0.0 && xi0[0] > 0.0 && t2 > 0.0 ? 0 : 1;
 }

@@ -15,17 +15,17 @@ void awiwi_thumb_gravity(const double q[restrict 4], const double g[restrict 3],
 {
     const double t0 = q[2] - 1.5626517105100128;
     const double t1 = q[2] + q[3] - 1.5526165117219184;
-    const awiwi_turn4 a0 = awiwi_sincos4(q[0], t0, t1, q[1]);
-    const double t2 = g[0]*a0.cos[0] + g[1]*a0.sin[0];
-    const double t3 = 6.601090818948033e-05*a0.cos[2];
-    const double t4 = 0.0003315109952927655*a0.cos[1] + t3;
-    const double t5 = g[0]*a0.sin[0] - g[1]*a0.cos[0];
-    const double t6 = 6.601090818948033e-05*a0.sin[2];
-    const double t7 = 0.0003315109952927655*a0.sin[1] + t6;
-    const double t8 = t7 - 0.001071;
-    const double t9 = g[2]*a0.sin[3] + a0.cos[3]*t2;
-    gravity[0] = t2*(t4 + 9e-06) - t5*(1.08e-05*a0.sin[3] + a0.cos[3]*t8 - 0.000204);
-    gravity[1] = 1.08e-05*t9 + (g[2]*a0.cos[3] - a0.sin[3]*t2)*t8;
-    gravity[2] = t9*t4 - t5*t7;
-    gravity[3] = t3*t9 - t5*t6;
+    const awiwi_turn4 a0 = awiwi_sincos4(t0, t1, q[0], q[1]);
+    const double t2 = 6.601090818948033e-05*a0.cos[1];
+    const double t3 = 0.0003315109952927655*a0.cos[0] + t2;
+    const double t4 = 6.601090818948033e-05*a0.sin[1];
+    const double t5 = 0.0003315109952927655*a0.sin[0] + t4;
+    const double t6 = t5 - 0.001071;
+    const double t7 = g[0]*a0.cos[2] + g[1]*a0.sin[2];
+    const double t8 = g[0]*a0.sin[2] - g[1]*a0.cos[2];
+    gravity[0] = t7*(t3 + 9e-06) - t8*(1.08e-05*a0.sin[3] + a0.cos[3]*t6 - 0.000204);
+    const double t9 = a0.cos[3]*t7 + g[2]*a0.sin[3];
+    gravity[1] = (g[2]*a0.cos[3] - a0.sin[3]*t7)*t6 + 1.08e-05*t9;
+    gravity[2] = t9*t3 - t8*t5;
+    gravity[3] = t2*t9 - t8*t4;
 }

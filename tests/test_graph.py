@@ -15,16 +15,16 @@ from awiwi_gen.ir.graph import SIGNLESS, Graph, Node, Output, canonical, node_of
 from awiwi_gen.ir.passes import AGAIN, BEGINNINGS, END, optimise, stages
 from awiwi_gen.ir.passes.bind import bind
 from awiwi_gen.ir.passes.factor import factor
-from awiwi_gen.ir.passes.finish import orient, quotients, schedule
+from awiwi_gen.ir.passes.finish import orient, quotients
 from awiwi_gen.ir.passes.flatten import flatten
-from awiwi_gen.ir.passes.gather import gather
 from awiwi_gen.ir.passes.scale import scale
+from awiwi_gen.ir.passes.schedule import schedule
 from awiwi_gen.ir.passes.share import share_products, share_sums
 from awiwi_gen.ir.passes.signs import signs
 from awiwi_gen.ir.passes.turn import turn
 from awiwi_gen.verify.reference import ball_values, disagreement
 
-PASSES = (flatten, turn, share_products, share_sums, factor, scale, quotients, orient, signs, schedule, gather)
+PASSES = (flatten, turn, share_products, share_sums, factor, scale, quotients, orient, signs, schedule)
 STEPS = st.lists(
     st.tuples(
         st.sampled_from(["add", "sub", "mul", "div", "neg", "sin", "cos", "sqrt"]),

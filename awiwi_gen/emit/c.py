@@ -16,7 +16,7 @@ from awiwi_gen.emit.options import Options
 from awiwi_gen.ir.cost import Cost, cost
 from awiwi_gen.ir.elementary import OWN
 from awiwi_gen.ir.graph import LEAVES, Graph, Node, Ref, node_of, operands
-from awiwi_gen.ir.passes.gather import angle_groups
+from awiwi_gen.ir.passes.rounds import angle_groups
 from awiwi_gen.kernel import GUARDS
 
 SPARSE = 64  # this many zeros in an output are written at once
@@ -92,6 +92,11 @@ def signature(
     return text.replace("%s", ""), text.replace("[%s", "[restrict ").replace("*%s", "*restrict ")
 
 
+def is_continued(graph: Graph, node: Node) -> bool:
+    """Whether a node adds to a sum that nothing else reads."""
+    return node[0] == "add" and node[1] >= 0 and graph.nodes[node[1]][0] == "add" and graph.uses[node[1]] == 1
+
+
 class Printer:
     """Turns the nodes of one graph into C text."""
 
@@ -102,36 +107,60 @@ class Printer:
         self.texts: list[Text] = []
         self.lines: list[str] = []
         self.count = self.calls = 0
+        self.angles = {node_of(r) for node in graph.nodes if node[0] in ("sin", "cos") for r in node[1:]}
+        self.partial = {node[1] for node in graph.nodes if is_continued(graph, node)}
+        noughts = {o.name: sum(graph.nodes[node_of(ref)] == ("const", 0) for ref in o.elements) for o in graph.outputs}
+        self.cleared = {name for name, count in noughts.items() if count >= SPARSE}
+        self.places = self.written()
 
     def statements(self) -> list[str]:
-        """Declarations in order of evaluation, then the assignments to the outputs."""
-        uses, nought = self.graph.uses, self.options.literal(Fraction(0))
-        argument = {node_of(r) for node in self.graph.nodes if node[0] in ("sin", "cos") for r in node[1:]}
+        """The nodes in their order; an output is written as soon as it is known."""
+        for output in self.graph.outputs:
+            if output.name in self.cleared:
+                self.lines.append(f"memset({output.name}, 0, {len(output.elements)} * sizeof {output.name}[0]);")
         for index, node in enumerate(self.graph.nodes):
-            if node[0] in ("sin", "cos") and self.options.math == "own":
-                self.texts.append((self.turn(node[1], node[0]), ATOM))
-                continue
-            text = self.expression(node)
-            named = node[0] not in LEAVES and (
-                uses[index] > 1 or len(text[0]) > LINE or index in argument or node[0] in ("sin", "cos")
-            )
-            self.texts.append(self.declare(node, text[0]) if named else text)
+            self.texts.append(self.value(index, node))
+            for place, ref in self.places.get(index, ()):
+                self.lines.append(f"{place} = {self.operand(ref, SUM)};")
+        nought = self.options.literal(Fraction(0))
         for output in self.graph.outputs:
             if output.name == GUARDS:
                 positive = [f"{self.operand(ref, SUM)} > {nought}" for ref in output.elements]
                 self.lines.append(f"return {' && '.join(positive)} ? 0 : 1;")
-                continue
-            cleared = sum(self.is_zero(ref) for ref in output.elements) >= SPARSE
-            if cleared:
-                self.lines.append(f"memset({output.name}, 0, {len(output.elements)} * sizeof {output.name}[0]);")
-            for position, ref in enumerate(output.elements):
-                if not (cleared and self.is_zero(ref)):
-                    self.lines.append(f"{output.name}[{position}] = {self.operand(ref, SUM)};")
         return self.lines
 
-    def is_zero(self, ref: Ref) -> bool:
-        """Whether a reference is the number nought."""
-        return self.graph.nodes[node_of(ref)] == ("const", 0)
+    def written(self) -> dict[int, list[tuple[str, Ref]]]:
+        """Where each node is written to, and with which sign."""
+        places: dict[int, list[tuple[str, Ref]]] = {}
+        for output in self.graph.outputs:
+            for position, ref in enumerate(output.elements):
+                is_nought = self.graph.nodes[node_of(ref)] == ("const", 0)
+                if output.name != GUARDS and not (is_nought and output.name in self.cleared):
+                    places.setdefault(node_of(ref), []).append((f"{output.name}[{position}]", ref))
+        return places
+
+    def value(self, index: int, node: Node) -> Text:
+        """What a node is called from here on: its name, after a line that computes it, or its expression."""
+        if node[0] in ("sin", "cos") and self.options.math == "own":
+            return self.turn(node[1], node[0]), ATOM
+        if is_continued(self.graph, node):
+            return self.accumulate(node)
+        text = self.expression(node)
+        if node[0] in LEAVES:
+            return text
+        uses, is_written = self.graph.uses[index], index in self.places
+        if index in self.partial:
+            return self.declare(node, text[0], "s", "")
+        if uses > 1 or index in self.angles or node[0] in ("sin", "cos") or (len(text[0]) > LINE and not is_written):
+            return self.declare(node, text[0])
+        return text
+
+    def accumulate(self, node: Node) -> Text:
+        """A sum that goes on: a line for each further term."""
+        name = self.texts[node[1]]
+        for ref in node[2:]:
+            self.lines.append(f"{name[0]} {'+=' if ref >= 0 else '-='} {self.operand(node_of(ref), SUM)};")
+        return name
 
     def turn(self, angle: Ref, function: str) -> str:
         """A sine or cosine; those of all angles of its group are computed when the first is asked for."""
@@ -145,15 +174,15 @@ class Printer:
             self.turns |= {each: f"{name}.%s[{lane}]" if lanes else f"{name}.%s" for lane, each in enumerate(group)}
         return self.turns[angle] % function
 
-    def declare(self, node: Node, text: str) -> Text:
+    def declare(self, node: Node, text: str, letter: str = "t", const: str = "const ") -> Text:
         """Give a value a name."""
-        name = f"t{self.count}"
+        name = f"{letter}{self.count}"
         leaf = self.graph.nodes[node_of(node[1])] if len(node) == 2 else None
         if node[0] in ("sin", "cos") and leaf is not None and leaf[0] == "input":
             name = f"{node[0]}_{leaf[1]}{leaf[2]}"
         else:
             self.count += 1
-        self.lines.append(f"const {self.options.c_type} {name} = {text};")
+        self.lines.append(f"{const}{self.options.c_type} {name} = {text};")
         return name, ATOM
 
     def expression(self, node: Node) -> Text:

@@ -14,7 +14,7 @@ from flint import arb
 from awiwi_gen.ir.algebras import Balls
 from awiwi_gen.ir.graph import Graph, Node, Output, Ref
 from awiwi_gen.ir.interpret import evaluate
-from awiwi_gen.ir.passes.finish import schedule
+from awiwi_gen.ir.passes.schedule import depth_first
 
 Array = np.ndarray[Any, Any]
 BallArrays = dict[str, list[list[arb]]]
@@ -64,7 +64,7 @@ def _joined(
     outputs: list[Output] = []
     names: list[dict[str, str]] = []
     for number, (given, inputs) in enumerate(cases):
-        graph = schedule(given)
+        graph = depth_first(given)
         renamed: list[int] = []
 
         def new(ref: Ref, renamed: list[int] = renamed) -> Ref:

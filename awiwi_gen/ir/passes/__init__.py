@@ -7,10 +7,10 @@ from collections.abc import Callable
 from awiwi_gen.ir.cost import Cost, cost
 from awiwi_gen.ir.graph import Graph
 from awiwi_gen.ir.passes.factor import factor
-from awiwi_gen.ir.passes.finish import orient, quotients, schedule
+from awiwi_gen.ir.passes.finish import orient, quotients
 from awiwi_gen.ir.passes.flatten import flatten
-from awiwi_gen.ir.passes.gather import gather
 from awiwi_gen.ir.passes.scale import scale
+from awiwi_gen.ir.passes.schedule import schedule
 from awiwi_gen.ir.passes.share import share_products, share_sums
 from awiwi_gen.ir.passes.signs import signs
 from awiwi_gen.ir.passes.turn import turn
@@ -24,7 +24,7 @@ BEGINNINGS: tuple[tuple[Pass, ...], ...] = (
     (flatten, turn, factor, scale, share_products, share_sums),
 )
 AGAIN: tuple[Pass, ...] = (flatten, share_products, share_sums, factor, scale)  # as long as it helps
-END: tuple[Pass, ...] = (quotients, orient, signs, schedule, gather)
+END: tuple[Pass, ...] = (quotients, orient, signs, schedule)
 
 Stages = list[tuple[str, Graph]]
 

@@ -1,11 +1,11 @@
-"""The last steps before C: quotients, signs that cost nothing, and the order of evaluation.
+"""The last steps before C but for the order of evaluation: quotients, and signs that cost nothing.
 
 These leave the canonical form on purpose: from here on the order of operands is the order of rounding.
 """
 
 from __future__ import annotations
 
-from awiwi_gen.ir.graph import LEAVES, Graph, Node, Output, Ref, node_of, operands, prune, reordered
+from awiwi_gen.ir.graph import LEAVES, Graph, Node, Output, Ref, node_of, prune
 
 
 def quotients(graph: Graph) -> Graph:
@@ -78,21 +78,3 @@ def _turn(nodes: list[Node], uses: tuple[int, ...], operation: str, refs: list[R
             refs[place] = ~ref
             return True
     return False
-
-
-def schedule(graph: Graph) -> Graph:
-    """Evaluate depth first from the outputs, so that few values are alive at any time."""
-    order: list[int] = []
-    placed = [False] * len(graph.nodes)
-    stack = [(node_of(ref), False) for ref in reversed(list(graph.roots))]
-    while stack:
-        index, expanded = stack.pop()
-        if placed[index]:
-            continue
-        if expanded:
-            placed[index] = True
-            order.append(index)
-            continue
-        stack.append((index, True))
-        stack += [(node_of(ref), False) for ref in reversed(operands(graph.nodes[index])) if not placed[node_of(ref)]]
-    return reordered(graph, order)

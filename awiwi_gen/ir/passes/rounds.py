@@ -1,8 +1,8 @@
-"""Angles that do not wait for each other's sines come first, so that their sines and cosines are computed together."""
+"""Rounds of angles: those that do not wait for each other's sines have them computed together."""
 
 from __future__ import annotations
 
-from awiwi_gen.ir.graph import Graph, Ref, node_of, operands, reordered
+from awiwi_gen.ir.graph import Graph, Ref, node_of, operands
 
 LANES = 4
 
@@ -33,15 +33,14 @@ def angle_groups(graph: Graph) -> dict[Ref, tuple[Ref, ...]]:
     return groups
 
 
-def gather(graph: Graph) -> Graph:
-    """The same nodes in another order: what the first angles need, then what the next ones need, then the rest."""
+def rounds(graph: Graph) -> list[int]:
+    """Per node, the first round of angles that cannot do without it; beyond the last one for what none needs."""
     depth = waits(graph)
     last = max(depth, default=0) + 1
-    turn = [last] * len(graph.nodes)  # the round of angles a node is needed for
+    found = [last] * len(graph.nodes)
     for index in range(len(graph.nodes) - 1, -1, -1):
         node = graph.nodes[index]
         for ref in operands(node):
             due = depth[index] if node[0] in ("sin", "cos") else last
-            turn[node_of(ref)] = min(turn[node_of(ref)], turn[index], due)
-    order = sorted(range(len(graph.nodes)), key=lambda index: (turn[index], index))
-    return reordered(graph, order)
+            found[node_of(ref)] = min(found[node_of(ref)], found[index], due)
+    return found

@@ -1,0 +1,199 @@
+"""The order of evaluation: few values are alive at a time, so that registers can hold them.
+
+Work comes in steps: a value of its own is computed, or a sum takes up one more of its terms. C compilers move values
+that are used once to where they are used, but leave an accumulated sum where it is written. Sums are therefore cut
+into partial sums, and take up each term as soon as it is known and lets go of what it was made of.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from heapq import heapify, heappop, heappush
+from itertools import groupby
+from typing import NamedTuple
+
+from awiwi_gen.ir.graph import LEAVES, Graph, Node, Output, Ref, node_of, operands, reordered
+from awiwi_gen.ir.passes.rounds import rounds
+
+AHEAD = 128  # more helps a finger no further, and scatters the many alike tendons of a wrist
+
+
+class Step(NamedTuple):
+    """Computing a node, or adding one term to it, from values that are kept."""
+
+    node: int
+    term: Ref | None
+    reads: tuple[int, ...]
+
+
+def schedule(graph: Graph) -> Graph:
+    """The same expressions in the order of the `Agenda`, sums accumulated term by term."""
+    graph = depth_first(merged(graph))
+    return accumulate(graph, Agenda(graph, steps(graph)))
+
+
+def merged(graph: Graph) -> Graph:
+    """Sums that one sum alone reads become part of it: passes after `flatten` leave such."""
+    nodes: list[Node] = []
+    for node in graph.nodes:
+        if node[0] == "add":
+            terms: list[Ref] = []
+            for ref in node[1:]:
+                inner = nodes[node_of(ref)]
+                lone = inner[0] == "add" and graph.uses[node_of(ref)] == 1
+                terms += [r if ref >= 0 else ~r for r in inner[1:]] if lone else [ref]
+            node = ("add", *sorted(terms, key=lambda ref: ref < 0 and terms[0] < 0))
+        nodes.append(node)
+    return Graph(tuple(nodes), graph.outputs)
+
+
+def depth_first(graph: Graph) -> Graph:
+    """The nodes that outputs depend on, in the order in which a recursive evaluation of the outputs meets them."""
+    order: list[int] = []
+    placed = [False] * len(graph.nodes)
+    stack = [(node_of(ref), False) for ref in reversed(list(graph.roots))]
+    while stack:
+        index, expanded = stack.pop()
+        if placed[index]:
+            continue
+        if expanded:
+            placed[index] = True
+            order.append(index)
+            continue
+        stack.append((index, True))
+        stack += [(node_of(ref), False) for ref in reversed(operands(graph.nodes[index])) if not placed[node_of(ref)]]
+    return reordered(graph, order)
+
+
+def steps(graph: Graph) -> list[Step]:
+    """All steps in the order of the nodes. Numbers, and what is used once and no sum, are no values of their own."""
+    roots = {node_of(ref) for ref in graph.roots}
+    needs: list[tuple[int, ...]] = []  # the kept values that reading a node comes to
+    found = []
+    for index, node in enumerate(graph.nodes):
+        reads = tuple(dict.fromkeys(value for ref in operands(node) for value in needs[node_of(ref)]))
+        kept = node[0] in ("input", "add", "sin", "cos") or graph.uses[index] > 1 or index in roots
+        is_number = node[0] in ("const", "param")
+        needs.append((index,) if kept and not is_number else reads)
+        if node[0] == "add":
+            found += [Step(index, ref, needs[node_of(ref)]) for ref in node[1:]]
+        elif kept and node[0] not in LEAVES:
+            found.append(Step(index, None, reads))
+    return found
+
+
+class Agenda:
+    """The steps in the order in which they are taken. Of those whose values are known, the first is next that needs no
+    further register; where all do, one that needs fewer may come up to so many steps `AHEAD` of its turn for each.
+    What earlier rounds of angles need goes before all else.
+    """
+
+    def __init__(self, graph: Graph, steps: list[Step]) -> None:
+        self.steps, self.turn = steps, rounds(graph)
+        self.is_input = [node[0] == "input" for node in graph.nodes]
+        self.begun = [False] * len(graph.nodes)  # in a register, as a whole or in part
+        self.of_node: list[list[int]] = [[] for _ in graph.nodes]
+        self.readers: list[list[int]] = [[] for _ in graph.nodes]
+        for number, step in enumerate(steps):
+            self.of_node[step.node].append(number)
+            for value in step.reads:
+                self.readers[value].append(number)
+        self.missing = [sum(not self.is_input[value] for value in step.reads) for step in steps]
+        self.taken = [False] * len(steps)
+        self.parts = [len(numbers) for numbers in self.of_node]
+        self.unread = [len(numbers) for numbers in self.readers]
+        # Registers a step fills less those it sets free: a result not begun, inputs not loaded, values not read again.
+        self.filled = [1 + sum(self.is_input[v] - (self.unread[v] == 1) for v in step.reads) for step in steps]
+        self.heap = [self._key(number) for number, count in enumerate(self.missing) if not count]
+        heapify(self.heap)
+
+    def __iter__(self) -> Iterator[Step]:
+        while self.heap:
+            entry = heappop(self.heap)
+            number = entry[-1]
+            if not self.taken[number] and entry == self._key(number):
+                self.taken[number] = True
+                self._take(self.steps[number])
+                yield self.steps[number]
+
+    def _key(self, number: int) -> tuple[int, bool, int, int]:
+        needed = max(self.filled[number], 0)
+        return self.turn[self.steps[number].node], needed > 0, number + AHEAD * needed, number
+
+    def _take(self, step: Step) -> None:
+        """What other steps fill once this one is taken, and which can be taken then."""
+        for value in (step.node, *(v for v in step.reads if self.is_input[v])):
+            if not self.begun[value]:
+                self.begun[value] = True
+                self._cheapen(self.readers[value] if self.is_input[value] else self.of_node[value])
+        for value in step.reads:
+            self.unread[value] -= 1
+            if self.unread[value] == 1:
+                self._cheapen(self.readers[value])
+        self.parts[step.node] -= 1
+        if not self.parts[step.node]:
+            for reader in self.readers[step.node]:
+                self.missing[reader] -= 1
+                self._offer(reader)
+
+    def _cheapen(self, numbers: list[int]) -> None:
+        for number in numbers:
+            self.filled[number] -= 1
+            self._offer(number)
+
+    def _offer(self, number: int) -> None:
+        if not self.taken[number] and not self.missing[number]:
+            heappush(self.heap, self._key(number))
+
+
+def accumulate(graph: Graph, steps: Iterable[Step]) -> Graph:
+    """The graph as these steps compute it: sums are cut where steps of something else come between."""
+    writer = Writer(graph)
+    for index, leaf in enumerate(graph.nodes):
+        if leaf[0] in LEAVES:
+            writer.new(index)
+    for node, group in groupby(steps, key=lambda step: step.node):
+        if graph.nodes[node][0] == "add":
+            writer.add(node, [step.term for step in group if step.term is not None])
+        else:
+            writer.new(node)
+    outputs = tuple(Output(o.name, o.shape, tuple(writer.new(ref) for ref in o.elements)) for o in graph.outputs)
+    return Graph(tuple(writer.nodes), outputs)
+
+
+class Writer:
+    """Writes the nodes of a graph down in the order in which they are asked for."""
+
+    def __init__(self, graph: Graph) -> None:
+        self.graph = graph
+        self.nodes: list[Node] = []
+        self.renamed: dict[int, int] = {}
+        self.coming = {i: len(node) - 1 for i, node in enumerate(graph.nodes) if node[0] == "add"}  # terms of sums
+        self.held: dict[int, list[Ref]] = {}  # terms that came before the sum could begin
+        self.partial: dict[int, int] = {}
+
+    def new(self, ref: Ref) -> Ref:
+        """The new reference of an old one; writes down what is not written yet."""
+        index = node_of(ref)
+        if index not in self.renamed:
+            node = self.graph.nodes[index]
+            refs = node[1:] if node[0] in LEAVES else tuple(self.new(r) for r in node[1:])
+            self.renamed[index] = self._write((node[0], *refs))
+        return self.renamed[index] if ref >= 0 else ~self.renamed[index]
+
+    def add(self, index: int, terms: list[Ref]) -> None:
+        """Take more terms into a sum. It begins with two, and with a positive one where there is any."""
+        self.coming[index] -= len(terms)
+        terms = self.held.pop(index, []) + terms
+        if index not in self.partial and self.coming[index] and (len(terms) < 2 or all(ref < 0 for ref in terms)):
+            self.held[index] = terms
+            return
+        refs = [self.new(ref) for ref in terms]
+        so_far = [self.partial[index]] if index in self.partial else []
+        self.partial[index] = self._write(("add", *so_far, *sorted(refs, key=lambda ref: not so_far and ref < 0)))
+        if not self.coming[index]:
+            self.renamed[index] = self.partial[index]
+
+    def _write(self, node: Node) -> int:
+        self.nodes.append(node)
+        return len(self.nodes) - 1
