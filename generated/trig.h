@@ -63,7 +63,7 @@ static inline awiwi_turn awiwi_sincos_by(double x, const awiwi_trig_numbers *k, 
     const double z = r * r, square = high * high, twice = low * (high + r);
     const double zz = z * z, part = k->sixth[i] * square;
     const double bent = (k->sine[0][i] + z * k->sine[1][i]) + zz * ((k->sine[2][i] + z * k->sine[3][i]) + zz * (k->sine[4][i] + z * k->sine[5][i]));
-    const double small = (r * (z * bent - k->sixth[i] * twice) - low * part) + rest;
+    const double small = (r * z) * bent + ((rest - low * part) - r * (k->sixth[i] * twice)); /* bent is known last */
     const double sine = r + (small - high * part);
     const double flat = (k->cosine[0][i] + z * k->cosine[1][i]) + zz * ((k->cosine[2][i] + z * k->cosine[3][i]) + zz * (k->cosine[4][i] + z * k->cosine[5][i]));
     const double cosine = (k->one[i] - k->half[i] * square) + (zz * flat - k->half[i] * twice);

@@ -87,8 +87,7 @@ def bounds(low_end: float, high_end: float) -> tuple[float, float]:
     zz = z * z
     square = Value(high.exact * high.exact)
     part = Value(k.sixth * square.exact)
-    bent = z * polynomial(k.sine, z, zz) - Value(arb(k.sixth)) * twice
-    small = (r * bent - low * part) + rest
+    small = (r * z) * polynomial(k.sine, z, zz) + ((rest - low * part) - r * (Value(arb(k.sixth)) * twice))
     added = small - Value(high.exact * part.exact)
     flat = zz * polynomial(k.cosine, z, zz) - Value(arb(0.5)) * twice
 

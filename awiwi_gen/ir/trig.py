@@ -99,7 +99,7 @@ def sincos(x: Any, dtype: type) -> tuple[Any, Any]:
     low = (r - high) + rest
     z, square, twice = r * r, high * high, low * (high + r)
     zz, part = z * z, sixth * square
-    small = (r * (z * polynomial(k.sine, z, zz, dtype) - sixth * twice) - low * part) + rest
+    small = (r * z) * polynomial(k.sine, z, zz, dtype) + ((rest - low * part) - r * (sixth * twice))
     sine = r + (small - high * part)
     cosine = (one - half * square) + (zz * polynomial(k.cosine, z, zz, dtype) - half * twice)
     q, s, c = (np.atleast_1d(value).view(bits) for value in (shifted, sine, cosine))
