@@ -27,6 +27,7 @@ typedef struct awiwi_trig_numbers {
     double one[4];
     double half[4];
     double sixth[4];
+    double third[4];
     double sine[6][4];
     double cosine[6][4];
 } awiwi_trig_numbers;
@@ -41,6 +42,7 @@ typedef struct awiwi_trig_numbers {
     AWIWI_FOUR(1.0), \
     AWIWI_FOUR(0.5), \
     AWIWI_FOUR(0.16650390625), \
+    AWIWI_FOUR(0.3330078125), \
     {AWIWI_FOUR(-0.0001627604166663073), AWIWI_FOUR(0.008333333333322118), AWIWI_FOUR(-0.00019841269829589037), AWIWI_FOUR(2.7557313621158387e-06), AWIWI_FOUR(-2.5050747720596477e-08), AWIWI_FOUR(1.5896227382026644e-10)}, \
     {AWIWI_FOUR(0.0416666666666666), AWIWI_FOUR(-0.0013888888888874474), AWIWI_FOUR(2.480158728967153e-05), AWIWI_FOUR(-2.755731440102671e-07), AWIWI_FOUR(2.087572928051067e-09), AWIWI_FOUR(-1.1359934199650456e-11)} \
 }
@@ -60,13 +62,13 @@ static inline awiwi_turn awiwi_sincos_by(double x, const awiwi_trig_numbers *k, 
     const double rest = ((a - r) - b) - n * k->half_pi[2][i];
     const double high = (r + k->split[i]) - k->split[i]; /* its square and cube are exact */
     const double low = (r - high) + rest;
-    const double z = r * r, square = high * high, twice = low * (high + r);
+    const double z = r * r, square = high * high, gap = low * (high + k->half[i] * low); /* half of r^2 - high^2 */
     const double zz = z * z, part = k->sixth[i] * square;
     const double bent = (k->sine[0][i] + z * k->sine[1][i]) + zz * ((k->sine[2][i] + z * k->sine[3][i]) + zz * (k->sine[4][i] + z * k->sine[5][i]));
-    const double small = (r * z) * bent + ((rest - low * part) - r * (k->sixth[i] * twice)); /* bent is known last */
+    const double small = (r * z) * bent + ((rest - low * part) - r * (k->third[i] * gap)); /* bent is known last */
     const double sine = r + (small - high * part);
     const double flat = (k->cosine[0][i] + z * k->cosine[1][i]) + zz * ((k->cosine[2][i] + z * k->cosine[3][i]) + zz * (k->cosine[4][i] + z * k->cosine[5][i]));
-    const double cosine = (k->one[i] - k->half[i] * square) + (zz * flat - k->half[i] * twice);
+    const double cosine = (k->one[i] - k->half[i] * square) + (zz * flat - gap);
     uint64_t q, s, c;
     memcpy(&q, &shifted, sizeof q);
     memcpy(&s, &sine, sizeof s);

@@ -83,13 +83,13 @@ def bounds(low_end: float, high_end: float) -> tuple[float, float]:
     high = Value(ball + arb(0, STEP / 2))  # it and what is said to be exact has no rounding error
     rest = Value(arb(0, REST), U * REST + 2.0**-111)
     low = rounded(arb(0, STEP / 2 + REST), rest.error)
-    z, twice = r * r, low * (high + r)
+    z, gap = r * r, low * (high + Value(arb(0.5) * low.exact, 0.5 * low.error))
     zz = z * z
     square = Value(high.exact * high.exact)
     part = Value(k.sixth * square.exact)
-    small = (r * z) * polynomial(k.sine, z, zz) + ((rest - low * part) - r * (Value(arb(k.sixth)) * twice))
+    small = (r * z) * polynomial(k.sine, z, zz) + ((rest - low * part) - r * (Value(arb(k.third)) * gap))
     added = small - Value(high.exact * part.exact)
-    flat = zz * polynomial(k.cosine, z, zz) - Value(arb(0.5)) * twice
+    flat = zz * polynomial(k.cosine, z, zz) - gap
 
     x = arb_series([arb(middle), 1])
     sine, cosine = x.sin(), x.cos()

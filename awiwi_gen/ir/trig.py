@@ -37,6 +37,7 @@ class Trig:
     one: float
     half: float
     sixth: float
+    third: float  # twice that
     sine: tuple[float, ...]  # from (sixth - 1/6) z^0 on
     cosine: tuple[float, ...]
 
@@ -55,6 +56,7 @@ DOUBLE = Trig(
     one=1.0,
     half=0.5,
     sixth=341.0 / 2048.0,
+    third=341.0 / 1024.0,
     sine=(
         -0.0001627604166663073, 0.008333333333322118, -0.00019841269829589037, 2.7557313621158387e-06,
         -2.5050747720596477e-08, 1.5896227382026644e-10,
@@ -74,6 +76,7 @@ SINGLE = Trig(
     one=1.0,
     half=0.5,
     sixth=11.0 / 64.0,
+    third=11.0 / 32.0,
     sine=(0.0052083334885537624, 0.008333330042660236, -0.00019839468586724252, 2.7191274512006203e-06),
     cosine=(0.04166664555668831, -0.00138873013202101, 2.4430670237052254e-05),
 )
@@ -88,7 +91,7 @@ def sincos(x: Any, dtype: type) -> tuple[Any, Any]:
     """Sine and cosine of an array, bit for bit what the emitted C computes; NaN from the limit on."""
     k = constants(dtype)
     bits: Any = np.uint32 if dtype is np.float32 else np.uint64
-    one, half, sixth = dtype(k.one), dtype(k.half), dtype(k.sixth)
+    one, half, sixth, third = dtype(k.one), dtype(k.half), dtype(k.sixth), dtype(k.third)
     x = np.asarray(x, dtype)
     shifted = (x * dtype(k.overflow)) * dtype(k.quarters) + dtype(k.integer)
     n = shifted - dtype(k.integer)
@@ -97,11 +100,11 @@ def sincos(x: Any, dtype: type) -> tuple[Any, Any]:
     rest = ((a - r) - b) - tail
     high = (r + dtype(k.split)) - dtype(k.split)
     low = (r - high) + rest
-    z, square, twice = r * r, high * high, low * (high + r)
+    z, square, gap = r * r, high * high, low * (high + half * low)
     zz, part = z * z, sixth * square
-    small = (r * z) * polynomial(k.sine, z, zz, dtype) + ((rest - low * part) - r * (sixth * twice))
+    small = (r * z) * polynomial(k.sine, z, zz, dtype) + ((rest - low * part) - r * (third * gap))
     sine = r + (small - high * part)
-    cosine = (one - half * square) + (zz * polynomial(k.cosine, z, zz, dtype) - half * twice)
+    cosine = (one - half * square) + (zz * polynomial(k.cosine, z, zz, dtype) - gap)
     q, s, c = (np.atleast_1d(value).view(bits) for value in (shifted, sine, cosine))
     top = bits(8 * bits().itemsize - 1)
     odd, turned = q << top, (q >> bits(1)) << top
