@@ -122,9 +122,9 @@ class TurningPlane:
         count, start = len(self.bodies), self.start
         mass = SX.zeros(count + start, count + start)
         for j in reversed(range(count)):
-            body, own = self.bodies[j], j + start
-            for k in range(j + 1, count):
-                product = _dot(self.arms[j], self.first[k])
+            body, own, product = self.bodies[j], j + start, SX(0)
+            for k in reversed(range(j + 1, count)):
+                product += _dot(self.arms[j], self.own[k])
                 mass[own, k + start] = mass[k + start, own] = mass[own + 1, k + start] + product
                 if k == j + 1:
                     mass[own, own] = mass[own, own + 1] + product
@@ -206,7 +206,7 @@ class TurningPlane:
                 torque += speeds[0] ** 2 * kappas[j] + rates[0] * body.turned(body.along)[1]
             torques.append(torque)
             gradient = (-(spins[j] ** 2), turnings[j])  # takes a vector of the body to its second derivative
-            if j + 1 == len(self.bodies) or turnings[j].is_zero():
+            if turnings[j].is_zero():
                 steps = [_product(gradient, body.turned(one)) for one in (body.arm, body.first, body.along)]
             else:  # turned once for all vectors of the body
                 steps = [_product(one, _product(gradient, body.spin)) for one in (body.arm, body.first, body.along)]

@@ -12,6 +12,7 @@ from awiwi_gen.ir.passes.flatten import flatten
 from awiwi_gen.ir.passes.gather import gather
 from awiwi_gen.ir.passes.scale import scale
 from awiwi_gen.ir.passes.share import share_products, share_sums
+from awiwi_gen.ir.passes.shift import shift
 from awiwi_gen.ir.passes.signs import signs
 from awiwi_gen.ir.passes.turn import turn
 
@@ -19,11 +20,11 @@ Pass = Callable[[Graph], Graph]
 
 # Tried in turn, and nothing but the end; the cheapest result wins: whether brackets pay depends on what products share.
 BEGINNINGS: tuple[tuple[Pass, ...], ...] = (
-    (flatten, turn, share_products, share_sums, factor, scale),
+    (flatten, turn, share_products, share_sums, factor, shift, scale),
     (flatten, share_products, turn, factor, share_products, share_sums, scale),
-    (flatten, turn, factor, scale, share_products, share_sums),
+    (flatten, turn, factor, shift, scale, share_products, share_sums),
 )
-AGAIN: tuple[Pass, ...] = (flatten, share_products, share_sums, factor, scale)  # as long as it helps
+AGAIN: tuple[Pass, ...] = (flatten, share_products, share_sums, factor, shift, scale)  # as long as it helps
 END: tuple[Pass, ...] = (quotients, orient, signs, schedule, gather)
 
 Stages = list[tuple[str, Graph]]
