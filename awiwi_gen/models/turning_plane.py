@@ -117,14 +117,14 @@ class TurningPlane:
 
     # -- quantities -----------------------------------------------------------------------------------------
 
-    def mass(self) -> SX:
-        """M of the joints [kg m^2]."""
+    def mass(self, alone: bool) -> SX:
+        """M of the joints [kg m^2]; unless it is computed alone, from the sums of first moments others need as well."""
         count, start = len(self.bodies), self.start
         mass = SX.zeros(count + start, count + start)
         for j in reversed(range(count)):
             body, own, product = self.bodies[j], j + start, SX(0)
             for k in reversed(range(j + 1, count)):
-                product += _dot(self.arms[j], self.own[k])
+                product = _dot(self.arms[j], self.own[k]) + product if alone else _dot(self.arms[j], self.first[k])
                 mass[own, k + start] = mass[k + start, own] = mass[own + 1, k + start] + product
                 if k == j + 1:
                     mass[own, own] = mass[own, own + 1] + product
@@ -191,10 +191,13 @@ class TurningPlane:
         chain = [-_cross(first, down) for first in self.first[:-1]]
         return [self._turning_weight(down, along), *chain] if self.lead else chain
 
-    def torques(self, speeds: list[SX], rates: list[SX], g: SX, absolute: bool = False) -> list[SX]:
+    def torques(
+        self, speeds: list[SX], rates: list[SX], g: SX, absolute: bool = False, once: bool = True
+    ) -> list[SX]:
         """Torques of the joints for their speeds [rad/s], rates of these [rad/s^2] and gravity g (3) [N m].
 
-        With `absolute`, those that belong to the absolute angles, of the bodies alone.
+        With `absolute`, those that belong to the absolute angles, of the bodies alone. A body's motion is turned `once`
+        for all its vectors, or each of these by itself, which is longer but has shorter derivatives.
         """
         spins, turnings = _running(speeds[self.start :]), _running(rates[self.start :])
         down, along = self._gravity(g)
@@ -206,10 +209,10 @@ class TurningPlane:
                 torque += speeds[0] ** 2 * kappas[j] + rates[0] * body.turned(body.along)[1]
             torques.append(torque)
             gradient = (-(spins[j] ** 2), turnings[j])  # takes a vector of the body to its second derivative
-            if turnings[j].is_zero():
-                steps = [_product(gradient, body.turned(one)) for one in (body.arm, body.first, body.along)]
-            else:  # turned once for all vectors of the body
+            if once and not turnings[j].is_zero():
                 steps = [_product(one, _product(gradient, body.spin)) for one in (body.arm, body.first, body.along)]
+            else:
+                steps = [_product(gradient, body.turned(one)) for one in (body.arm, body.first, body.along)]
             acceleration = _sum(acceleration, steps[0])
             forces.append(steps[1])
             swing -= steps[2][0]

@@ -21,27 +21,28 @@ BITS = 400
 EXACT = Fraction(1, 1 << 300)  # what is smaller than this part of its form is zero but for rounding
 Form = tuple[Fraction, Fraction]  # of cosine and sine
 Square = tuple[Fraction, Fraction, Fraction]  # of their squares and product: cos^2, cos*sin, sin^2
-_X = (Fraction(1), Fraction(0))
+Part = tuple[int, tuple[int, ...]]  # a sign and factors
+Swing = tuple[Form, Fraction, tuple[int, ...]]  # cosine or sine, a constant and other factors
+_X, _Y = (Fraction(1), Fraction(0)), (Fraction(0), Fraction(1))
 
 
 @dataclass(frozen=True)
 class _Pair:
-    """Two nodes that turn with an angle as its cosine and sine do.
+    """Two values that turn with an angle as its cosine and sine do: a*cos + b*sin and a*sin - b*cos.
 
-    These are one pair themselves. With `made` = (a, b) they are a*cos + b*sin and `sign` times a*sin - b*cos.
+    Of a and b signs and factors are given; there is no b where it is zero.
     """
 
-    first: int
-    second: int
-    sign: int = 1
-    made: tuple[Ref, Ref] | None = None
+    a: Part
+    b: Part | None = None
 
 
 @dataclass
 class _Angle:
     """An angle's cosine and sine, what else turns so, and the sums of terms in them: of first and second degree."""
 
-    pairs: list[_Pair]
+    argument: Ref
+    pairs: list[_Pair] = field(default_factory=lambda: [_Pair((1, ()))])
     linear: dict[tuple[int, int], Form] = field(default_factory=dict)  # by sum, and by pair
     square: dict[int, Square] = field(default_factory=dict)  # of cosine and sine
     taken: dict[int, set[int]] = field(default_factory=dict)  # the places of these terms in each sum
@@ -61,65 +62,81 @@ class _Reader:
             for ref in operands(node):
                 self.parents[node_of(ref)].append(index)
 
-    def read(self, own: _Pair) -> _Angle | None:
+    def read(self, cosine: int, sine: int) -> _Angle | None:
         """All uses of an angle's cosine and sine as terms of sums; None if there are others."""
-        graph, parents = self.graph, self.parents
-        angle = _Angle([own, *self._companions(own)])
-        leaves: Terms = {}
-        for number, pair in enumerate(angle.pairs):
-            leaves |= {pair.first: (number, _X), pair.second: (number, (Fraction(0), Fraction(pair.sign)))}
-        making = {node_of(ref) for pair in angle.pairs[1:] for ref in graph.nodes[pair.first][1:]}
-        making |= {node_of(ref) for pair in angle.pairs[1:] for ref in graph.nodes[pair.second][1:]}
-        users = {p for leaf in leaves for p in parents[leaf]} - making
-        products = {p for p in users if graph.nodes[p][0] == "mul"}
-        if self.roots & (leaves.keys() | products) or any(graph.nodes[p][0] not in ("mul", "add") for p in users):
+        graph, units = self.graph, {cosine: _X, sine: _Y}
+        users = {p for leaf in units for p in self.parents[leaf]}
+        products = sorted(p for p in users if graph.nodes[p][0] == "mul")
+        if self.roots & units.keys() or not self._terms_only(products):
             return None
-        if any(graph.nodes[p][0] != "add" for product in products for p in parents[product]):
+        if any(graph.nodes[p][0] not in ("mul", "add") for p in users):
             return None
-        terms: Terms = dict(leaves)
-        terms |= {p: form for p in sorted(products) if (form := _linear(graph, p, leaves))}
-        pure = {leaf: unit for leaf, (pair, unit) in leaves.items() if pair == 0}
-        sums: dict[int, Form] = {}
-        for index, node in enumerate(graph.nodes):
-            if node[0] == "add" and all(_is_form(terms.get(node_of(r))) for r in node[1:]):
-                parts = [[(1 if r >= 0 else -1) * x for x in terms[node_of(r)][1]] for r in node[1:]]
-                sums[index] = (sum((p[0] for p in parts), Fraction(0)), sum((p[1] for p in parts), Fraction(0)))
-        for p in sorted(products - terms.keys()):
-            square = _square(graph, p, pure | sums)
-            if square is None:
-                return None
-            terms[p] = 0, square
-        squares = {p for p, (_, term) in terms.items() if len(term) == 3}
-        inner = {index for index in sums if index not in self.roots and squares.issuperset(parents[index])}
-        holders = {p for term in terms for p in parents[term] if graph.nodes[p][0] == "add"} - inner
+        angle = _Angle(graph.nodes[cosine][1])
+        terms: Terms = {leaf: (0, unit) for leaf, unit in units.items()}
+        terms |= {p: (0, form) for p in products if (form := _linear(graph, p, units))}
+        sums = self._sums(terms)
+        terms |= {p: (0, form) for p in products if p not in terms and (form := _square(graph, p, units | sums))}
+        squares = {p for p, (_, form) in terms.items() if len(form) == 3}
+        inner = {index for index in sums if index not in self.roots and squares.issuperset(self.parents[index])}
+        swings = {p: _swing(graph, p, units) for p in products if p not in terms}
+        if None in swings.values():
+            return None
+        self._companions(angle, terms, swings)
+        holders = {p for term in terms for p in self.parents[term] if graph.nodes[p][0] == "add"} - inner
         for index in sorted(holders):
             _collect(index, graph.nodes[index], terms, angle)
         return angle
 
-    def _companions(self, own: _Pair) -> list[_Pair]:
-        """The other pairs that turn with an angle: sums and differences of its cosine and sine with the same factors."""
-        parents = self.parents
-        sums = {p for leaf in (own.first, own.second) for product in parents[leaf] for p in parents[product]}
-        found = {found: index for index in sorted(sums - self.roots) if (found := self._factors(index, own))}
-        pairs: list[_Pair] = []
-        for (a, b), first in found.items():
-            for sign, factors in ((1, (~b, a)), (-1, (b, ~a))):
-                second = found.get(factors)
-                if second is not None and first < second:
-                    pairs.append(_Pair(first, second, sign, (a, b)))
-        return pairs
+    def _terms_only(self, products: Iterable[int]) -> bool:
+        """Whether nodes are used as terms of sums only."""
+        nodes = self.graph.nodes
+        return all(p not in self.roots and all(nodes[q][0] == "add" for q in self.parents[p]) for p in products)
 
-    def _factors(self, index: int, own: _Pair) -> tuple[Ref, Ref] | None:
-        """(a, b) if a node is a*cos + b*sin, where these products are used for such pairs only."""
-        node = self.graph.nodes[index]
-        found: dict[int, Ref] = {}
-        for ref in operands(node):
-            product = self.graph.nodes[node_of(ref)]
-            if product[0] == "mul" and len(product) == 3 and len(self.parents[node_of(ref)]) == 1:
-                for leaf, other in (product[1:], product[:0:-1]):
-                    if leaf in (own.first, own.second) and self.graph.nodes[other][0] != "const":
-                        found[leaf] = other if ref >= 0 else ~other
-        return (found[own.first], found[own.second]) if node[0] == "add" and len(found) == len(node) - 1 == 2 else None
+    def _sums(self, terms: Terms) -> dict[int, Form]:
+        """The sums of nothing but terms of first degree."""
+        sums: dict[int, Form] = {}
+        for index, node in enumerate(self.graph.nodes):
+            if node[0] == "add" and all(node_of(r) in terms for r in node[1:]):
+                parts = [[(1 if r >= 0 else -1) * x for x in terms[node_of(r)][1]] for r in node[1:]]
+                sums[index] = (sum((p[0] for p in parts), Fraction(0)), sum((p[1] for p in parts), Fraction(0)))
+        return sums
+
+    def _companions(self, angle: _Angle, terms: Terms, swings: dict[int, Swing]) -> None:
+        """What else turns with the angle: sums a*cos + b*sin beside a*sin - b*cos, and products a*cos, a*sin."""
+        vectors = {}
+        for index in sorted({p for product in swings for p in self.parents[product]}):
+            if vector := self._vector(index, swings):
+                vectors[vector] = index
+        for ((plus, a), (minus, b)), index in vectors.items():
+            for sign in (1, -1):
+                other = vectors.get(((-sign * minus, b), (sign * plus, a)))
+                if other is not None and index < other:
+                    angle.pairs.append(_Pair((plus, a), (minus, b)))
+                    for one, unit in ((index, _X), (other, _scaled(_Y, sign))):
+                        terms[one] = len(angle.pairs) - 1, unit
+                        terms |= {q: (len(angle.pairs) - 1, _linear(self.graph, q, {one: unit})) for q in self.parents[one] if self.graph.nodes[q][0] == "mul"}
+                        for ref in self.graph.nodes[one][1:]:
+                            del swings[node_of(ref)]
+        numbers: dict[tuple[int, ...], int] = {}
+        for product, (unit, factor, others) in swings.items():
+            if others not in numbers:
+                numbers[others] = len(angle.pairs)
+                angle.pairs.append(_Pair((1, others)))
+            terms[product] = numbers[others], _scaled(unit, factor)
+
+    def _vector(self, index: int, swings: dict[int, Swing]) -> tuple[Part, Part] | None:
+        """(a, b) if a node is a*cos + b*sin and its multiples are terms of sums only."""
+        nodes, parts = self.graph.nodes, {}
+        for ref in nodes[index][1:]:
+            unit, factor, others = swings.get(node_of(ref), (_X, Fraction(0), ()))
+            if factor != 1 or len(self.parents[node_of(ref)]) > 1:
+                return None
+            parts[unit] = (1 if ref >= 0 else -1, others)
+        multiples = [q for q in self.parents[index] if nodes[q][0] != "add"]
+        constant = all(nodes[q][0] == "mul" and len(nodes[q]) == 3 and nodes[nodes[q][1]][0] == "const" for q in multiples)
+        if len(nodes[index]) != 3 or len(parts) != 2 or index in self.roots or not constant or not self._terms_only(multiples):
+            return None
+        return parts[_X], parts[_Y]
 
 
 def turn(graph: Graph) -> Graph:
@@ -128,7 +145,7 @@ def turn(graph: Graph) -> Graph:
     found = {(node[0], node[1]): index for index, node in enumerate(graph.nodes) if node[0] in ("cos", "sin")}
     for (name, argument), cosine in found.items():
         if name == "cos" and ("sin", argument) in found:
-            angle = reader.read(_Pair(cosine, found["sin", argument]))
+            angle = reader.read(cosine, found["sin", argument])
             phase = _best(angle) if angle else None
             turned = _turned(graph, angle, phase) if angle and phase else graph
             if _operations(turned) < _operations(graph):
@@ -139,11 +156,6 @@ def turn(graph: Graph) -> Graph:
 def _operations(graph: Graph) -> int:
     spent = cost(graph)
     return spent.add + spent.mul
-
-
-def _is_form(term: tuple[int, Form | Square] | None) -> bool:
-    """Whether a term is of first degree in cosine and sine."""
-    return term is not None and term[0] == 0 and len(term[1]) == 2
 
 
 def _collect(index: int, node: Node, terms: Terms, angle: _Angle) -> None:
@@ -163,12 +175,25 @@ def _collect(index: int, node: Node, terms: Terms, angle: _Angle) -> None:
             angle.square[index] = (total[0], total[1], total[2])
 
 
-def _linear(graph: Graph, product: int, leaves: Terms) -> tuple[int, Form] | None:
+def _linear(graph: Graph, product: int, units: dict[int, Form]) -> Form | None:
     refs = graph.nodes[product][1:]
-    if len(refs) == 2 and graph.nodes[refs[0]][0] == "const" and refs[1] in leaves:
-        factor, (pair, (c, s)) = graph.nodes[refs[0]][1], leaves[refs[1]]
-        return pair, (factor * c, factor * s)
+    if len(refs) == 2 and graph.nodes[refs[0]][0] == "const" and refs[1] in units:
+        return _scaled(units[refs[1]], graph.nodes[refs[0]][1])
     return None
+
+
+def _swing(graph: Graph, product: int, units: dict[int, Form]) -> Swing | None:
+    """A product with cosine or sine among its factors once: which, the constant, and the other factors."""
+    refs = list(graph.nodes[product][1:])
+    factor = graph.nodes[refs.pop(0)][1] if graph.nodes[refs[0]][0] == "const" else Fraction(1)
+    others = tuple(ref for ref in refs if ref not in units)
+    if len(others) != len(refs) - 1:
+        return None
+    return next(units[ref] for ref in refs if ref in units), factor, others
+
+
+def _scaled(form: Form, factor: Fraction | int) -> Form:
+    return factor * form[0], factor * form[1]
 
 
 def _square(graph: Graph, product: int, forms: dict[int, Form]) -> Square | None:
@@ -252,28 +277,31 @@ def _turned(graph: Graph, angle: _Angle, phase: Form) -> Graph:
     for square in squares.values():
         slopes.update({_key(_slope(square)), _key(_other_slope(square))})
     shared: dict[tuple[int, int], Form] = {}
-    argument = graph.nodes[angle.pairs[0].first][1]
     with ctx.workprec(BITS):
         c, s = (arb(fmpq(x.numerator, x.denominator)) for x in phase)
         shift = _fraction(arb.atan2(s, c))
 
-    def form(builder: Builder, leaves: tuple[Ref, Ref], one: Form) -> list[Ref]:
+    def form(builder: Builder, leaves: tuple[tuple[Ref, ...], tuple[Ref, ...]], one: Form) -> list[Ref]:
         one = shared.setdefault(_key(one), one)
-        return [builder.mul((builder.const(x), leaf)) for x, leaf in zip(one, leaves, strict=True) if x]
+        return [builder.mul((builder.const(x), *leaf)) for x, leaf in zip(one, leaves, strict=True) if x]
 
-    def leaves(builder: Builder, own: tuple[Ref, Ref], pair: _Pair) -> tuple[Ref, Ref]:
-        if pair.made is None:
-            return own
-        a, b = (renamed[ref] if ref >= 0 else ~renamed[~ref] for ref in pair.made)
+    def part(builder: Builder, factors: Part) -> Ref:
+        product = builder.mul([renamed[ref] for ref in factors[1]])
+        return product if factors[0] > 0 else ~product
+
+    def leaves(builder: Builder, own: tuple[Ref, Ref], pair: _Pair) -> tuple[tuple[Ref, ...], tuple[Ref, ...]]:
+        if pair.b is None:
+            factors = [renamed[ref] for ref in pair.a[1]]
+            return (*factors, own[0]), (*factors, own[1])
+        a, b = part(builder, pair.a), part(builder, pair.b)
         first = builder.add((builder.mul((a, own[0])), builder.mul((b, own[1]))))
-        second = builder.sub(builder.mul((a, own[1])), builder.mul((b, own[0])))
-        return first, second
+        return (first,), (builder.sub(builder.mul((a, own[1])), builder.mul((b, own[0]))),)
 
     def rule(builder: Builder, node: Node, refs: tuple[Ref, ...]) -> Ref:
         index = position[node]
         if index not in angle.taken:
             return copy_node(builder, node, refs)
-        turned = builder.add((renamed[argument], builder.const(shift)))
+        turned = builder.add((renamed[angle.argument], builder.const(shift)))
         own = (builder.call("cos", turned), builder.call("sin", turned))
         terms = [ref for place, ref in enumerate(refs) if place not in angle.taken[index]]
         for number, pair in enumerate(angle.pairs):
@@ -282,7 +310,7 @@ def _turned(graph: Graph, angle: _Angle, phase: Form) -> Graph:
         if index in squares:
             one, other = _slope(squares[index]), _other_slope(squares[index])
             by_sine = slopes[_key(other)] > slopes[_key(one)]
-            inner = builder.add(form(builder, own, other if by_sine else one))
+            inner = builder.add(form(builder, ((own[0],), (own[1],)), other if by_sine else one))
             terms += [builder.mul((own[by_sine], inner)), builder.const(squares[index][0 if by_sine else 2])]
         return builder.add(terms)
 
