@@ -10,7 +10,7 @@ from awiwi_gen.ir.passes.factor import factor
 from awiwi_gen.ir.passes.finish import orient, quotients, schedule
 from awiwi_gen.ir.passes.flatten import flatten
 from awiwi_gen.ir.passes.gather import gather
-from awiwi_gen.ir.passes.scale import scale
+from awiwi_gen.ir.passes.scale import scale, units
 from awiwi_gen.ir.passes.share import share_products, share_sums
 from awiwi_gen.ir.passes.shift import shift
 from awiwi_gen.ir.passes.signs import signs
@@ -53,6 +53,9 @@ def optimise(graph: Graph) -> Stages:
         if weight >= rough:
             break
         rough, way = weight, further
+    other = [*way, *stages(way[-1][1], (units, *AGAIN))]
+    if _rough(other[-1][1]).weight < rough:
+        way = other
     way = [*way, *stages(way[-1][1], END)]
     plain = _rough(graph)
     if plain.weight - plain.neg > cost(way[-1][1]).weight:  # the end takes away negations, and nothing else
