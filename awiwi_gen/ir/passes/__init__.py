@@ -20,9 +20,9 @@ Pass = Callable[[Graph], Graph]
 
 # Tried in turn, and nothing but the end; the cheapest result wins: whether brackets pay depends on what products share.
 BEGINNINGS: tuple[tuple[Pass, ...], ...] = (
-    (flatten, turn, share_products, share_sums, factor, shift, scale),
+    (flatten, turn, share_products, share_sums, factor, scale),
     (flatten, share_products, turn, factor, share_products, share_sums, scale),
-    (flatten, turn, factor, shift, scale, share_products, share_sums),
+    (flatten, turn, factor, scale, share_products, share_sums),
 )
 AGAIN: tuple[Pass, ...] = (flatten, share_products, share_sums, factor, shift, scale)  # as long as it helps
 END: tuple[Pass, ...] = (quotients, orient, signs, schedule, gather)
@@ -53,9 +53,9 @@ def optimise(graph: Graph) -> Stages:
         if weight >= rough:
             break
         rough, way = weight, further
-    other = [*way, *stages(way[-1][1], (units, *AGAIN))]
-    if _rough(other[-1][1]).weight < rough:
-        way = other
+    further += stages(further[-1][1], (units, *AGAIN))
+    if _rough(further[-1][1]).weight < rough:
+        way = further
     way = [*way, *stages(way[-1][1], END)]
     plain = _rough(graph)
     if plain.weight - plain.neg > cost(way[-1][1]).weight:  # the end takes away negations, and nothing else

@@ -1,67 +1,100 @@
-"""Complete brackets: ``x*(a*y + b*z) + c*y`` is ``(x + c/a)*(a*y + b*z) - (c*b/a)*z``.
+"""Complete brackets: ``x*(a*y + b*z) + c*y`` is ``(x + c/a)*(a*y + b*z) - (b*c/a)*z``.
 
-That pays where the sum has a term in z already, or where z is x itself or a constant, whose share fits in the bracket.
+That pays where the sum has a term in z already, or where z is a constant or x itself, for which the bracket has room.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable
+from dataclasses import dataclass
 from fractions import Fraction
 
 from awiwi_gen.ir.builder import Builder, copy_node, rebuild
 from awiwi_gen.ir.graph import Graph, Node, Ref, node_of
 
-Terms = dict[int | None, Fraction]  # coefficients of nodes; that of None is the constant
+Factors = tuple[int, ...]  # of a term, besides its coefficient; none for a constant
+Terms = dict[Factors, Fraction]
+
+
+@dataclass(frozen=True)
+class _Bracket:
+    """A term of a sum that is x times a bracket, and by how much x is to be shifted."""
+
+    place: int
+    x: int
+    inner: Terms
+    by: Fraction
 
 
 def shift(graph: Graph) -> Graph:
     """The same graph with fewer terms beside brackets."""
-    uses = graph.uses
+    found: dict[Node, _Bracket] = {}
     shifted: set[tuple[int, Fraction]] = set()
+    for node in graph.nodes:
+        if node[0] == "add" and (bracket := _best(graph, node, shifted)):
+            found[node] = bracket
+            shifted.add((bracket.x, bracket.by))
+    if not found:
+        return graph
+    renamed: dict[Node, Ref] = {}
 
     def rule(builder: Builder, node: Node, refs: tuple[Ref, ...]) -> Ref:
-        if node[0] != "add":
-            return copy_node(builder, node, refs)
-        for old, ref in zip(node[1:], refs, strict=True):
-            product = builder.nodes[node_of(ref)]
-            if product[0] != "mul" or len(product) != 3 or uses[node_of(old)] > 1:
-                continue
-            for x, bracket in (product[1:], product[:0:-1]):
-                alone = any(uses[r] == 1 and graph.nodes[r][0] == "add" for r in graph.nodes[node_of(old)][1:])
-                if builder.nodes[bracket][0] == "add" and alone and builder.nodes[x][0] != "const":
-                    inner, outer = _terms(builder, builder.nodes[bracket][1:]), _terms(builder, refs)
-                    by = _best(builder, x, inner, outer, 1 if ref >= 0 else -1, shifted)
-                    if by:
-                        shifted.add((x, by))
-                        return _shifted(builder, x, by, inner, [r for r in refs if r != ref], ref >= 0)
-        return copy_node(builder, node, refs)
+        result = copy_node(builder, node, refs)
+        if node in found:
+            result = _completed(builder, found[node], list(refs), node[found[node].place] >= 0, new)
+        renamed[node] = result
+        return result
+
+    def new(index: int) -> Ref:
+        return renamed[graph.nodes[index]]
 
     return rebuild(graph, rule)
 
 
-def _terms(builder: Builder, refs: Iterable[Ref]) -> Terms:
-    return {base: coefficient for coefficient, base in map(builder.split, refs)}
-
-
-def _best(builder: Builder, x: int, inner: Terms, outer: Terms, sign: int, shifted: set[tuple[int, Fraction]]) -> Fraction | None:
-    """The shift of x that saves most operations."""
-    found = None
-    most = 0
-    for base, coefficient in inner.items():
-        if base is None or base == x or base not in outer:
+def _best(graph: Graph, node: Node, shifted: set[tuple[int, Fraction]]) -> _Bracket | None:
+    """The shift that saves most operations of a sum."""
+    outer = _terms(graph, node)
+    best, most = None, 0
+    for place, ref in enumerate(node[1:], 1):
+        product = graph.nodes[node_of(ref)]
+        if product[0] != "mul" or len(product) != 3 or graph.uses[node_of(ref)] > 1:
             continue
-        by = sign * outer[base] / coefficient
-        gain = -1 if (x, by) not in shifted else 0
-        gain -= x in inner and None not in inner
-        for other, value in inner.items():
-            if other is None or other == x:
+        for x, bracket in (product[1:], product[:0:-1]):
+            if graph.nodes[bracket][0] != "add" or graph.uses[bracket] > 1 or graph.nodes[x][0] == "const":
                 continue
-            before = outer.get(other, Fraction(0))
-            gain += _price(before) - _price(before - sign * by * value)
-        gain -= (None in inner or x in inner) and None not in outer
-        if gain > most:
-            found, most = by, gain
-    return found
+            inner = _terms(graph, graph.nodes[bracket])
+            for factors in inner.keys() & outer.keys() - {(), (x,)}:
+                by = (1 if ref >= 0 else -1) * outer[factors] / inner[factors]
+                gain = _gain(x, inner, outer, by if ref >= 0 else -by) - ((x, by) not in shifted)
+                if gain > most:
+                    best, most = _Bracket(place, x, inner, by), gain
+    return best
+
+
+def _terms(graph: Graph, node: Node) -> Terms:
+    """A sum's coefficients."""
+    terms: Terms = {}
+    for ref in node[1:]:
+        factor, index = Fraction(1 if ref >= 0 else -1), node_of(ref)
+        factors: Factors = (index,)
+        if graph.nodes[index][0] == "const":
+            factors = (index,)[:0]
+            factor *= graph.nodes[index][1]
+        elif graph.nodes[index][0] == "mul" and graph.nodes[graph.nodes[index][1]][0] == "const":
+            factors = graph.nodes[index][2:]
+            factor *= graph.nodes[graph.nodes[index][1]][1]
+        terms[factors] = factor
+    return terms
+
+
+def _gain(x: int, inner: Terms, outer: Terms, times: Fraction) -> int:
+    """Operations saved where the outer sum loses its part of the inner one."""
+    inside, outside = () in inner, () in outer
+    gain = -((x,) in inner and not inside) - (((x,) in inner or inside) and not outside)
+    for factors in inner.keys() - {(), (x,)}:
+        before = outer.get(factors, Fraction(0))
+        gain += _price(before) - _price(before - times * inner[factors])
+    return gain
 
 
 def _price(coefficient: Fraction) -> int:
@@ -69,13 +102,15 @@ def _price(coefficient: Fraction) -> int:
     return 0 if not coefficient else 1 if abs(coefficient) == 1 else 2
 
 
-def _shifted(builder: Builder, x: int, by: Fraction, inner: Terms, others: list[Ref], plus: bool) -> Ref:
-    inner = {**inner, None: inner.get(None, Fraction(0)) - by * inner.get(x, Fraction(0))}
-    sign = 1 if plus else -1
+def _completed(builder: Builder, found: _Bracket, refs: list[Ref], plus: bool, new: Callable[[int], Ref]) -> Ref:
+    """The sum with its bracket completed."""
+    x, by = found.x, found.by
+    inner = found.inner | {(): found.inner.get((), Fraction(0)) - by * found.inner.get((x,), Fraction(0))}
 
-    def sums(terms: Terms) -> list[Ref]:
-        return [builder.const(c) if base is None else builder.scaled(c, base) for base, c in terms.items() if c]
+    def sum_of(terms: Terms) -> Ref:
+        return builder.add([builder.mul([builder.const(c), *map(new, factors)]) for factors, c in terms.items()])
 
-    left = sums({base: -sign * by * c for base, c in inner.items() if base != x})
-    product = builder.mul((builder.add((x, builder.const(by))), builder.add(sums(inner))))
-    return builder.add([*others, *left, product if plus else ~product])
+    rest = sum_of({factors: by * c for factors, c in inner.items() if factors != (x,)})
+    product = builder.mul((builder.add((new(x), builder.const(by))), sum_of(inner)))
+    del refs[found.place - 1]
+    return builder.add([*refs, *((product, ~rest) if plus else (~product, rest))])
