@@ -191,9 +191,7 @@ class TurningPlane:
         chain = [-_cross(first, down) for first in self.first[:-1]]
         return [self._turning_weight(down, along), *chain] if self.lead else chain
 
-    def torques(
-        self, speeds: list[SX], rates: list[SX], g: SX, absolute: bool = False, once: bool = True
-    ) -> list[SX]:
+    def torques(self, speeds: list[SX], rates: list[SX], g: SX, absolute: bool = False, once: bool = True) -> list[SX]:
         """Torques of the joints for their speeds [rad/s], rates of these [rad/s^2] and gravity g (3) [N m].
 
         With `absolute`, those that belong to the absolute angles, of the bodies alone. A body's motion is turned `once`
@@ -203,6 +201,8 @@ class TurningPlane:
         down, along = self._gravity(g)
         kappas = self.kappas() if self.lead else []
         acceleration, torques, forces, swing = (-down[0], -down[1]), [], [], SX(0)
+        # Without rates the last two bodies pull each other along one line, which is shorter than to pass it on.
+        pair = len(self.bodies) - 2 if all(rate.is_zero() for rate in turnings) else -1
         for j, body in enumerate(self.bodies):
             torque = _cross(self.own[j], acceleration) + body.inertia * turnings[j]
             if self.lead:
@@ -213,12 +213,18 @@ class TurningPlane:
                 steps = [_product(one, _product(gradient, body.spin)) for one in (body.arm, body.first, body.along)]
             else:
                 steps = [_product(gradient, body.turned(one)) for one in (body.arm, body.first, body.along)]
-            acceleration = _sum(acceleration, steps[0])
+            if j != pair:
+                acceleration = _sum(acceleration, steps[0])
             forces.append(steps[1])
             swing -= steps[2][0]
+        if pair >= 0:
+            area = _cross(self.arms[pair], self.own[-1])
+            torques[-1] += spins[-2] ** 2 * area
+            torques[-2] -= spins[-1] ** 2 * area
         result, force = [SX(0)], (SX(0), SX(0))
         for j in reversed(range(len(self.bodies))):
-            result.insert(0, torques[j] + (SX(0) if absolute else result[0]) + _cross(self.arms[j], force))
+            carried = _cross(self.arms[j], force) if j != pair else SX(0)
+            result.insert(0, torques[j] + (SX(0) if absolute else result[0]) + carried)
             force = _sum(forces[j], force)
         result.pop()
         if self.lead:
