@@ -8,7 +8,9 @@ keeps its form in other axes; angles of which this is not so are left alone.
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterable
 from fractions import Fraction
+from math import hypot
 
 from flint import arb, ctx, fmpq
 
@@ -43,10 +45,26 @@ def _operations(graph: Graph) -> int:
 
 def _best(angle: Angle) -> Form | None:
     """Cosine and sine of the phase at which most terms vanish, if they are worth one addition."""
-    candidates = [unit for form in angle.linear.values() if all(form) for unit in [_direction(form)]]
-    here = _terms(angle, (Fraction(1), Fraction(0)))
-    best = min(candidates, key=lambda unit: _terms(angle, unit), default=None)
-    return best if best and _terms(angle, best) < here else None
+    forms = [(pair, float(a), float(b)) for (_, pair), (a, b) in angle.linear.items()]
+    squares = [(float(xx - yy), float(xy)) for xx, xy, yy in angle.square.values()]
+    best, least = None, _terms(forms, squares, 1.0, 0.0)
+    for form in angle.linear.values():
+        if all(form):
+            a, b = map(float, form)
+            terms = _terms(forms, squares, a / hypot(a, b), -b / hypot(a, b))
+            if terms < least:
+                best, least = form, terms
+    return _direction(best) if best else None
+
+
+def _terms(
+    forms: Iterable[tuple[int, float, float]], squares: Iterable[tuple[float, float]], c: float, s: float
+) -> int:
+    """Number of terms that are left at a phase with this cosine and sine, forms that are alike counted once."""
+    turned = [(pair, a * c - b * s, a * s + b * c) for pair, a, b in forms]
+    turned += [(0, a * (c * c - s * s) - 2 * b * c * s, 2 * a * c * s + b * (c * c - s * s)) for a, b in squares]
+    left = {(pair, *(f"{x:.9e}" if abs(x) > 1e-12 * hypot(a, b) else "" for x in (a, b))) for pair, a, b in turned}
+    return sum(bool(x) for _, *form in left for x in form)
 
 
 def _direction(form: Form) -> Form:
@@ -60,13 +78,6 @@ def _direction(form: Form) -> Form:
 def _fraction(x: arb) -> Fraction:
     mantissa, exponent = x.mid().man_exp()
     return Fraction(int(mantissa)) * Fraction(2) ** int(exponent)
-
-
-def _terms(angle: Angle, phase: Form) -> int:
-    """Number of terms that are left at a phase."""
-    forms = {(pair, *_key(_turn(form, phase))) for (_, pair), form in angle.linear.items()}
-    forms |= {(0, *_key(_slope(_turn_square(square, phase)))) for square in angle.square.values()}
-    return sum(bool(x) for _, *form in forms for x in form)
 
 
 def _key(form: Form) -> tuple[int, int]:
