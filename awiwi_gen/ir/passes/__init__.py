@@ -25,6 +25,7 @@ BEGINNINGS: tuple[tuple[Pass, ...], ...] = (
     (flatten, turn, factor, scale, share_products, share_sums),
 )
 AGAIN: tuple[Pass, ...] = (flatten, share_products, share_sums, factor, shift, scale)  # as long as it helps
+ONCE: tuple[Pass, ...] = (units, *AGAIN)  # if it helps
 END: tuple[Pass, ...] = (quotients, orient, signs, schedule, gather)
 
 Stages = list[tuple[str, Graph]]
@@ -53,7 +54,7 @@ def optimise(graph: Graph) -> Stages:
         if weight >= rough:
             break
         rough, way = weight, further
-    further += stages(further[-1][1], (units, *AGAIN))
+    further += stages(further[-1][1], ONCE)
     if _rough(further[-1][1]).weight < rough:
         way = further
     way = [*way, *stages(way[-1][1], END)]

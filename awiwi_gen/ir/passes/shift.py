@@ -1,6 +1,7 @@
 """Complete brackets: ``x*(a*y + b*z) + c*y`` is ``(x + c/a)*(a*y + b*z) - (b*c/a)*z``.
 
 That pays where the sum has a term in z already, or where z is a constant or x itself, for which the bracket has room.
+Only sines and cosines are shifted, and by no more than what they may be themselves: then little cancels.
 """
 
 from __future__ import annotations
@@ -60,13 +61,14 @@ def _best(graph: Graph, node: Node, shifted: set[tuple[int, Fraction]]) -> _Brac
         if product[0] != "mul" or len(product) != 3 or graph.uses[node_of(ref)] > 1:
             continue
         for x, bracket in (product[1:], product[:0:-1]):
-            if graph.nodes[bracket][0] != "add" or graph.uses[bracket] > 1 or graph.nodes[x][0] == "const":
+            if graph.nodes[bracket][0] != "add" or graph.uses[bracket] > 1 or graph.nodes[x][0] not in ("cos", "sin"):
                 continue
             inner = _terms(graph, graph.nodes[bracket])
-            for factors in inner.keys() & outer.keys() - {(), (x,)}:
-                by = (1 if ref >= 0 else -1) * outer[factors] / inner[factors]
-                gain = _gain(x, inner, outer, by if ref >= 0 else -by) - ((x, by) not in shifted)
-                if gain > most:
+            for factors in [common for common in inner if common in outer and common not in ((), (x,))]:
+                times = outer[factors] / inner[factors]
+                by = times if ref >= 0 else -times
+                gain = _gain(x, inner, outer, times) - ((x, by) not in shifted)
+                if gain > most and abs(by) <= 1:
                     best, most = _Bracket(place, x, inner, by), gain
     return best
 
@@ -78,7 +80,7 @@ def _terms(graph: Graph, node: Node) -> Terms:
         factor, index = Fraction(1 if ref >= 0 else -1), node_of(ref)
         factors: Factors = (index,)
         if graph.nodes[index][0] == "const":
-            factors = (index,)[:0]
+            factors = ()
             factor *= graph.nodes[index][1]
         elif graph.nodes[index][0] == "mul" and graph.nodes[graph.nodes[index][1]][0] == "const":
             factors = graph.nodes[index][2:]
@@ -105,12 +107,16 @@ def _price(coefficient: Fraction) -> int:
 def _completed(builder: Builder, found: _Bracket, refs: list[Ref], plus: bool, new: Callable[[int], Ref]) -> Ref:
     """The sum with its bracket completed."""
     x, by = found.x, found.by
-    inner = found.inner | {(): found.inner.get((), Fraction(0)) - by * found.inner.get((x,), Fraction(0))}
+    inner = (
+        {(x,): Fraction(0)}
+        | found.inner
+        | {(): found.inner.get((), Fraction(0)) - by * found.inner.get((x,), Fraction(0))}
+    )
 
-    def sum_of(terms: Terms) -> Ref:
-        return builder.add([builder.mul([builder.const(c), *map(new, factors)]) for factors, c in terms.items()])
+    def products(terms: Terms, times: Fraction | int) -> list[Ref]:
+        return [builder.mul([builder.const(c * times), *map(new, factors)]) for factors, c in terms.items()]
 
-    rest = sum_of({factors: by * c for factors, c in inner.items() if factors != (x,)})
-    product = builder.mul((builder.add((new(x), builder.const(by))), sum_of(inner)))
     del refs[found.place - 1]
-    return builder.add([*refs, *((product, ~rest) if plus else (~product, rest))])
+    product = builder.mul((builder.add((new(x), builder.const(by))), builder.add(products(inner, 1))))
+    del inner[(x,)]
+    return builder.add([*refs, product if plus else ~product, *products(inner, -by if plus else by)])
