@@ -86,8 +86,8 @@ def inverse_dynamics(finger: Finger, q: SX, qd: SX, qdd: SX, g: SX) -> SX:
     return _torques(assemble(finger, q), qd, qdd, g)
 
 
-def inverse_dynamics_to_differentiate(finger: Finger, q: SX, qd: SX, qdd: SX, g: SX) -> SX:
-    """The same torques, longer but with shorter derivatives."""
+def inverse_dynamics_by_vector(finger: Finger, q: SX, qd: SX, qdd: SX, g: SX) -> SX:
+    """The same torques with each vector of a body turned by itself: longer, but with shorter derivatives."""
     return _torques(assemble(finger, q), qd, qdd, g, once=False)
 
 

@@ -107,16 +107,13 @@ def _price(coefficient: Fraction) -> int:
 def _completed(builder: Builder, found: _Bracket, refs: list[Ref], plus: bool, new: Callable[[int], Ref]) -> Ref:
     """The sum with its bracket completed."""
     x, by = found.x, found.by
-    inner = (
-        {(x,): Fraction(0)}
-        | found.inner
-        | {(): found.inner.get((), Fraction(0)) - by * found.inner.get((x,), Fraction(0))}
-    )
+    inner = {(): Fraction(0), (x,): Fraction(0)} | found.inner
+    inner[()] -= by * inner[x,]
 
     def products(terms: Terms, times: Fraction | int) -> list[Ref]:
         return [builder.mul([builder.const(c * times), *map(new, factors)]) for factors, c in terms.items()]
 
     del refs[found.place - 1]
     product = builder.mul((builder.add((new(x), builder.const(by))), builder.add(products(inner, 1))))
-    del inner[(x,)]
+    del inner[x,]
     return builder.add([*refs, product if plus else ~product, *products(inner, -by if plus else by)])
