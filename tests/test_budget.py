@@ -62,6 +62,7 @@ def test_a_pass_that_does_nothing_any_more_is_named(monkeypatch):
     def costs(*beginning) -> tuple[tuple[str, int, int], ...]:
         monkeypatch.setattr(passes, "BEGINNINGS", (beginning,))
         monkeypatch.setattr(passes, "AGAIN", ())
+        monkeypatch.setattr(passes, "ONCE", ())
         return make_records([(kernel, graphs, "digest")], "x", Options())[0].costs
 
     beginning = passes.BEGINNINGS[2]

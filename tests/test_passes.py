@@ -12,9 +12,11 @@ from awiwi_gen.ir.builder import Builder
 from awiwi_gen.ir.cost import cost
 from awiwi_gen.ir.graph import Graph, Output, Ref
 from awiwi_gen.ir.passes import optimise
+from awiwi_gen.ir.passes.factor import factor
 from awiwi_gen.ir.passes.finish import orient
 from awiwi_gen.ir.passes.flatten import flatten
-from awiwi_gen.ir.passes.scale import scale
+from awiwi_gen.ir.passes.scale import scale, units
+from awiwi_gen.ir.passes.shift import shift
 from awiwi_gen.ir.passes.signs import signs
 from awiwi_gen.ir.passes.turn import turn
 from awiwi_gen.verify.reference import ball_values, disagreement
@@ -152,3 +154,69 @@ def test_a_level_arm_whose_products_are_all_negative_is_computed_negative():
 
     assert cost(graph).neg == 2
     assert cost(signs(graph)).neg == 1
+
+
+@settings(deadline=None, max_examples=60)
+@given(BODIES, USES)
+def test_completed_brackets_and_inputs_in_other_units_have_the_same_values_and_cost_no_more(bodies, uses):
+    graph = factor(flatten(moments(bodies, uses)))
+    shifted, measured = shift(graph), units(graph)
+
+    assert values_differ(graph, shifted) < 1e-50
+    assert values_differ(graph, measured) < 1e-50
+    assert cost(shifted).add + cost(shifted).mul <= cost(graph).add + cost(graph).mul
+    assert cost(measured).mul <= cost(graph).mul
+
+
+def inertia(builder: Builder, by: Fraction) -> Ref:
+    """c*(2 c + 3 s + 5 y + 7) + 5 by y + 11 s + 13: y is a moment at a distance from the axis that turns with c."""
+    cosine, sine = (builder.call(name, builder.input("x", 0)) for name in ("cos", "sin"))
+    inner = [(2, cosine), (3, sine), (5, builder.input("x", 1))]
+    bracket = builder.add([builder.const(7), *(builder.mul((builder.const(k), x)) for k, x in inner)])
+    outer = [(5 * by, builder.input("x", 1)), (Fraction(11), sine)]
+    beside = [builder.const(13), *(builder.mul((builder.const(k), x)) for k, x in outer)]
+    return builder.add([builder.mul((cosine, bracket)), *beside])
+
+
+def test_a_distance_that_turns_takes_the_constant_distance_into_its_bracket():
+    builder = Builder()
+    graph = builder.graph([Output("y", (1,), (inertia(builder, Fraction(1, 7)),))])
+    before, after = cost(graph), cost(shift(graph))
+
+    assert (after.mul, after.add) == (before.mul - 1, before.add)
+    assert values_differ(graph, shift(graph)) < 1e-50
+
+
+def test_a_shift_that_would_cancel_is_not_made():
+    builder = Builder()
+    graph = builder.graph([Output("y", (1,), (inertia(builder, Fraction(7)),))])
+
+    assert shift(graph) == graph
+
+
+def test_an_input_is_measured_in_arms_where_more_levers_than_it_has_elements_need_the_arm():
+    builder = Builder()
+    x, y, z = (builder.input("x", i) for i in range(3))
+    gravity, arm = builder.input("g", 0), Fraction(3, 100)
+    levers = [builder.mul((builder.const(arm), one)) for one in (x, y, z)]
+    products = [builder.mul((builder.add((gravity, lever)), one)) for lever, one in zip(levers, (y, z, x), strict=True)]
+    loads = [builder.mul((builder.const(Fraction(k, 7)), one)) for k, one in zip((2, 3, 5), products, strict=True)]
+    graph = builder.graph([Output("y", (3,), tuple(loads))])
+
+    assert cost(scale(graph)).mul == cost(graph).mul
+    assert cost(units(graph)).mul == cost(graph).mul - 2
+
+
+def test_an_acceleration_that_turns_with_a_body_turns_with_its_axes():
+    builder = Builder()
+    cosine, sine, x, y = pair(builder)
+    a, b = builder.input("x", 1), builder.input("x", 2)
+    first = builder.add((builder.mul((a, cosine)), builder.mul((b, sine))))
+    second = builder.sub(builder.mul((a, sine)), builder.mul((b, cosine)))
+    c, d = Fraction(3, 10), Fraction(-7, 10)
+    forces = form(builder, (first, second), c, d), form(builder, (first, second), -d, c)
+    graph = builder.graph([Output("y", (4,), (x, y, *forces))])
+    before, after = cost(graph), cost(turn(graph))
+
+    assert (after.add, after.mul) == (before.add - 3, before.mul - 4)
+    assert values_differ(graph, turn(graph)) < 1e-50

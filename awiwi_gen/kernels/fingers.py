@@ -189,7 +189,7 @@ def inverse_dynamics(finger: Any, q: Any, qd: Any, qdd: Any, g: Any) -> Any:
     return lagrange.inverse_dynamics(finger, q, qd, qdd, g)
 
 
-by_definition, by_witness = derivatives_of(lagrange.inverse_dynamics, recursive.inverse_dynamics, "q", "qd")
+by_definition, by_witness = derivatives_of(lagrange.inverse_dynamics, recursive.inverse_dynamics_by_vector, "q", "qd")
 
 
 @per_finger(

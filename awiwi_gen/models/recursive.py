@@ -86,6 +86,11 @@ def inverse_dynamics(finger: Finger, q: SX, qd: SX, qdd: SX, g: SX) -> SX:
     return _torques(assemble(finger, q), qd, qdd, g)
 
 
+def inverse_dynamics_by_vector(finger: Finger, q: SX, qd: SX, qdd: SX, g: SX) -> SX:
+    """The same torques with each vector of a body turned by itself: longer, but with shorter derivatives."""
+    return _torques(assemble(finger, q), qd, qdd, g, once=False)
+
+
 def forward_dynamics(finger: Finger, q: SX, qd: SX, tau: SX, g: SX) -> SX:
     """Joint accelerations (n) [rad/s^2] that joint torques tau cause: M qdd = tau - bias (eq. 2.1)."""
     assembly, none = assemble(finger, q), SX.zeros(q.numel())
@@ -125,18 +130,18 @@ def _mass_and_coriolis(assembly: Assembly, qd: SX) -> tuple[SX, SX]:
     if plane is None:
         return mass_and_coriolis(assembly, qd)
     ways, bends = _ways(assembly, qd)
-    mass = plane.mass()
+    mass = plane.mass(alone=qd.is_zero())
     coriolis = plane.coriolis(ca.vertsplit(ways @ qd))
     return ca.triu2symm(ca.triu(ways.T @ mass @ ways)), ways.T @ (coriolis @ ways + mass @ bends)
 
 
-def _torques(assembly: Assembly, qd: SX, qdd: SX, g: SX) -> SX:
+def _torques(assembly: Assembly, qd: SX, qdd: SX, g: SX, once: bool = True) -> SX:
     plane = turning_plane(assembly)
     if plane is None:
         return torques(assembly, qd, qdd, g)
     ways, bends = _ways(assembly, qd)
     speeds, rates = ways @ qd, ways @ qdd + bends @ qd
-    return ways.T @ ca.vertcat(*plane.torques(ca.vertsplit(speeds), ca.vertsplit(rates), g))
+    return ways.T @ ca.vertcat(*plane.torques(ca.vertsplit(speeds), ca.vertsplit(rates), g, once=once))
 
 
 def _weight(assembly: Assembly, g: SX, n: int) -> SX:

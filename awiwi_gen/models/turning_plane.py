@@ -117,14 +117,14 @@ class TurningPlane:
 
     # -- quantities -----------------------------------------------------------------------------------------
 
-    def mass(self) -> SX:
-        """M of the joints [kg m^2]."""
+    def mass(self, alone: bool) -> SX:
+        """M of the joints [kg m^2]; unless it is computed alone, from the sums of first moments others need as well."""
         count, start = len(self.bodies), self.start
         mass = SX.zeros(count + start, count + start)
         for j in reversed(range(count)):
-            body, own = self.bodies[j], j + start
-            for k in range(j + 1, count):
-                product = _dot(self.arms[j], self.first[k])
+            body, own, product = self.bodies[j], j + start, SX(0)
+            for k in reversed(range(j + 1, count)):
+                product = _dot(self.arms[j], self.own[k]) + product if alone else _dot(self.arms[j], self.first[k])
                 mass[own, k + start] = mass[k + start, own] = mass[own + 1, k + start] + product
                 if k == j + 1:
                     mass[own, own] = mass[own, own + 1] + product
@@ -191,31 +191,40 @@ class TurningPlane:
         chain = [-_cross(first, down) for first in self.first[:-1]]
         return [self._turning_weight(down, along), *chain] if self.lead else chain
 
-    def torques(self, speeds: list[SX], rates: list[SX], g: SX, absolute: bool = False) -> list[SX]:
+    def torques(self, speeds: list[SX], rates: list[SX], g: SX, absolute: bool = False, once: bool = True) -> list[SX]:
         """Torques of the joints for their speeds [rad/s], rates of these [rad/s^2] and gravity g (3) [N m].
 
-        With `absolute`, those that belong to the absolute angles, of the bodies alone.
+        With `absolute`, those that belong to the absolute angles, of the bodies alone. A body's motion is turned `once`
+        for all its vectors, or each of these by itself, which is longer but has shorter derivatives.
         """
         spins, turnings = _running(speeds[self.start :]), _running(rates[self.start :])
         down, along = self._gravity(g)
         kappas = self.kappas() if self.lead else []
         acceleration, torques, forces, swing = (-down[0], -down[1]), [], [], SX(0)
+        # Without rates the last two bodies pull each other along one line, which is shorter than to pass it on.
+        pair = len(self.bodies) - 2 if all(rate.is_zero() for rate in turnings) else -1
         for j, body in enumerate(self.bodies):
             torque = _cross(self.own[j], acceleration) + body.inertia * turnings[j]
             if self.lead:
                 torque += speeds[0] ** 2 * kappas[j] + rates[0] * body.turned(body.along)[1]
             torques.append(torque)
             gradient = (-(spins[j] ** 2), turnings[j])  # takes a vector of the body to its second derivative
-            if j + 1 == len(self.bodies) or turnings[j].is_zero():
-                steps = [_product(gradient, body.turned(one)) for one in (body.arm, body.first, body.along)]
-            else:  # turned once for all vectors of the body
+            if once and not turnings[j].is_zero():
                 steps = [_product(one, _product(gradient, body.spin)) for one in (body.arm, body.first, body.along)]
-            acceleration = _sum(acceleration, steps[0])
+            else:
+                steps = [_product(gradient, body.turned(one)) for one in (body.arm, body.first, body.along)]
+            if j != pair:
+                acceleration = _sum(acceleration, steps[0])
             forces.append(steps[1])
             swing -= steps[2][0]
+        if pair >= 0:
+            area = _cross(self.arms[pair], self.own[-1])
+            torques[-1] += spins[-2] ** 2 * area
+            torques[-2] -= spins[-1] ** 2 * area
         result, force = [SX(0)], (SX(0), SX(0))
         for j in reversed(range(len(self.bodies))):
-            result.insert(0, torques[j] + (SX(0) if absolute else result[0]) + _cross(self.arms[j], force))
+            carried = _cross(self.arms[j], force) if j != pair else SX(0)
+            result.insert(0, torques[j] + (SX(0) if absolute else result[0]) + carried)
             force = _sum(forces[j], force)
         result.pop()
         if self.lead:

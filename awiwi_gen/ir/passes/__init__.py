@@ -9,9 +9,10 @@ from awiwi_gen.ir.graph import Graph
 from awiwi_gen.ir.passes.factor import factor
 from awiwi_gen.ir.passes.finish import orient, quotients
 from awiwi_gen.ir.passes.flatten import flatten
-from awiwi_gen.ir.passes.scale import scale
+from awiwi_gen.ir.passes.scale import scale, units
 from awiwi_gen.ir.passes.schedule import schedule
 from awiwi_gen.ir.passes.share import share_products, share_sums
+from awiwi_gen.ir.passes.shift import shift
 from awiwi_gen.ir.passes.signs import signs
 from awiwi_gen.ir.passes.turn import turn
 
@@ -23,7 +24,8 @@ BEGINNINGS: tuple[tuple[Pass, ...], ...] = (
     (flatten, share_products, turn, factor, share_products, share_sums, scale),
     (flatten, turn, factor, scale, share_products, share_sums),
 )
-AGAIN: tuple[Pass, ...] = (flatten, share_products, share_sums, factor, scale)  # as long as it helps
+AGAIN: tuple[Pass, ...] = (flatten, share_products, share_sums, factor, shift, scale)  # as long as it helps
+ONCE: tuple[Pass, ...] = (units, *AGAIN)  # if it helps
 END: tuple[Pass, ...] = (quotients, orient, signs, schedule)
 
 Stages = list[tuple[str, Graph]]
@@ -52,6 +54,9 @@ def optimise(graph: Graph) -> Stages:
         if weight >= rough:
             break
         rough, way = weight, further
+    further += stages(further[-1][1], ONCE)
+    if _rough(further[-1][1]).weight < rough:
+        way = further
     way = [*way, *stages(way[-1][1], END)]
     plain = _rough(graph)
     if plain.weight - plain.neg > cost(way[-1][1]).weight:  # the end takes away negations, and nothing else

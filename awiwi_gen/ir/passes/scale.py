@@ -3,6 +3,9 @@
 ``x = k*a``, ``y = x*b`` may as well compute ``a`` with ``k`` in what ``a`` is made of. Every value gets an unknown
 factor. What has no constant now must stay so, which is a linear equation for the factors' logarithms; each product with
 a constant would lose it by one more such equation. Those that the others leave open are added, the most frequent first.
+
+An input may be measured in another unit as well, at the price of a product for each of its elements: with gravity in
+arms per second squared, the levers of a chain in that arm need no constant.
 """
 
 from __future__ import annotations
@@ -14,6 +17,7 @@ from functools import cache
 from flint import arb, ctx, fmpq
 
 from awiwi_gen.ir.builder import Builder, copy_node, rebuild
+from awiwi_gen.ir.cost import cost
 from awiwi_gen.ir.graph import LEAVES, Graph, Node, Ref, node_of, operands
 
 BITS = 400
@@ -68,7 +72,22 @@ def _add(total: dict, other: dict, factor: Fraction) -> None:  # type: ignore[ty
 
 def scale(graph: Graph) -> Graph:
     """The same graph with fewer products with constants."""
-    group = _groups(graph)
+    return _scaled(graph, set())
+
+
+def units(graph: Graph) -> Graph:
+    """The same graph with the input that saves most by it measured in another unit."""
+    ports: defaultdict[str, set[int]] = defaultdict(set)
+    for index, node in enumerate(graph.nodes):
+        if node[0] == "input":
+            ports[node[1]].add(index)
+    tries = [graph, *(_scaled(graph, elements) for elements in ports.values())]
+    return min(tries, key=lambda one: cost(one).mul)
+
+
+def _scaled(graph: Graph, free: set[int]) -> Graph:
+    """The graph with factors of its own for every value that may have one; `free` inputs have one in common."""
+    group = _groups(graph, free)
     system, wishes = _System(), []
     for index, node in enumerate(graph.nodes):
         if node[0] not in ("mul", "inv"):
@@ -86,7 +105,7 @@ def scale(graph: Graph) -> Graph:
     return _rewritten(graph, group, factors)
 
 
-def _groups(graph: Graph) -> list[int]:
+def _groups(graph: Graph, free: set[int]) -> list[int]:
     """For each node one that must have the same factor; -1 for those that keep their value."""
     group = list(range(len(graph.nodes)))
 
@@ -102,7 +121,9 @@ def _groups(graph: Graph) -> list[int]:
 
     fixed = {node_of(ref) for ref in graph.roots}
     for index, node in enumerate(graph.nodes):
-        if node[0] not in ("add", "mul", "inv"):
+        if index in free:
+            join(index, min(free))
+        elif node[0] not in ("add", "mul", "inv"):
             fixed |= {index, *(node_of(r) for r in operands(node))}
         elif node[0] == "add":
             for ref in node[1:]:
@@ -179,9 +200,11 @@ def _rewritten(graph: Graph, group: list[int], factors: dict[int, Fraction]) -> 
     position = {node: index for index, node in enumerate(graph.nodes)}
 
     def rule(builder: Builder, node: Node, refs: tuple[Ref, ...]) -> Ref:
+        own, terms = scales[position[node]], []
+        if node[0] == "input" and own != 1:
+            return builder.mul((builder.const(1 / own), builder.input(node[1], node[2])))
         if node[0] in LEAVES or node[0] not in ("add", "mul"):
             return copy_node(builder, node, refs)
-        own, terms = scales[position[node]], []
         if node[0] == "add":
             for ref in refs:
                 constant = builder.value(ref)
@@ -196,6 +219,6 @@ def _rewritten(graph: Graph, group: list[int], factors: dict[int, Fraction]) -> 
         near = round(constant)
         if near and abs(constant - near) < Fraction(1, 1 << 300):
             constant = Fraction(near)
-        return builder.mul([builder.const(constant), *terms])
+        return builder.mul(terms if constant == 1 else [builder.const(constant), *terms])
 
     return rebuild(graph, rule)

@@ -1,50 +1,36 @@
 """Turn the axes in which an angle is measured: ``a*cos(x) + b*sin(x)`` is ``hypot(a, b)*cos(x + phase)``.
 
 A body's moments are pairs of such sums, (a, b) and (-b, a), so one added constant saves two products and two sums. All
-else that reads this sine and cosine must be of first or second degree in them with constant coefficients, for then it
-keeps its form in other axes; angles of which this is not so are left alone.
+else that reads this sine and cosine must be terms of sums, of first degree, or of second with constant coefficients, for
+then it keeps its form in other axes (`angles`); angles of which this is not so are left alone.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, field
+from collections.abc import Iterable
 from fractions import Fraction
+from math import hypot
 
 from flint import arb, ctx, fmpq
 
 from awiwi_gen.ir.builder import Builder, copy_node, rebuild, shorten
 from awiwi_gen.ir.cost import cost
-from awiwi_gen.ir.graph import Graph, Node, Ref, node_of, operands
+from awiwi_gen.ir.graph import Graph, Node, Ref
+from awiwi_gen.ir.passes.angles import Angle, Form, Pair, Part, Reader, Square
 
 BITS = 400
 EXACT = Fraction(1, 1 << 300)  # what is smaller than this part of its form is zero but for rounding
-Form = tuple[Fraction, Fraction]  # of cosine and sine
-Square = tuple[Fraction, Fraction, Fraction]  # of their squares and product: cos^2, cos*sin, sin^2
-
-
-@dataclass
-class _Angle:
-    """An angle's cosine and sine, and the sums that hold terms in them: of first and of second degree."""
-
-    cos: int
-    sin: int
-    linear: dict[int, Form] = field(default_factory=dict)
-    square: dict[int, Square] = field(default_factory=dict)
-    taken: dict[int, set[int]] = field(default_factory=dict)  # the places of these terms in each sum
+Leaves = tuple[tuple[Ref, ...], tuple[Ref, ...]]  # the factors of the two values of a pair
 
 
 def turn(graph: Graph) -> Graph:
     """The same graph with angles measured from where most terms vanish."""
-    parents: list[list[int]] = [[] for _ in graph.nodes]
-    for index, node in enumerate(graph.nodes):
-        for ref in operands(node):
-            parents[node_of(ref)].append(index)
-    roots = {node_of(ref) for ref in graph.roots}
+    reader = Reader(graph)
     found = {(node[0], node[1]): index for index, node in enumerate(graph.nodes) if node[0] in ("cos", "sin")}
     for (name, argument), cosine in found.items():
         if name == "cos" and ("sin", argument) in found:
-            angle = _read(graph, parents, roots, _Angle(cosine, found["sin", argument]))
+            angle = reader.read(cosine, found["sin", argument])
             phase = _best(angle) if angle else None
             turned = _turned(graph, angle, phase) if angle and phase else graph
             if _operations(turned) < _operations(graph):
@@ -57,78 +43,28 @@ def _operations(graph: Graph) -> int:
     return spent.add + spent.mul
 
 
-def _read(graph: Graph, parents: list[list[int]], roots: set[int], angle: _Angle) -> _Angle | None:
-    """All uses of an angle's cosine and sine as terms of sums; None if there are others."""
-    own = {angle.cos: (Fraction(1), Fraction(0)), angle.sin: (Fraction(0), Fraction(1))}
-    users = {p for leaf in own for p in parents[leaf]}
-    if roots & own.keys():
-        return None
-    products = {p for p in users if graph.nodes[p][0] == "mul"}
-    if any(graph.nodes[p][0] not in ("mul", "add") for p in users) or roots & products:
-        return None
-    if any(graph.nodes[p][0] != "add" for product in products for p in parents[product]):
-        return None
-    terms: dict[int, Form | Square] = dict(own)
-    pure: dict[int, Form] = {}
-    for p in sorted(products):
-        form = _linear(graph, p, own)
-        if form:
-            terms[p] = form
-    for index, node in enumerate(graph.nodes):
-        if node[0] == "add" and all(len(terms.get(node_of(r), ())) == 2 for r in node[1:]):
-            parts = [[(1 if r >= 0 else -1) * x for x in terms[node_of(r)]] for r in node[1:]]
-            pure[index] = (sum((p[0] for p in parts), Fraction(0)), sum((p[1] for p in parts), Fraction(0)))
-    for p in sorted(products - terms.keys()):
-        square = _square(graph, p, own | pure)
-        if square is None:
-            return None
-        terms[p] = square
-    inner = {index for index in pure if index not in roots and all(len(terms.get(p, ())) == 3 for p in parents[index])}
-    holders = {p for term in terms for p in parents[term] if graph.nodes[p][0] == "add"} - inner
-    for index in sorted(holders):
-        _collect(index, graph.nodes[index], terms, angle)
-    return angle
-
-
-def _collect(index: int, node: Node, terms: dict[int, Form | Square], angle: _Angle) -> None:
-    """The part of a sum that an angle's terms make up."""
-    linear, square, taken = [Fraction(0)] * 2, [Fraction(0)] * 3, set()
-    for place, ref in enumerate(node[1:]):
-        term = terms.get(node_of(ref))
-        if term is not None:
-            taken.add(place)
-            total = linear if len(term) == 2 else square
-            total[:] = [a + b if ref >= 0 else a - b for a, b in zip(total, term, strict=True)]
-    angle.taken[index] = taken
-    if any(linear):
-        angle.linear[index] = (linear[0], linear[1])
-    if any(square):
-        angle.square[index] = (square[0], square[1], square[2])
-
-
-def _linear(graph: Graph, product: int, own: dict[int, Form]) -> Form | None:
-    refs = graph.nodes[product][1:]
-    if len(refs) == 2 and graph.nodes[refs[0]][0] == "const" and refs[1] in own:
-        factor, (c, s) = graph.nodes[refs[0]][1], own[refs[1]]
-        return factor * c, factor * s
-    return None
-
-
-def _square(graph: Graph, product: int, forms: dict[int, Form]) -> Square | None:
-    refs = list(graph.nodes[product][1:])
-    factor = graph.nodes[refs.pop(0)][1] if graph.nodes[refs[0]][0] == "const" else Fraction(1)
-    if len(refs) != 2 or any(r not in forms for r in refs):
-        return None
-    (a, b), (c, d) = forms[refs[0]], forms[refs[1]]
-    return factor * a * c, factor * (a * d + b * c), factor * b * d
-
-
-def _best(angle: _Angle) -> Form | None:
+def _best(angle: Angle) -> Form | None:
     """Cosine and sine of the phase at which most terms vanish, if they are worth one addition."""
-    candidates = [unit for form in angle.linear.values() if all(form) for unit in [_direction(form)]]
-    here = _terms(angle, (Fraction(1), Fraction(0)))
-    best = min(candidates, key=lambda unit: _terms(angle, unit), default=None)
-    return best if best and _terms(angle, best) < here else None
+    forms = [(pair, float(a), float(b)) for (_, pair), (a, b) in angle.linear.items()]
+    squares = [(float(xx - yy), float(xy)) for xx, xy, yy in angle.square.values()]
+    best, least = None, _terms(forms, squares, 1.0, 0.0)
+    for form in angle.linear.values():
+        if all(form):
+            a, b = map(float, form)
+            terms = _terms(forms, squares, a / hypot(a, b), -b / hypot(a, b))
+            if terms < least:
+                best, least = form, terms
+    return _direction(best) if best else None
+
+
+def _terms(
+    forms: Iterable[tuple[int, float, float]], squares: Iterable[tuple[float, float]], c: float, s: float
+) -> int:
+    """Number of terms that are left at a phase with this cosine and sine, forms that are alike counted once."""
+    turned = [(pair, a * c - b * s, a * s + b * c) for pair, a, b in forms]
+    turned += [(0, a * (c * c - s * s) - 2 * b * c * s, 2 * a * c * s + b * (c * c - s * s)) for a, b in squares]
+    left = {(pair, *(f"{x:.9e}" if abs(x) > 1e-12 * hypot(a, b) else "" for x in (a, b))) for pair, a, b in turned}
+    return sum(bool(x) for _, *form in left for x in form)
 
 
 def _direction(form: Form) -> Form:
@@ -142,13 +78,6 @@ def _direction(form: Form) -> Form:
 def _fraction(x: arb) -> Fraction:
     mantissa, exponent = x.mid().man_exp()
     return Fraction(int(mantissa)) * Fraction(2) ** int(exponent)
-
-
-def _terms(angle: _Angle, phase: Form) -> int:
-    """Number of terms that are left at a phase."""
-    forms = {_key(form) for form in (_turn(form, phase) for form in angle.linear.values())}
-    slopes = {_key(_slope(_turn_square(square, phase))) for square in angle.square.values()}
-    return sum(bool(x) for form in forms | slopes for x in form)
 
 
 def _key(form: Form) -> tuple[int, int]:
@@ -189,36 +118,47 @@ def _other_slope(square: Square) -> Form:
     return _clean((xy, yy - xx))
 
 
-def _turned(graph: Graph, angle: _Angle, phase: Form) -> Graph:
+def _turned(graph: Graph, angle: Angle, phase: Form) -> Graph:
     squares = {index: _turn_square(square, phase) for index, square in angle.square.items()}
     slopes: Counter[tuple[int, int]] = Counter()
     for square in squares.values():
         slopes.update({_key(_slope(square)), _key(_other_slope(square))})
     shared: dict[tuple[int, int], Form] = {}
-    argument = graph.nodes[angle.cos][1]
     with ctx.workprec(BITS):
         c, s = (arb(fmpq(x.numerator, x.denominator)) for x in phase)
         shift = _fraction(arb.atan2(s, c))
 
-    def form(builder: Builder, leaves: tuple[Ref, Ref], one: Form) -> list[Ref]:
+    def form(builder: Builder, leaves: Leaves, one: Form) -> list[Ref]:
         one = shared.setdefault(_key(one), one)
-        return [builder.mul((builder.const(x), leaf)) for x, leaf in zip(one, leaves, strict=True) if x]
+        return [builder.mul((builder.const(x), *leaf)) for x, leaf in zip(one, leaves, strict=True) if x]
+
+    def part(builder: Builder, factors: Part) -> Ref:
+        product = builder.mul([renamed[ref] for ref in factors[1]])
+        return product if factors[0] > 0 else ~product
+
+    def leaves(builder: Builder, own: tuple[Ref, Ref], pair: Pair) -> Leaves:
+        if pair.b is None:
+            factors = [renamed[ref] for ref in pair.a[1]]
+            return (*factors, own[0]), (*factors, own[1])
+        a, b = part(builder, pair.a), part(builder, pair.b)
+        first = builder.add((builder.mul((a, own[0])), builder.mul((b, own[1]))))
+        return (first,), (builder.sub(builder.mul((a, own[1])), builder.mul((b, own[0]))),)
 
     def rule(builder: Builder, node: Node, refs: tuple[Ref, ...]) -> Ref:
         index = position[node]
         if index not in angle.taken:
             return copy_node(builder, node, refs)
-        old = renamed[argument]
-        turned = builder.add((old, builder.const(shift)))
-        leaves = (builder.call("cos", turned), builder.call("sin", turned))
+        turned = builder.add((renamed[angle.argument], builder.const(shift)))
+        own = (builder.call("cos", turned), builder.call("sin", turned))
         terms = [ref for place, ref in enumerate(refs) if place not in angle.taken[index]]
-        if index in angle.linear:
-            terms += form(builder, leaves, _turn(angle.linear[index], phase))
+        for number, pair in enumerate(angle.pairs):
+            if (index, number) in angle.linear:
+                terms += form(builder, leaves(builder, own, pair), _turn(angle.linear[index, number], phase))
         if index in squares:
             one, other = _slope(squares[index]), _other_slope(squares[index])
             by_sine = slopes[_key(other)] > slopes[_key(one)]
-            inner = builder.add(form(builder, leaves, other if by_sine else one))
-            terms += [builder.mul((leaves[by_sine], inner)), builder.const(squares[index][0 if by_sine else 2])]
+            inner = builder.add(form(builder, ((own[0],), (own[1],)), other if by_sine else one))
+            terms += [builder.mul((own[by_sine], inner)), builder.const(squares[index][0 if by_sine else 2])]
         return builder.add(terms)
 
     position = {node: index for index, node in enumerate(graph.nodes)}
