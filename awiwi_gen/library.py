@@ -16,7 +16,8 @@ import numpy as np
 from awiwi_gen.errors import BuildError, InputError
 
 Array = np.ndarray[Any, Any]
-Pointers = list[tuple[Any, int]]  # where samples begin, and the step from one to the next
+Samples = tuple[Array, int, int]  # an array to point at, the steps from sample to sample and element to element
+Place = tuple[Any, int, tuple[int, ...]]  # where samples begin, the step from one to the next, what a loop is told
 
 C_TYPES = {"d": "double", "f": "float", "i": "int"}  # by NumPy's characters
 VECTORISE_AFTER = 100_000  # samples of a kernel
@@ -42,13 +43,13 @@ def restore(name: str, fields: tuple[str, ...], values: tuple[Array, ...]) -> An
 class KernelFunction:
     """One compiled kernel. Call it with arrays in the order, or by the names, of its inputs.
 
-    An input of shape (4,) takes arrays (..., 4); leading dimensions broadcast against each other, and no input is
-    copied for that or for its layout where samples are evenly apart in memory. One output comes as an array, several
-    as a named tuple. Kernels that can fail add a field ``status``, an integer array over the leading dimensions with 0
-    for success. Raises InputError (a ValueError) for shapes that do not fit.
+    An input of shape (4,) takes arrays (..., 4); leading dimensions broadcast against each other. One output comes as
+    an array, several as a named tuple. Kernels that can fail add a field ``status``, an integer array over the leading
+    dimensions with 0 for success. Raises InputError (a ValueError) for shapes that do not fit.
 
-    Large batches run in vector units and on several cores (see `Library`); every sample has the same bits however many
-    come with it.
+    Results lie in memory as the inputs do: sample after sample, or element after element where all inputs are such as
+    ``x.T`` of an array (4, n). Large batches run in vector units and on several cores (see `Library`), copy no input
+    whose samples are evenly apart, and are fastest by elements. A sample has the same bits however many come with it.
 
     ``flat`` is the kernel as a C function of one array with all inputs and one with all outputs.
     """
@@ -63,7 +64,8 @@ class KernelFunction:
         self.__doc__ = f"{self.doc}\n\n{self.signature}\nSource: {self.source}."
         self.dtype = library.dtype
         self.flat = flat
-        self._entry, self._library, self._loop, self._vectorised = entry, library, loop, None
+        self._entry, self._library, self._loop = entry, library, loop
+        self._vectorised: Any = None  # not decided yet
         self._seen = 0
         self._params: tuple[Any, ...] = () if params is None else (params,)
         self._names = [port["name"] for port in self.inputs]
@@ -96,19 +98,35 @@ class KernelFunction:
         several = {lead for lead in leads if lead}
         lead = self._common(leads, arrays) if len(several) > 1 else several.pop() if several else ()
         samples = [_samples(a, own, lead, shape) for a, own, shape in zip(arrays, leads, self._shapes, strict=True)]
-        results = [np.empty(lead + shape, dtype) for shape, _, dtype in self._results]
-        pointers = [(self._library.pointer(array), step) for array, step in samples]
-        targets = [(self._library.pointer(r), size) for r, (_, size, _) in zip(results, self._results, strict=True)]
-        self._run(prod(lead), pointers, targets)
+        steps = {abs(element) > abs(step) for _, step, element in samples if step and element}
+        results = self._evaluated(lead, samples, by_element=steps == {True})
         return results[0] if len(results) == 1 else self._result(*results)
 
-    def _run(self, n: int, inputs: Pointers, outputs: Pointers) -> None:
+    def _evaluated(self, lead: tuple[int, ...], samples: list[Samples], by_element: bool) -> list[Array]:
+        """The results at all samples, in arrays that lie as asked for."""
+        n, pointer = prod(lead), self._library.pointer
+        loop = self._vectors(n)
+        laid = by_element and loop is not None
+        results = [_empty(lead, shape, dtype, laid) for shape, _, dtype in self._results]
+        places: list[Place] = []
+        if loop is None:
+            places += [(pointer(array), step, (step,)) for array, step in (_packed(*each) for each in samples)]
+            places += [(pointer(r), size, ()) for r, (_, size, _) in zip(results, self._results, strict=True)]
+        else:
+            steps = [(1, n) if laid else (size, 1) for _, size, _ in self._results]
+            places += [(pointer(array), step, (step, element)) for array, step, element in samples]
+            places += [(pointer(r), two[0], two) for r, two in zip(results, steps, strict=True)]
+            if self._entry["status"]:
+                places[-1] = (*places[-1][:2], ())
+        self._run(loop or self._loop, n, places)
+        return [_by_element(r, len(lead)) for r in results] if by_element else results
+
+    def _run(self, loop: Any, n: int, places: list[Place]) -> None:
         """Evaluate n samples, in equal parts on several cores where that pays for the threads."""
-        loop = self._fastest(n)
 
         def part(first: int, last: int) -> None:
-            moved = [x for pointer, step in inputs for x in (pointer + first * step, step)]
-            loop(last - first, *self._params, *moved, *(pointer + first * size for pointer, size in outputs))
+            moved = [x for pointer, step, told in places for x in (pointer + first * step, *told)]
+            loop(last - first, *self._params, *moved)
 
         parts = min(self._library.threads, n * self._work // WORTH_A_THREAD)
         if parts <= 1:
@@ -118,14 +136,14 @@ class KernelFunction:
         with ThreadPoolExecutor(parts) as pool:
             list(pool.map(part, bounds[:-1], bounds[1:]))
 
-    def _fastest(self, n: int) -> Any:
-        """The loop over samples: compiled for vectors once so many were asked for that compiling is worth its time."""
+    def _vectors(self, n: int) -> Any:
+        """The loop for vectors, compiled once so many samples were asked for that it is worth its time; else None."""
         if self._vectorised is None:
             self._seen += n
             if self._seen < self._library.vectorise_after:
-                return self._loop
-            self._vectorised = self._library.vectorised(self._entry) or self._loop
-        return self._vectorised
+                return None
+            self._vectorised = self._library.vectorised(self._entry) or False
+        return self._vectorised or None
 
     def _common(self, leads: list[tuple[int, ...]], arrays: list[Array]) -> tuple[int, ...]:
         """The leading dimensions of the result."""
@@ -157,20 +175,38 @@ class KernelFunction:
         return array
 
 
-def _samples(array: Array, own: tuple[int, ...], lead: tuple[int, ...], shape: tuple[int, ...]) -> tuple[Array, int]:
-    """An input as samples that are evenly apart: an array to point at, and the step from one to the next."""
+def _samples(array: Array, own: tuple[int, ...], lead: tuple[int, ...], shape: tuple[int, ...]) -> Samples:
+    """An input as samples and elements that are evenly apart; the step between elements is 0 where there is one."""
     size = prod(shape)
+    packed = size, int(size > 1)
     flags = array.flags
-    packed = flags.c_contiguous and flags.aligned
-    if packed and (own == lead or not own):
-        return array, size if own else 0
+    if flags.c_contiguous and flags.aligned and (own == lead or not own):
+        return array, size if own else 0, packed[1]
     if not prod(lead):
-        return np.empty(0, array.dtype), size
+        return np.empty(0, array.dtype), *packed
     rows = np.broadcast_to(array, lead + shape).reshape(-1, size)
-    step, misfit = divmod(rows.strides[0], array.itemsize)
-    if misfit or not rows.flags.aligned or (size > 1 and rows.strides[1] != array.itemsize):
-        return np.array(rows, order="C"), size
-    return rows, step
+    (step, misfit), (element, askew) = (divmod(stride, array.itemsize) for stride in rows.strides)
+    if misfit or askew or not rows.flags.aligned or (size > 1 and not element):
+        return np.array(rows, order="C"), *packed
+    return rows, step, element if size > 1 else 0
+
+
+def _packed(array: Array, step: int, element: int) -> tuple[Array, int]:
+    """The same with elements one after another, as a kernel takes them."""
+    return (array, step) if element in (0, 1) else (np.array(array, order="C"), array.shape[1])
+
+
+def _empty(lead: tuple[int, ...], shape: tuple[int, ...], dtype: Any, by_element: bool) -> Array:
+    """A result to be filled, sample after sample or element after element."""
+    if by_element:
+        return np.moveaxis(np.empty(shape + lead, dtype), range(len(shape)), range(-len(shape), 0))
+    return np.empty(lead + shape, dtype)
+
+
+def _by_element(result: Array, leading: int) -> Array:
+    """A result in memory element after element, copied if it is not there so."""
+    elements = range(leading, result.ndim), range(result.ndim - leading)
+    return np.moveaxis(np.ascontiguousarray(np.moveaxis(result, *elements)), *reversed(elements))
 
 
 class Library(Mapping[str, KernelFunction]):

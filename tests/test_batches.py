@@ -14,13 +14,12 @@ import pytest
 
 import awiwi_gen
 from awiwi_gen import library as library_module
-from awiwi_gen.build import BATCH_FLAGS, FUSED, UNFUSED, WARNINGS, compile_objects, compiler, load, native
+from awiwi_gen.build import BATCH_FLAGS, FUSED, GCC_FLAGS, UNFUSED, WARNINGS, compile_objects, compiler, load, native
 from awiwi_gen.cache import Cache
-from awiwi_gen.emit.batch import batch_source
+from awiwi_gen.emit.batch import BATCHES, has_batch, worthwhile
 from awiwi_gen.emit.options import Options
-from awiwi_gen.errors import BuildError, InputError
+from awiwi_gen.errors import BuildError
 from awiwi_gen.pipeline import Job, cached_tree
-from awiwi_gen.resources import CSRC
 
 ONE_FINGER = Path(__file__).with_name("one_finger.toml")
 ODD = 1003  # no multiple of any vector's length
@@ -63,10 +62,11 @@ def same_bits(a, b) -> bool:
 
 
 class Witness:
-    """Stands in for a kernel's loop over samples and remembers its calls."""
+    """Stands in for the loop over samples that a kernel uses, and remembers its calls."""
 
-    def __init__(self, function):
-        self.loop, self.calls = function._fastest(0), []
+    def __init__(self, function, monkeypatch):
+        self.loop, self.calls = function._vectors(0) or function._loop, []
+        monkeypatch.setattr(function, "_vectorised" if function._vectors(0) else "_loop", self)
 
     def __call__(self, n, *arguments):
         self.calls.append((n, threading.get_ident()))
@@ -122,14 +122,28 @@ def test_each_sample_has_a_status_of_its_own(hand):
 # ------------------------------------------------------------------------------------------------- vectors
 
 
-def test_the_loop_is_vectorised_by_the_compiler(tmp_path):
+@pytest.mark.parametrize("options", [VARIANTS["double"], VARIANTS["single"]], ids=["double", "single"])
+def test_whole_vectors_alone_are_computed_with(options, tmp_path):
     if native()[0] != ("-march=native",) or "__AVX__" not in native()[1] or "clang" in compiler().version:
         pytest.skip("reads the assembly of gcc for x86 with AVX")
-    for name in ("jaw_mass_matrix", "jaw_inverse_dynamics", "jaw_forward_dynamics"):
-        assembly = compiled(name, tree(), tmp_path, *BATCH_FLAGS, *native()[0], *UNFUSED[0], "-S").read_text()
-        loops = re.findall(r"\bv(?:add|sub|mul|div)(pd|sd)\b", assembly)
+    for name in worth_compiling(tree(options)):
+        flags = (*BATCH_FLAGS, *GCC_FLAGS, *native()[0], *UNFUSED[0], "-S")
+        loop = body("block", compiled(name, tree(options), tmp_path, *flags).read_text())
+        found = re.findall(r"\bv?(?:add|sub|mul|div|sqrt)([ps][sd])\b.*%([xyz]mm)", loop)
 
-        assert loops.count("pd") >= loops.count("sd") > 0, name  # what is over is done one by one, once each
+        assert len(found) > 10, name
+        assert {*found} <= {("pd" if options.scalar == "f64" else "ps", vector) for vector in ("ymm", "zmm")}, name
+
+
+def worth_compiling(directory: Path) -> list[str]:
+    entries = load(directory).manifest["kernels"]
+    chosen = [e["name"] for e in entries if worthwhile(e, (directory / f"{e['name']}.c").read_text())]
+    assert len(chosen) > 10
+    return chosen
+
+
+def body(function: str, assembly: str) -> str:
+    return re.search(rf"^{function}:\n(.*?)^\t\.size\t{function},", assembly, re.S | re.M)[1]
 
 
 @pytest.mark.parametrize(
@@ -158,27 +172,20 @@ def test_a_compiler_that_fuses_them_all_the_same_is_not_used(monkeypatch):
 @pytest.mark.parametrize("options", VARIANTS.values(), ids=VARIANTS)
 def test_the_c_of_a_batch_is_clean_and_links_with_everything_else(options, tmp_path):
     directory = tree(options)
-    kernels = [entry for entry in load(directory).manifest["kernels"] if entry["route"] != "solver"]
+    kernels = [entry for entry in load(directory).manifest["kernels"] if has_batch(entry)]
     flags = ("-std=c99", "-O1", "-fPIC", *WARNINGS, "-c")
     batches = [compiled(entry["name"], directory, tmp_path, *flags) for entry in kernels]
     others = compile_objects(directory, Cache())
     compiler().run("-shared", *map(str, batches + others), "-o", str(tmp_path / "all.so"), "-lm")
 
     assert len(batches) > 10
+    assert {path.name for path in (directory / BATCHES).glob("*.c")} == {f"{entry['name']}.c" for entry in kernels}
 
 
 def compiled(name: str, directory: Path, scratch: Path, *flags: str) -> Path:
-    source, made = scratch / f"{name}_batch.c", scratch / f"{name}_batch.o"
-    source.write_text(batch_source(directory, name))
-    compiler().run(*flags, f"-I{directory}", f"-I{CSRC}", str(source), "-o", str(made))
+    made = scratch / f"{name}_batch.o"
+    compiler().run(*flags, str(directory / BATCHES / f"{name}.c"), "-o", str(made))
     return made
-
-
-def test_a_kernel_that_was_not_generated_has_no_batch(tmp_path):
-    with pytest.raises(InputError, match="no kernel 'jaw_mass_matrx'; did you mean jaw_mass_matrix"):
-        batch_source(tree(), "jaw_mass_matrx")
-    with pytest.raises(InputError, match="no kernel 'jaw_mass_matrix'"):
-        batch_source(tmp_path, "jaw_mass_matrix")
 
 
 def test_few_samples_are_not_worth_compiling_for(jaw):
@@ -211,6 +218,8 @@ def test_what_vectors_do_not_help_keeps_its_plain_loop(jaw, name):
         lambda x: x[::-1],
         lambda x: x[3:4],
         lambda x: np.asfortranarray(x),
+        lambda x: np.asfortranarray(x)[::-1, ::-1],
+        lambda x: np.repeat(np.asfortranarray(x), 2, axis=0)[::2],
         lambda x: np.repeat(x, 3, axis=1)[:, ::3],
         lambda x: np.concatenate([x, x], axis=1)[:, : x.shape[1]],
         lambda x: x.reshape(8, -1, x.shape[1])[:, 1:],
@@ -227,21 +236,48 @@ def test_the_layout_of_an_input_does_not_matter(jaw, view):
 
 
 @pytest.mark.parametrize(
-    ("array", "lead", "step"),
+    ("array", "lead", "step", "element"),
     [
-        (np.zeros((6, 4)), (6,), 4),
-        (np.zeros((6, 9))[:, 2:6], (6,), 9),
-        (np.zeros((6, 4))[::-1], (6,), -4),
-        (np.zeros(4), (1000,), 0),
-        (np.zeros((1, 1, 4)), (30, 1000), 0),
-        (np.zeros((12, 4)).reshape(3, 4, 4), (3, 4), 4),
+        (np.zeros((6, 4)), (6,), 4, 1),
+        (np.zeros((6, 9))[:, 2:6], (6,), 9, 1),
+        (np.zeros((6, 4))[::-1], (6,), -4, 1),
+        (np.zeros(4), (1000,), 0, 1),
+        (np.zeros((1, 1, 4)), (30, 1000), 0, 1),
+        (np.zeros((12, 4)).reshape(3, 4, 4), (3, 4), 4, 1),
+        (np.zeros((4, 6)).T, (6,), 1, 6),
+        (np.zeros((9, 6))[::2][:4].T, (6,), 1, 12),
+        (np.zeros((6, 4))[:, ::-1], (6,), 4, -1),
+        (np.zeros((4, 3, 5)).transpose(1, 2, 0), (3, 5), 1, 15),
     ],
 )
-def test_inputs_whose_samples_are_evenly_apart_are_not_copied(array, lead, step):
-    rows, found = library_module._samples(array, array.shape[:-1], lead, (4,))
+def test_inputs_whose_samples_are_evenly_apart_are_not_copied(array, lead, step, element):
+    rows, *found = library_module._samples(array, array.shape[:-1], lead, (4,))
 
-    assert found == step
+    assert found == [step, element]
     assert np.shares_memory(rows, array)
+
+
+@pytest.mark.parametrize("vectorise_after", [0, np.inf], ids=["vectors", "plain"])
+def test_results_lie_in_memory_as_the_inputs_do(vectorise_after):
+    loaded = load(tree())
+    loaded.vectorise_after = vectorise_after
+    given = points(loaded.jaw_dynamics, 5, 12)
+    by_element = [np.moveaxis(np.moveaxis(x, -1, 0).copy(), 0, -1) for x in given]
+
+    for one, other in zip(loaded.jaw_dynamics(*given), loaded.jaw_dynamics(*by_element), strict=True):
+        assert same_bits(one, other)
+        assert one.flags.c_contiguous
+        assert np.moveaxis(other, (0, 1), (-2, -1)).flags.c_contiguous
+    assert loaded.jaw_dynamics(by_element[0], given[1], by_element[2]).M.flags.c_contiguous
+    assert not loaded.jaw_dynamics(*by_element[:2], given[2][0, 0]).M.flags.c_contiguous
+
+
+@pytest.mark.parametrize("n", [*range(35), 512, 1000])
+def test_arrays_by_element_have_the_bits_of_samples_one_after_another(jaw, n):
+    for name in ("jaw_inverse_dynamics", "jaw_tendon_stiffness"):
+        given = points(jaw[name], n)
+
+        assert same_bits(jaw[name](*(np.asfortranarray(x) for x in given)), jaw[name](*given))
 
 
 def test_inputs_with_different_leading_dimensions_meet_in_vectors(jaw):
@@ -272,8 +308,7 @@ def test_threads_share_a_large_batch_in_equal_parts(jaw, threads, monkeypatch):
     for name in ("jaw_forward_dynamics", "jaw_joint_estimate"):
         function = jaw[name]
         given = points(function, ODD)
-        witness = Witness(function)
-        monkeypatch.setattr(function, "_vectorised", witness)
+        witness = Witness(function, monkeypatch)
         together = function(*given)
         sizes = [n for n, _ in witness.calls]
 
@@ -288,8 +323,7 @@ def test_threads_share_a_large_batch_in_equal_parts(jaw, threads, monkeypatch):
 def test_small_batches_start_no_threads(jaw, monkeypatch):
     monkeypatch.setattr(jaw, "threads", 8)
     function = jaw.jaw_mass_matrix
-    witness = Witness(function)
-    monkeypatch.setattr(function, "_vectorised", witness)
+    witness = Witness(function, monkeypatch)
     function(np.zeros((1000, 2)))
 
     assert witness.calls == [(1000, threading.get_ident())]
