@@ -38,7 +38,7 @@ FLAGS = ("-std=c99", "-O2", "-fPIC", "-ffp-contract=off", *WARNINGS)
 GLUE_FLAGS = ("-O0", "-fPIC", "-w")  # what cffi writes is long and runs once a call; the loops are optimised
 OPTIMISED = '#pragma GCC push_options\n#pragma GCC optimize ("O1")\n{}\n#pragma GCC pop_options\n'
 BATCH_FLAGS = ("-std=c99", "-O3", "-fPIC", "-w", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math")
-GCC_FLAGS = ("-fschedule-insns", "-fsched-pressure")  # for long straight-line loops
+GCC_FLAGS = ("-fschedule-insns", "-fsched-pressure", "-fno-tree-loop-distribute-patterns")  # for long straight loops
 UNFUSED = (("-mno-fma",), ("-mno-fma", "-mno-avx512f"))  # x86 without the instructions, in AVX-512 they are built in
 FUSED = re.compile(r"\b(v?fn?m(add|sub|la|ls|acc|sac)|xvn?m(add|sub)|vfm[as])\w*")
 

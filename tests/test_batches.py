@@ -143,7 +143,7 @@ def worth_compiling(directory: Path) -> list[str]:
 
 
 def body(function: str, assembly: str) -> str:
-    return re.search(rf"^{function}:\n(.*?)^\t\.size\t{function},", assembly, re.S | re.M)[1]
+    return re.search(rf"^({function}(?:\.\w+)*):\n(.*?)^\t\.size\t\1,", assembly, re.S | re.M)[2]
 
 
 @pytest.mark.parametrize(

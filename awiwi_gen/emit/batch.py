@@ -19,7 +19,7 @@ BATCHES = "batches"  # the directory of these files inside the generated one
 USAGE = (
     "Kernels over many samples, for hosts with vector units. What is called is compiled with",
     "  cc -std=c99 -O3 -march=native -mno-fma -ffp-contract=off -fno-math-errno -fno-trapping-math \\",
-    f"     -fschedule-insns -fsched-pressure -c {BATCHES}/KERNEL.c",
+    f"     -fschedule-insns -fsched-pressure -fno-tree-loop-distribute-patterns -c {BATCHES}/KERNEL.c",
     "where -mno-fma is for x86 and the second line's flags for gcc, and linked instead of KERNEL.c or with it.",
     "",
     "Element e of sample i of an array x is at x[i*x_sample + e*x_element]. Steps of 1 and n are a structure of arrays,",
