@@ -106,20 +106,27 @@ class KernelFunction:
         """The results at all samples, in arrays that lie as asked for."""
         n, pointer = prod(lead), self._library.pointer
         loop = self._vectors(n)
-        laid = by_element and loop is not None
-        results = [_empty(lead, shape, dtype, laid) for shape, _, dtype in self._results]
-        places: list[Place] = []
-        if loop is None:
-            places += [(pointer(array), step, (step,)) for array, step in (_packed(*each) for each in samples)]
+        if loop is None:  # the kernel itself, which has elements one after another
+            packed = [
+                (array, step) if element in (0, 1) else (np.array(array, order="C"), array.shape[1])
+                for array, step, element in samples
+            ]
+            results = [np.empty(lead + shape, dtype) for shape, _, dtype in self._results]
+            places: list[Place] = [(pointer(array), step, (step,)) for array, step in packed]
             places += [(pointer(r), size, ()) for r, (_, size, _) in zip(results, self._results, strict=True)]
-        else:
-            steps = [(1, n) if laid else (size, 1) for _, size, _ in self._results]
-            places += [(pointer(array), step, (step, element)) for array, step, element in samples]
-            places += [(pointer(r), two[0], two) for r, two in zip(results, steps, strict=True)]
-            if self._entry["status"]:
-                places[-1] = (*places[-1][:2], ())
-        self._run(loop or self._loop, n, places)
-        return [_by_element(r, len(lead)) for r in results] if by_element else results
+            self._run(self._loop, n, places)
+            return (
+                [_rolled(_rolled(r, len(lead)).copy(), r.ndim - len(lead)) for r in results] if by_element else results
+            )
+        shapes = [shape + lead if by_element else lead + shape for shape, _, _ in self._results]
+        results = [np.empty(shape, dtype) for shape, (_, _, dtype) in zip(shapes, self._results, strict=True)]
+        steps = [(1, n) if by_element else (size, 1) for _, size, _ in self._results]
+        places = [(pointer(array), step, (step, element)) for array, step, element in samples]
+        places += [(pointer(r), both[0], both) for r, both in zip(results, steps, strict=True)]
+        if self._entry["status"]:
+            places[-1] = (*places[-1][:2], ())
+        self._run(loop, n, places)
+        return [_rolled(r, r.ndim - len(lead)) for r in results] if by_element else results
 
     def _run(self, loop: Any, n: int, places: list[Place]) -> None:
         """Evaluate n samples, in equal parts on several cores where that pays for the threads."""
@@ -184,29 +191,21 @@ def _samples(array: Array, own: tuple[int, ...], lead: tuple[int, ...], shape: t
         return array, size if own else 0, packed[1]
     if not prod(lead):
         return np.empty(0, array.dtype), *packed
-    rows = np.broadcast_to(array, lead + shape).reshape(-1, size)
+    rows = array if array.ndim == 2 and own == lead and len(lead) == 1 else _rows(array, lead + shape, size)
     (step, misfit), (element, askew) = (divmod(stride, array.itemsize) for stride in rows.strides)
-    if misfit or askew or not rows.flags.aligned or (size > 1 and not element):
+    if misfit or askew or not flags.aligned or (size > 1 and not element):
         return np.array(rows, order="C"), *packed
     return rows, step, element if size > 1 else 0
 
 
-def _packed(array: Array, step: int, element: int) -> tuple[Array, int]:
-    """The same with elements one after another, as a kernel takes them."""
-    return (array, step) if element in (0, 1) else (np.array(array, order="C"), array.shape[1])
+def _rows(array: Array, shape: tuple[int, ...], size: int) -> Array:
+    """An array broadcast to a shape, as a matrix with a row for each sample."""
+    return np.broadcast_to(array, shape).reshape(-1, size)
 
 
-def _empty(lead: tuple[int, ...], shape: tuple[int, ...], dtype: Any, by_element: bool) -> Array:
-    """A result to be filled, sample after sample or element after element."""
-    if by_element:
-        return np.moveaxis(np.empty(shape + lead, dtype), range(len(shape)), range(-len(shape), 0))
-    return np.empty(lead + shape, dtype)
-
-
-def _by_element(result: Array, leading: int) -> Array:
-    """A result in memory element after element, copied if it is not there so."""
-    elements = range(leading, result.ndim), range(result.ndim - leading)
-    return np.moveaxis(np.ascontiguousarray(np.moveaxis(result, *elements)), *reversed(elements))
+def _rolled(array: Array, count: int) -> Array:
+    """The first so many dimensions after the others."""
+    return array.transpose(*range(count, array.ndim), *range(count))
 
 
 class Library(Mapping[str, KernelFunction]):
@@ -243,7 +242,7 @@ class Library(Mapping[str, KernelFunction]):
         kind = C_TYPES[array.dtype.char]
         if array.flags.c_contiguous:
             return self.ffi.from_buffer(kind + "[]", array)
-        return self.ffi.cast(kind + " *", array.ctypes.data)
+        return self.ffi.cast(kind + " *", array.__array_interface__["data"][0])
 
     def vectorised(self, entry: Mapping[str, Any]) -> Any:
         """A kernel's loop for vector units, or None; where it cannot be compiled a warning tells why."""

@@ -77,7 +77,7 @@ def batch_file(entry: Entry, prefix: str, c_type: str) -> str:
         call=f"{'status[i_] = ' * status}{prefix}_{name}({', '.join([*given, *(f'{n}_one' for n, _ in sizes)])})",
         prototype=prototype(entry, prefix, c_type),
         rows=", ".join(f"{n}_rows[{size}*BLOCK]" for n, size in sizes),
-        at=", ".join([*given, *(f"AT({n}, {size})" for n, size in sizes), *["status_rows"] * status]),
+        at=", ".join([*given, *(f"AT({n})" for n, _ in sizes), *["status_rows"] * status]),
         c_type=c_type,
         inputs=sizes[: len(entry["inputs"])],
         outputs=sizes[len(entry["inputs"]) :],
