@@ -240,8 +240,8 @@ class Library(Mapping[str, KernelFunction]):
     def pointer(self, array: Array) -> Any:
         """Where an array's first element is; the array must outlive the pointer."""
         kind = C_TYPES[array.dtype.char]
-        if array.flags.c_contiguous:
-            return self.ffi.from_buffer(kind + "[]", array)
+        if array.flags.forc:
+            return self.ffi.from_buffer(kind + "[]", array if array.flags.c_contiguous else array.T)
         return self.ffi.cast(kind + " *", array.__array_interface__["data"][0])
 
     def vectorised(self, entry: Mapping[str, Any]) -> Any:
