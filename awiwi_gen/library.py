@@ -50,6 +50,7 @@ class KernelFunction:
     Results lie in memory as the inputs do: sample after sample, or element after element where all inputs are such as
     ``x.T`` of an array (4, n). Large batches run in vector units and on several cores (see `Library`), copy no input
     whose samples are evenly apart, and are fastest by elements. A sample has the same bits however many come with it.
+    ``out=M`` writes into what a call with such inputs returned before: fresh memory can cost more than a kernel.
 
     ``flat`` is the kernel as a C function of one array with all inputs and one with all outputs.
     """
@@ -90,8 +91,8 @@ class KernelFunction:
     def __repr__(self) -> str:
         return f"<kernel {self.name}: {self.signature}>"
 
-    def __call__(self, *args: Any, **named: Any) -> Any:
-        """Evaluate the kernel at one or many points."""
+    def __call__(self, *args: Any, out: Any = None, **named: Any) -> Any:
+        """Evaluate the kernel at one or many points, where told so into what a call like this one returned before."""
         given = args if len(args) == len(self._names) and not named else self._bound(args, named)
         arrays = [self._checked(place, value) for place, value in enumerate(given)]
         leads = [a.shape[: a.ndim - len(shape)] for a, shape in zip(arrays, self._shapes, strict=True)]
@@ -99,34 +100,46 @@ class KernelFunction:
         lead = self._common(leads, arrays) if len(several) > 1 else several.pop() if several else ()
         samples = [_samples(a, own, lead, shape) for a, own, shape in zip(arrays, leads, self._shapes, strict=True)]
         steps = {abs(element) > abs(step) for _, step, element in samples if step and element}
-        results = self._evaluated(lead, samples, by_element=steps == {True})
+        by_element = steps == {True}
+        results = self._targets(lead, by_element, out, arrays)
+        self._evaluate(lead, by_element, samples, results)
+        if by_element:
+            results = [_rolled(result, result.ndim - len(lead)) for result in results]
         return results[0] if len(results) == 1 else self._result(*results)
 
-    def _evaluated(self, lead: tuple[int, ...], samples: list[Samples], by_element: bool) -> list[Array]:
-        """The results at all samples, in arrays that lie as asked for."""
+    def _targets(self, lead: tuple[int, ...], by_element: bool, out: Any, arrays: list[Array]) -> list[Array]:
+        """Packed arrays for the results, new ones or those of an earlier call."""
+        shapes = [shape + lead if by_element else lead + shape for shape, _, _ in self._results]
+        if out is None:
+            return [np.empty(shape, dtype) for shape, (_, _, dtype) in zip(shapes, self._results, strict=True)]
+        given = [np.asanyarray(one) for one in ((out,) if len(shapes) == 1 else out)]
+        targets = [_rolled(one, len(lead)) if by_element else one for one in given]
+        kinds = [(one.shape, one.dtype, one.flags.carray) for one in targets]
+        if kinds != [(shape, dtype, True) for shape, (_, _, dtype) in zip(shapes, self._results, strict=True)]:
+            raise InputError(f"{self.name}: out is not what a call with such inputs returns")
+        if any(np.may_share_memory(one, array) for one in targets for array in arrays):
+            raise InputError(f"{self.name}: out overlaps an input")
+        return targets
+
+    def _evaluate(self, lead: tuple[int, ...], by_element: bool, samples: list[Samples], results: list[Array]) -> None:
+        """Fill the results, in vectors or one after another; the kernel itself has elements one after another."""
         n, pointer = prod(lead), self._library.pointer
         loop = self._vectors(n)
-        if loop is None:  # the kernel itself, which has elements one after another
-            packed = [
-                (array, step) if element in (0, 1) else (np.array(array, order="C"), array.shape[1])
-                for array, step, element in samples
-            ]
-            results = [np.empty(lead + shape, dtype) for shape, _, dtype in self._results]
-            places: list[Place] = [(pointer(array), step, (step,)) for array, step in packed]
-            places += [(pointer(r), size, ()) for r, (_, size, _) in zip(results, self._results, strict=True)]
-            self._run(self._loop, n, places)
-            return (
-                [_rolled(_rolled(r, len(lead)).copy(), r.ndim - len(lead)) for r in results] if by_element else results
-            )
-        shapes = [shape + lead if by_element else lead + shape for shape, _, _ in self._results]
-        results = [np.empty(shape, dtype) for shape, (_, _, dtype) in zip(shapes, self._results, strict=True)]
-        steps = [(1, n) if by_element else (size, 1) for _, size, _ in self._results]
-        places = [(pointer(array), step, (step, element)) for array, step, element in samples]
-        places += [(pointer(r), both[0], both) for r, both in zip(results, steps, strict=True)]
-        if self._entry["status"]:
-            places[-1] = (*places[-1][:2], ())
-        self._run(loop, n, places)
-        return [_rolled(r, r.ndim - len(lead)) for r in results] if by_element else results
+        if loop is not None:
+            steps = [(1, n) if by_element else (size, 1) for _, size, _ in self._results]
+            places: list[Place] = [(pointer(array), step, (step, element)) for array, step, element in samples]
+            places += [(pointer(r), two[0], two) for r, two in zip(results, steps, strict=True)]
+            if self._entry["status"]:
+                places[-1] = (*places[-1][:2], ())
+            self._run(loop, n, places)
+            return
+        packed = [np.empty(lead + shape, dtype) for shape, _, dtype in self._results] if by_element else results
+        places = [(pointer(array), step, (step,)) for array, step in (_packed(*each) for each in samples)]
+        places += [(pointer(r), size, ()) for r, (_, size, _) in zip(packed, self._results, strict=True)]
+        self._run(self._loop, n, places)
+        if by_element:
+            for result, each in zip(results, packed, strict=True):
+                result[...] = _rolled(each, len(lead))
 
     def _run(self, loop: Any, n: int, places: list[Place]) -> None:
         """Evaluate n samples, in equal parts on several cores where that pays for the threads."""
@@ -196,6 +209,11 @@ def _samples(array: Array, own: tuple[int, ...], lead: tuple[int, ...], shape: t
     if misfit or askew or not flags.aligned or (size > 1 and not element):
         return np.array(rows, order="C"), *packed
     return rows, step, element if size > 1 else 0
+
+
+def _packed(array: Array, step: int, element: int) -> tuple[Array, int]:
+    """The same with elements one after another."""
+    return (array, step) if element in (0, 1) else (np.array(array, order="C"), array.shape[1])
 
 
 def _rows(array: Array, shape: tuple[int, ...], size: int) -> Array:

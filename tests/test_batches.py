@@ -18,7 +18,7 @@ from awiwi_gen.build import BATCH_FLAGS, FUSED, GCC_FLAGS, UNFUSED, WARNINGS, co
 from awiwi_gen.cache import Cache
 from awiwi_gen.emit.batch import BATCHES, has_batch, worthwhile
 from awiwi_gen.emit.options import Options
-from awiwi_gen.errors import BuildError
+from awiwi_gen.errors import BuildError, InputError
 from awiwi_gen.pipeline import Job, cached_tree
 
 ONE_FINGER = Path(__file__).with_name("one_finger.toml")
@@ -270,6 +270,33 @@ def test_results_lie_in_memory_as_the_inputs_do(vectorise_after):
         assert np.moveaxis(other, (0, 1), (-2, -1)).flags.c_contiguous
     assert loaded.jaw_dynamics(by_element[0], given[1], by_element[2]).M.flags.c_contiguous
     assert not loaded.jaw_dynamics(*by_element[:2], given[2][0, 0]).M.flags.c_contiguous
+
+
+@pytest.mark.parametrize("vectorise_after", [0, np.inf], ids=["vectors", "plain"])
+@pytest.mark.parametrize("lay", [np.ascontiguousarray, np.asfortranarray])
+def test_results_can_be_written_where_earlier_ones_are(vectorise_after, lay):
+    loaded = load(tree())
+    loaded.vectorise_after = vectorise_after
+    for function in (loaded.jaw_mass_matrix, loaded.jaw_dynamics, loaded.jaw_tendon_stiffness):
+        first, second = ([lay(x) for x in points(function, 70)] for _ in range(2))
+        expected, place = function(*second), function(*first)
+        written = function(*second, out=place)
+
+        assert same_bits(written, expected)
+        assert same_bits(place, expected)
+        assert all(np.shares_memory(*two) for two in zip(fields(place), fields(written), strict=True))
+
+
+def test_results_are_written_to_nothing_else(jaw):
+    q = points(jaw.jaw_mass_matrix, 70)[0]
+    read_only = jaw.jaw_mass_matrix(q)
+    read_only.flags.writeable = False
+    for place in (np.zeros((69, 2, 2)), np.zeros((70, 2, 2), np.float32), np.zeros((70, 2, 4))[..., ::2], read_only):
+        with pytest.raises(InputError, match="jaw_mass_matrix: out is not what a call with such inputs returns"):
+            jaw.jaw_mass_matrix(q, out=place)
+    both = np.zeros(500)
+    with pytest.raises(InputError, match="jaw_mass_matrix: out overlaps an input"):
+        jaw.jaw_mass_matrix(both[:140].reshape(70, 2), out=both[100:380].reshape(70, 2, 2))
 
 
 @pytest.mark.parametrize("n", [*range(35), 512, 1000])
