@@ -11,54 +11,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from samples import ODD, RANDOM, VARIANTS, fields, points, same_bits, tree, vectorised
 
-import awiwi_gen
 from awiwi_gen import library as library_module
 from awiwi_gen.build import BATCH_FLAGS, FUSED, GCC_FLAGS, UNFUSED, WARNINGS, compile_objects, compiler, load, native
 from awiwi_gen.cache import Cache
 from awiwi_gen.emit.batch import BATCHES, has_batch, worthwhile
-from awiwi_gen.emit.options import Options
-from awiwi_gen.errors import BuildError, InputError
+from awiwi_gen.errors import BuildError
 from awiwi_gen.pipeline import Job, cached_tree
-
-ONE_FINGER = Path(__file__).with_name("one_finger.toml")
-ODD = 1003  # no multiple of any vector's length
-RANDOM = np.random.default_rng(7)
-VARIANTS = {
-    "double": Options(),
-    "single": Options(scalar="f32"),
-    "runtime": Options(params="runtime"),
-}
-
-
-def tree(options: Options = VARIANTS["double"], only: str = "jaw_*") -> Path:
-    return cached_tree(Job(awiwi_gen.Hand.load(ONE_FINGER), options, only))
-
-
-def vectorised(directory: Path):
-    """A library that compiles for vectors at the first call, and stays on one core."""
-    made = load(directory)
-    made.vectorise_after, made.threads = 0, 1
-    return made
 
 
 @pytest.fixture(scope="module")
 def jaw():
     return vectorised(tree())
-
-
-def points(function, *lead: int) -> list[np.ndarray]:
-    """Random inputs inside the ranges of a kernel."""
-    shapes = [(np.reshape(p["low"], p["shape"]), np.reshape(p["high"], p["shape"])) for p in function.inputs]
-    return [RANDOM.uniform(low, high, (*lead, *low.shape)).astype(function.dtype) for low, high in shapes]
-
-
-def fields(result) -> tuple[np.ndarray, ...]:
-    return result if isinstance(result, tuple) else (result,)
-
-
-def same_bits(a, b) -> bool:
-    return all(np.array_equal(x, y, equal_nan=True) for x, y in zip(fields(a), fields(b), strict=True))
 
 
 class Witness:
@@ -169,6 +134,50 @@ def test_a_compiler_that_fuses_them_all_the_same_is_not_used(monkeypatch):
         )
 
 
+PROGRAM = """
+#include <string.h>
+#include "kernels.h"
+#include "batches/batches.h"
+enum { N = 1003 };
+static double q[2][N], qd[2][N], qdd[2][N], rows[2][N], samples[N][2];
+int main(void)
+{
+    const double g[3] = {1.0, -9.0, 2.0};
+    for (int i = 0; i < N; i++)
+        for (int e = 0; e < 2; e++) {
+            q[e][i] = 0.001 * i + e;
+            qd[e][i] = 2.0 - q[e][i];
+            qdd[e][i] = 30.0 * q[e][i];
+        }
+    claw_jaw_inverse_dynamics_batch(N, q[0], 1, N, qd[0], 1, N, qdd[0], 1, N, g, 0, 1, rows[0], 1, N);
+    claw_jaw_inverse_dynamics_batch(N, q[0], 1, N, qd[0], 1, N, qdd[0], 1, N, g, 0, 1, samples[0], 2, 1);
+    for (int i = 0; i < N; i++) {
+        const double x[2] = {q[0][i], q[1][i]}, v[2] = {qd[0][i], qd[1][i]}, a[2] = {qdd[0][i], qdd[1][i]};
+        double tau[2], row[2] = {rows[0][i], rows[1][i]};
+        claw_jaw_inverse_dynamics(x, v, a, g, tau);
+        if (memcmp(tau, row, sizeof tau) || memcmp(tau, samples[i], sizeof tau))
+            return 1;
+    }
+    return 0;
+}
+"""
+
+
+def test_c_programs_run_batches_as_their_header_tells(tmp_path):
+    if "__x86_64__" not in native()[1] or "clang" in compiler().version:
+        pytest.skip("the command is for gcc on x86")
+    told = (tree() / BATCHES / "batches.h").read_text()
+    command = re.search(r"cc (-std.*?)\\\n \*(.*?) -c batches/KERNEL.c", told)
+    flags = f"{command[1]} {command[2]}".split()
+    assert {*BATCH_FLAGS, *GCC_FLAGS, *UNFUSED[0], *native()[0]} - {"-fPIC", "-w"} == {*flags}
+
+    (tmp_path / "main.c").write_text(PROGRAM)
+    batch, program = compiled("jaw_inverse_dynamics", tree(), tmp_path, *flags, "-c"), str(tmp_path / "main")
+    others = map(str, compile_objects(tree(), Cache()))
+    compiler().run("-std=c99", f"-I{tree()}", str(tmp_path / "main.c"), str(batch), *others, "-o", program, "-lm")
+    subprocess.run([program], check=True)
+
+
 @pytest.mark.parametrize("options", VARIANTS.values(), ids=VARIANTS)
 def test_the_c_of_a_batch_is_clean_and_links_with_everything_else(options, tmp_path):
     directory = tree(options)
@@ -205,124 +214,6 @@ def test_few_samples_are_not_worth_compiling_for(jaw):
 @pytest.mark.parametrize("name", ["jaw_joint_estimate", "jaw_coupling"])
 def test_what_vectors_do_not_help_keeps_its_plain_loop(jaw, name):
     assert jaw.vectorised(jaw[name]._entry) is None
-
-
-# ------------------------------------------------------------------------------------------------- memory
-
-
-@pytest.mark.parametrize(
-    "view",
-    [
-        lambda x: x,
-        lambda x: x[::2],
-        lambda x: x[::-1],
-        lambda x: x[3:4],
-        lambda x: np.asfortranarray(x),
-        lambda x: np.asfortranarray(x)[::-1, ::-1],
-        lambda x: np.repeat(np.asfortranarray(x), 2, axis=0)[::2],
-        lambda x: np.repeat(x, 3, axis=1)[:, ::3],
-        lambda x: np.concatenate([x, x], axis=1)[:, : x.shape[1]],
-        lambda x: x.reshape(8, -1, x.shape[1])[:, 1:],
-        lambda x: x.reshape(8, -1, x.shape[1]).transpose(1, 0, 2),
-        lambda x: np.broadcast_to(x[0], x.shape),
-        lambda x: np.frombuffer(b"\0" + x.tobytes(), x.dtype, offset=1).reshape(x.shape),
-    ],
-)
-def test_the_layout_of_an_input_does_not_matter(jaw, view):
-    given = [view(array) for array in points(jaw.jaw_inverse_dynamics, 64)]
-    packed = [np.array(array, order="C") for array in given]
-
-    assert same_bits(jaw.jaw_inverse_dynamics(*given), jaw.jaw_inverse_dynamics(*packed))
-
-
-@pytest.mark.parametrize(
-    ("array", "lead", "step", "element"),
-    [
-        (np.zeros((6, 4)), (6,), 4, 1),
-        (np.zeros((6, 9))[:, 2:6], (6,), 9, 1),
-        (np.zeros((6, 4))[::-1], (6,), -4, 1),
-        (np.zeros(4), (1000,), 0, 1),
-        (np.zeros((1, 1, 4)), (30, 1000), 0, 1),
-        (np.zeros((12, 4)).reshape(3, 4, 4), (3, 4), 4, 1),
-        (np.zeros((4, 6)).T, (6,), 1, 6),
-        (np.zeros((9, 6))[::2][:4].T, (6,), 1, 12),
-        (np.zeros((6, 4))[:, ::-1], (6,), 4, -1),
-        (np.zeros((4, 3, 5)).transpose(1, 2, 0), (3, 5), 1, 15),
-    ],
-)
-def test_inputs_whose_samples_are_evenly_apart_are_not_copied(array, lead, step, element):
-    rows, *found = library_module._samples(array, array.shape[:-1], lead, (4,))
-
-    assert found == [step, element]
-    assert np.shares_memory(rows, array)
-
-
-@pytest.mark.parametrize("vectorise_after", [0, np.inf], ids=["vectors", "plain"])
-def test_results_lie_in_memory_as_the_inputs_do(vectorise_after):
-    loaded = load(tree())
-    loaded.vectorise_after = vectorise_after
-    given = points(loaded.jaw_dynamics, 5, 12)
-    by_element = [np.moveaxis(np.moveaxis(x, -1, 0).copy(), 0, -1) for x in given]
-
-    for one, other in zip(loaded.jaw_dynamics(*given), loaded.jaw_dynamics(*by_element), strict=True):
-        assert same_bits(one, other)
-        assert one.flags.c_contiguous
-        assert np.moveaxis(other, (0, 1), (-2, -1)).flags.c_contiguous
-    assert loaded.jaw_dynamics(by_element[0], given[1], by_element[2]).M.flags.c_contiguous
-    assert not loaded.jaw_dynamics(*by_element[:2], given[2][0, 0]).M.flags.c_contiguous
-
-
-@pytest.mark.parametrize("vectorise_after", [0, np.inf], ids=["vectors", "plain"])
-@pytest.mark.parametrize("lay", [np.ascontiguousarray, np.asfortranarray])
-def test_results_can_be_written_where_earlier_ones_are(vectorise_after, lay):
-    loaded = load(tree())
-    loaded.vectorise_after = vectorise_after
-    for function in (loaded.jaw_mass_matrix, loaded.jaw_dynamics, loaded.jaw_tendon_stiffness):
-        first, second = ([lay(x) for x in points(function, 70)] for _ in range(2))
-        expected, place = function(*second), function(*first)
-        written = function(*second, out=place)
-
-        assert same_bits(written, expected)
-        assert same_bits(place, expected)
-        assert all(np.shares_memory(*two) for two in zip(fields(place), fields(written), strict=True))
-
-
-def test_results_are_written_to_nothing_else(jaw):
-    q = points(jaw.jaw_mass_matrix, 70)[0]
-    read_only = jaw.jaw_mass_matrix(q)
-    read_only.flags.writeable = False
-    for place in (np.zeros((69, 2, 2)), np.zeros((70, 2, 2), np.float32), np.zeros((70, 2, 4))[..., ::2], read_only):
-        with pytest.raises(InputError, match="jaw_mass_matrix: out is not what a call with such inputs returns"):
-            jaw.jaw_mass_matrix(q, out=place)
-    both = np.zeros(500)
-    with pytest.raises(InputError, match="jaw_mass_matrix: out overlaps an input"):
-        jaw.jaw_mass_matrix(both[:140].reshape(70, 2), out=both[100:380].reshape(70, 2, 2))
-
-
-@pytest.mark.parametrize("n", [*range(35), 512, 1000])
-def test_arrays_by_element_have_the_bits_of_samples_one_after_another(jaw, n):
-    for name in ("jaw_inverse_dynamics", "jaw_tendon_stiffness"):
-        given = points(jaw[name], n)
-
-        assert same_bits(jaw[name](*(np.asfortranarray(x) for x in given)), jaw[name](*given))
-
-
-def test_inputs_with_different_leading_dimensions_meet_in_vectors(jaw):
-    q, qd, qdd, g = points(jaw.jaw_inverse_dynamics, 60)
-    q, qd, g = q[:20, None], qd[:3], g[0]
-    tau = jaw.jaw_inverse_dynamics(q, qd, qdd.reshape(20, 3, 2), g)
-
-    assert tau.shape == (20, 3, 2)
-    for index in np.ndindex(20, 3):
-        one = jaw.jaw_inverse_dynamics(q[index[0], 0], qd[index[1]], qdd.reshape(20, 3, 2)[index], g)
-        assert same_bits(tau[index], one)
-
-
-@pytest.mark.parametrize("lead", [(0,), (3, 0), (0, 5)])
-def test_empty_batches_give_empty_results(jaw, lead):
-    for function in jaw.values():
-        for result in fields(function(*points(function, *lead))):
-            assert result.shape[: len(lead)] == lead
 
 
 # ------------------------------------------------------------------------------------------------- threads
