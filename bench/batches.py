@@ -56,7 +56,7 @@ class Loops:
         batch = (tree / BATCHES / file).read_text(encoding="utf-8").replace("../", "")
         vectors = ("-fno-semantic-interposition", *BATCH_FLAGS, *native()[0], *GCC_FLAGS, *UNFUSED[0])
         ported = self._sines() + self._peer(self.function, finger).replace("casadi_", "ported_")
-        ported = batch.replace(f'#include "{file}"', ported).replace("_batch(", "_ported(")
+        ported = batch.replace(f'#include "{file}"', ported).replace("_batch(", "_ported(").replace("INLINED", "static")
         casadi = self._peer("peer", finger) + self._loop("casadi", self._each("peer"))
         plain = f'#include "kernels.h"\n{self._loop("plain", self._each(self.function))}'
         objects = [
