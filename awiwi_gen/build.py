@@ -38,7 +38,7 @@ FLAGS = ("-std=c99", "-O2", "-fPIC", "-ffp-contract=off", *WARNINGS)
 GLUE_FLAGS = ("-O0", "-fPIC", "-w")  # what cffi writes is long and runs once a call; the loops are optimised
 OPTIMISED = '#pragma GCC push_options\n#pragma GCC optimize ("O1")\n{}\n#pragma GCC pop_options\n'
 BATCH_FLAGS = ("-std=c99", "-O3", "-fPIC", "-w", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math")
-GCC_FLAGS = ("-fschedule-insns", "-fsched-pressure", "--param", "vect-epilogues-nomask=0")  # long straight-line loops
+GCC_FLAGS = ("-fschedule-insns", "-fsched-pressure", "-fno-tree-loop-distribute-patterns")  # for long straight loops
 UNFUSED = (("-mno-fma",), ("-mno-fma", "-mno-avx512f"))  # x86 without the instructions, in AVX-512 they are built in
 FUSED = re.compile(r"\b(v?fn?m(add|sub|la|ls|acc|sac)|xvn?m(add|sub)|vfm[as])\w*")
 
@@ -173,7 +173,7 @@ def batch_function(
 
     Raises BuildError when that fails, and when the directory is no longer what the library was ``loaded`` from.
     """
-    from awiwi_gen.emit.batch import batch_file, worthwhile
+    from awiwi_gen.emit.batch import BATCHES, prototype, worthwhile
 
     source = directory / f"{entry['name']}.c"
     text = source.read_text(encoding="utf-8")
@@ -182,34 +182,29 @@ def batch_function(
     shared = headers(directory)
     if object_name(source, shared) not in loaded:
         raise BuildError(f"{directory} has changed since it was loaded; load it again")
-    prefix, scalar = manifest["prefix"], manifest["c_type"]
-    written = batch_file(entry, prefix, scalar, text)
-    includes = (f"-I{directory}", f"-I{CSRC}")
-    digest = key(written, text, shared, BATCH_FLAGS, GCC_FLAGS, UNFUSED, native(), compiler().version) + ".so"
+    looped = directory / BATCHES / source.name
+    texts = (text, shared, looped.read_text(encoding="utf-8"), headers(directory / BATCHES))
+    digest = key(texts, BATCH_FLAGS, GCC_FLAGS, UNFUSED, native(), compiler().version) + ".so"
     target = store.directory / "batches" / digest
     if not target.exists():
         with tempfile.TemporaryDirectory() as scratch:
-            made = _compile_batch(written, Path(scratch), includes)
-            target = store.put_bytes("batches", digest, made.read_bytes())
-    function = getattr(ctypes.CDLL(str(target)), f"{prefix}_{entry['name']}_batch")
-    pointer = f"{scalar} *"
-    types = ["ptrdiff_t", *[f"const {prefix}_params *"] * entry["params"]]
-    types += [f"const {pointer}", "ptrdiff_t"] * len(entry["inputs"]) + [pointer] * len(entry["outputs"])
-    types += ["int *"] * entry["status"]
-    return ffi.cast(f"void (*)({', '.join(types)})", ctypes.cast(function, ctypes.c_void_p).value)
+            target = store.put_bytes("batches", digest, _compile_batch(looped, Path(scratch)).read_bytes())
+    head = prototype(entry, manifest["prefix"], manifest["c_type"])
+    result, name = head.split("(")[0].split()
+    function = getattr(ctypes.CDLL(str(target)), name)
+    return ffi.cast(head.replace(f"{result} {name}", f"{result} (*)", 1), ctypes.cast(function, ctypes.c_void_p).value)
 
 
-def _compile_batch(written: str, scratch: Path, includes: tuple[str, ...]) -> Path:
+def _compile_batch(source: Path, scratch: Path) -> Path:
     """A loop over samples as a library for this machine, of which no instruction multiplies and adds at once.
 
     gcc 12 makes such where it finds a sum beside a difference, whatever it is told; then it may not know them.
     """
-    source, assembly, made = scratch / "batch.c", scratch / "batch.s", scratch / "batch.so"
-    source.write_text(written, encoding="utf-8")
+    assembly, made = scratch / "batch.s", scratch / "batch.so"
     flags, machine = native()
     flags += () if "clang" in compiler().version else GCC_FLAGS
     for without in UNFUSED if "__x86_64__" in machine else ((),):
-        compiler().run(*BATCH_FLAGS, *flags, *without, *includes, "-S", str(source), "-o", str(assembly))
+        compiler().run(*BATCH_FLAGS, *flags, *without, "-S", str(source), "-o", str(assembly))
         if not FUSED.search(assembly.read_text(encoding="utf-8")):
             compiler().run("-shared", str(assembly), "-o", str(made), "-lm")
             return made

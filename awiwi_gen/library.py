@@ -16,7 +16,8 @@ import numpy as np
 from awiwi_gen.errors import BuildError, InputError
 
 Array = np.ndarray[Any, Any]
-Pointers = list[tuple[Any, int]]  # where samples begin, and the step from one to the next
+Samples = tuple[Array, int, int]  # an array to point at, the steps from sample to sample and element to element
+Place = tuple[Any, int, tuple[int, ...]]  # where samples begin, the step from one to the next, what a loop is told
 
 C_TYPES = {"d": "double", "f": "float", "i": "int"}  # by NumPy's characters
 VECTORISE_AFTER = 100_000  # samples of a kernel
@@ -42,13 +43,14 @@ def restore(name: str, fields: tuple[str, ...], values: tuple[Array, ...]) -> An
 class KernelFunction:
     """One compiled kernel. Call it with arrays in the order, or by the names, of its inputs.
 
-    An input of shape (4,) takes arrays (..., 4); leading dimensions broadcast against each other, and no input is
-    copied for that or for its layout where samples are evenly apart in memory. One output comes as an array, several
-    as a named tuple. Kernels that can fail add a field ``status``, an integer array over the leading dimensions with 0
-    for success. Raises InputError (a ValueError) for shapes that do not fit.
+    An input of shape (4,) takes arrays (..., 4); leading dimensions broadcast against each other. One output comes as
+    an array, several as a named tuple. Kernels that can fail add a field ``status``, an integer array over the leading
+    dimensions with 0 for success. Raises InputError (a ValueError) for shapes that do not fit.
 
-    Large batches run in vector units and on several cores (see `Library`); every sample has the same bits however many
-    come with it.
+    Results lie in memory as the inputs do: sample after sample, or element after element where all inputs are such as
+    ``x.T`` of an array (4, n). Large batches run in vector units and on several cores (see `Library`), copy no input
+    whose samples are evenly apart, and are fastest by elements. A sample has the same bits however many come with it.
+    ``out=M`` writes into what a call with such inputs returned before: fresh memory can cost more than a kernel.
 
     ``flat`` is the kernel as a C function of one array with all inputs and one with all outputs.
     """
@@ -63,7 +65,8 @@ class KernelFunction:
         self.__doc__ = f"{self.doc}\n\n{self.signature}\nSource: {self.source}."
         self.dtype = library.dtype
         self.flat = flat
-        self._entry, self._library, self._loop, self._vectorised = entry, library, loop, None
+        self._entry, self._library, self._loop = entry, library, loop
+        self._vectorised: Any = None  # not decided yet
         self._seen = 0
         self._params: tuple[Any, ...] = () if params is None else (params,)
         self._names = [port["name"] for port in self.inputs]
@@ -88,27 +91,62 @@ class KernelFunction:
     def __repr__(self) -> str:
         return f"<kernel {self.name}: {self.signature}>"
 
-    def __call__(self, *args: Any, **named: Any) -> Any:
-        """Evaluate the kernel at one or many points."""
+    def __call__(self, *args: Any, out: Any = None, **named: Any) -> Any:
+        """Evaluate the kernel at one or many points, where told so into what a call like this one returned before."""
         given = args if len(args) == len(self._names) and not named else self._bound(args, named)
         arrays = [self._checked(place, value) for place, value in enumerate(given)]
         leads = [a.shape[: a.ndim - len(shape)] for a, shape in zip(arrays, self._shapes, strict=True)]
         several = {lead for lead in leads if lead}
         lead = self._common(leads, arrays) if len(several) > 1 else several.pop() if several else ()
         samples = [_samples(a, own, lead, shape) for a, own, shape in zip(arrays, leads, self._shapes, strict=True)]
-        results = [np.empty(lead + shape, dtype) for shape, _, dtype in self._results]
-        pointers = [(self._library.pointer(array), step) for array, step in samples]
-        targets = [(self._library.pointer(r), size) for r, (_, size, _) in zip(results, self._results, strict=True)]
-        self._run(prod(lead), pointers, targets)
+        steps = {abs(element) > abs(step) for _, step, element in samples if step and element}
+        by_element = steps == {True}
+        results = self._targets(lead, by_element, out, arrays)
+        self._evaluate(lead, by_element, samples, results)
+        if by_element:
+            results = [_rolled(result, result.ndim - len(lead)) for result in results]
         return results[0] if len(results) == 1 else self._result(*results)
 
-    def _run(self, n: int, inputs: Pointers, outputs: Pointers) -> None:
+    def _targets(self, lead: tuple[int, ...], by_element: bool, out: Any, arrays: list[Array]) -> list[Array]:
+        """Packed arrays for the results, new ones or those of an earlier call."""
+        shapes = [shape + lead if by_element else lead + shape for shape, _, _ in self._results]
+        if out is None:
+            return [np.empty(shape, dtype) for shape, (_, _, dtype) in zip(shapes, self._results, strict=True)]
+        given = [np.asanyarray(one) for one in ((out,) if len(shapes) == 1 else out)]
+        targets = [_rolled(one, len(lead)) if by_element else one for one in given]
+        kinds = [(one.shape, one.dtype, one.flags.carray) for one in targets]
+        if kinds != [(shape, dtype, True) for shape, (_, _, dtype) in zip(shapes, self._results, strict=True)]:
+            raise InputError(f"{self.name}: out is not what a call with such inputs returns")
+        if any(np.may_share_memory(one, array) for one in targets for array in arrays):
+            raise InputError(f"{self.name}: out overlaps an input")
+        return targets
+
+    def _evaluate(self, lead: tuple[int, ...], by_element: bool, samples: list[Samples], results: list[Array]) -> None:
+        """Fill the results, in vectors or one after another; the kernel itself has elements one after another."""
+        n, pointer = prod(lead), self._library.pointer
+        loop = self._vectors(n)
+        if loop is not None:
+            steps = [(1, n) if by_element else (size, 1) for _, size, _ in self._results]
+            places: list[Place] = [(pointer(array), step, (step, element)) for array, step, element in samples]
+            places += [(pointer(r), two[0], two) for r, two in zip(results, steps, strict=True)]
+            if self._entry["status"]:
+                places[-1] = (*places[-1][:2], ())
+            self._run(loop, n, places)
+            return
+        packed = [np.empty(lead + shape, dtype) for shape, _, dtype in self._results] if by_element else results
+        places = [(pointer(array), step, (step,)) for array, step in (_packed(*each) for each in samples)]
+        places += [(pointer(r), size, ()) for r, (_, size, _) in zip(packed, self._results, strict=True)]
+        self._run(self._loop, n, places)
+        if by_element:
+            for result, each in zip(results, packed, strict=True):
+                result[...] = _rolled(each, len(lead))
+
+    def _run(self, loop: Any, n: int, places: list[Place]) -> None:
         """Evaluate n samples, in equal parts on several cores where that pays for the threads."""
-        loop = self._fastest(n)
 
         def part(first: int, last: int) -> None:
-            moved = [x for pointer, step in inputs for x in (pointer + first * step, step)]
-            loop(last - first, *self._params, *moved, *(pointer + first * size for pointer, size in outputs))
+            moved = [x for pointer, step, told in places for x in (pointer + first * step, *told)]
+            loop(last - first, *self._params, *moved)
 
         parts = min(self._library.threads, n * self._work // WORTH_A_THREAD)
         if parts <= 1:
@@ -118,14 +156,14 @@ class KernelFunction:
         with ThreadPoolExecutor(parts) as pool:
             list(pool.map(part, bounds[:-1], bounds[1:]))
 
-    def _fastest(self, n: int) -> Any:
-        """The loop over samples: compiled for vectors once so many were asked for that compiling is worth its time."""
+    def _vectors(self, n: int) -> Any:
+        """The loop for vectors, compiled once so many samples were asked for that it is worth its time; else None."""
         if self._vectorised is None:
             self._seen += n
             if self._seen < self._library.vectorise_after:
-                return self._loop
-            self._vectorised = self._library.vectorised(self._entry) or self._loop
-        return self._vectorised
+                return None
+            self._vectorised = self._library.vectorised(self._entry) or False
+        return self._vectorised or None
 
     def _common(self, leads: list[tuple[int, ...]], arrays: list[Array]) -> tuple[int, ...]:
         """The leading dimensions of the result."""
@@ -157,20 +195,35 @@ class KernelFunction:
         return array
 
 
-def _samples(array: Array, own: tuple[int, ...], lead: tuple[int, ...], shape: tuple[int, ...]) -> tuple[Array, int]:
-    """An input as samples that are evenly apart: an array to point at, and the step from one to the next."""
+def _samples(array: Array, own: tuple[int, ...], lead: tuple[int, ...], shape: tuple[int, ...]) -> Samples:
+    """An input as samples and elements that are evenly apart; the step between elements is 0 where there is one."""
     size = prod(shape)
+    packed = size, int(size > 1)
     flags = array.flags
-    packed = flags.c_contiguous and flags.aligned
-    if packed and (own == lead or not own):
-        return array, size if own else 0
+    if flags.c_contiguous and flags.aligned and (own == lead or not own):
+        return array, size if own else 0, packed[1]
     if not prod(lead):
-        return np.empty(0, array.dtype), size
-    rows = np.broadcast_to(array, lead + shape).reshape(-1, size)
-    step, misfit = divmod(rows.strides[0], array.itemsize)
-    if misfit or not rows.flags.aligned or (size > 1 and rows.strides[1] != array.itemsize):
-        return np.array(rows, order="C"), size
-    return rows, step
+        return np.empty(0, array.dtype), *packed
+    rows = array if array.ndim == 2 and own == lead and len(lead) == 1 else _rows(array, lead + shape, size)
+    (step, misfit), (element, askew) = (divmod(stride, array.itemsize) for stride in rows.strides)
+    if misfit or askew or not flags.aligned or (size > 1 and not element):
+        return np.array(rows, order="C"), *packed
+    return rows, step, element if size > 1 else 0
+
+
+def _packed(array: Array, step: int, element: int) -> tuple[Array, int]:
+    """The same with elements one after another."""
+    return (array, step) if element in (0, 1) else (np.array(array, order="C"), array.shape[1])
+
+
+def _rows(array: Array, shape: tuple[int, ...], size: int) -> Array:
+    """An array broadcast to a shape, as a matrix with a row for each sample."""
+    return np.broadcast_to(array, shape).reshape(-1, size)
+
+
+def _rolled(array: Array, count: int) -> Array:
+    """The first so many dimensions after the others."""
+    return array.transpose(*range(count, array.ndim), *range(count))
 
 
 class Library(Mapping[str, KernelFunction]):
@@ -205,9 +258,9 @@ class Library(Mapping[str, KernelFunction]):
     def pointer(self, array: Array) -> Any:
         """Where an array's first element is; the array must outlive the pointer."""
         kind = C_TYPES[array.dtype.char]
-        if array.flags.c_contiguous:
-            return self.ffi.from_buffer(kind + "[]", array)
-        return self.ffi.cast(kind + " *", array.ctypes.data)
+        if array.flags.forc:
+            return self.ffi.from_buffer(kind + "[]", array if array.flags.c_contiguous else array.T)
+        return self.ffi.cast(kind + " *", array.__array_interface__["data"][0])
 
     def vectorised(self, entry: Mapping[str, Any]) -> Any:
         """A kernel's loop for vector units, or None; where it cannot be compiled a warning tells why."""

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 
 from awiwi_gen.cache import Cache, code_digest, key, libraries
 from awiwi_gen.emit.options import Options
-from awiwi_gen.emit.tree import MANIFEST, State, inspect, install, require_place, sha256, sweep
+from awiwi_gen.emit.tree import MANIFEST, State, contents, inspect, install, require_place, sha256, sweep
 from awiwi_gen.errors import InputError
 from awiwi_gen.hand import Hand
 
@@ -116,6 +116,7 @@ def generate(job: Job, directory: Path) -> bool:
         return False
     require_place(directory)
     from awiwi_gen.budget import BUDGET, budget_text, require_budget
+    from awiwi_gen.emit.batch import batch_files
     from awiwi_gen.emit.files import shared_files
     from awiwi_gen.records import manifest_entry
 
@@ -130,6 +131,8 @@ def generate(job: Job, directory: Path) -> bool:
     if not job.accept_cost:
         require_budget(directory, files[BUDGET])
     files |= shared_files(job.hand.prefix, functions, job.hand.digest(), quantities, job.options)
+    entries = [manifest_entry(kernel, records[kernel.name]) for kernel in job.kernels]
+    files |= batch_files(entries, job.hand.prefix, job.options)
     manifest = {
         "hand": job.hand.name,
         "prefix": job.hand.prefix,
@@ -137,7 +140,7 @@ def generate(job: Job, directory: Path) -> bool:
         "digest": job.hand.digest(),
         "inputs": job.inputs,
         "files": {name: sha256(text) for name, text in sorted(files.items())},
-        "kernels": [manifest_entry(kernel, records[kernel.name]) for kernel in job.kernels],
+        "kernels": entries,
     }
     install(directory, {**files, MANIFEST: json.dumps(manifest, indent=1, ensure_ascii=False) + "\n"})
     return True
@@ -258,7 +261,7 @@ def verify(job: Job, directory: Path) -> Proof:
     """
     from awiwi_gen.build import compiler
 
-    texts = {path.name: sha256(path.read_bytes()) for path in sorted(directory.iterdir())}
+    texts = {name: sha256((directory / name).read_bytes()) for name in contents(directory)}
     digest = key(texts, job.inputs, code_digest(), compiler())
     return job.store.memo("proofs", digest, lambda: _examine(job, directory))
 

@@ -11,36 +11,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from samples import ODD, RANDOM, VARIANTS, fields, points, same_bits, tree, vectorised
 
-import awiwi_gen
 from awiwi_gen import library as library_module
-from awiwi_gen.build import BATCH_FLAGS, FUSED, UNFUSED, WARNINGS, compile_objects, compiler, load, native
+from awiwi_gen.build import BATCH_FLAGS, FUSED, GCC_FLAGS, UNFUSED, WARNINGS, compile_objects, compiler, load, native
 from awiwi_gen.cache import Cache
-from awiwi_gen.emit.batch import batch_source
-from awiwi_gen.emit.options import Options
-from awiwi_gen.errors import BuildError, InputError
+from awiwi_gen.emit.batch import BATCHES, has_batch, worthwhile
+from awiwi_gen.errors import BuildError
 from awiwi_gen.pipeline import Job, cached_tree
-from awiwi_gen.resources import CSRC
-
-ONE_FINGER = Path(__file__).with_name("one_finger.toml")
-ODD = 1003  # no multiple of any vector's length
-RANDOM = np.random.default_rng(7)
-VARIANTS = {
-    "double": Options(),
-    "single": Options(scalar="f32"),
-    "runtime": Options(params="runtime"),
-}
-
-
-def tree(options: Options = VARIANTS["double"], only: str = "jaw_*") -> Path:
-    return cached_tree(Job(awiwi_gen.Hand.load(ONE_FINGER), options, only))
-
-
-def vectorised(directory: Path):
-    """A library that compiles for vectors at the first call, and stays on one core."""
-    made = load(directory)
-    made.vectorise_after, made.threads = 0, 1
-    return made
 
 
 @pytest.fixture(scope="module")
@@ -48,25 +26,12 @@ def jaw():
     return vectorised(tree())
 
 
-def points(function, *lead: int) -> list[np.ndarray]:
-    """Random inputs inside the ranges of a kernel."""
-    shapes = [(np.reshape(p["low"], p["shape"]), np.reshape(p["high"], p["shape"])) for p in function.inputs]
-    return [RANDOM.uniform(low, high, (*lead, *low.shape)).astype(function.dtype) for low, high in shapes]
-
-
-def fields(result) -> tuple[np.ndarray, ...]:
-    return result if isinstance(result, tuple) else (result,)
-
-
-def same_bits(a, b) -> bool:
-    return all(np.array_equal(x, y, equal_nan=True) for x, y in zip(fields(a), fields(b), strict=True))
-
-
 class Witness:
-    """Stands in for a kernel's loop over samples and remembers its calls."""
+    """Stands in for the loop over samples that a kernel uses, and remembers its calls."""
 
-    def __init__(self, function):
-        self.loop, self.calls = function._fastest(0), []
+    def __init__(self, function, monkeypatch):
+        self.loop, self.calls = function._vectors(0) or function._loop, []
+        monkeypatch.setattr(function, "_vectorised" if function._vectors(0) else "_loop", self)
 
     def __call__(self, n, *arguments):
         self.calls.append((n, threading.get_ident()))
@@ -122,14 +87,28 @@ def test_each_sample_has_a_status_of_its_own(hand):
 # ------------------------------------------------------------------------------------------------- vectors
 
 
-def test_the_loop_is_vectorised_by_the_compiler(tmp_path):
+@pytest.mark.parametrize("options", [VARIANTS["double"], VARIANTS["single"]], ids=["double", "single"])
+def test_whole_vectors_alone_are_computed_with(options, tmp_path):
     if native()[0] != ("-march=native",) or "__AVX__" not in native()[1] or "clang" in compiler().version:
         pytest.skip("reads the assembly of gcc for x86 with AVX")
-    for name in ("jaw_mass_matrix", "jaw_inverse_dynamics", "jaw_forward_dynamics"):
-        assembly = compiled(name, tree(), tmp_path, *BATCH_FLAGS, *native()[0], *UNFUSED[0], "-S").read_text()
-        loops = re.findall(r"\bv(?:add|sub|mul|div)(pd|sd)\b", assembly)
+    for name in worth_compiling(tree(options)):
+        flags = (*BATCH_FLAGS, *GCC_FLAGS, *native()[0], *UNFUSED[0], "-S")
+        loop = body("block", compiled(name, tree(options), tmp_path, *flags).read_text())
+        found = re.findall(r"\bv?(?:add|sub|mul|div|sqrt)([ps][sd])\b.*%([xyz]mm)", loop)
 
-        assert loops.count("pd") >= loops.count("sd") > 0, name  # what is over is done one by one, once each
+        assert len(found) > 10, name
+        assert {*found} <= {("pd" if options.scalar == "f64" else "ps", vector) for vector in ("ymm", "zmm")}, name
+
+
+def worth_compiling(directory: Path) -> list[str]:
+    entries = load(directory).manifest["kernels"]
+    chosen = [e["name"] for e in entries if worthwhile(e, (directory / f"{e['name']}.c").read_text())]
+    assert len(chosen) > 10
+    return chosen
+
+
+def body(function: str, assembly: str) -> str:
+    return re.search(rf"^({function}(?:\.\w+)*):\n(.*?)^\t\.size\t\1,", assembly, re.S | re.M)[2]
 
 
 @pytest.mark.parametrize(
@@ -155,30 +134,67 @@ def test_a_compiler_that_fuses_them_all_the_same_is_not_used(monkeypatch):
         )
 
 
+PROGRAM = """
+#include <string.h>
+#include "kernels.h"
+#include "batches/batches.h"
+enum { N = 1003 };
+static double q[2][N], qd[2][N], qdd[2][N], rows[2][N], samples[N][2];
+int main(void)
+{
+    const double g[3] = {1.0, -9.0, 2.0};
+    for (int i = 0; i < N; i++)
+        for (int e = 0; e < 2; e++) {
+            q[e][i] = 0.001 * i + e;
+            qd[e][i] = 2.0 - q[e][i];
+            qdd[e][i] = 30.0 * q[e][i];
+        }
+    claw_jaw_inverse_dynamics_batch(N, q[0], 1, N, qd[0], 1, N, qdd[0], 1, N, g, 0, 1, rows[0], 1, N);
+    claw_jaw_inverse_dynamics_batch(N, q[0], 1, N, qd[0], 1, N, qdd[0], 1, N, g, 0, 1, samples[0], 2, 1);
+    for (int i = 0; i < N; i++) {
+        const double x[2] = {q[0][i], q[1][i]}, v[2] = {qd[0][i], qd[1][i]}, a[2] = {qdd[0][i], qdd[1][i]};
+        double tau[2], row[2] = {rows[0][i], rows[1][i]};
+        claw_jaw_inverse_dynamics(x, v, a, g, tau);
+        if (memcmp(tau, row, sizeof tau) || memcmp(tau, samples[i], sizeof tau))
+            return 1;
+    }
+    return 0;
+}
+"""
+
+
+def test_c_programs_run_batches_as_their_header_tells(tmp_path):
+    if "__x86_64__" not in native()[1] or "clang" in compiler().version:
+        pytest.skip("the command is for gcc on x86")
+    told = (tree() / BATCHES / "batches.h").read_text()
+    command = re.search(r"cc (-std.*?)\\\n \*(.*?) -c batches/KERNEL.c", told)
+    flags = f"{command[1]} {command[2]}".split()
+    assert {*BATCH_FLAGS, *GCC_FLAGS, *UNFUSED[0], *native()[0]} - {"-fPIC", "-w"} == {*flags}
+
+    (tmp_path / "main.c").write_text(PROGRAM)
+    batch, program = compiled("jaw_inverse_dynamics", tree(), tmp_path, *flags, "-c"), str(tmp_path / "main")
+    others = map(str, compile_objects(tree(), Cache()))
+    compiler().run("-std=c99", f"-I{tree()}", str(tmp_path / "main.c"), str(batch), *others, "-o", program, "-lm")
+    subprocess.run([program], check=True)
+
+
 @pytest.mark.parametrize("options", VARIANTS.values(), ids=VARIANTS)
 def test_the_c_of_a_batch_is_clean_and_links_with_everything_else(options, tmp_path):
     directory = tree(options)
-    kernels = [entry for entry in load(directory).manifest["kernels"] if entry["route"] != "solver"]
+    kernels = [entry for entry in load(directory).manifest["kernels"] if has_batch(entry)]
     flags = ("-std=c99", "-O1", "-fPIC", *WARNINGS, "-c")
     batches = [compiled(entry["name"], directory, tmp_path, *flags) for entry in kernels]
     others = compile_objects(directory, Cache())
     compiler().run("-shared", *map(str, batches + others), "-o", str(tmp_path / "all.so"), "-lm")
 
     assert len(batches) > 10
+    assert {path.name for path in (directory / BATCHES).glob("*.c")} == {f"{entry['name']}.c" for entry in kernels}
 
 
 def compiled(name: str, directory: Path, scratch: Path, *flags: str) -> Path:
-    source, made = scratch / f"{name}_batch.c", scratch / f"{name}_batch.o"
-    source.write_text(batch_source(directory, name))
-    compiler().run(*flags, f"-I{directory}", f"-I{CSRC}", str(source), "-o", str(made))
+    made = scratch / f"{name}_batch.o"
+    compiler().run(*flags, str(directory / BATCHES / f"{name}.c"), "-o", str(made))
     return made
-
-
-def test_a_kernel_that_was_not_generated_has_no_batch(tmp_path):
-    with pytest.raises(InputError, match="no kernel 'jaw_mass_matrx'; did you mean jaw_mass_matrix"):
-        batch_source(tree(), "jaw_mass_matrx")
-    with pytest.raises(InputError, match="no kernel 'jaw_mass_matrix'"):
-        batch_source(tmp_path, "jaw_mass_matrix")
 
 
 def test_few_samples_are_not_worth_compiling_for(jaw):
@@ -200,68 +216,6 @@ def test_what_vectors_do_not_help_keeps_its_plain_loop(jaw, name):
     assert jaw.vectorised(jaw[name]._entry) is None
 
 
-# ------------------------------------------------------------------------------------------------- memory
-
-
-@pytest.mark.parametrize(
-    "view",
-    [
-        lambda x: x,
-        lambda x: x[::2],
-        lambda x: x[::-1],
-        lambda x: x[3:4],
-        lambda x: np.asfortranarray(x),
-        lambda x: np.repeat(x, 3, axis=1)[:, ::3],
-        lambda x: np.concatenate([x, x], axis=1)[:, : x.shape[1]],
-        lambda x: x.reshape(8, -1, x.shape[1])[:, 1:],
-        lambda x: x.reshape(8, -1, x.shape[1]).transpose(1, 0, 2),
-        lambda x: np.broadcast_to(x[0], x.shape),
-        lambda x: np.frombuffer(b"\0" + x.tobytes(), x.dtype, offset=1).reshape(x.shape),
-    ],
-)
-def test_the_layout_of_an_input_does_not_matter(jaw, view):
-    given = [view(array) for array in points(jaw.jaw_inverse_dynamics, 64)]
-    packed = [np.array(array, order="C") for array in given]
-
-    assert same_bits(jaw.jaw_inverse_dynamics(*given), jaw.jaw_inverse_dynamics(*packed))
-
-
-@pytest.mark.parametrize(
-    ("array", "lead", "step"),
-    [
-        (np.zeros((6, 4)), (6,), 4),
-        (np.zeros((6, 9))[:, 2:6], (6,), 9),
-        (np.zeros((6, 4))[::-1], (6,), -4),
-        (np.zeros(4), (1000,), 0),
-        (np.zeros((1, 1, 4)), (30, 1000), 0),
-        (np.zeros((12, 4)).reshape(3, 4, 4), (3, 4), 4),
-    ],
-)
-def test_inputs_whose_samples_are_evenly_apart_are_not_copied(array, lead, step):
-    rows, found = library_module._samples(array, array.shape[:-1], lead, (4,))
-
-    assert found == step
-    assert np.shares_memory(rows, array)
-
-
-def test_inputs_with_different_leading_dimensions_meet_in_vectors(jaw):
-    q, qd, qdd, g = points(jaw.jaw_inverse_dynamics, 60)
-    q, qd, g = q[:20, None], qd[:3], g[0]
-    tau = jaw.jaw_inverse_dynamics(q, qd, qdd.reshape(20, 3, 2), g)
-
-    assert tau.shape == (20, 3, 2)
-    for index in np.ndindex(20, 3):
-        one = jaw.jaw_inverse_dynamics(q[index[0], 0], qd[index[1]], qdd.reshape(20, 3, 2)[index], g)
-        assert same_bits(tau[index], one)
-
-
-@pytest.mark.parametrize("lead", [(0,), (3, 0), (0, 5)])
-def test_empty_batches_give_empty_results(jaw, lead):
-    for function in jaw.values():
-        for result in fields(function(*points(function, *lead))):
-            assert result.shape[: len(lead)] == lead
-
-
 # ------------------------------------------------------------------------------------------------- threads
 
 
@@ -272,8 +226,7 @@ def test_threads_share_a_large_batch_in_equal_parts(jaw, threads, monkeypatch):
     for name in ("jaw_forward_dynamics", "jaw_joint_estimate"):
         function = jaw[name]
         given = points(function, ODD)
-        witness = Witness(function)
-        monkeypatch.setattr(function, "_vectorised", witness)
+        witness = Witness(function, monkeypatch)
         together = function(*given)
         sizes = [n for n, _ in witness.calls]
 
@@ -288,8 +241,7 @@ def test_threads_share_a_large_batch_in_equal_parts(jaw, threads, monkeypatch):
 def test_small_batches_start_no_threads(jaw, monkeypatch):
     monkeypatch.setattr(jaw, "threads", 8)
     function = jaw.jaw_mass_matrix
-    witness = Witness(function)
-    monkeypatch.setattr(function, "_vectorised", witness)
+    witness = Witness(function, monkeypatch)
     function(np.zeros((1000, 2)))
 
     assert witness.calls == [(1000, threading.get_ident())]

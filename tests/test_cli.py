@@ -45,7 +45,7 @@ def complaint(*arguments: object, code: int = 2, stdin: str | None = None) -> st
 
 
 def snapshot(directory: Path) -> dict[str, tuple[int, bytes]]:
-    return {path.name: (path.stat().st_mtime_ns, path.read_bytes()) for path in directory.iterdir()}
+    return {str(path): (path.stat().st_mtime_ns, path.read_bytes()) for path in directory.rglob("*") if path.is_file()}
 
 
 @pytest.fixture(scope="module")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -36,7 +37,7 @@ def empty_cache(tmp_path) -> dict[str, str]:
 
 
 def contents(directory: Path) -> dict[str, tuple[int, bytes]]:
-    return {path.name: (path.stat().st_mtime_ns, path.read_bytes()) for path in directory.iterdir()}
+    return {str(path): (path.stat().st_mtime_ns, path.read_bytes()) for path in directory.rglob("*") if path.is_file()}
 
 
 @pytest.mark.parametrize("command", ["build", "verify", "generate --verify"])
@@ -95,9 +96,7 @@ def test_a_compiler_with_options_of_its_own_is_used(generated, empty_cache):
 
 def test_a_compiler_that_refuses_the_code_is_quoted(generated, tmp_path, empty_cache):
     copy = tmp_path / "generated"
-    copy.mkdir()
-    for path in generated.iterdir():
-        (copy / path.name).write_bytes(path.read_bytes())
+    shutil.copytree(generated, copy)
     (copy / "jaw_tendon_lengths.c").write_text("this is not C\n")
     done = run("verify", *OPTIONS, "-o", copy, env=empty_cache)
 

@@ -85,6 +85,28 @@ def test_a_foreign_file_is_named_and_its_owner_told_to_move_it(tree, is_director
     )  # fmt: skip
 
 
+def test_files_below_a_directory_are_known_by_their_places(tmp_path):
+    tree = tmp_path / "generated"
+    texts = {"a.c": "a", "batches/a.c": "aa", "batches/b.c": "bb", "batches/c.c": "cc"}
+    manifest = {"inputs": INPUTS, "files": {name: sha256(text) for name, text in texts.items()}}
+    install(tree, {**texts, MANIFEST: json.dumps(manifest)})
+    assert inspect(tree, INPUTS) == State()
+
+    (tree / "batches" / "a.c").write_text("faster")
+    (tree / "batches" / "b.c").unlink()
+    (tree / "batches" / "mine.c").write_text("mine")
+    (tree / "mine").mkdir()
+    assert inspect(tree, INPUTS) == State(
+        edited=("batches/a.c",), lost=("batches/b.c",), foreign=("batches/mine.c", "mine")
+    )
+    with pytest.raises(OutputError, match=r"\(batches/mine.c, mine\)"):
+        install(tree, version("new"))
+    (tree / "batches" / "mine.c").unlink()
+    (tree / "mine").rmdir()
+    install(tree, version("new"))
+    assert contents(tree) == version("new")
+
+
 @pytest.mark.parametrize(
     ("changed", "reason"),
     [("hand", "hand file"), ("generator", "version of awiwi_gen"), ("libraries", "set of libraries")],

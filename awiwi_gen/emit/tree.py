@@ -37,6 +37,12 @@ def read_manifest(directory: Path) -> dict[str, Any] | None:
         return None
 
 
+def contents(directory: Path) -> list[str]:
+    """What a directory holds: files in it and below it, and empty directories, by their places."""
+    found = [path for path in directory.rglob("*") if not path.is_dir() or path.is_symlink() or not any(path.iterdir())]
+    return sorted(path.relative_to(directory).as_posix() for path in found)
+
+
 @dataclass(frozen=True)
 class State:
     """How a generated directory compares with its manifest and with what it should be made from."""
@@ -58,7 +64,7 @@ def inspect(directory: Path, inputs: Mapping[str, Any]) -> State:
     if not directory.is_dir():
         return State(missing=True)
     manifest = read_manifest(directory)
-    present = {path.name for path in directory.iterdir()} - {MANIFEST}
+    present = {*contents(directory)} - {MANIFEST}
     if manifest is None:
         return State(missing=True, foreign=tuple(sorted(present)))
     files = manifest["files"]
@@ -83,6 +89,7 @@ def install(directory: Path, files: Mapping[str, str]) -> None:
     sweep(directory)
     with _staging(directory) as staging:
         for name, text in files.items():
+            (staging / name).parent.mkdir(exist_ok=True)
             (staging / name).write_text(text, encoding="utf-8", newline="\n")
         staging.chmod(0o755)
         try:
@@ -102,7 +109,7 @@ def _require_ours(directory: Path) -> None:
     if directory.exists() and not directory.is_dir():
         raise OutputError(Fault(file=str(directory), message="is a file; expected a directory"))
     ours = (read_manifest(directory) or {"files": {}})["files"].keys() | {MANIFEST}
-    foreign = [path.name for path in directory.iterdir() if path.name not in ours] if directory.exists() else []
+    foreign = [name for name in contents(directory) if name not in ours]
     if foreign:
         names = ", ".join(sorted(foreign)[:5])
         mend = "move them away, or choose another place with -o"
