@@ -31,7 +31,7 @@ class Pair:
 
 @dataclass
 class Angle:
-    """All that turns with an angle, and the sums of terms in it: of first degree in all pairs, of second in the first."""
+    """What turns with an angle, and the sums of terms in it: of first degree in all pairs, of second in the first."""
 
     argument: Ref
     pairs: list[Pair] = field(default_factory=lambda: [Pair((1, ()))])  # cosine and sine themselves come first

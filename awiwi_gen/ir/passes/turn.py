@@ -1,7 +1,7 @@
 """Turn the axes in which an angle is measured: ``a*cos(x) + b*sin(x)`` is ``hypot(a, b)*cos(x + phase)``.
 
 A body's moments are pairs of such sums, (a, b) and (-b, a), so one added constant saves two products and two sums. All
-else that reads this sine and cosine must be terms of sums, of first degree, or of second with constant coefficients, for
+else that reads this sine and cosine must be terms of sums: of first degree, or of second with constant factors, for
 then it keeps its form in other axes (`angles`); angles of which this is not so are left alone.
 """
 
