@@ -185,7 +185,12 @@ class Dimensions:
     """Dimension checking: a value is a unit. Zero, which fits any unit, is None."""
 
     def __init__(self) -> None:
-        self._products: dict[tuple[Unit, Unit], Unit] = {}
+        self._units: dict[Unit, Unit] = {one: one}  # one object for each, as it takes a while to tell two equal ones so
+        self._products: dict[tuple[int, int], tuple[Unit, Unit, Unit]] = {}  # by the factors' identities
+        self._inverses: dict[int, tuple[Unit, Unit]] = {}
+
+    def _same(self, unit: Unit) -> Unit:
+        return self._units.setdefault(unit, unit)
 
     def const(self, value: Fraction) -> Unit | None:
         return one if value else None
@@ -205,12 +210,17 @@ class Dimensions:
     def mul(self, a: Unit | None, b: Unit | None) -> Unit | None:
         if a is None or b is None:
             return None
-        if (a, b) not in self._products:
-            self._products[a, b] = a * b
-        return self._products[a, b]
+        names = id(a), id(b)
+        if names not in self._products:
+            self._products[names] = a, b, self._same(a * b)
+        return self._products[names][2]
 
     def div(self, a: Unit | None, b: Unit | None) -> Unit | None:
-        return None if a is None or b is None else a / b
+        if a is None or b is None:
+            return None
+        if id(b) not in self._inverses:
+            self._inverses[id(b)] = b, self._same(b**-1)
+        return self.mul(a, self._inverses[id(b)][1])
 
     def call(self, operation: str, *args: Unit | None) -> Unit | None:
         if operation in ("sqrt", "fabs"):

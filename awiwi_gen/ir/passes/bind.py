@@ -9,7 +9,7 @@ from flint import arb, ctx
 
 from awiwi_gen.ir.algebras import FLINT_NAMES, ball
 from awiwi_gen.ir.builder import Builder, rebuild
-from awiwi_gen.ir.graph import LEAVES, VARIADIC, Graph, Node, Ref
+from awiwi_gen.ir.graph import VARIADIC, Graph, Node, Ref
 
 ARITHMETIC = VARIADIC | {"inv", "div"}
 FOLDING_BITS = 400  # the rounding of a folded square root stays far below what the pass checks resolve

@@ -83,7 +83,8 @@ def scale(graph: Graph) -> Graph:
     """The same graph with fewer products with constants."""
     group = _groups(graph)
     constants: dict[Fraction, int] = {}
-    system, wishes = _System(), []
+    system = _System()
+    wishes: list[tuple[Row, Powers]] = []
     for index, node in enumerate(graph.nodes):
         if node[0] not in ("mul", "inv"):
             continue

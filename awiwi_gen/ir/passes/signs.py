@@ -31,16 +31,15 @@ class _Signs:
 
     def cost(self, index: int) -> int:
         """Negations that a node's own computation and the results it is take."""
-        node, turned = self.nodes[index], self.turned
-        results = self.results[index]
+        node, turned, results = self.nodes[index], self.turned, self.results[index]
         own = sum(map(self.minus, results)) if results and node[0] != "const" else 0
         if node[0] in LEAVES or self.constant[index]:
             return own
-        minuses = [(ref < 0) != turned[ref if ref >= 0 else ~ref] for ref in node[1:]]
+        minuses: list[bool] = [(ref < 0) != turned[ref if ref >= 0 else ~ref] for ref in node[1:]]
         if node[0] == "add":
-            return own + (turned[index] not in minuses)
+            return own + int(turned[index] not in minuses)
         if node[0] in ("mul", "div"):
-            return own + ((sum(minuses) % 2 == 1) != turned[index])
+            return own + int((sum(minuses) % 2 == 1) != turned[index])
         return own + sum(minuses)
 
     def willing(self, index: int) -> set[int]:
@@ -63,8 +62,8 @@ class _Signs:
     def turn(self, group: set[int]) -> None:
         """Compute the negatives of these nodes instead."""
         self._turn(group)
-        for index in group | {user for index in group for user in self.users[index]}:
-            self.spent[index] = self.cost(index)
+        for near in group | {user for index in group for user in self.users[index]}:
+            self.spent[near] = self.cost(near)
 
     def _turn(self, group: set[int]) -> None:
         for index in group:
