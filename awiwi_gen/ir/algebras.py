@@ -44,11 +44,14 @@ class Floats:
     div = staticmethod(operator.truediv)
 
     def call(self, operation: str, *args: Any) -> Any:
-        if operation == "sqrt":
-            return np.sqrt(args[0])
+        if operation in CORRECTLY_ROUNDED:
+            return CORRECTLY_ROUNDED[operation](args[0])
         if operation in self.own:
             return self.own[operation](*args, self.dtype)
         return np.asarray(libm(operation, self.dtype)(*args), self.dtype)[()]  # a function of numbers alone gives one
+
+
+CORRECTLY_ROUNDED: dict[str, Callable[..., Any]] = {"sqrt": np.sqrt, "fabs": np.abs}  # NumPy's are the C library's
 
 
 @cache
