@@ -11,7 +11,7 @@ import numpy as np
 from flint import arb
 
 from awiwi_gen.ir.algebras import Balls, Floats
-from awiwi_gen.ir.graph import Graph
+from awiwi_gen.ir.graph import Graph, prune
 from awiwi_gen.ir.interpret import evaluate
 from awiwi_gen.kernel import Solver
 from awiwi_gen.verify.reference import Reference, reference
