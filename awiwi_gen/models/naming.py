@@ -111,7 +111,9 @@ def _product(*factors: Expr) -> Expr:
                 others.append(part)
     if number is not sympy.S.One:
         others.insert(0, number)
-    return sympy.Mul._from_args(others, is_commutative=True) if len(others) > 1 else others[0] if others else sympy.S.One
+    return (
+        sympy.Mul._from_args(others, is_commutative=True) if len(others) > 1 else others[0] if others else sympy.S.One
+    )
 
 
 # Partial derivatives of functions by each of their arguments.
