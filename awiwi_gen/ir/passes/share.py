@@ -29,7 +29,7 @@ def share_products(graph: Graph) -> Graph:
 def _share(graph: Graph, operation: str) -> Graph:
     groups = {i: list(node[1:]) for i, node in enumerate(graph.nodes) if node[0] == operation}
     pairs = _extract(groups, first_free=len(graph.nodes))
-    return _replay(graph, operation, groups, pairs)
+    return _replay(graph, operation, groups, pairs) if pairs else graph
 
 
 def _normal(a: Ref, b: Ref) -> tuple[Pair, bool]:
