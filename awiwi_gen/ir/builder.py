@@ -22,6 +22,7 @@ class Builder:
     def __init__(self) -> None:
         self.nodes: list[Node] = []
         self._index: dict[Node, int] = {}
+        self._constants: dict[tuple[int, int], int] = {}
 
     # -- leaves -------------------------------------------------------------------------------------------
 
@@ -31,7 +32,12 @@ class Builder:
             value = Fraction(value)
         if value.denominator.bit_length() > FRACTION_BITS:
             value = shorten(value)
-        return self._intern(("const", value)) if value.numerator >= 0 else ~self._intern(("const", -value))
+        name = (abs(value.numerator), value.denominator)  # their hash is quicker than that of a fraction
+        index = self._constants.get(name)
+        if index is None:
+            index = self._constants[name] = len(self.nodes)
+            self.nodes.append(("const", value if value.numerator >= 0 else -value))
+        return index if value.numerator >= 0 else ~index
 
     def input(self, port: str, element: int) -> Ref:
         """Element number ``element`` (row by row) of an input port."""

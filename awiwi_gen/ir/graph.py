@@ -138,12 +138,14 @@ def canonical(graph: Graph) -> Graph:
     number hardly moves anything else.
     """
     first, *others = levels(graph) or [[]]
-    nodes = sorted({graph.nodes[index] for index in first})
-    numbers = {node: number for number, node in enumerate(nodes)}
-    constants = {number for number, node in enumerate(nodes) if node[0] == "const"}
+    nodes: list[Node] = []
+    numbers: dict[Node, int] = {}
     renamed: list[Ref] = [0] * len(graph.nodes)
-    for index in first:
-        renamed[index] = numbers[graph.nodes[index]]
+    for index in sorted(first, key=graph.nodes.__getitem__):
+        if not nodes or nodes[-1] != graph.nodes[index]:
+            nodes.append(graph.nodes[index])
+        renamed[index] = len(nodes) - 1
+    constants = {number for number, node in enumerate(nodes) if node[0] == "const"}
     for level in others:
         found = [(*_moved(graph.nodes[index], renamed, nodes, constants), index) for index in level]
         found.sort(key=_KEY)
