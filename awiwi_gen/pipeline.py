@@ -11,8 +11,9 @@ from __future__ import annotations
 import fnmatch
 import json
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
 from functools import cached_property, partial
 from math import ceil
@@ -26,6 +27,7 @@ from awiwi_gen.errors import InputError
 from awiwi_gen.hand import Hand
 
 if TYPE_CHECKING:
+    from awiwi_gen.library import Library
     from awiwi_gen.records import Record
     from awiwi_gen.verify.objects import Seal
     from awiwi_gen.verify.physics import Law
@@ -88,15 +90,28 @@ class Job:
 
     def parallel(self, stage: str, function: Callable[[Any], Any], items: Sequence[Any]) -> list[Any]:
         """Apply a function to items on all cores, in order, with progress."""
-        results: list[Any] = []
+        with self.begun(stage, function, items) as results:
+            return results()
+
+    @contextmanager
+    def begun(
+        self, stage: str, function: Callable[[Any], Any], items: Sequence[Any]
+    ) -> Iterator[Callable[[], list[Any]]]:
+        """The same while something else is done inside; what it gives waits for the results."""
         if len(items) <= 1:
-            results = [function(item) for item in items]
-        else:
-            with ProcessPoolExecutor(min(os.cpu_count() or 1, len(items))) as pool:
-                for result in pool.map(function, items):
-                    results.append(result)
-                    self.progress(stage, len(results), len(items))
-        return results
+            yield lambda: [function(item) for item in items]
+            return
+
+        def results() -> list[Any]:
+            made: list[Any] = []
+            for result in found:
+                made.append(result)
+                self.progress(stage, len(made), len(items))
+            return made
+
+        with ProcessPoolExecutor(min(os.cpu_count() or 1, len(items))) as pool:
+            found = pool.map(function, items)
+            yield results
 
 
 def state(job: Job, directory: Path) -> State:
@@ -267,12 +282,25 @@ def verify(job: Job, directory: Path) -> Proof:
 
 
 def _examine(job: Job, directory: Path) -> Proof:
-    from awiwi_gen.build import compiler, headers, load
+    from awiwi_gen.build import load
+
+    records = job.records
+    with _laws_begun(job, records) as laws:  # they need no compiler, which has work for less than all cores in the end
+        verdicts = _judged(job, directory, load(directory, job.store), records)
+        seal = _seal(job, directory)
+        found = seal.found if seal else {}
+        verdicts = [
+            v.refused(f"its object computes in double: {', '.join(x)}") if (x := found.get(f"{v.name}.c")) else v
+            for v in verdicts
+        ]
+        return Proof(verdicts, laws(), seal)
+
+
+def _judged(job: Job, directory: Path, library: Library, records: Mapping[str, Record]) -> list[Verdict]:
+    from awiwi_gen.build import compiler, headers
     from awiwi_gen.records import judge_record, verdict_key
 
-    library = load(directory, job.store)
     shared = headers(directory)
-    records = job.records
     verdicts = []
     for kernel in job.kernels:
         record, used = records[kernel.name], {family: records[name] for family, name in kernel.needs.items()}
@@ -281,13 +309,7 @@ def _examine(job: Job, directory: Path) -> Proof:
         examine = partial(judge_record, kernel, record, used, library[kernel.name], job.options)
         verdicts.append(job.store.memo("verdicts", digest, examine))
         job.progress("verify", len(verdicts), len(job.kernels))
-    seal = _seal(job, directory)
-    found = seal.found if seal else {}
-    verdicts = [
-        v.refused(f"its object computes in double: {', '.join(x)}") if (x := found.get(f"{v.name}.c")) else v
-        for v in verdicts
-    ]
-    return Proof(verdicts, _obey_physics(job, records), seal)
+    return verdicts
 
 
 def _seal(job: Job, directory: Path) -> Seal | None:
@@ -301,7 +323,9 @@ def _seal(job: Job, directory: Path) -> Seal | None:
     return examine(dict(zip(names, compile_objects(directory, job.store), strict=True)))
 
 
-def _obey_physics(job: Job, records: Mapping[str, Record]) -> list[Law]:
+@contextmanager
+def _laws_begun(job: Job, records: Mapping[str, Record]) -> Iterator[Callable[[], list[Law]]]:
+    """The laws of physics on all parts, looked at on other cores while something else is done inside."""
     from awiwi_gen.records import laws_key
 
     parts: dict[str, list[tuple[Any, Record]]] = {}
@@ -317,8 +341,13 @@ def _obey_physics(job: Job, records: Mapping[str, Record]) -> list[Law]:
         for (path, members), digest in zip(parts.items(), keys, strict=True)
         if digest in absent
     ]
-    job.parallel("physics", _physics_task, tasks)
-    return [law for digest in keys for law in job.store.get("laws", digest)]  # type: ignore[attr-defined]
+    with job.begun("physics", _physics_task, tasks) as made:
+
+        def laws() -> list[Law]:
+            made()
+            return [law for digest in keys for law in job.store.get("laws", digest)]  # type: ignore[attr-defined]
+
+        yield laws
 
 
 def _physics_task(task: tuple[Any, ...]) -> None:

@@ -44,11 +44,14 @@ class Floats:
     div = staticmethod(operator.truediv)
 
     def call(self, operation: str, *args: Any) -> Any:
-        if operation == "sqrt":
-            return np.sqrt(args[0])
+        if operation in CORRECTLY_ROUNDED:
+            return CORRECTLY_ROUNDED[operation](args[0])
         if operation in self.own:
             return self.own[operation](*args, self.dtype)
         return np.asarray(libm(operation, self.dtype)(*args), self.dtype)[()]  # a function of numbers alone gives one
+
+
+CORRECTLY_ROUNDED: dict[str, Callable[..., Any]] = {"sqrt": np.sqrt, "fabs": np.abs}  # NumPy's are the C library's
 
 
 @cache
@@ -185,7 +188,12 @@ class Dimensions:
     """Dimension checking: a value is a unit. Zero, which fits any unit, is None."""
 
     def __init__(self) -> None:
-        self._products: dict[tuple[Unit, Unit], Unit] = {}
+        self._units: dict[Unit, Unit] = {one: one}  # one object for each, as it takes a while to tell two equal ones so
+        self._products: dict[tuple[int, int], tuple[Unit, Unit, Unit]] = {}  # by the factors' identities
+        self._inverses: dict[int, tuple[Unit, Unit]] = {}
+
+    def _same(self, unit: Unit) -> Unit:
+        return self._units.setdefault(unit, unit)
 
     def const(self, value: Fraction) -> Unit | None:
         return one if value else None
@@ -205,12 +213,17 @@ class Dimensions:
     def mul(self, a: Unit | None, b: Unit | None) -> Unit | None:
         if a is None or b is None:
             return None
-        if (a, b) not in self._products:
-            self._products[a, b] = a * b
-        return self._products[a, b]
+        names = id(a), id(b)
+        if names not in self._products:
+            self._products[names] = a, b, self._same(a * b)
+        return self._products[names][2]
 
     def div(self, a: Unit | None, b: Unit | None) -> Unit | None:
-        return None if a is None or b is None else a / b
+        if a is None or b is None:
+            return None
+        if id(b) not in self._inverses:
+            self._inverses[id(b)] = b, self._same(b**-1)
+        return self.mul(a, self._inverses[id(b)][1])
 
     def call(self, operation: str, *args: Unit | None) -> Unit | None:
         if operation in ("sqrt", "fabs"):

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from fractions import Fraction
+from math import prod
 
 from awiwi_gen.ir.graph import EVEN, ODD, Graph, Node, Output, Ref, canonical, node_of, operands, reachable
 
 AT_ZERO = {"sin": 0, "cos": 1, "tan": 0, "asin": 0, "atan": 0, "exp": 1, "sqrt": 0, "fabs": 0}
+
+ONE = Fraction(1)
 
 # Longer fractions are rounded to this many bits: far beyond the 200 bits at which passes are compared.
 FRACTION_BITS = 512
@@ -19,13 +22,22 @@ class Builder:
     def __init__(self) -> None:
         self.nodes: list[Node] = []
         self._index: dict[Node, int] = {}
+        self._constants: dict[tuple[int, int], int] = {}
 
     # -- leaves -------------------------------------------------------------------------------------------
 
     def const(self, value: Fraction | int) -> Ref:
         """A constant; any sign."""
-        value = shorten(value if isinstance(value, Fraction) else Fraction(value))
-        return self._intern(("const", value)) if value >= 0 else ~self._intern(("const", -value))
+        if not isinstance(value, Fraction):
+            value = Fraction(value)
+        if value.denominator.bit_length() > FRACTION_BITS:
+            value = shorten(value)
+        name = (abs(value.numerator), value.denominator)  # their hash is quicker than that of a fraction
+        index = self._constants.get(name)
+        if index is None:
+            index = self._constants[name] = len(self.nodes)
+            self.nodes.append(("const", value if value.numerator >= 0 else -value))
+        return index if value.numerator >= 0 else ~index
 
     def input(self, port: str, element: int) -> Ref:
         """Element number ``element`` (row by row) of an input port."""
@@ -49,7 +61,8 @@ class Builder:
         """The sum of any number of references; like terms are collected."""
         refs = list(refs)
         if self._all_unlike(refs):
-            return self._sum(sorted(refs, key=node_of))
+            refs.sort(key=node_of if min(refs, default=0) < 0 else None)
+            return self._sum(refs)
         coefficients: dict[int, Fraction] = {}
         constant = Fraction(0)
         for ref in refs:
@@ -66,17 +79,17 @@ class Builder:
 
     def _all_unlike(self, refs: list[Ref]) -> bool:
         """Whether no two terms differ by a rational factor only, and none is a constant: the common case."""
-        seen = set()
+        nodes, seen = self.nodes, set()
         for ref in refs:
-            node = self.nodes[node_of(ref)]
+            base = ref if ref >= 0 else ~ref
+            node = nodes[base]
             if node[0] == "const":
                 return False
-            is_scaled = node[0] == "mul" and self.nodes[node[1]][0] == "const"
-            base = node[2:] if is_scaled else node[1:] if node[0] == "mul" else (node_of(ref),)
-            if base in seen:
-                return False
-            seen.add(base)
-        return True
+            if node[0] == "mul" and nodes[node[1]][0] == "const":
+                seen.add(node[2:] if len(node) > 3 else node[2])
+            else:
+                seen.add(node[1:] if node[0] == "mul" else base)
+        return len(seen) == len(refs)
 
     def _sum(self, terms: list[Ref]) -> Ref:
         if not terms:
@@ -89,29 +102,47 @@ class Builder:
 
     def mul(self, refs: Sequence[Ref]) -> Ref:
         """The product of any number of references; powers are collected, numbers multiplied."""
-        coefficient: Fraction | int = 1
-        powers: dict[int, int] = {}
-        numbers = [ref for ref in refs if self.nodes[node_of(ref)][0] == "const"]
-        for ref in refs:
-            if ref < 0:
-                ref, coefficient = ~ref, -coefficient
-            node = self.nodes[ref]
+        nodes = self.nodes
+        signed = min(refs, default=0) < 0
+        factors = [ref if ref >= 0 else ~ref for ref in refs] if signed else list(refs)
+        kinds = {nodes[factor][0] for factor in factors}
+        coefficient = ONE
+        if "const" in kinds:
+            coefficient, factors = self._numbers(factors)
+            if not coefficient:
+                return self.const(0)
+            kinds = {nodes[factor][0] for factor in factors}
+        if "inv" in kinds:
+            factors = self._powers(factors)
+        product = self._product(coefficient, factors)
+        return ~product if signed and sum([ref < 0 for ref in refs]) % 2 else product
+
+    def _numbers(self, factors: list[int]) -> tuple[Fraction, list[int]]:
+        """Factors with those that are numbers, or have one of their own, taken apart: their product, and the rest."""
+        numbers: list[Fraction] = []
+        rest: list[int] = []
+        for factor in factors:
+            node = self.nodes[factor]
             if node[0] == "const":
-                coefficient *= node[1]
-            elif numbers and node[0] == "mul" and self.value(node[1]) is not None:
-                coefficient *= self.nodes[node[1]][1]
-                for factor in node[2:]:
-                    powers[factor] = powers.get(factor, 0) + 1
-            elif node[0] == "inv":
-                powers[node[1]] = powers.get(node[1], 0) - 1
+                numbers.append(node[1])
+            elif node[0] == "mul" and self.nodes[node[1]][0] == "const":
+                numbers.append(self.nodes[node[1]][1])
+                rest += node[2:]
             else:
-                powers[ref] = powers.get(ref, 0) + 1
-        if not coefficient:
-            return self.const(0)
-        factors: list[Ref] = []
+                rest.append(factor)
+        return (numbers[0] if len(numbers) == 1 else prod(numbers, start=ONE)), rest
+
+    def _powers(self, factors: list[int]) -> list[int]:
+        """Factors of which none is the reciprocal of another."""
+        powers: dict[int, int] = {}
+        for factor in factors:
+            node = self.nodes[factor]
+            base, power = (node[1], -1) if node[0] == "inv" else (factor, 1)
+            powers[base] = powers.get(base, 0) + power
+        left: list[int] = []
         for base, power in powers.items():
-            factors += [base] * power if power > 0 else [self.inv(base)] * -power
-        return self._product(coefficient, factors)
+            left += [base] * power if power > 0 else [self.inv(base)] * -power
+        return left
 
     def inv(self, ref: Ref) -> Ref:
         """The reciprocal."""
@@ -123,7 +154,7 @@ class Builder:
         if node[0] == "inv":
             return int(node[1])
         if node[0] == "mul" and self.value(node[1]) is not None:  # keep numbers out of denominators
-            rest = self._product(Fraction(1), list(node[2:]))
+            rest = self._product(ONE, list(node[2:]))
             return self._product(1 / self.nodes[node[1]][1], [self.inv(rest)])
         return self._intern(("inv", ref))
 
@@ -173,7 +204,7 @@ class Builder:
         if node[0] == "const":
             return sign * node[1], None
         if node[0] == "mul" and self.nodes[node[1]][0] == "const":
-            return sign * self.nodes[node[1]][1], self._product(Fraction(1), list(node[2:]))
+            return sign * self.nodes[node[1]][1], self._product(ONE, list(node[2:]))
         return Fraction(sign), base
 
     def scaled(self, coefficient: Fraction, base: int) -> Ref:
@@ -186,11 +217,11 @@ class Builder:
         return self._product(coefficient, list(node[1:]) if node[0] == "mul" else [base])
 
     def _product(self, coefficient: Fraction | int, factors: list[Ref]) -> Ref:
-        if coefficient < 0:
+        if coefficient.numerator < 0:
             return ~self._product(-coefficient, factors)
         ordered = sorted(factors)
-        if coefficient != 1:
-            ordered = [self.const(coefficient), *ordered]
+        if coefficient is not ONE and coefficient != 1:
+            ordered.insert(0, self.const(coefficient))
         if not ordered:
             return self.const(1)
         return ordered[0] if len(ordered) == 1 else self._intern(("mul", *ordered))
@@ -222,15 +253,11 @@ def rebuild(graph: Graph, rule: Callable[[Builder, Node, tuple[Ref, ...]], Ref])
     """Replay a graph node by node: ``rule(builder, old node, new operands)`` returns the new reference."""
     builder = Builder()
     renamed: list[Ref] = [0] * len(graph.nodes)
-    marked = reachable(graph)
-
-    def new(ref: Ref) -> Ref:
-        return renamed[ref] if ref >= 0 else ~renamed[~ref]
-
-    for index, node in enumerate(graph.nodes):
-        if marked[index]:
-            renamed[index] = rule(builder, node, tuple(new(ref) for ref in operands(node)))
-    return builder.graph(Output(o.name, o.shape, tuple(new(r) for r in o.elements)) for o in graph.outputs)
+    for index, (node, marked) in enumerate(zip(graph.nodes, reachable(graph), strict=True)):
+        if marked:
+            refs = [renamed[ref] if ref >= 0 else ~renamed[~ref] for ref in operands(node)]
+            renamed[index] = rule(builder, node, tuple(refs))
+    return builder.graph(output.renamed(renamed) for output in graph.outputs)
 
 
 def copy_node(builder: Builder, node: Node, refs: tuple[Ref, ...]) -> Ref:
@@ -247,11 +274,10 @@ def copy_node(builder: Builder, node: Node, refs: tuple[Ref, ...]) -> Ref:
 def graft(builder: Builder, graph: Graph, leaves: Mapping[Node, Ref]) -> dict[str, list[Ref]]:
     """Replay a graph inside another builder with some leaves replaced; returns the output references."""
     renamed: list[Ref] = []
-
-    def new(ref: Ref) -> Ref:
-        return renamed[ref] if ref >= 0 else ~renamed[~ref]
-
     for node in graph.nodes:
         given = leaves.get(node)
-        renamed.append(copy_node(builder, node, tuple(new(r) for r in operands(node))) if given is None else given)
-    return {o.name: [new(r) for r in o.elements] for o in graph.outputs}
+        if given is None:
+            refs = [renamed[ref] if ref >= 0 else ~renamed[~ref] for ref in operands(node)]
+            given = copy_node(builder, node, tuple(refs))
+        renamed.append(given)
+    return {output.name: list(output.renamed(renamed).elements) for output in graph.outputs}

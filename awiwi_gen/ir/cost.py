@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from dataclasses import asdict, astuple, dataclass
 
 from awiwi_gen.ir.graph import LEAVES, Graph
@@ -43,25 +42,27 @@ class Cost:
 
 def cost(graph: Graph) -> Cost:
     """Count the operations of a graph."""
-    counts: Counter[str] = Counter()
-    angles = set()
-    for node in graph.nodes:
-        operation, *refs = node
+    nodes, angles = graph.nodes, set()
+    add = mul = div = neg = sqrt = calls = 0
+    for node in nodes:
+        operation = node[0]
+        if operation == "add":
+            add += len(node) - 2
+            neg += node[1] < 0
+            continue
         if operation in LEAVES:
             continue
-        if operation in ("add", "mul"):
-            counts[operation] += len(refs) - 1
+        if operation == "mul":
+            mul += len(node) - 2
         elif operation in ("div", "inv"):
-            counts["div"] += 1
+            div += 1
         elif operation in ("sin", "cos"):
-            angles.add(refs[0])
+            angles.add(node[1])
         elif operation == "sqrt":
-            counts["sqrt"] += 1
+            sqrt += 1
         else:
-            counts["calls"] += 1
-        if operation != "add":
-            counts["neg"] += sum(1 for r in refs if r < 0 and graph.nodes[~r][0] != "const")
-        elif refs[0] < 0:
-            counts["neg"] += 1
-    counts["neg"] += sum(1 for r in graph.roots if r < 0 and graph.nodes[~r][0] != "const")
-    return Cost(sincos=len(angles), **counts)
+            calls += 1
+        for ref in node[1:]:
+            neg += ref < 0 and nodes[~ref][0] != "const"
+    neg += sum(ref < 0 and nodes[~ref][0] != "const" for ref in graph.roots)
+    return Cost(add, mul, div, neg, sqrt, len(angles), calls)

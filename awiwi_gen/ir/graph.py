@@ -22,6 +22,7 @@ import hashlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from operator import itemgetter
 from typing import Any
 
 Node = tuple[Any, ...]
@@ -52,6 +53,10 @@ class Output:
     shape: tuple[int, ...]
     elements: tuple[Ref, ...]
 
+    def renamed(self, renamed: Sequence[Ref]) -> Output:
+        """The same output of a graph in which node i has become the reference ``renamed[i]``."""
+        return Output(self.name, self.shape, tuple(renamed[r] if r >= 0 else ~renamed[~r] for r in self.elements))
+
 
 @dataclass(frozen=True)
 class Graph:
@@ -66,7 +71,7 @@ class Graph:
         counts = [0] * len(self.nodes)
         for node in self.nodes:
             for ref in operands(node):
-                counts[node_of(ref)] += 1
+                counts[ref if ref >= 0 else ~ref] += 1
         for ref in self.roots:
             counts[node_of(ref)] += 1
         return tuple(counts)
@@ -106,8 +111,24 @@ def reachable(graph: Graph) -> list[bool]:
     for index in range(len(graph.nodes) - 1, -1, -1):
         if marked[index]:
             for ref in operands(graph.nodes[index]):
-                marked[node_of(ref)] = True
+                marked[ref if ref >= 0 else ~ref] = True
     return marked
+
+
+def levels(graph: Graph) -> list[list[int]]:
+    """The nodes that outputs depend on: leaves first, then those that are made of leaves, and so on."""
+    found: list[list[int]] = []
+    heights: list[int] = []
+    for index, (node, marked) in enumerate(zip(graph.nodes, reachable(graph), strict=True)):
+        height = 0
+        if marked and node[0] not in LEAVES:
+            height = 1 + max([heights[ref if ref >= 0 else ~ref] for ref in node[1:]])
+        heights.append(height)
+        if marked:
+            if height == len(found):
+                found.append([])
+            found[height].append(index)
+    return found
 
 
 def canonical(graph: Graph) -> Graph:
@@ -116,56 +137,55 @@ def canonical(graph: Graph) -> Graph:
     Neither the order of construction nor any hash decides; constants compare last, so that a changed
     number hardly moves anything else.
     """
-    marked = reachable(graph)
-    height = [0] * len(graph.nodes)
-    levels: dict[int, list[int]] = {}
-    for index, node in enumerate(graph.nodes):
-        if marked[index]:
-            height[index] = 1 + max((height[node_of(r)] for r in operands(node)), default=-1)
-            levels.setdefault(height[index], []).append(index)
-
+    first, *others = levels(graph) or [[]]
     nodes: list[Node] = []
     numbers: dict[Node, int] = {}
     renamed: list[Ref] = [0] * len(graph.nodes)
-
-    def new(ref: Ref) -> Ref:
-        return renamed[ref] if ref >= 0 else ~renamed[~ref]
-
-    def moved(node: Node) -> tuple[Node, bool]:
-        """The node with renamed operands, those of sums and products sorted; and whether its sign was pulled out.
-
-        An operand may have been turned since the node was made, and products keep no signs inside.
-        """
-        if node[0] in LEAVES:
-            return node, False
-        refs = [new(r) for r in node[1:]]
-        negative = False
-        if node[0] in SIGNLESS:
-            negative = node[0] not in EVEN and sum(r < 0 for r in refs) % 2 == 1
-            refs = [node_of(r) for r in refs]
-        if node[0] in VARIADIC:
-            is_sum = node[0] == "add"
-            refs.sort(key=lambda r: (is_sum == (nodes[node_of(r)][0] == "const"), node_of(r)))
-        return (node[0], *refs), negative
-
-    def key(node: Node) -> tuple[Any, ...]:
-        if node[0] in LEAVES:
-            return node
-        variables = [r for r in node[1:] if nodes[node_of(r)][0] != "const"]
-        constants = [nodes[node_of(r)][1] * (1 if r >= 0 else -1) for r in node[1:] if nodes[node_of(r)][0] == "const"]
-        return (node[0], len(variables), [node_of(r) for r in variables], variables, constants)
-
-    for level in sorted(levels):
-        found = [(*moved(graph.nodes[i]), i) for i in levels[level]]
-        for node, turned, index in sorted(found, key=lambda each: key(each[0])):
+    for index in sorted(first, key=graph.nodes.__getitem__):
+        if not nodes or nodes[-1] != graph.nodes[index]:
+            nodes.append(graph.nodes[index])
+        renamed[index] = len(nodes) - 1
+    constants = {number for number, node in enumerate(nodes) if node[0] == "const"}
+    for level in others:
+        found = [(*_moved(graph.nodes[index], renamed, nodes, constants), index) for index in level]
+        found.sort(key=_KEY)
+        for _, node, turned, index in found:
             if node[0] == "add" and node[1] < 0:
-                node, turned = (node[0], *(~r for r in node[1:])), True
+                node, turned = (node[0], *[~ref for ref in node[1:]]), True
             number = numbers.setdefault(node, len(nodes))
             if number == len(nodes):
                 nodes.append(node)
             renamed[index] = ~number if turned else number
-    outputs = tuple(Output(o.name, o.shape, tuple(new(r) for r in o.elements)) for o in graph.outputs)
-    return Graph(tuple(nodes), outputs)
+    return Graph(tuple(nodes), tuple(output.renamed(renamed) for output in graph.outputs))
+
+
+_KEY = itemgetter(0)
+
+
+def _moved(node: Node, renamed: list[Ref], nodes: list[Node], constants: set[int]) -> tuple[Any, Node, bool]:
+    """What to sort an operation by, the operation with renamed operands, and whether its sign was pulled out.
+
+    Operands of sums and products are sorted. An operand may have been turned since the node was made, and products
+    keep no signs inside.
+    """
+    operation = node[0]
+    refs = [renamed[ref] if ref >= 0 else ~renamed[~ref] for ref in node[1:]]
+    signless, turned = min(refs) >= 0, False
+    bare = refs if signless else [ref if ref >= 0 else ~ref for ref in refs]
+    if operation in SIGNLESS and not signless:
+        turned = operation not in EVEN and sum([ref < 0 for ref in refs]) % 2 == 1
+        refs, signless = bare, True
+    variables, numbers = refs, []
+    if not constants.isdisjoint(bare):
+        variables = [ref for ref in refs if node_of(ref) not in constants]
+        numbers = [ref for ref in refs if node_of(ref) in constants]
+    if operation in VARIADIC:
+        variables.sort(key=None if signless else node_of)
+        numbers.sort(key=node_of)
+        refs = variables + numbers if operation == "add" else numbers + variables
+    values = [nodes[ref][1] if ref >= 0 else -nodes[~ref][1] for ref in numbers]
+    bare = variables if signless else [node_of(ref) for ref in variables]
+    return (operation, len(variables), bare, variables, values), (operation, *refs), turned
 
 
 def prune(graph: Graph) -> Graph:

@@ -70,14 +70,12 @@ class Derivation:
         if not any(rates):
             return sympy.S.Zero
         if expr.is_Add:
-            return sympy.Add(*rates)
+            return _sum(rates)
         if expr.is_Mul:
             factors = expr.args
-            return sympy.Add(
-                *(sympy.Mul(*factors[:i], rate, *factors[i + 1 :]) for i, rate in enumerate(rates) if rate)
-            )
+            return _sum([_product(*factors[:i], rate, *factors[i + 1 :]) for i, rate in enumerate(rates) if rate])
         slopes = self._power_slope(expr) if expr.is_Pow else self._function_slopes(expr)
-        return sympy.Add(*(sympy.Mul(slope, rate) for slope, rate in zip(slopes, rates, strict=True)))
+        return _sum([_product(slope, rate) for slope, rate in zip(slopes, rates, strict=True) if rate])
 
     def _function_slopes(self, call: Expr) -> tuple[Expr, ...]:
         if call.func not in _SLOPES:
@@ -94,6 +92,28 @@ class Derivation:
         if exponent is sympy.S.NegativeOne:
             return -(self.name(power) ** 2), sympy.S.Zero
         return exponent * base ** (exponent - 1), sympy.S.Zero
+
+
+def _sum(terms: list[Expr]) -> Expr:
+    """A sum as it is written: graphs bring it into a normal form, for which SymPy would need ten times as long."""
+    parts = [part for term in terms if term for part in (term.args if term.is_Add else (term,))]
+    return sympy.Add._from_args(parts, is_commutative=True) if len(parts) > 1 else parts[0] if parts else sympy.S.Zero
+
+
+def _product(*factors: Expr) -> Expr:
+    """A product as it is written, with one number at most, first, as SymPy's own products have it."""
+    number, others = sympy.S.One, []
+    for factor in factors:
+        for part in factor.args if factor.is_Mul else (factor,):
+            if part.is_Number:
+                number *= part
+            else:
+                others.append(part)
+    if number is not sympy.S.One:
+        others.insert(0, number)
+    return (
+        sympy.Mul._from_args(others, is_commutative=True) if len(others) > 1 else others[0] if others else sympy.S.One
+    )
 
 
 # Partial derivatives of functions by each of their arguments.

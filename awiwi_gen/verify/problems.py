@@ -22,7 +22,8 @@ from awiwi_gen.verify.reference import Reference, reference
 Array = np.ndarray[Any, Any]
 
 NOISE = 2.5e-4  # error of a measured length [m]; keeps the estimate inside the limits it starts in
-ROUNDS = 30  # of Gauss-Newton at 256 bits: the residual is small, each round gains a digit at least
+ROUNDS = 30  # of Gauss-Newton at 256 bits, at most: the residual is small, each round gains a digit at least
+SETTLED = 1e-40  # largest step [rad] after which the next would change nothing that two doubles show
 
 
 class Problem(Protocol):
@@ -83,6 +84,7 @@ class LeastSquares:
         measured = [[arb(x) for x in column] for column in inputs["h"].T.astype(np.float64).tolist()]
         other = [arb(0)] * samples
         for _ in range(ROUNDS):
+            largest = 0.0
 
             def leaf(node: Node, q: Any = q) -> list[arb]:
                 return [ball(self.values[node[1]])] * samples if node[0] == "param" else self._angle(node, q, other)
@@ -95,6 +97,9 @@ class LeastSquares:
                 step = (turned * jacobian).solve(turned * residual)
                 for j in range(n):
                     q[j][s] = (q[j][s] + step[j, 0]).mid()
+                    largest = max(largest, abs(float(step[j, 0])))
+            if largest < SETTLED:
+                break
         return reference({"q": q})
 
     def mirror(self, inputs: Mapping[str, Array], own: bool) -> Mapping[str, Array]:

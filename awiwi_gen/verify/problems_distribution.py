@@ -11,7 +11,7 @@ import numpy as np
 from flint import arb
 
 from awiwi_gen.ir.algebras import Balls, Floats
-from awiwi_gen.ir.graph import Graph
+from awiwi_gen.ir.graph import Graph, prune
 from awiwi_gen.ir.interpret import evaluate
 from awiwi_gen.kernel import Solver
 from awiwi_gen.verify.reference import Reference, reference
@@ -74,6 +74,7 @@ class Distribution:
     graphs: Mapping[str, Graph]
     values: Mapping[str, Fraction]
     _known: dict[bytes, list[Answer]] = field(default_factory=dict, init=False, compare=False)
+    _curves: dict[tuple[str, ...], Graph] = field(default_factory=dict, init=False, compare=False)
 
     def sample(self, drawn: dict[str, Array]) -> dict[str, Array]:
         """Poses and limits as drawn, with demands for them."""
@@ -97,7 +98,7 @@ class Distribution:
             wishes = [_wish(s % 4, P[s], random) for s in range(len(q))]
             ends = [(float(low[s]), float(high[s])) for s in range(len(q))]
             first = [_forces(wish.share, wish.held, each) for wish, each in zip(wishes, ends, strict=True)]
-            k, slope, _ = self.curve(np.array(first).T)
+            k, slope = self.curve(np.array(first).T, "k", "slope")
             pulls = [_pull(first[s], k[:, s], slope[:, s], P[s], dP[s]) for s in range(len(q))]
             self._known[given] = [self._answer(wishes[s], pulls[s], P[s], dP[s], ends[s]) for s in range(len(q))]
         return self._known[given]
@@ -128,7 +129,7 @@ class Distribution:
                 return pull, held, excess
             held = -np.sign(prices).astype(int)
             f = _forces(wish.share, held, ends)
-            k, slope, _ = (each[:, 0] for each in self.curve(f[:, None]))
+            k, slope = (each[:, 0] for each in self.curve(f[:, None], "k", "slope"))
             pull = _pull(f, k, slope, P, dP)
         return pull, held, excess * 0
 
@@ -154,7 +155,7 @@ class Distribution:
 
     def _stiffness(self, f: Array, P: Array, dP: Array) -> Array:
         """Joint stiffness (..., n, n) of forces (..., m)."""
-        k = self.curve(f.reshape(-1, len(P)).T)[0].T.reshape(f.shape)
+        k = self.curve(f.reshape(-1, len(P)).T, "k")[0].T.reshape(f.shape)
         return np.asarray(np.einsum("...i,ia,ib->...ab", k, P, P) + np.tensordot(f, dP, 1))
 
     def tendons(self, q: Array) -> tuple[Array, Array]:
@@ -170,10 +171,14 @@ class Distribution:
             found.append(stacked.reshape(samples, *shape))
         return found[0], found[1]
 
-    def curve(self, f: Any, algebra: Any = None) -> Any:
-        """Stiffness, slope and curvature (m, samples) of forces f (m, samples), in an algebra."""
-        found = evaluate(self.graphs["tendon_stiffness"], algebra or Floats(), lambda node: f[node[2]])
-        columns = (found[name] for name in ("k", "slope", "curvature"))
+    def curve(self, f: Any, *names: str, algebra: Any = None) -> Any:
+        """Of "k", "slope" and "curvature" (m, samples) of forces f (m, samples) those asked for, in an algebra."""
+        if names not in self._curves:
+            whole = self.graphs["tendon_stiffness"]
+            outputs = tuple(output for output in whole.outputs if output.name in names)
+            self._curves[names] = prune(Graph(whole.nodes, outputs))
+        found = evaluate(self._curves[names], algebra or Floats(), lambda node: f[node[2]])
+        columns = (found[name] for name in names)
         return columns if algebra else [np.stack([np.broadcast_to(c, f.shape[1]) for c in each]) for each in columns]
 
     # -- answers at 256 bits ----------------------------------------------------------------------------------
@@ -193,14 +198,15 @@ class Distribution:
             for s, answer in enumerate(answers):
                 if answer.held[i]:
                     row[s] = arb(float(inputs["f_min" if answer.held[i] < 0 else "f_max"][s]))
-        floats, curves = self.tendons(q), self.curve(np.array([a.f for a in answers]).T)
+        floats = self.tendons(q)
+        curves = self.curve(np.array([a.f for a in answers]).T, "k", "slope", "curvature")
         systems = [
             _System(answer, inputs["tau"][s], inputs["K"][s], [c[s] for c in P], [c[s] for c in dP],
                     (floats[0][s], floats[1][s]), [each[:, s] for each in curves])
             for s, answer in enumerate(answers)
         ]  # fmt: skip
         for _ in range(ROUNDS):
-            k, slope, _ = (list(each) for each in self.curve(f, balls))
+            k, slope = (list(each) for each in self.curve(f, "k", "slope", algebra=balls))
             steps = [0.0]
             for s, system in enumerate(systems):
                 here = system.improved([row[s] for row in f], [c[s] for c in k], [c[s] for c in slope])

@@ -29,41 +29,44 @@ ONCE: tuple[Pass, ...] = (units, *AGAIN)  # if it helps
 END: tuple[Pass, ...] = (quotients, orient, signs, schedule)
 
 Stages = list[tuple[str, Graph]]
+Known = dict[tuple[Pass, Graph], Graph]  # what a pass made of a graph: different ways often meet
 
 
-def stages(graph: Graph, passes: tuple[Pass, ...], known: dict[tuple[Pass, ...], Graph] | None = None) -> Stages:
-    """The graph after each pass, with the pass's name; what begins as something `known` is not computed again."""
+def stages(graph: Graph, passes: tuple[Pass, ...], known: Known | None = None) -> Stages:
+    """The graph after each pass, with the pass's name; what is `known` is not computed again."""
     known = {} if known is None else known
     result = []
-    for count, apply in enumerate(passes, 1):
-        if passes[:count] not in known:
-            known[passes[:count]] = apply(graph)
-        graph = known[passes[:count]]
+    for apply in passes:
+        step = apply, graph
+        found = known.get(step)
+        if found is None:
+            found = known[step] = apply(graph)
+        graph = found
         result.append((apply.__name__, graph))
     return result
 
 
 def optimise(graph: Graph) -> Stages:
     """The stages of the cheapest way; the last one is what is emitted."""
-    known: dict[tuple[Pass, ...], Graph] = {}
+    known: Known = {}
     ways = [stages(graph, passes, known) for passes in BEGINNINGS]
-    rough, way = min(((_rough(way[-1][1]).weight, way) for way in ways), key=lambda found: found[0])
+    rough, way = min(((_rough(way[-1][1], known).weight, way) for way in ways), key=lambda found: found[0])
     while True:
-        further = [*way, *stages(way[-1][1], AGAIN)]
-        weight = _rough(further[-1][1]).weight
+        further = [*way, *stages(way[-1][1], AGAIN, known)]
+        weight = _rough(further[-1][1], known).weight
         if weight >= rough:
             break
         rough, way = weight, further
-    further += stages(further[-1][1], ONCE)
-    if _rough(further[-1][1]).weight < rough:
+    further += stages(further[-1][1], ONCE, known)
+    if _rough(further[-1][1], known).weight < rough:
         way = further
-    way = [*way, *stages(way[-1][1], END)]
-    plain = _rough(graph)
+    way = [*way, *stages(way[-1][1], END, known)]
+    plain = _rough(graph, known)
     if plain.weight - plain.neg > cost(way[-1][1]).weight:  # the end takes away negations, and nothing else
         return way
-    return min(stages(graph, END), way, key=lambda ended: cost(ended[-1][1]).weight)
+    return min(stages(graph, END, known), way, key=lambda ended: cost(ended[-1][1]).weight)
 
 
-def _rough(graph: Graph) -> Cost:
+def _rough(graph: Graph, known: Known) -> Cost:
     """What the end of a way will cost, but for the last few signs."""
-    return cost(orient(quotients(graph)))
+    return cost(stages(graph, (quotients, orient), known)[-1][1])

@@ -9,8 +9,9 @@ from flint import arb, ctx
 
 from awiwi_gen.ir.algebras import FLINT_NAMES, ball
 from awiwi_gen.ir.builder import Builder, rebuild
-from awiwi_gen.ir.graph import LEAVES, VARIADIC, Graph, Node, Ref
+from awiwi_gen.ir.graph import VARIADIC, Graph, Node, Ref
 
+ARITHMETIC = VARIADIC | {"inv", "div"}
 FOLDING_BITS = 400  # the rounding of a folded square root stays far below what the pass checks resolve
 
 
@@ -37,9 +38,10 @@ def fold(builder: Builder, node: Node, refs: tuple[Ref, ...]) -> Ref:
         return builder.const(node[1])
     if node[0] == "input":
         return builder.input(node[1], node[2])
-    arguments = [builder.value(ref) for ref in refs]
-    if node[0] not in VARIADIC | LEAVES | {"inv", "div"} and None not in arguments:
-        return builder.const(_value(node[0], [a for a in arguments if a is not None]))
+    if node[0] not in ARITHMETIC:
+        arguments = [builder.value(ref) for ref in refs]
+        if None not in arguments:
+            return builder.const(_value(node[0], [a for a in arguments if a is not None]))
     return builder.make(node[0], refs)
 
 

@@ -14,6 +14,8 @@ from awiwi_gen.ir.graph import Graph, Node, Ref, node_of
 def factor(graph: Graph) -> Graph:
     """The same graph with fewer multiplications."""
     uses = graph.uses
+    if not any(_has_common_factors(graph, node) for node in graph.nodes if node[0] == "add"):
+        return graph
 
     def rule(builder: Builder, node: Node, refs: tuple[Ref, ...]) -> Ref:
         if node[0] != "add":
@@ -26,6 +28,19 @@ def factor(graph: Graph) -> Graph:
         return bracket(builder, private, fixed)
 
     return rebuild(graph, rule)
+
+
+def _has_common_factors(graph: Graph, total: Node) -> bool:
+    """Whether a sum has two terms with a factor in common, one of them a product that nothing else uses."""
+    terms = [node_of(ref) for ref in total[1:]]
+    private = [t for t in terms if graph.nodes[t][0] == "mul" and graph.uses[t] == 1]
+    factors: set[Ref] = set()
+    for product in private:
+        own = graph.nodes[product][1:]
+        if not factors.isdisjoint(own):
+            return True
+        factors.update(own)
+    return bool(factors) and any(t in factors for t in terms if t not in private)
 
 
 def bracket(builder: Builder, products: list[Ref], others: list[Ref]) -> Ref:

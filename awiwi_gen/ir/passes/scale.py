@@ -16,14 +16,15 @@ from functools import cache
 
 from flint import arb, ctx, fmpq
 
-from awiwi_gen.ir.builder import Builder, copy_node, rebuild
+from awiwi_gen.ir.builder import ONE, Builder, copy_node, rebuild
 from awiwi_gen.ir.cost import cost
 from awiwi_gen.ir.graph import LEAVES, Graph, Node, Ref, node_of, operands
 
 BITS = 400
 LARGEST = 1e9  # no value is scaled by more, for single precision has a small range
-Row = dict[int, Fraction]  # a linear form in the logarithms of the factors
-Powers = dict[Fraction, Fraction]  # constant -> exponent: the logarithm on an equation's right side
+Number = int | Fraction  # mostly whole, and then an int: fractions are slow
+Row = dict[int, Number]  # a linear form in the logarithms of the factors
+Powers = dict[int, Number]  # number of a constant -> exponent: the logarithm on an equation's right side
 
 
 class _System:
@@ -37,9 +38,12 @@ class _System:
         """The same equation in the unknowns that are still free."""
         result, right = Row(), Powers(powers)
         for unknown, factor in row.items():
-            known, value = self.solved.get(unknown, ({unknown: Fraction(1)}, {}))
-            _add(result, known, factor)
-            _add(right, value, -factor)
+            if unknown in self.solved:
+                known, value = self.solved[unknown]
+                _add(result, known, factor)
+                _add(right, value, -factor)
+            else:
+                _add(result, {unknown: 1}, factor)
         return result, right
 
     def require(self, row: Row, powers: Powers) -> bool:
@@ -49,7 +53,10 @@ class _System:
             return False
         pivot = max(row)
         factor = row.pop(pivot)
-        solution = {unknown: -f / factor for unknown, f in row.items()}, {k: e / factor for k, e in powers.items()}
+        solution = (
+            {unknown: _quotient(-f, factor) for unknown, f in row.items()},
+            {k: _quotient(e, factor) for k, e in powers.items()},
+        )
         for unknown in self._in.pop(pivot, set()):
             form, value = self.solved[unknown]
             share = form.pop(pivot)
@@ -63,11 +70,17 @@ class _System:
         return True
 
 
-def _add(total: dict, other: dict, factor: Fraction) -> None:  # type: ignore[type-arg]
+def _add(total: dict[int, Number], other: dict[int, Number], factor: Number) -> None:
     for key, value in other.items():
-        total[key] = total.get(key, Fraction(0)) + factor * value
-        if not total[key]:
+        new = total.get(key, 0) + factor * value
+        if new:
+            total[key] = new
+        else:
             del total[key]
+
+
+def _quotient(a: Number, b: Number) -> Number:
+    return a * b if abs(b) == 1 else Fraction(a) / b
 
 
 def scale(graph: Graph) -> Graph:
@@ -88,7 +101,9 @@ def units(graph: Graph) -> Graph:
 def _scaled(graph: Graph, free: set[int]) -> Graph:
     """The graph with factors of its own for every value that may have one; `free` inputs have one in common."""
     group = _groups(graph, free)
-    system, wishes = _System(), []
+    constants: dict[Fraction, int] = {}
+    system = _System()
+    wishes: list[tuple[Row, Powers]] = []
     for index, node in enumerate(graph.nodes):
         if node[0] not in ("mul", "inv"):
             continue
@@ -96,10 +111,11 @@ def _scaled(graph: Graph, free: set[int]) -> Graph:
         if constant == 1:
             system.require(row, {})
         else:
-            wishes.append((row, {constant: Fraction(-1)}))
-    if not _fulfil(system, wishes):
+            wishes.append((row, {constants.setdefault(constant, len(constants)): -1}))
+    if not _fulfil(system, wishes, [*map(_log, constants)]):
         return graph
-    factors = {unknown: _value(powers) for unknown, (_, powers) in system.solved.items()}
+    numbers = list(constants)
+    factors = {unknown: _value(powers, numbers) for unknown, (_, powers) in system.solved.items()}
     if any(not 1 / LARGEST < abs(x) < LARGEST for x in factors.values()):
         return graph
     return _rewritten(graph, group, factors)
@@ -136,43 +152,47 @@ def _groups(graph: Graph, free: set[int]) -> list[int]:
 
 def _equation(graph: Graph, group: list[int], index: int, node: Node) -> tuple[Row, Fraction]:
     """Factors of a product's factors, less that of the product; and its constant."""
-    row, constant = Row(), Fraction(1)
+    row, constant = Row(), ONE
     for ref in node[1:]:
         if graph.nodes[ref][0] == "const":
             constant = graph.nodes[ref][1]
         elif group[ref] >= 0:
-            _add(row, {group[ref]: Fraction(1)}, Fraction(-1 if node[0] == "inv" else 1))
+            _add(row, {group[ref]: 1}, -1 if node[0] == "inv" else 1)
     if group[index] >= 0:
-        _add(row, {group[index]: Fraction(1)}, Fraction(-1))
+        _add(row, {group[index]: 1}, -1)
     return row, constant
 
 
-def _fulfil(system: _System, wishes: list[tuple[Row, Powers]]) -> int:
+def _fulfil(system: _System, wishes: list[tuple[Row, Powers]], logs: list[float]) -> int:
     """Add the equations that most constants wish for, until none is left open; returns how many were added."""
     wishes = [system.reduced(*wish) for wish in wishes]
-    names = [_normal(*wish) if wish[0] else () for wish in wishes]
+    names = [_normal(*wish, logs) for wish in wishes]
     counts = Counter(name for name in names if name)
     added = 0
     while counts:
         best = max(counts.values())
         row, powers = next(wish for wish, name in zip(wishes, names, strict=True) if name and counts[name] == best)
         added += system.require(row, powers)
+        pivot = max(row)
         for index, wish in enumerate(wishes):
-            if max(row) in wish[0]:  # what the new equation has settled; no other wish has changed
+            if pivot in wish[0]:  # what the new equation has settled; no other wish has changed
                 counts[names[index]] -= 1
+                if not counts[names[index]]:
+                    del counts[names[index]]
                 wishes[index] = system.reduced(*wish)
-                names[index] = _normal(*wishes[index]) if wishes[index][0] else ()
-                counts[names[index]] += 1
-        counts = +counts
-        del counts[()]
+                names[index] = _normal(*wishes[index], logs)
+                if names[index]:
+                    counts[names[index]] += 1
     return added
 
 
-def _normal(row: Row, powers: Powers) -> tuple[object, ...]:
-    """Equal for wishes that one equation fulfils."""
+def _normal(row: Row, powers: Powers, logs: list[float]) -> tuple[object, ...]:
+    """Equal for wishes that one equation fulfils; empty where nothing is open."""
+    if not row:
+        return ()
     pivot = row[min(row)]
-    value = sum(float(e / pivot) * _log(k) for k, e in powers.items())
-    return (*((u, row[u] / pivot) for u in sorted(row)), round(value, 9))
+    value = sum(float(_quotient(e, pivot)) * logs[k] for k, e in powers.items())
+    return (*((u, _quotient(row[u], pivot)) for u in sorted(row)), round(value, 9))
 
 
 @cache
@@ -181,11 +201,12 @@ def _log(value: Fraction) -> float:
         return float(arb(fmpq(value.numerator, value.denominator)).log().mid())
 
 
-def _value(powers: Powers) -> Fraction:
+def _value(powers: Powers, constants: list[Fraction]) -> Fraction:
     """The product of constants to their exponents: exact if these are integers, else at 400 bits."""
-    result = Fraction(1)
+    result = ONE
     with ctx.workprec(BITS):
-        for k, e in powers.items():
+        for number, e in powers.items():
+            k = constants[number]
             if e.denominator == 1:
                 result *= k**e.numerator
             else:
@@ -196,7 +217,7 @@ def _value(powers: Powers) -> Fraction:
 
 
 def _rewritten(graph: Graph, group: list[int], factors: dict[int, Fraction]) -> Graph:
-    scales = [factors.get(one, Fraction(1)) for one in group]
+    scales = [factors.get(one, ONE) for one in group]
     position = {node: index for index, node in enumerate(graph.nodes)}
 
     def rule(builder: Builder, node: Node, refs: tuple[Ref, ...]) -> Ref:

@@ -29,7 +29,7 @@ def share_products(graph: Graph) -> Graph:
 def _share(graph: Graph, operation: str) -> Graph:
     groups = {i: list(node[1:]) for i, node in enumerate(graph.nodes) if node[0] == operation}
     pairs = _extract(groups, first_free=len(graph.nodes))
-    return _replay(graph, operation, groups, pairs)
+    return _replay(graph, operation, groups, pairs) if pairs else graph
 
 
 def _normal(a: Ref, b: Ref) -> tuple[Pair, bool]:
@@ -105,13 +105,16 @@ def _replay(graph: Graph, operation: str, groups: dict[int, list[Ref]], pairs: d
     stack = [node_of(ref) for ref in reversed(list(graph.roots))]
     while stack:
         index = stack[-1]
-        missing = [node_of(r) for r in members(index) if node_of(r) not in done]
-        if index not in done and missing:
+        if index in done:
+            stack.pop()
+            continue
+        terms = members(index)
+        missing = [n for n in map(node_of, terms) if n not in done]
+        if missing:
             stack += missing
             continue
         stack.pop()
-        if index not in done:
-            refs = tuple(new(r) for r in members(index))
-            grouped = index in pairs or index in groups
-            done[index] = builder.make(operation, refs) if grouped else copy_node(builder, graph.nodes[index], refs)
+        refs = tuple(map(new, terms))
+        grouped = index in pairs or index in groups
+        done[index] = builder.make(operation, refs) if grouped else copy_node(builder, graph.nodes[index], refs)
     return builder.graph(Output(o.name, o.shape, tuple(new(r) for r in o.elements)) for o in graph.outputs)

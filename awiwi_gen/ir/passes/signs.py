@@ -19,9 +19,11 @@ class _Signs:
         for index, node in enumerate(graph.nodes):
             for ref in set(map(node_of, operands(node))):
                 self.users[ref].append(index)
+        self.constant = [node[0] in ("mul", "div") and _constant(graph.nodes, node) is not None for node in graph.nodes]
         self.results: list[list[Ref]] = [[] for _ in graph.nodes]
         for ref in graph.roots:
             self.results[node_of(ref)].append(ref)
+        self.spent = [self.cost(index) for index in range(len(graph.nodes))]
 
     def minus(self, ref: Ref) -> bool:
         """Whether a reference needs the negative of what is computed."""
@@ -29,16 +31,16 @@ class _Signs:
 
     def cost(self, index: int) -> int:
         """Negations that a node's own computation and the results it is take."""
-        node = self.nodes[index]
-        own = sum(self.minus(ref) for ref in self.results[index] if node[0] != "const")
-        if node[0] in LEAVES:
+        node, turned, results = self.nodes[index], self.turned, self.results[index]
+        own = sum(map(self.minus, results)) if results and node[0] != "const" else 0
+        if node[0] in LEAVES or self.constant[index]:
             return own
+        minuses: list[bool] = [(ref < 0) != turned[ref if ref >= 0 else ~ref] for ref in node[1:]]
         if node[0] == "add":
-            return own + all(self.minus(ref) != self.turned[index] for ref in node[1:])
+            return own + int(turned[index] not in minuses)
         if node[0] in ("mul", "div"):
-            odd = sum(self.minus(ref) for ref in node[1:]) % 2 == 1
-            return own + (odd != self.turned[index] and _constant(self.nodes, node) is None)
-        return own + sum(self.minus(ref) for ref in node[1:])
+            return own + int((sum(minuses) % 2 == 1) != turned[index])
+        return own + sum(minuses)
 
     def willing(self, index: int) -> set[int]:
         """The terms of a sum that take a sign at no cost: products with a constant that nothing else uses."""
@@ -51,14 +53,19 @@ class _Signs:
     def gain(self, group: set[int]) -> int:
         """Negations saved by turning these nodes."""
         near = group | {user for index in group for user in self.users[index]}
-        before = sum(map(self.cost, near))
-        self.turn(group)
-        saved = before - sum(map(self.cost, near))
-        self.turn(group)
-        return saved
+        before = sum([self.spent[index] for index in near])
+        self._turn(group)
+        after = sum(map(self.cost, near))
+        self._turn(group)
+        return before - after
 
     def turn(self, group: set[int]) -> None:
         """Compute the negatives of these nodes instead."""
+        self._turn(group)
+        for near in group | {user for index in group for user in self.users[index]}:
+            self.spent[near] = self.cost(near)
+
+    def _turn(self, group: set[int]) -> None:
         for index in group:
             self.turned[index] = not self.turned[index]
 
