@@ -4,7 +4,7 @@
  * Source: eq. 5.2, 5.3, table 5.1.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   out  T[4][4] in 1, m
- * Cost: 29 add, 45 mul, 1 div, 3 neg, 1 sqrt, 5 sincos.
+ * Cost: 28 add, 44 mul, 1 div, 3 neg, 1 sqrt, 5 sincos.
  * Inputs: sha256 28edf41a51f84ef24222facbdc6e1021f809ccdd8b122d41df2ba55b8d1b95d9.
  */
 #include <math.h>
@@ -22,38 +22,40 @@ void awiwi_fifth_fingertip_pose(const double q[restrict 4], double T[restrict 16
     const double t2 = 0.7692307692307693*q[3] + t1;
     const awiwi_turn4 a0 = awiwi_sincos4(t2, t0, q[2], t1);
     const double t3 = 0.01*a0.sin[1];
-    const double t4 = 0.00024*a0.cos[1] - 0.000244;
+    const double t4 = 0.00012*a0.cos[1] - 0.000122;
     const double t5 = 0.01*a0.cos[1];
     const double t6 = 1.0/t4;
-    const double t7 = 0.5*(t4 + 0.000121 - 5.625e-05);
-    const double t8 = sqrt(-5.625e-05*t4 - t7*t7);
+    const double t7 = 33.610469291294464*t6;
+    const double t8 = 57.5741330674062*t6;
     const double t9 = t5 - 0.012;
-    const double t10 = t6*(t3*t7 + t9*t8);
-    const double t11 = t6*(t9*t7 - t3*t8);
-    const double t12 = 115.1482661348124*t10 + 67.22093858258893*t11;
-    const double t13 = 67.22093858258893*t10 - 115.1482661348124*t11;
-    double s14 = 0.033*a0.sin[2] + 0.018*a0.sin[0] - 0.006;
-    double s15 = 0.033*a0.cos[2] + 0.018*a0.cos[0] + 0.006;
-    s14 += 0.022*a0.sin[3];
-    s15 += 0.022*a0.cos[3];
-    double s16 = t5 - s14*t13;
-    double s17 = t3 + s14*t12;
+    const double t10 = t4 + 3.2375e-05;
+    const double t11 = sqrt(-0.0001125*t4 - t10*t10);
+    const double t12 = t9*t10 - t3*t11;
+    const double t13 = t3*t10 + t9*t11;
+    const double t14 = t7*t12 + t8*t13;
+    const double t15 = t7*t13 - t8*t12;
+    double s16 = 0.033*a0.sin[2] + 0.018*a0.sin[0] - 0.006;
+    double s17 = 0.033*a0.cos[2] + 0.018*a0.cos[0] + 0.006;
+    s16 += 0.022*a0.sin[3];
+    s17 += 0.022*a0.cos[3];
+    double s18 = t5 - s16*t15;
+    double s19 = t3 + s16*t14;
     const awiwi_turn a1 = awiwi_sincos(q[1]);
     T[6] = -a1.cos;
-    const double t18 = 0.0036*a1.sin - 0.004 - a1.cos*s15;
-    s16 -= t18*t12;
-    T[3] = s16;
-    T[7] = a1.sin*s15 + 0.0036*a1.cos;
-    s17 -= t18*t13;
-    T[11] = s17;
-    const double t19 = a1.cos*t12;
-    T[0] = a0.cos[0]*t19 - a0.sin[0]*t13;
-    T[1] = -(a0.cos[0]*t13) - a0.sin[0]*t19;
-    T[2] = a1.sin*t12;
-    const double t20 = a1.cos*t13;
-    T[8] = a0.sin[0]*t12 + a0.cos[0]*t20;
+    const double t20 = 0.0036*a1.sin - 0.004 - a1.cos*s17;
+    s18 -= t20*t14;
+    T[3] = s18;
+    T[7] = a1.sin*s17 + 0.0036*a1.cos;
+    s19 -= t20*t15;
+    T[11] = s19;
+    const double t21 = a1.cos*a0.cos[0];
+    T[0] = t21*t14 - a0.sin[0]*t15;
+    const double t22 = a1.cos*a0.sin[0];
+    T[1] = -(a0.cos[0]*t15) - t22*t14;
+    T[2] = a1.sin*t14;
     T[4] = a1.sin*a0.cos[0];
-    T[9] = a0.cos[0]*t12 - a0.sin[0]*t20;
     T[5] = -(a1.sin*a0.sin[0]);
-    T[10] = a1.sin*t13;
+    T[8] = a0.sin[0]*t14 + t21*t15;
+    T[9] = a0.cos[0]*t14 - t22*t15;
+    T[10] = a1.sin*t15;
 }

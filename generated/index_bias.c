@@ -6,7 +6,7 @@
  *   in   qd[4] in rad/s, -20 to 20
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  bias[4] in N m
- * Cost: 55 add, 73 mul, 4 sincos.
+ * Cost: 54 add, 72 mul, 4 sincos.
  * Inputs: sha256 e81c8580817eac8f68e2015b14a5b569106ad1f3f949b7d278d0a2f0f5760292.
  */
 #include "trig.h"
@@ -35,34 +35,34 @@ void awiwi_index_bias(const double q[restrict 4], const double qd[restrict 4], c
     const double t15 = 0.04038*a0.sin[0];
     const double t16 = t13 + 0.006;
     const double t17 = 1.2e-06*a0.cos[1] + 0.0002062*a0.sin[1];
-    const double t18 = a0.sin[1]*(5.22042e-06*a0.cos[1] - 2.28e-08*a0.sin[1] - 9.538979534520451e-07*a0.sin[2]) + t16*t17 + 1.14e-08;
-    const double t19 = 0.0298*a0.cos[1];
-    const double t20 = 3.2009998437988094e-05*a0.cos[2];
-    const double t21 = a0.cos[2]*(9.716427232979388e-09*a0.cos[2] - 3.7031708931917554e-07*a0.sin[2]) + (t16 + t19)*t20 - 4.858213616489694e-09;
-    s5 -= 2.0*qd[0]*(qd[1]*s10 + t2*t18 + t11*t21);
-    const double t22 = qd[0]*qd[0];
-    const double t23 = 0.0298*a0.sin[1];
-    double s24 = t22*s10 - g[2]*t6;
-    const double t25 = g[2] + t3*t15;
-    double s26 = t22*t18 - t25*t7;
-    double s27 = t22*t21 + (t25 + t4*t23)*t8;
-    const double t28 = t12*t8;
-    const double t29 = t12*t20;
-    s26 -= t19*t29;
-    s26 -= t23*t28;
-    s24 += t15*(t4*t7 - t28);
-    s24 -= t13*(t4*t17 + t29);
-    const double t30 = g[0]*a0.cos[3] + g[1]*a0.sin[3];
-    s5 += 3.22e-05*t30;
+    const double t18 = 9.538979534520451e-07*a0.sin[2];
+    const double t19 = 3.2009998437988094e-05*a0.cos[2];
+    double s20 = a0.cos[2]*(9.716427232979388e-09*a0.cos[2] - 3.7031708931917554e-07*a0.sin[2]) - 4.858213616489694e-09;
+    const double t21 = a0.sin[1]*(5.22042e-06*a0.cos[1] - 2.28e-08*a0.sin[1] - t18) + t16*t17 + 1.14e-08;
+    const double t22 = 0.0298*a0.cos[1];
+    s20 += (t16 + t22)*t19;
+    s5 -= 2.0*qd[0]*(qd[1]*s10 + t2*t21 + t11*s20);
+    const double t23 = qd[0]*qd[0];
+    const double t24 = a0.sin[1]*t18 + t22*t19;
+    double s25 = t23*s20 + t4*t24;
+    double s26 = t23*t21 - t12*t24;
+    double s27 = t23*s10 - g[2]*t6;
+    const double t28 = g[2] + t3*t15;
+    s25 += t28*t8;
+    s26 -= t28*t7;
+    s27 += t15*(t4*t7 - t12*t8);
+    s27 -= t13*(t4*t17 + t12*t19);
+    const double t29 = g[0]*a0.cos[3] + g[1]*a0.sin[3];
+    s5 += 3.22e-05*t29;
     s5 += (g[0]*a0.sin[3] - g[1]*a0.cos[3])*(t6 + t9 + 0.0001245);
     bias[0] = s5;
-    const double t31 = t3*t13 + t30;
-    s27 += (t4*t19 + t31)*t20;
-    bias[3] = s27;
-    s26 += t31*t17;
-    s26 += s27;
+    const double t30 = t3*t13 + t29;
+    s25 += t30*t19;
+    bias[3] = s25;
+    s26 += t30*t17;
+    s26 += s25;
     bias[2] = s26;
-    s24 += t14*t30;
-    s24 += s26;
-    bias[1] = s24;
+    s27 += t14*t29;
+    s27 += s26;
+    bias[1] = s27;
 }

@@ -5,7 +5,7 @@
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   qd[4] in rad/s, -20 to 20
  *   out  C[4][4] in N m s/rad
- * Cost: 46 add, 49 mul, 2 neg, 3 sincos.
+ * Cost: 46 add, 47 mul, 2 neg, 3 sincos.
  * Inputs: sha256 282282bd680841d03234ba2709f06e709554a528cf56b8719c5e0b6114109589.
  */
 #include "trig.h"
@@ -18,48 +18,51 @@ void awiwi_index_coriolis_matrix(const double q[restrict 4], const double qd[res
     const double t1 = q[3] + t0 - 1.5458015331759765;
     const awiwi_turn3 a0 = awiwi_sincos3(q[1], t0, t1);
     const double t2 = a0.cos[0] + 0.1485884101040119;
-    const double t3 = 1.2925637369259591e-06*a0.cos[2];
-    double s4 = 4.858213616489694e-09 - (t2 + 0.7379891035165924*a0.cos[1])*t3;
-    s4 -= a0.cos[2]*(9.716427232979388e-09*a0.cos[2] - 3.7031708931917554e-07*a0.sin[2]);
-    const double t5 = 4.8456e-08*a0.cos[1] + 8.326356e-06*a0.sin[1];
-    double s6 = t2*t5 + 1.14e-08 - s4;
-    s6 += a0.sin[1]*(5.22042e-06*a0.cos[1] - 2.28e-08*a0.sin[1] - 9.538979534520451e-07*a0.sin[2]);
-    const double t7 = 8.326356e-06*a0.cos[1] - 4.8456e-08*a0.sin[1] - 1.2925637369259591e-06*a0.sin[2];
-    const double t8 = a0.cos[0]*(t3 + t5) - a0.sin[0]*t7;
-    const double t9 = a0.sin[0]*(t7 + 2.1654944e-05*a0.cos[0] + 3.6348e-06 - 7.72e-08*a0.sin[0]) + 1.8e-08*a0.cos[0] + s6 + 3.86e-08;
-    const double t10 = 1.2925637369259591e-06*(a0.cos[0]*a0.cos[2] + a0.sin[0]*a0.sin[2]);
-    const double t11 = 9.538979534520451e-07*(a0.cos[1]*a0.cos[2] + a0.sin[1]*a0.sin[2]);
-    double s12 = qd[3]*s4 - qd[1]*t9;
-    s12 -= qd[2]*s6;
-    C[0] = s12;
-    const double t13 = qd[2] + qd[1];
-    const double t14 = qd[3] + t13;
-    const double t15 = t14*(1.0746642198887319e-09*a0.cos[2] + 1.666789209732727e-07*a0.sin[2]);
-    const double t16 = t13*(7.5326e-07*a0.cos[1] - 5.8e-09*a0.sin[1]) - t15;
-    double s17 = qd[1]*(1.244876e-06*a0.cos[0] - 9.6e-09*a0.sin[0]) + t16;
-    const double t18 = qd[0]*t9;
-    C[4] = t18;
-    s17 -= t18;
-    C[1] = s17;
-    const double t19 = qd[0]*s6;
-    C[8] = t19;
-    C[2] = t16 - t19;
-    const double t20 = qd[0]*s4;
-    C[12] = -t20;
-    C[3] = t20 - t15;
-    const double t21 = qd[1]*t8;
-    const double t22 = t13*t11;
-    C[14] = t22;
-    const double t23 = -t14*t11;
-    C[11] = t23;
-    const double t24 = t14*t10;
-    double s25 = t13*(t10 - t8) - t24;
-    C[7] = t23 - t24;
-    const double t26 = t23 + t22;
-    C[10] = t26;
-    s25 += t26;
-    C[6] = s25;
-    C[5] = s25 + t21;
-    C[9] = t26 + t21;
-    C[13] = qd[1]*t10 + t22;
+    const double t3 = 0.7379891035165924*a0.cos[1];
+    const double t4 = 1.2925637369259591e-06*a0.cos[2];
+    double s5 = 4.858213616489694e-09 - (t2 + t3)*t4;
+    s5 -= a0.cos[2]*(9.716427232979388e-09*a0.cos[2] - 3.7031708931917554e-07*a0.sin[2]);
+    const double t6 = 4.8456e-08*a0.cos[1] + 8.326356e-06*a0.sin[1];
+    double s7 = t2*t6 + 1.14e-08 - s5;
+    const double t8 = 9.538979534520451e-07*a0.sin[2];
+    const double t9 = 1.2925637369259591e-06*a0.sin[2];
+    const double t10 = t3*t4 + a0.sin[1]*t8;
+    s7 += a0.sin[1]*(5.22042e-06*a0.cos[1] - t8 - 2.28e-08*a0.sin[1]);
+    const double t11 = a0.cos[0]*t4 + a0.sin[0]*t9;
+    const double t12 = 8.326356e-06*a0.cos[1] - t9 - 4.8456e-08*a0.sin[1];
+    const double t13 = a0.cos[0]*(t6 + t4) - a0.sin[0]*t12;
+    const double t14 = a0.sin[0]*(t12 + 2.1654944e-05*a0.cos[0] + 3.6348e-06 - 7.72e-08*a0.sin[0]) + 1.8e-08*a0.cos[0] + s7 + 3.86e-08;
+    double s15 = qd[3]*s5 - qd[1]*t14;
+    s15 -= qd[2]*s7;
+    C[0] = s15;
+    const double t16 = qd[2] + qd[1];
+    const double t17 = qd[3] + t16;
+    const double t18 = t17*(1.0746642198887319e-09*a0.cos[2] + 1.666789209732727e-07*a0.sin[2]);
+    const double t19 = t16*(7.5326e-07*a0.cos[1] - 5.8e-09*a0.sin[1]) - t18;
+    double s20 = qd[1]*(1.244876e-06*a0.cos[0] - 9.6e-09*a0.sin[0]) + t19;
+    const double t21 = qd[0]*t14;
+    C[4] = t21;
+    s20 -= t21;
+    C[1] = s20;
+    const double t22 = qd[0]*s7;
+    C[8] = t22;
+    C[2] = t19 - t22;
+    const double t23 = qd[0]*s5;
+    C[12] = -t23;
+    C[3] = t23 - t18;
+    const double t24 = qd[1]*t13;
+    const double t25 = t16*t10;
+    C[14] = t25;
+    const double t26 = -t17*t10;
+    C[11] = t26;
+    const double t27 = t17*t11;
+    double s28 = t16*(t11 - t13) - t27;
+    C[7] = t26 - t27;
+    const double t29 = t26 + t25;
+    C[10] = t29;
+    s28 += t29;
+    C[6] = s28;
+    C[5] = s28 + t24;
+    C[9] = t29 + t24;
+    C[13] = qd[1]*t11 + t25;
 }

@@ -4,7 +4,7 @@
  * Source: eq. 2.17, 5.4.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   out  M[4][4] in kg m^2
- * Cost: 33 add, 32 mul, 3 sincos.
+ * Cost: 33 add, 30 mul, 3 sincos.
  * Inputs: sha256 3111373cde589691558afe839d151a7b960ef034f13613b5010ff777ad2e903d.
  */
 #include "trig.h"
@@ -16,34 +16,36 @@ void awiwi_index_mass_matrix(const double q[restrict 4], double M[restrict 16])
     const double t0 = q[2] + q[1];
     const double t1 = q[3] + t0 - 1.5458015331759765;
     const awiwi_turn3 a0 = awiwi_sincos3(t0, t1, q[1]);
-    double s2 = a0.cos[0]*(5.22042e-06*a0.cos[0] - 2.28e-08*a0.sin[0] - 1.9077959069040903e-06*a0.sin[1]) + 1.5542885446595878e-06;
-    s2 -= 3.6e-08*a0.sin[2];
-    const double t3 = a0.sin[0] + 26.67499869832341*a0.sin[1] - 171.83333333333334*a0.cos[0];
-    s2 -= 1.44e-08*t3;
-    s2 += a0.cos[2]*(2.1654944e-05*a0.cos[2] + 7.2696e-06 - 7.72e-08*a0.sin[2] - 9.6912e-08*t3);
-    s2 -= a0.cos[1]*(3.7031708931917554e-07*a0.cos[1] + 9.716427232979388e-09*a0.sin[1]);
-    M[0] = s2;
-    const double t4 = 1.666789209732727e-07*a0.cos[1] - 1.0746642198887319e-09*a0.sin[1];
-    M[3] = t4;
-    M[12] = t4;
-    const double t5 = t4 + 5.8e-09*a0.cos[0] + 7.5326e-07*a0.sin[0];
-    M[2] = t5;
-    M[8] = t5;
-    const double t6 = t5 + 9.6e-09*a0.cos[2] + 1.244876e-06*a0.sin[2];
-    M[1] = t6;
-    M[4] = t6;
-    const double t7 = 9.538979534520451e-07*(a0.cos[0]*a0.sin[1] - a0.sin[0]*a0.cos[1]);
-    const double t8 = 4.8456e-08*(a0.cos[2]*t3 - a0.sin[2]*(a0.cos[0] + 171.83333333333334*a0.sin[0] + 26.67499869832341*a0.cos[1]));
-    const double t9 = 4.1116e-07 - t7;
-    M[11] = t9;
-    M[14] = t9;
-    const double t10 = t9 + 5.2959e-06 - t7;
-    M[10] = t10;
-    const double t11 = t10 - t8;
-    M[6] = t11;
-    M[9] = t11;
-    M[5] = t11 + 2.1836744e-05 - t8;
-    const double t12 = t9 - 1.2925637369259591e-06*(a0.cos[2]*a0.sin[1] - a0.sin[2]*a0.cos[1]);
-    M[7] = t12;
-    M[13] = t12;
+    const double t2 = a0.sin[0] - 171.83333333333334*a0.cos[0];
+    const double t3 = t2 + 26.67499869832341*a0.sin[1];
+    double s4 = a0.cos[0]*(5.22042e-06*a0.cos[0] - 2.28e-08*a0.sin[0] - 1.9077959069040903e-06*a0.sin[1]) + 3.079212435233161e-08*t3;
+    s4 += 2.8733063545336782e-06;
+    const double t5 = (a0.cos[2] + 0.46632124352331605)*(2.1654944e-05*a0.cos[2] - 9.6912e-08*t3 - 2.828560414507772e-06 - 7.72e-08*a0.sin[2]);
+    s4 += t5;
+    s4 -= a0.cos[1]*(3.7031708931917554e-07*a0.cos[1] + 9.716427232979388e-09*a0.sin[1]);
+    M[0] = s4;
+    const double t6 = 1.666789209732727e-07*a0.cos[1] - 1.0746642198887319e-09*a0.sin[1];
+    M[3] = t6;
+    M[12] = t6;
+    const double t7 = t6 + 5.8e-09*a0.cos[0] + 7.5326e-07*a0.sin[0];
+    M[2] = t7;
+    M[8] = t7;
+    const double t8 = t7 + 9.6e-09*a0.cos[2] + 1.244876e-06*a0.sin[2];
+    M[1] = t8;
+    M[4] = t8;
+    const double t9 = 9.538979534520451e-07*(a0.cos[0]*a0.sin[1] - a0.sin[0]*a0.cos[1]);
+    const double t10 = 1.2925637369259591e-06*(a0.cos[2]*a0.sin[1] - a0.sin[2]*a0.cos[1]);
+    const double t11 = 4.8456e-08*(a0.cos[2]*t2 - a0.sin[2]*(a0.cos[0] + 171.83333333333334*a0.sin[0])) + t10;
+    const double t12 = 4.1116e-07 - t9;
+    M[11] = t12;
+    M[14] = t12;
+    const double t13 = t12 + 5.2959e-06 - t9;
+    M[10] = t13;
+    const double t14 = t13 - t11;
+    M[6] = t14;
+    M[9] = t14;
+    M[5] = t14 + 2.1836744e-05 - t11;
+    const double t15 = t12 - t10;
+    M[7] = t15;
+    M[13] = t15;
 }

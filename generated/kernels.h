@@ -20,7 +20,7 @@ extern const char awiwi_model_digest[65];
  *   out  curvature[8] in 1/(N m)
  * Returns 0 where every tension is on its spring's curve, give or take a hundredth; elsewhere 1, and
  * what is not defined is NaN.
- * Cost: 198 add, 229 mul, 7 calls.
+ * Cost: 198 add, 198 mul, 7 calls.
  */
 int awiwi_thumb_tendon_stiffness(const double tension[8], double k[8], double slope[8], double curvature[8]);
 
@@ -76,7 +76,7 @@ void awiwi_thumb_mass_matrix(const double q[4], double M[16]);
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   in   qd[4] in rad/s, -20 to 20
  *   out  C[4][4] in N m s/rad
- * Cost: 133 add, 138 mul, 1 neg, 3 sincos.
+ * Cost: 128 add, 129 mul, 1 neg, 3 sincos.
  */
 void awiwi_thumb_coriolis_matrix(const double q[4], const double qd[4], double C[16]);
 
@@ -97,7 +97,7 @@ void awiwi_thumb_gravity(const double q[4], const double g[3], double gravity[4]
  *   in   qd[4] in rad/s, -20 to 20
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  bias[4] in N m
- * Cost: 108 add, 135 mul, 4 sincos.
+ * Cost: 108 add, 131 mul, 4 sincos.
  */
 void awiwi_thumb_bias(const double q[4], const double qd[4], const double g[3], double bias[4]);
 
@@ -109,7 +109,7 @@ void awiwi_thumb_bias(const double q[4], const double qd[4], const double g[3], 
  *   in   qdd[4] in rad/s^2, -2000 to 2000
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  tau[4] in N m
- * Cost: 135 add, 145 mul, 4 sincos.
+ * Cost: 135 add, 141 mul, 4 sincos.
  */
 void awiwi_thumb_inverse_dynamics(const double q[4], const double qd[4], const double qdd[4], const double g[3], double tau[4]);
 
@@ -122,7 +122,7 @@ void awiwi_thumb_inverse_dynamics(const double q[4], const double qd[4], const d
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  dtau_dq[4][4] in N m/rad
  *   out  dtau_dqd[4][4] in N m s/rad
- * Cost: 374 add, 422 mul, 1 neg, 4 sincos.
+ * Cost: 372 add, 393 mul, 1 neg, 4 sincos.
  */
 void awiwi_thumb_inverse_dynamics_derivatives(const double q[4], const double qd[4], const double qdd[4], const double g[3], double dtau_dq[16], double dtau_dqd[16]);
 
@@ -134,7 +134,7 @@ void awiwi_thumb_inverse_dynamics_derivatives(const double q[4], const double qd
  *   in   tau[4] in N m, -1 to 1
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  qdd[4] in rad/s^2
- * Cost: 171 add, 190 mul, 3 div, 1 neg, 4 sincos.
+ * Cost: 170 add, 184 mul, 3 div, 1 neg, 4 sincos.
  */
 void awiwi_thumb_forward_dynamics(const double q[4], const double qd[4], const double tau[4], const double g[3], double qdd[4]);
 
@@ -147,7 +147,7 @@ void awiwi_thumb_forward_dynamics(const double q[4], const double qd[4], const d
  *   out  M[4][4] in kg m^2
  *   out  C[4][4] in N m s/rad
  *   out  gravity[4] in N m
- * Cost: 156 add, 172 mul, 1 neg, 4 sincos.
+ * Cost: 152 add, 161 mul, 1 neg, 4 sincos.
  */
 void awiwi_thumb_dynamics(const double q[4], const double qd[4], const double g[3], double M[16], double C[16], double gravity[4]);
 
@@ -196,7 +196,7 @@ void awiwi_thumb_coupling_derivative(const double q[4], double dP[128]);
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   in   f[8] in N, 0 to 100
  *   out  tau[4] in N m
- * Cost: 60 add, 54 mul, 4 div, 4 sqrt, 2 sincos.
+ * Cost: 61 add, 52 mul, 4 div, 4 sqrt, 2 sincos.
  */
 void awiwi_thumb_joint_torque(const double q[4], const double f[8], double tau[4]);
 
@@ -284,7 +284,7 @@ int awiwi_thumb_base_estimate_by_gradient(const double h[4], const double start[
  *   out  curvature[8] in 1/(N m)
  * Returns 0 where every tension is on its spring's curve, give or take a hundredth; elsewhere 1, and
  * what is not defined is NaN.
- * Cost: 198 add, 229 mul, 7 calls.
+ * Cost: 198 add, 198 mul, 7 calls.
  */
 int awiwi_index_tendon_stiffness(const double tension[8], double k[8], double slope[8], double curvature[8]);
 
@@ -330,7 +330,7 @@ void awiwi_index_pose_and_jacobian(const double q[4], double T[16], double J[24]
  * Source: eq. 2.17, 5.4.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   out  M[4][4] in kg m^2
- * Cost: 33 add, 32 mul, 3 sincos.
+ * Cost: 33 add, 30 mul, 3 sincos.
  */
 void awiwi_index_mass_matrix(const double q[4], double M[16]);
 
@@ -340,7 +340,7 @@ void awiwi_index_mass_matrix(const double q[4], double M[16]);
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   qd[4] in rad/s, -20 to 20
  *   out  C[4][4] in N m s/rad
- * Cost: 46 add, 49 mul, 2 neg, 3 sincos.
+ * Cost: 46 add, 47 mul, 2 neg, 3 sincos.
  */
 void awiwi_index_coriolis_matrix(const double q[4], const double qd[4], double C[16]);
 
@@ -361,7 +361,7 @@ void awiwi_index_gravity(const double q[4], const double g[3], double gravity[4]
  *   in   qd[4] in rad/s, -20 to 20
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  bias[4] in N m
- * Cost: 55 add, 73 mul, 4 sincos.
+ * Cost: 54 add, 72 mul, 4 sincos.
  */
 void awiwi_index_bias(const double q[4], const double qd[4], const double g[3], double bias[4]);
 
@@ -373,7 +373,7 @@ void awiwi_index_bias(const double q[4], const double qd[4], const double g[3], 
  *   in   qdd[4] in rad/s^2, -2000 to 2000
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  tau[4] in N m
- * Cost: 82 add, 101 mul, 4 sincos.
+ * Cost: 81 add, 98 mul, 4 sincos.
  */
 void awiwi_index_inverse_dynamics(const double q[4], const double qd[4], const double qdd[4], const double g[3], double tau[4]);
 
@@ -386,7 +386,7 @@ void awiwi_index_inverse_dynamics(const double q[4], const double qd[4], const d
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  dtau_dq[4][4] in N m/rad
  *   out  dtau_dqd[4][4] in N m s/rad
- * Cost: 164 add, 197 mul, 1 neg, 4 sincos.
+ * Cost: 161 add, 191 mul, 4 sincos.
  */
 void awiwi_index_inverse_dynamics_derivatives(const double q[4], const double qd[4], const double qdd[4], const double g[3], double dtau_dq[16], double dtau_dqd[16]);
 
@@ -398,7 +398,7 @@ void awiwi_index_inverse_dynamics_derivatives(const double q[4], const double qd
  *   in   tau[4] in N m, -1 to 1
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  qdd[4] in rad/s^2
- * Cost: 95 add, 119 mul, 3 div, 2 neg, 4 sincos.
+ * Cost: 94 add, 119 mul, 3 div, 2 neg, 4 sincos.
  */
 void awiwi_index_forward_dynamics(const double q[4], const double qd[4], const double tau[4], const double g[3], double qdd[4]);
 
@@ -423,7 +423,7 @@ void awiwi_index_dynamics(const double q[4], const double qd[4], const double g[
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  kinetic[1] in J
  *   out  potential[1] in J
- * Cost: 43 add, 57 mul, 4 sincos.
+ * Cost: 43 add, 56 mul, 4 sincos.
  */
 void awiwi_index_energy(const double q[4], const double qd[4], const double g[3], double kinetic[1], double potential[1]);
 
@@ -536,7 +536,7 @@ int awiwi_index_tendon_distribution(const double q[4], const double tau[4], cons
  *   out  curvature[8] in 1/(N m)
  * Returns 0 where every tension is on its spring's curve, give or take a hundredth; elsewhere 1, and
  * what is not defined is NaN.
- * Cost: 198 add, 229 mul, 7 calls.
+ * Cost: 198 add, 198 mul, 7 calls.
  */
 int awiwi_middle_tendon_stiffness(const double tension[8], double k[8], double slope[8], double curvature[8]);
 
@@ -582,7 +582,7 @@ void awiwi_middle_pose_and_jacobian(const double q[4], double T[16], double J[24
  * Source: eq. 2.17, 5.4.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   out  M[4][4] in kg m^2
- * Cost: 33 add, 32 mul, 3 sincos.
+ * Cost: 33 add, 30 mul, 3 sincos.
  */
 void awiwi_middle_mass_matrix(const double q[4], double M[16]);
 
@@ -592,7 +592,7 @@ void awiwi_middle_mass_matrix(const double q[4], double M[16]);
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   qd[4] in rad/s, -20 to 20
  *   out  C[4][4] in N m s/rad
- * Cost: 46 add, 49 mul, 2 neg, 3 sincos.
+ * Cost: 46 add, 47 mul, 2 neg, 3 sincos.
  */
 void awiwi_middle_coriolis_matrix(const double q[4], const double qd[4], double C[16]);
 
@@ -613,7 +613,7 @@ void awiwi_middle_gravity(const double q[4], const double g[3], double gravity[4
  *   in   qd[4] in rad/s, -20 to 20
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  bias[4] in N m
- * Cost: 55 add, 73 mul, 4 sincos.
+ * Cost: 54 add, 72 mul, 4 sincos.
  */
 void awiwi_middle_bias(const double q[4], const double qd[4], const double g[3], double bias[4]);
 
@@ -625,7 +625,7 @@ void awiwi_middle_bias(const double q[4], const double qd[4], const double g[3],
  *   in   qdd[4] in rad/s^2, -2000 to 2000
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  tau[4] in N m
- * Cost: 82 add, 101 mul, 4 sincos.
+ * Cost: 81 add, 98 mul, 4 sincos.
  */
 void awiwi_middle_inverse_dynamics(const double q[4], const double qd[4], const double qdd[4], const double g[3], double tau[4]);
 
@@ -638,7 +638,7 @@ void awiwi_middle_inverse_dynamics(const double q[4], const double qd[4], const 
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  dtau_dq[4][4] in N m/rad
  *   out  dtau_dqd[4][4] in N m s/rad
- * Cost: 164 add, 197 mul, 1 neg, 4 sincos.
+ * Cost: 161 add, 191 mul, 4 sincos.
  */
 void awiwi_middle_inverse_dynamics_derivatives(const double q[4], const double qd[4], const double qdd[4], const double g[3], double dtau_dq[16], double dtau_dqd[16]);
 
@@ -650,7 +650,7 @@ void awiwi_middle_inverse_dynamics_derivatives(const double q[4], const double q
  *   in   tau[4] in N m, -1 to 1
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  qdd[4] in rad/s^2
- * Cost: 95 add, 119 mul, 3 div, 2 neg, 4 sincos.
+ * Cost: 94 add, 119 mul, 3 div, 2 neg, 4 sincos.
  */
 void awiwi_middle_forward_dynamics(const double q[4], const double qd[4], const double tau[4], const double g[3], double qdd[4]);
 
@@ -675,7 +675,7 @@ void awiwi_middle_dynamics(const double q[4], const double qd[4], const double g
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  kinetic[1] in J
  *   out  potential[1] in J
- * Cost: 43 add, 57 mul, 4 sincos.
+ * Cost: 43 add, 56 mul, 4 sincos.
  */
 void awiwi_middle_energy(const double q[4], const double qd[4], const double g[3], double kinetic[1], double potential[1]);
 
@@ -788,7 +788,7 @@ int awiwi_middle_tendon_distribution(const double q[4], const double tau[4], con
  *   out  curvature[6] in 1/(N m)
  * Returns 0 where every tension is on its spring's curve, give or take a hundredth; elsewhere 1, and
  * what is not defined is NaN.
- * Cost: 148 add, 171 mul, 5 calls.
+ * Cost: 148 add, 148 mul, 5 calls.
  */
 int awiwi_ring_tendon_stiffness(const double tension[6], double k[6], double slope[6], double curvature[6]);
 
@@ -834,7 +834,7 @@ void awiwi_ring_pose_and_jacobian(const double q[3], double T[16], double J[18])
  * Source: eq. 2.17, 5.4.
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   out  M[3][3] in kg m^2
- * Cost: 37 add, 36 mul, 3 sincos.
+ * Cost: 37 add, 35 mul, 3 sincos.
  */
 void awiwi_ring_mass_matrix(const double q[3], double M[9]);
 
@@ -844,7 +844,7 @@ void awiwi_ring_mass_matrix(const double q[3], double M[9]);
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   in   qd[3] in rad/s, -20 to 20
  *   out  C[3][3] in N m s/rad
- * Cost: 51 add, 58 mul, 1 neg, 3 sincos.
+ * Cost: 51 add, 56 mul, 3 sincos.
  */
 void awiwi_ring_coriolis_matrix(const double q[3], const double qd[3], double C[9]);
 
@@ -865,7 +865,7 @@ void awiwi_ring_gravity(const double q[3], const double g[3], double gravity[3])
  *   in   qd[3] in rad/s, -20 to 20
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  bias[3] in N m
- * Cost: 56 add, 76 mul, 4 sincos.
+ * Cost: 55 add, 75 mul, 4 sincos.
  */
 void awiwi_ring_bias(const double q[3], const double qd[3], const double g[3], double bias[3]);
 
@@ -877,7 +877,7 @@ void awiwi_ring_bias(const double q[3], const double qd[3], const double g[3], d
  *   in   qdd[3] in rad/s^2, -2000 to 2000
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  tau[3] in N m
- * Cost: 83 add, 105 mul, 4 sincos.
+ * Cost: 82 add, 102 mul, 4 sincos.
  */
 void awiwi_ring_inverse_dynamics(const double q[3], const double qd[3], const double qdd[3], const double g[3], double tau[3]);
 
@@ -890,7 +890,7 @@ void awiwi_ring_inverse_dynamics(const double q[3], const double qd[3], const do
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  dtau_dq[3][3] in N m/rad
  *   out  dtau_dqd[3][3] in N m s/rad
- * Cost: 179 add, 218 mul, 4 sincos.
+ * Cost: 177 add, 212 mul, 4 sincos.
  */
 void awiwi_ring_inverse_dynamics_derivatives(const double q[3], const double qd[3], const double qdd[3], const double g[3], double dtau_dq[9], double dtau_dqd[9]);
 
@@ -902,7 +902,7 @@ void awiwi_ring_inverse_dynamics_derivatives(const double q[3], const double qd[
  *   in   tau[3] in N m, -1 to 1
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  qdd[3] in rad/s^2
- * Cost: 95 add, 111 mul, 3 div, 1 neg, 4 sincos.
+ * Cost: 94 add, 110 mul, 3 div, 1 neg, 4 sincos.
  */
 void awiwi_ring_forward_dynamics(const double q[3], const double qd[3], const double tau[3], const double g[3], double qdd[3]);
 
@@ -927,7 +927,7 @@ void awiwi_ring_dynamics(const double q[3], const double qd[3], const double g[3
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  kinetic[1] in J
  *   out  potential[1] in J
- * Cost: 43 add, 59 mul, 4 sincos.
+ * Cost: 43 add, 58 mul, 4 sincos.
  */
 void awiwi_ring_energy(const double q[3], const double qd[3], const double g[3], double kinetic[1], double potential[1]);
 
@@ -1040,7 +1040,7 @@ int awiwi_ring_tendon_distribution(const double q[3], const double tau[3], const
  *   out  curvature[8] in 1/(N m)
  * Returns 0 where every tension is on its spring's curve, give or take a hundredth; elsewhere 1, and
  * what is not defined is NaN.
- * Cost: 198 add, 229 mul, 7 calls.
+ * Cost: 198 add, 198 mul, 7 calls.
  */
 int awiwi_fifth_tendon_stiffness(const double tension[8], double k[8], double slope[8], double curvature[8]);
 
@@ -1049,7 +1049,7 @@ int awiwi_fifth_tendon_stiffness(const double tension[8], double k[8], double sl
  * Source: eq. 5.2, 5.3, table 5.1.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   out  T[4][4] in 1, m
- * Cost: 29 add, 45 mul, 1 div, 3 neg, 1 sqrt, 5 sincos.
+ * Cost: 28 add, 44 mul, 1 div, 3 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_fingertip_pose(const double q[4], double T[16]);
 
@@ -1086,7 +1086,7 @@ void awiwi_fifth_pose_and_jacobian(const double q[4], double T[16], double J[24]
  * Source: eq. 2.17, 5.4.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   out  M[4][4] in kg m^2
- * Cost: 113 add, 128 mul, 2 div, 1 sqrt, 5 sincos.
+ * Cost: 113 add, 126 mul, 2 div, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_mass_matrix(const double q[4], double M[16]);
 
@@ -1154,7 +1154,7 @@ void awiwi_fifth_inverse_dynamics_derivatives(const double q[4], const double qd
  *   in   tau[4] in N m, -1 to 1
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  qdd[4] in rad/s^2
- * Cost: 329 add, 355 mul, 6 div, 1 neg, 1 sqrt, 5 sincos.
+ * Cost: 329 add, 352 mul, 6 div, 1 neg, 1 sqrt, 5 sincos.
  */
 void awiwi_fifth_forward_dynamics(const double q[4], const double qd[4], const double tau[4], const double g[3], double qdd[4]);
 
@@ -1332,7 +1332,7 @@ int awiwi_wrist_palm_pose(const double q71[1], const double q73[1], double T[16]
  *   out  h[38] in m
  * Returns 0 where the side bars are short of the line B0C0 (q73 between 0 and pi) and their plane is
  * short of A0 and bar AA0 reaches; elsewhere 1, and what is not defined is NaN.
- * Cost: 180 add, 144 mul, 2 div, 39 sqrt, 2 sincos.
+ * Cost: 180 add, 143 mul, 2 div, 39 sqrt, 2 sincos.
  */
 int awiwi_wrist_tendon_lengths(const double q71[1], const double q73[1], double h[38]);
 
@@ -1357,7 +1357,7 @@ int awiwi_wrist_coupling(const double q71[1], const double q73[1], double dh[76]
  *   out  h[38] in m
  * Returns 0 where the side bars are short of the line B0C0 (q73 between 0 and pi) and their plane is
  * short of A0 and bar AA0 reaches; elsewhere 1, and what is not defined is NaN.
- * Cost: 254 add, 181 mul, 2 div, 43 sqrt, 4 sincos.
+ * Cost: 254 add, 180 mul, 2 div, 43 sqrt, 4 sincos.
  */
 int awiwi_hand_tendon_lengths(const double q[19], const double wrist[2], double h[38]);
 
@@ -1376,7 +1376,7 @@ void awiwi_hand_coupling(const double q[19], double P[722]);
  *   in   q[19] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727, -0.3491, -0.1745, -0.08727, -0.08727, -0.3491, -0.1745, -0.08727, -0.08727, -0.3491, -0.1745, -0.08727, -0.5236, -0.3491, -0.1745, -0.08727] to [0.6109, 0.6109, 1.396, 1.396, 0.3491, 1.484, 1.571, 1.396, 0.3491, 1.484, 1.571, 1.396, 0.3491, 1.484, 1.571, 0.6981, 0.3491, 1.484, 1.571]
  *   in   f[38] in N, 0 to 100
  *   out  tau[19] in N m
- * Cost: 85 add, 69 mul, 4 div, 4 sqrt, 2 sincos.
+ * Cost: 86 add, 67 mul, 4 div, 4 sqrt, 2 sincos.
  */
 void awiwi_hand_joint_torque(const double q[19], const double f[38], double tau[19]);
 
@@ -1513,7 +1513,7 @@ void awiwi_motor_compensation(const double theta[1], const double thd[1], double
  *   in   tau[1] in N m, -3 to 3
  *   in   f[1] in N, 0 to 100
  *   out  thdd[1] in rad/s^2
- * Cost: 15 add, 17 mul, 2 sincos, 1 calls.
+ * Cost: 15 add, 16 mul, 2 sincos, 1 calls.
  */
 void awiwi_motor_acceleration(const double theta[1], const double thd[1], const double tau[1], const double f[1], double thdd[1]);
 
@@ -1551,7 +1551,7 @@ int awiwi_spring_lever(const double theta[1], double dL[1], double force[1], dou
  *   out  f[1] in N
  * Returns 0 where the argument is within the lever's travel, give or take a hundredth; elsewhere 1,
  * and what is not defined is NaN.
- * Cost: 18 add, 19 mul.
+ * Cost: 18 add, 18 mul.
  */
 int awiwi_spring_force(const double x[1], double f[1]);
 
@@ -1562,7 +1562,7 @@ int awiwi_spring_force(const double x[1], double f[1]);
  *   out  k[1] in N/m
  * Returns 0 where the argument is within the lever's travel, give or take a hundredth; elsewhere 1,
  * and what is not defined is NaN.
- * Cost: 18 add, 19 mul.
+ * Cost: 18 add, 18 mul.
  */
 int awiwi_spring_stiffness(const double x[1], double k[1]);
 
@@ -1573,7 +1573,7 @@ int awiwi_spring_stiffness(const double x[1], double k[1]);
  *   out  x[1] in m
  * Returns 0 where the argument is within the lever's travel, give or take a hundredth; elsewhere 1,
  * and what is not defined is NaN.
- * Cost: 18 add, 19 mul.
+ * Cost: 18 add, 18 mul.
  */
 int awiwi_spring_elongation(const double f[1], double x[1]);
 
@@ -1587,7 +1587,7 @@ int awiwi_spring_elongation(const double f[1], double x[1]);
  *   out  stiffness[38] in N/m
  * Returns 0 where the argument is within the lever's travel, give or take a hundredth; elsewhere 1,
  * and what is not defined is NaN.
- * Cost: 1062 add, 1137 mul, 37 calls.
+ * Cost: 1062 add, 1062 mul, 37 calls.
  */
 int awiwi_calibration_readings(const double readings[38], double dL[38], double force[38], double stiffness[38]);
 
@@ -2422,7 +2422,7 @@ void awiwi_antagonistic_springs(const double stretches[2], const double speeds[2
  *   in   motor[2] in kg m^2, m, from [0.0001, 0.002] to [0.01, 0.02]
  *   in   line[3] in N/m, N/m^2, N/m^3, from [1000, 0, 0] to [2e+04, 1e+06, 1e+08]
  *   out  f[8] in N
- * Cost: 40 add, 40 mul, 8 calls.
+ * Cost: 40 add, 35 mul, 8 calls.
  */
 void awiwi_plant_finger_forces(const double thetas[8], const double path[8], const double slack[8], const double motor[2], const double line[3], double f[8]);
 

@@ -7,7 +7,7 @@
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  kinetic[1] in J
  *   out  potential[1] in J
- * Cost: 43 add, 57 mul, 4 sincos.
+ * Cost: 43 add, 56 mul, 4 sincos.
  * Inputs: sha256 6dc3171fbd7a3bb4e8ba1b2ad4c5197dcf6b595756784e4b6b74a397a420a135.
  */
 #include "trig.h"
@@ -18,31 +18,33 @@ void awiwi_middle_energy(const double q[restrict 4], const double qd[restrict 4]
     const double t0 = q[2] + q[1];
     const double t1 = q[3] + t0 - 1.5485777614681775;
     const double t2 = qd[2] + qd[1];
-    const double t3 = qd[3] + t2;
-    const double t4 = 0.044*qd[1];
     const awiwi_turn4 a0 = awiwi_sincos4(q[1], t0, t1, q[0]);
-    const double t5 = 0.033*t2;
-    const double t6 = 3.780933218135438e-05*a0.cos[2];
-    double s7 = (t4*a0.sin[0] + t5*a0.sin[1])*t6 + 2.58184e-07*t3;
-    double s8 = t6 + 3.3e-06*a0.cos[0] + 0.0007128*a0.sin[0];
-    const double t9 = 3.780933218135438e-05*a0.sin[2];
-    s7 -= (a0.cos[1]*t5 + a0.cos[0]*t4)*t9;
-    double s10 = t3*s7 + 1.3955095e-05*qd[1]*qd[1];
-    const double t11 = 0.0002426*a0.cos[1] - 1.3e-06*a0.sin[1];
-    const double t12 = t11 - t9;
-    const double t13 = 1.3e-06*a0.cos[1] + 0.0002426*a0.sin[1];
-    s10 += t2*(t4*(a0.cos[0]*t11 + a0.sin[0]*t13) + 3.43403e-06*t2);
-    s8 += t13;
-    const double t14 = a0.cos[1]*(0.24490395417429173*a0.cos[1] - 0.0009238472028901982*a0.sin[1] - 0.09005402427370233*a0.sin[2]);
-    double s15 = t14 + 0.06157293829045353;
-    double s16 = qd[1]*(1.166e-08*a0.cos[0] + 1.16724e-06*a0.sin[0]) + t2*(6.56e-09*a0.cos[1] + 7.1078e-07*a0.sin[1]);
-    s15 -= a0.cos[2]*(0.00039427593310353175*a0.sin[2] + 0.017088073337986856*a0.cos[2]);
-    s16 += t3*(1.5960308558361416e-07*a0.cos[2] - 1.0664033896870507e-09*a0.sin[2]);
-    const double t17 = 0.0007128*a0.cos[0] - 3.3e-06*a0.sin[0];
-    s15 += a0.cos[0]*(a0.cos[0] + 3175.724759935056*t12 - 0.0032190300975705344*a0.sin[0]);
-    s15 += 433.0533763547804*(t17 + t12);
-    s16 += 1.3855105e-05*qd[0]*s15;
-    s10 += qd[0]*s16;
-    kinetic[0] = s10;
-    potential[0] = 2.806e-05*(g[0]*a0.sin[3] - g[1]*a0.cos[3]) - g[2]*s8 - (g[0]*a0.cos[3] + g[1]*a0.sin[3])*(t17 + t12 + 0.0001347);
+    const double t3 = 0.044*qd[1];
+    const double t4 = a0.cos[0]*t3;
+    const double t5 = t3*a0.sin[0];
+    const double t6 = 0.0002426*a0.cos[1] - 1.3e-06*a0.sin[1];
+    const double t7 = 1.3e-06*a0.cos[1] + 0.0002426*a0.sin[1];
+    double s8 = t2*(3.43403e-06*t2 + t4*t6 + t5*t7) + 1.3955095e-05*qd[1]*qd[1];
+    double s9 = t7 + 3.3e-06*a0.cos[0] + 0.0007128*a0.sin[0];
+    const double t10 = qd[3] + t2;
+    const double t11 = 0.033*t2;
+    const double t12 = 3.780933218135438e-05*a0.cos[2];
+    double s13 = (t5 + t11*a0.sin[1])*t12 + 2.58184e-07*t10;
+    s9 += t12;
+    const double t14 = 3.780933218135438e-05*a0.sin[2];
+    s13 -= (t4 + a0.cos[1]*t11)*t14;
+    const double t15 = t6 - t14;
+    s8 += t10*s13;
+    const double t16 = a0.cos[1]*(0.24490395417429173*a0.cos[1] - 0.0009238472028901982*a0.sin[1] - 0.09005402427370233*a0.sin[2]);
+    double s17 = t16 + 0.06157293829045353;
+    double s18 = qd[1]*(1.166e-08*a0.cos[0] + 1.16724e-06*a0.sin[0]) + t2*(6.56e-09*a0.cos[1] + 7.1078e-07*a0.sin[1]);
+    s17 -= a0.cos[2]*(0.00039427593310353175*a0.sin[2] + 0.017088073337986856*a0.cos[2]);
+    s18 += t10*(1.5960308558361416e-07*a0.cos[2] - 1.0664033896870507e-09*a0.sin[2]);
+    const double t19 = 0.0007128*a0.cos[0] - 3.3e-06*a0.sin[0];
+    s17 += a0.cos[0]*(a0.cos[0] + 3175.724759935056*t15 - 0.0032190300975705344*a0.sin[0]);
+    s17 += 433.0533763547804*(t19 + t15);
+    s18 += 1.3855105e-05*qd[0]*s17;
+    s8 += qd[0]*s18;
+    kinetic[0] = s8;
+    potential[0] = 2.806e-05*(g[0]*a0.sin[3] - g[1]*a0.cos[3]) - g[2]*s9 - (g[0]*a0.cos[3] + g[1]*a0.sin[3])*(t19 + t15 + 0.0001347);
 }

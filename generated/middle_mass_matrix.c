@@ -4,7 +4,7 @@
  * Source: eq. 2.17, 5.4.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   out  M[4][4] in kg m^2
- * Cost: 33 add, 32 mul, 3 sincos.
+ * Cost: 33 add, 30 mul, 3 sincos.
  * Inputs: sha256 ae4a85ce0785917635eb44a968958b9f879dffad6da58c0336320b942386f084.
  */
 #include "trig.h"
@@ -16,34 +16,36 @@ void awiwi_middle_mass_matrix(const double q[restrict 4], double M[restrict 16])
     const double t0 = q[2] + q[1];
     const double t1 = q[3] + t0 - 1.5485777614681775;
     const awiwi_turn3 a0 = awiwi_sincos3(t0, t1, q[1]);
-    double s2 = a0.cos[0]*(6.78634e-06*a0.cos[0] - 2.56e-08*a0.sin[0] - 2.495415923969389e-06*a0.sin[1]) + 1.7061990503455084e-06;
-    s2 -= 3.96e-08*a0.sin[2];
-    const double t3 = a0.sin[0] + 29.08410167796491*a0.sin[1] - 186.6153846153846*a0.cos[0];
-    s2 -= 1.56e-08*t3;
-    s2 += a0.cos[2]*(2.771021e-05*a0.cos[2] + 8.5536e-06 - 8.92e-08*a0.sin[2] - 1.144e-07*t3);
-    s2 -= a0.cos[1]*(4.735141006910168e-07*a0.cos[1] + 1.0925468904244817e-08*a0.sin[1]);
-    M[0] = s2;
-    const double t4 = 1.5960308558361416e-07*a0.cos[1] - 1.0664033896870507e-09*a0.sin[1];
-    M[3] = t4;
-    M[12] = t4;
-    const double t5 = t4 + 6.56e-09*a0.cos[0] + 7.1078e-07*a0.sin[0];
-    M[2] = t5;
-    M[8] = t5;
-    const double t6 = t5 + 1.166e-08*a0.cos[2] + 1.16724e-06*a0.sin[2];
-    M[1] = t6;
-    M[4] = t6;
-    const double t7 = 1.2477079619846946e-06*(a0.cos[0]*a0.sin[1] - a0.sin[0]*a0.cos[1]);
-    const double t8 = 5.72e-08*(a0.cos[2]*t3 - a0.sin[2]*(a0.cos[0] + 186.6153846153846*a0.sin[0] + 29.08410167796491*a0.cos[1]));
-    const double t9 = 5.16368e-07 - t7;
-    M[11] = t9;
-    M[14] = t9;
-    const double t10 = t9 + 6.86806e-06 - t7;
-    M[10] = t10;
-    const double t11 = t10 - t8;
-    M[6] = t11;
-    M[9] = t11;
-    M[5] = t11 + 2.791019e-05 - t8;
-    const double t12 = t9 - 1.6636106159795927e-06*(a0.cos[2]*a0.sin[1] - a0.sin[2]*a0.cos[1]);
-    M[7] = t12;
-    M[13] = t12;
+    const double t2 = a0.sin[0] - 186.6153846153846*a0.cos[0];
+    const double t3 = t2 + 29.08410167796491*a0.sin[1];
+    double s4 = a0.cos[0]*(6.78634e-06*a0.cos[0] - 2.56e-08*a0.sin[0] - 2.495415923969389e-06*a0.sin[1]) + 3.518744394618834e-08*t3;
+    s4 += 3.3702168470033942e-06;
+    const double t5 = (a0.cos[2] + 0.4439461883408072)*(2.771021e-05*a0.cos[2] - 1.144e-07*t3 - 3.7482421076233183e-06 - 8.92e-08*a0.sin[2]);
+    s4 += t5;
+    s4 -= a0.cos[1]*(4.735141006910168e-07*a0.cos[1] + 1.0925468904244817e-08*a0.sin[1]);
+    M[0] = s4;
+    const double t6 = 1.5960308558361416e-07*a0.cos[1] - 1.0664033896870507e-09*a0.sin[1];
+    M[3] = t6;
+    M[12] = t6;
+    const double t7 = t6 + 6.56e-09*a0.cos[0] + 7.1078e-07*a0.sin[0];
+    M[2] = t7;
+    M[8] = t7;
+    const double t8 = t7 + 1.166e-08*a0.cos[2] + 1.16724e-06*a0.sin[2];
+    M[1] = t8;
+    M[4] = t8;
+    const double t9 = 1.2477079619846946e-06*(a0.cos[0]*a0.sin[1] - a0.sin[0]*a0.cos[1]);
+    const double t10 = 1.6636106159795927e-06*(a0.cos[2]*a0.sin[1] - a0.sin[2]*a0.cos[1]);
+    const double t11 = 5.72e-08*(a0.cos[2]*t2 - a0.sin[2]*(a0.cos[0] + 186.6153846153846*a0.sin[0])) + t10;
+    const double t12 = 5.16368e-07 - t9;
+    M[11] = t12;
+    M[14] = t12;
+    const double t13 = t12 + 6.86806e-06 - t9;
+    M[10] = t13;
+    const double t14 = t13 - t11;
+    M[6] = t14;
+    M[9] = t14;
+    M[5] = t14 + 2.791019e-05 - t11;
+    const double t15 = t12 - t10;
+    M[7] = t15;
+    M[13] = t15;
 }

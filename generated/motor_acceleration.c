@@ -7,7 +7,7 @@
  *   in   tau[1] in N m, -3 to 3
  *   in   f[1] in N, 0 to 100
  *   out  thdd[1] in rad/s^2
- * Cost: 15 add, 17 mul, 2 sincos, 1 calls.
+ * Cost: 15 add, 16 mul, 2 sincos, 1 calls.
  * Inputs: sha256 7084e234668ca468d45c39abb733d38309f0ac7101d19ea59d2d77b39478c1d3.
  */
 #include "elementary.h"
@@ -19,10 +19,12 @@ void awiwi_motor_acceleration(const double theta[restrict 1], const double thd[r
     const double t0 = 2.2689280275926285 + 100.0*theta[0];
     const awiwi_turn2 a0 = awiwi_sincos2(theta[0], t0);
     const double t1 = a0.sin[0]*a0.sin[0] - 0.5;
-    const double t2 = a0.sin[0]*(0.012*a0.cos[0] + 0.020784609690826527*a0.sin[0]) + 0.020784609690826527*t1 - 0.005209445330007911;
-    double s3 = a0.cos[0]*t2 + tau[0] + 0.010565456543517485 - 0.004*f[0] - a0.sin[0]*(0.012*t1 + 0.029544232590366242);
-    s3 -= a0.cos[1]*(0.0453153893518325*a0.sin[1] + 0.02113091308703497*a0.cos[1] - 0.06);
-    s3 -= 0.0356*thd[0];
-    s3 -= 0.5586*awiwi_atan(10.0*thd[0]);
-    thdd[0] = 499.7501249375312*s3;
+    double s2 = 1.7320508075688772*t1 - 0.43412044416732587;
+    double s3 = a0.sin[0]*(t1 + 2.4620193825305203) + 0.3333333333333333*f[0] - 83.33333333333333*tau[0] - 0.8804547119597905;
+    s3 += a0.cos[1]*(3.7762824459860416*a0.sin[1] + 1.760909423919581*a0.cos[1] - 5.0);
+    s2 += a0.sin[0]*(a0.cos[0] + 1.7320508075688772*a0.sin[0]);
+    s3 -= a0.cos[0]*s2;
+    s3 += 2.966666666666667*thd[0];
+    s3 += 46.55*awiwi_atan(10.0*thd[0]);
+    thdd[0] = -5.997001499250374*s3;
 }

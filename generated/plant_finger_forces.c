@@ -10,7 +10,7 @@
  *   in   motor[2] in kg m^2, m, from [0.0001, 0.002] to [0.01, 0.02]
  *   in   line[3] in N/m, N/m^2, N/m^3, from [1000, 0, 0] to [2e+04, 1e+06, 1e+08]
  *   out  f[8] in N
- * Cost: 40 add, 40 mul, 8 calls.
+ * Cost: 40 add, 35 mul, 8 calls.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
 #include <math.h>
@@ -19,27 +19,30 @@
 void awiwi_plant_finger_forces(const double thetas[restrict 8], const double path[restrict 8], const double slack[restrict 8], const double motor[restrict 2], const double line[restrict 3], double f[restrict 8])
 {
     const double t0 = path[0] + motor[1]*thetas[0] - slack[0];
-    const double t1 = 0.5*(t0 + fabs(t0));
-    const double t2 = path[1] + motor[1]*thetas[1] - slack[1];
-    const double t3 = 0.5*(t2 + fabs(t2));
-    const double t4 = path[2] + motor[1]*thetas[2] - slack[2];
-    const double t5 = 0.5*(t4 + fabs(t4));
-    const double t6 = path[3] + motor[1]*thetas[3] - slack[3];
-    const double t7 = 0.5*(t6 + fabs(t6));
-    const double t8 = path[4] + motor[1]*thetas[4] - slack[4];
-    const double t9 = 0.5*(t8 + fabs(t8));
-    const double t10 = path[5] + motor[1]*thetas[5] - slack[5];
-    const double t11 = 0.5*(t10 + fabs(t10));
-    const double t12 = path[6] + motor[1]*thetas[6] - slack[6];
-    const double t13 = motor[1]*thetas[7] + path[7] - slack[7];
-    const double t14 = 0.5*(t12 + fabs(t12));
-    const double t15 = 0.5*(t13 + fabs(t13));
-    f[0] = t1*(t1*(line[1] + line[2]*t1) + line[0]);
-    f[1] = t3*(t3*(line[1] + line[2]*t3) + line[0]);
-    f[2] = t5*(t5*(line[1] + line[2]*t5) + line[0]);
-    f[3] = t7*(t7*(line[1] + line[2]*t7) + line[0]);
-    f[4] = t9*(t9*(line[1] + line[2]*t9) + line[0]);
-    f[5] = t11*(t11*(line[1] + line[2]*t11) + line[0]);
-    f[6] = t14*(t14*(line[1] + line[2]*t14) + line[0]);
-    f[7] = t15*(line[0] + t15*(line[1] + line[2]*t15));
+    const double t1 = t0 + fabs(t0);
+    const double t2 = 0.5*line[0];
+    const double t3 = 0.25*line[1];
+    const double t4 = 0.125*line[2];
+    f[0] = t1*(t1*(t3 + t4*t1) + t2);
+    const double t5 = path[1] + motor[1]*thetas[1] - slack[1];
+    const double t6 = t5 + fabs(t5);
+    f[1] = t6*(t6*(t3 + t4*t6) + t2);
+    const double t7 = path[2] + motor[1]*thetas[2] - slack[2];
+    const double t8 = t7 + fabs(t7);
+    f[2] = t8*(t8*(t3 + t4*t8) + t2);
+    const double t9 = path[3] + motor[1]*thetas[3] - slack[3];
+    const double t10 = t9 + fabs(t9);
+    f[3] = t10*(t10*(t3 + t4*t10) + t2);
+    const double t11 = path[4] + motor[1]*thetas[4] - slack[4];
+    const double t12 = t11 + fabs(t11);
+    f[4] = t12*(t12*(t3 + t4*t12) + t2);
+    const double t13 = path[5] + motor[1]*thetas[5] - slack[5];
+    const double t14 = t13 + fabs(t13);
+    f[5] = t14*(t14*(t3 + t4*t14) + t2);
+    const double t15 = path[6] + motor[1]*thetas[6] - slack[6];
+    const double t16 = motor[1]*thetas[7] + path[7] - slack[7];
+    const double t17 = t15 + fabs(t15);
+    f[6] = t17*(t17*(t3 + t4*t17) + t2);
+    const double t18 = t16 + fabs(t16);
+    f[7] = t18*(t2 + t18*(t3 + t4*t18));
 }

@@ -6,7 +6,7 @@
  *   in   qd[3] in rad/s, -20 to 20
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  bias[3] in N m
- * Cost: 56 add, 76 mul, 4 sincos.
+ * Cost: 55 add, 75 mul, 4 sincos.
  * Inputs: sha256 629681b331d715cabc79e549054515e6ff19ef45f5083fc8fb3efe64fdde7fbb.
  */
 #include "trig.h"
@@ -29,42 +29,39 @@ void awiwi_ring_bias(const double q[restrict 3], const double qd[restrict 3], co
     const double t9 = 0.041*a0.sin[0];
     const double t10 = t7 + 0.006;
     const double t11 = 1.2e-06*a0.cos[1] + 0.0002108*a0.sin[1];
-    const double t12 = a0.sin[1]*(5.463e-06*a0.cos[1] - 2.352e-08*a0.sin[1] - 1.0982710776488653e-06*a0.sin[2]) + t10*t11 + 1.176e-08;
-    const double t13 = 0.0305*a0.cos[1];
-    const double t14 = 3.600888779176608e-05*a0.cos[2];
-    const double t15 = a0.cos[2]*(9.304540967423494e-09*a0.cos[2] - 4.4336434353405724e-07*a0.sin[2]) + (t10 + t13)*t14 - 4.652270483711747e-09;
-    const double t16 = 0.0305*a0.sin[1];
-    const double t17 = g[0]*a0.cos[3] + g[1]*a0.sin[3];
-    double s18 = (g[0]*a0.sin[3] - g[1]*a0.cos[3])*(t2 + t5 + 0.0001245) + 2.64e-05*t17;
-    double s19 = t8*t17 - g[2]*t2;
-    const double t20 = qd[1]*qd[1];
-    s18 += t20*(1.0264e-06*a0.cos[0] - 9.6e-09*a0.sin[0]);
-    const double t21 = t17 + t20*t7;
-    const double t22 = g[2] + t20*t9;
-    const double t23 = qd[1] + qd[2];
-    const double t24 = 0.7857142857142857*qd[2] + t23;
-    double s25 = qd[1]*s6 + t23*t12;
-    const double t26 = t23*t23;
-    s25 += t24*t15;
+    const double t12 = 1.0982710776488653e-06*a0.sin[2];
+    const double t13 = 3.600888779176608e-05*a0.cos[2];
+    double s14 = a0.cos[2]*(9.304540967423494e-09*a0.cos[2] - 4.4336434353405724e-07*a0.sin[2]) - 4.652270483711747e-09;
+    const double t15 = a0.sin[1]*(5.463e-06*a0.cos[1] - 2.352e-08*a0.sin[1] - t12) + t10*t11 + 1.176e-08;
+    const double t16 = 0.0305*a0.cos[1];
+    s14 += (t10 + t16)*t13;
+    const double t17 = a0.sin[1]*t12 + t16*t13;
+    const double t18 = g[0]*a0.cos[3] + g[1]*a0.sin[3];
+    double s19 = (g[0]*a0.sin[3] - g[1]*a0.cos[3])*(t2 + t5 + 0.0001245) + 2.64e-05*t18;
+    double s20 = t8*t18 - g[2]*t2;
+    const double t21 = qd[1]*qd[1];
+    s19 += t21*(1.0264e-06*a0.cos[0] - 9.6e-09*a0.sin[0]);
+    const double t22 = t18 + t21*t7;
+    const double t23 = g[2] + t21*t9;
+    const double t24 = qd[1] + qd[2];
+    const double t25 = 0.7857142857142857*qd[2] + t24;
+    double s26 = qd[1]*s6 + t24*t15;
     const double t27 = t24*t24;
-    s18 += t26*(6.2216e-07*a0.cos[1] - 5.44e-09*a0.sin[1]);
-    s18 -= t27*(1.0664033896870507e-09*a0.cos[2] + 1.5186117470838444e-07*a0.sin[2]);
-    s18 -= 2.0*qd[0]*s25;
-    bias[0] = s18;
-    const double t28 = qd[0]*qd[0];
-    double s29 = t28*t12 + t21*t11;
-    double s30 = t28*t15 + (t21 + t26*t13)*t14;
-    const double t31 = t27*t14;
-    const double t32 = t27*t4;
-    s29 -= t22*t3;
-    s30 += (t22 + t26*t16)*t4;
-    s29 += s30;
-    s29 -= t13*t31;
-    s29 -= t16*t32;
-    s19 += t9*(t26*t3 - t32);
-    s19 += s29;
-    s19 += t28*s6;
-    s19 -= t7*(t26*t11 + t31);
-    bias[1] = s19;
-    bias[2] = s29 + 0.7857142857142857*s30;
+    s26 += t25*s14;
+    const double t28 = t25*t25;
+    s19 += t27*(6.2216e-07*a0.cos[1] - 5.44e-09*a0.sin[1]);
+    s19 -= t28*(1.0664033896870507e-09*a0.cos[2] + 1.5186117470838444e-07*a0.sin[2]);
+    s19 -= 2.0*qd[0]*s26;
+    bias[0] = s19;
+    const double t29 = qd[0]*qd[0];
+    double s30 = t29*s14 + t23*t4;
+    s30 += t22*t13;
+    s30 += t27*t17;
+    const double t31 = t22*t11 + t29*t15 + s30 - t23*t3 - t28*t17;
+    s20 += t9*(t27*t3 - t28*t4);
+    s20 += t31;
+    s20 += t29*s6;
+    s20 -= t7*(t27*t11 + t28*t13);
+    bias[1] = s20;
+    bias[2] = t31 + 0.7857142857142857*s30;
 }

@@ -5,7 +5,7 @@
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   in   qd[3] in rad/s, -20 to 20
  *   out  C[3][3] in N m s/rad
- * Cost: 51 add, 58 mul, 1 neg, 3 sincos.
+ * Cost: 51 add, 56 mul, 3 sincos.
  * Inputs: sha256 ed3232564f274d4be5483571e47101a84f2df0a316cf4e98203aa0bde8d76c89.
  */
 #include "trig.h"
@@ -17,47 +17,44 @@ void awiwi_ring_coriolis_matrix(const double q[restrict 3], const double qd[rest
     const double t1 = q[2] + q[1];
     s0 += t1;
     const awiwi_turn3 a0 = awiwi_sincos3(q[1], t1, s0);
-    const double t2 = 8.6428e-06*a0.cos[1] - 4.92e-08*a0.sin[1] - 1.4763643994624091e-06*a0.sin[2];
-    double s3 = a0.sin[0]*(2.23216e-05*a0.cos[0] + t2 + 3.69e-06 - 7.9e-08*a0.sin[0]) + 1.8e-08*a0.cos[0] + 3.95e-08;
-    const double t4 = a0.cos[0] + 0.14634146341463414;
-    const double t5 = 4.92e-08*a0.cos[1] + 8.6428e-06*a0.sin[1];
-    double s6 = a0.sin[1]*(5.463e-06*a0.cos[1] - 2.352e-08*a0.sin[1] - 1.0982710776488653e-06*a0.sin[2]) + t4*t5;
-    s6 += 1.176e-08;
-    const double t7 = 1.4763643994624091e-06*a0.cos[2];
-    double s8 = (t4 + 0.7439024390243902*a0.cos[1])*t7 - 4.652270483711747e-09;
-    const double t9 = a0.cos[0]*(t5 + t7) - a0.sin[0]*t2;
-    s8 += a0.cos[2]*(9.304540967423494e-09*a0.cos[2] - 4.4336434353405724e-07*a0.sin[2]);
-    s6 += s8;
-    s3 += s6;
-    const double t10 = 0.7857142857142857*s8;
-    C[0] = -(qd[2]*(s6 + t10)) - qd[1]*s3;
-    const double t11 = a0.cos[0]*a0.cos[2] + a0.sin[0]*a0.sin[2];
-    const double t12 = qd[1] + qd[2];
-    const double t13 = 0.7857142857142857*qd[2] + t12;
-    const double t14 = t13*(1.0664033896870507e-09*a0.cos[2] + 1.5186117470838444e-07*a0.sin[2]);
-    const double t15 = t12*(6.2216e-07*a0.cos[1] - 5.44e-09*a0.sin[1]) - t14;
-    double s16 = qd[1]*(1.0264e-06*a0.cos[0] - 9.6e-09*a0.sin[0]) + t15;
-    const double t17 = qd[0]*s3;
-    C[3] = t17;
-    s16 -= t17;
-    C[1] = s16;
-    const double t18 = qd[0]*s6;
-    C[2] = t15 - t18 - 0.7857142857142857*(t14 + qd[0]*s8);
-    const double t19 = a0.cos[1]*a0.cos[2] + a0.sin[1]*a0.sin[2];
-    C[6] = t18 + qd[0]*t10;
-    const double t20 = qd[1]*t9;
-    const double t21 = 1.4763643994624091e-06*t11;
-    double s22 = t12*(t21 - t9) - t13*t21;
-    double s23 = 1.160000599577607e-06*qd[1]*t11 + t20;
-    const double t24 = t12 - t13;
-    const double t25 = 1.0982710776488653e-06*t19;
-    const double t26 = t24*t25;
-    s22 += t26;
-    C[4] = t20 + s22;
-    C[5] = s22 - 0.7857142857142857*t13*(t21 + t25);
-    const double t27 = 8.629272752955371e-07*t19;
-    s23 += t12*t27;
-    s23 += t26;
-    C[7] = s23;
-    C[8] = t24*t27 + t26;
+    const double t2 = a0.cos[0] + 0.14634146341463414;
+    const double t3 = 0.7439024390243902*a0.cos[1];
+    const double t4 = 1.4763643994624091e-06*a0.cos[2];
+    double s5 = 4.652270483711747e-09 - (t2 + t3)*t4;
+    s5 -= a0.cos[2]*(9.304540967423494e-09*a0.cos[2] - 4.4336434353405724e-07*a0.sin[2]);
+    const double t6 = 4.92e-08*a0.cos[1] + 8.6428e-06*a0.sin[1];
+    double s7 = t2*t6 + 1.176e-08 - s5;
+    const double t8 = 1.0982710776488653e-06*a0.sin[2];
+    const double t9 = 1.4763643994624091e-06*a0.sin[2];
+    const double t10 = t3*t4 + a0.sin[1]*t8;
+    s7 += a0.sin[1]*(5.463e-06*a0.cos[1] - t8 - 2.352e-08*a0.sin[1]);
+    const double t11 = a0.cos[0]*t4 + a0.sin[0]*t9;
+    const double t12 = 8.6428e-06*a0.cos[1] - t9 - 4.92e-08*a0.sin[1];
+    const double t13 = a0.cos[0]*(t6 + t4) - a0.sin[0]*t12;
+    const double t14 = a0.sin[0]*(t12 + 2.23216e-05*a0.cos[0] + 3.69e-06 - 7.9e-08*a0.sin[0]) + 1.8e-08*a0.cos[0] + s7 + 3.95e-08;
+    const double t15 = 0.7857142857142857*qd[2];
+    C[0] = t15*s5 - qd[1]*t14 - qd[2]*s7;
+    const double t16 = qd[2] + qd[1];
+    const double t17 = t15 + t16;
+    const double t18 = t17*(1.0664033896870507e-09*a0.cos[2] + 1.5186117470838444e-07*a0.sin[2]);
+    const double t19 = t16*(6.2216e-07*a0.cos[1] - 5.44e-09*a0.sin[1]) - t18;
+    double s20 = qd[1]*(1.0264e-06*a0.cos[0] - 9.6e-09*a0.sin[0]) + t19;
+    double s21 = t19 - 0.7857142857142857*t18;
+    const double t22 = qd[0]*t14;
+    C[3] = t22;
+    s20 -= t22;
+    C[1] = s20;
+    const double t23 = -0.7857142857142857*(qd[0]*s5) + qd[0]*s7;
+    C[6] = t23;
+    s21 -= t23;
+    C[2] = s21;
+    const double t24 = qd[1]*t13;
+    double s25 = t16*(t11 - t13) - t17*t11;
+    const double t26 = t16*t10;
+    const double t27 = t26 - t17*t10;
+    s25 += t27;
+    C[5] = s25 - 0.7857142857142857*(t17*(t11 + t10));
+    C[4] = s25 + t24;
+    C[7] = t24 + t27 + 0.7857142857142857*(qd[1]*t11 + t26);
+    C[8] = t27 + (t16 - t17)*(0.7857142857142857*t10);
 }

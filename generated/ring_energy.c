@@ -7,7 +7,7 @@
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  kinetic[1] in J
  *   out  potential[1] in J
- * Cost: 43 add, 59 mul, 4 sincos.
+ * Cost: 43 add, 58 mul, 4 sincos.
  * Inputs: sha256 002a38e3700c4633fdb4a7f5f3af58489ec3ef1c8d6654b8a99f77e3122edefa.
  */
 #include "trig.h"
@@ -19,28 +19,30 @@ void awiwi_ring_energy(const double q[restrict 3], const double qd[restrict 3], 
     const double t1 = q[2] + q[1];
     s0 += t1;
     const awiwi_turn4 a0 = awiwi_sincos4(q[1], t1, s0, q[0]);
-    const double t2 = 3.600888779176608e-05*a0.cos[2];
-    const double t3 = 3.600888779176608e-05*a0.sin[2];
-    const double t4 = 0.0002108*a0.cos[1] - 1.2e-06*a0.sin[1];
-    const double t5 = 1.2e-06*a0.cos[1] + 0.0002108*a0.sin[1];
-    const double t6 = t4 - t3;
-    const double t7 = a0.cos[1]*(0.2447405203928034*a0.cos[1] - 0.001053687907676869*a0.sin[1] - 0.09840433281206233*a0.sin[2]);
-    double s8 = t7 + 0.07096499228402214 - a0.cos[2]*(0.0004168402340075754*a0.sin[2] + 0.019862570045787814*a0.cos[2]);
-    const double t9 = 0.000615*a0.cos[0] - 3e-06*a0.sin[0];
-    s8 += 537.5958712637087*(t9 + t6);
-    double s10 = t9 + t6;
-    s8 += a0.cos[0]*(3673.571786968676*t6 + a0.cos[0] - 0.003539172819152749*a0.sin[0]);
+    const double t2 = 0.0002108*a0.cos[1] - 1.2e-06*a0.sin[1];
+    const double t3 = 1.2e-06*a0.cos[1] + 0.0002108*a0.sin[1];
+    const double t4 = 3.600888779176608e-05*a0.cos[2];
+    const double t5 = 3.600888779176608e-05*a0.sin[2];
+    const double t6 = a0.cos[1]*(0.2447405203928034*a0.cos[1] - 0.001053687907676869*a0.sin[1] - 0.09840433281206233*a0.sin[2]);
+    double s7 = t6 + 0.07096499228402214 - a0.cos[2]*(0.0004168402340075754*a0.sin[2] + 0.019862570045787814*a0.cos[2]);
+    const double t8 = 0.000615*a0.cos[0] - 3e-06*a0.sin[0];
+    const double t9 = t2 - t5;
+    s7 += 537.5958712637087*(t8 + t9);
+    double s10 = t8 + t9;
+    s7 += a0.cos[0]*(3673.571786968676*t9 + a0.cos[0] - 0.003539172819152749*a0.sin[0]);
     s10 += 0.0001245;
-    double s11 = qd[1]*(9.6e-09*a0.cos[0] + 1.0264e-06*a0.sin[0]) + 1.11608e-05*qd[0]*s8;
+    double s11 = qd[1]*(9.6e-09*a0.cos[0] + 1.0264e-06*a0.sin[0]) + 1.11608e-05*qd[0]*s7;
     const double t12 = qd[1] + qd[2];
     const double t13 = 0.7857142857142857*qd[2] + t12;
     s11 += t12*(5.44e-09*a0.cos[1] + 6.2216e-07*a0.sin[1]);
     s11 += t13*(1.5186117470838444e-07*a0.cos[2] - 1.0664033896870507e-09*a0.sin[2]);
     double s14 = qd[0]*s11 + 1.12517e-05*qd[1]*qd[1];
     const double t15 = 0.041*qd[1];
-    s14 += t12*(t15*(a0.cos[0]*t4 + a0.sin[0]*t5) + 2.76924e-06*t12);
-    const double t16 = 0.0305*t12;
-    s14 += t13*((t15*a0.sin[0] + t16*a0.sin[1])*t2 + 2.4208e-07*t13 - (a0.cos[0]*t15 + a0.cos[1]*t16)*t3);
+    const double t16 = a0.cos[0]*t15;
+    const double t17 = t15*a0.sin[0];
+    s14 += t12*(t16*t2 + 2.76924e-06*t12 + t17*t3);
+    const double t18 = 0.0305*t12;
+    s14 += t13*((t17 + t18*a0.sin[1])*t4 + 2.4208e-07*t13 - (t16 + a0.cos[1]*t18)*t5);
     kinetic[0] = s14;
-    potential[0] = 2.64e-05*(g[0]*a0.sin[3] - g[1]*a0.cos[3]) - g[2]*(t5 + 3e-06*a0.cos[0] + 0.000615*a0.sin[0] + t2) - (g[0]*a0.cos[3] + g[1]*a0.sin[3])*s10;
+    potential[0] = 2.64e-05*(g[0]*a0.sin[3] - g[1]*a0.cos[3]) - g[2]*(3e-06*a0.cos[0] + 0.000615*a0.sin[0] + t3 + t4) - (g[0]*a0.cos[3] + g[1]*a0.sin[3])*s10;
 }

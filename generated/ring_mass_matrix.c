@@ -4,7 +4,7 @@
  * Source: eq. 2.17, 5.4.
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   out  M[3][3] in kg m^2
- * Cost: 37 add, 36 mul, 3 sincos.
+ * Cost: 37 add, 35 mul, 3 sincos.
  * Inputs: sha256 d2fd8ea8122210c370a876d04ecdbc1ca49df3b198ba198458bb7b3639479b1a.
  */
 #include "trig.h"
@@ -16,31 +16,36 @@ void awiwi_ring_mass_matrix(const double q[restrict 3], double M[restrict 9])
     const double t1 = q[2] + q[1];
     s0 += t1;
     const awiwi_turn3 a0 = awiwi_sincos3(t1, s0, q[1]);
-    double s2 = a0.cos[0]*(5.463e-06*a0.cos[0] - 2.352e-08*a0.sin[0] - 2.1965421552977306e-06*a0.sin[1]) + 1.5840521717670286e-06;
-    s2 -= 3.6e-08*a0.sin[2];
-    const double t3 = a0.sin[0] + 30.007406493138397*a0.sin[1] - 175.66666666666666*a0.cos[0];
-    s2 -= 1.44e-08*t3;
-    s2 += a0.cos[2]*(2.23216e-05*a0.cos[2] + 7.38e-06 - 7.9e-08*a0.sin[2] - 9.84e-08*t3);
+    double s2 = a0.cos[0]*(5.463e-06*a0.cos[0] - 2.352e-08*a0.sin[0] - 2.1965421552977306e-06*a0.sin[1]) + 2.856295978849227e-06;
+    const double t3 = 8.6428e-06*a0.cos[0] - 4.92e-08*a0.sin[0];
+    const double t4 = 1.4763643994624091e-06*a0.sin[1];
+    const double t5 = t3 - t4;
+    s2 -= 0.6187094782340229*t5;
+    const double t6 = (a0.cos[2] + 0.45569620253164556)*(2.0*t5 + 2.23216e-05*a0.cos[2] - 7.9e-08*a0.sin[2] - 2.7918683544303796e-06);
+    s2 += t6;
+    const double t7 = 1.4763643994624091e-06*a0.sin[2]*a0.cos[1] - a0.cos[2]*t4;
+    double s8 = 9.6e-09*a0.cos[2] + 1.0264e-06*a0.sin[2];
+    double s9 = a0.cos[2]*t3 + t7;
     s2 -= a0.cos[1]*(4.4336434353405724e-07*a0.cos[1] + 9.304540967423494e-09*a0.sin[1]);
     M[0] = s2;
-    const double t4 = 1.5186117470838444e-07*a0.cos[1] - 1.0664033896870507e-09*a0.sin[1];
-    const double t5 = 5.44e-09*a0.cos[0] + 6.2216e-07*a0.sin[0] + t4;
-    const double t6 = 0.7857142857142857*t4 + t5;
-    M[2] = t6;
-    M[6] = t6;
-    const double t7 = t5 + 9.6e-09*a0.cos[2] + 1.0264e-06*a0.sin[2];
-    M[1] = t7;
-    M[3] = t7;
-    const double t8 = 1.0982710776488653e-06*(a0.cos[0]*a0.sin[1] - a0.sin[0]*a0.cos[1]);
-    const double t9 = 4.92e-08*(a0.cos[2]*t3 - a0.sin[2]*(a0.cos[0] + 175.66666666666666*a0.sin[0] + 30.007406493138397*a0.cos[1]));
-    const double t10 = t8 - 4.8416e-07;
-    const double t11 = 5.53848e-06 - t8 - t10;
-    double s12 = t11 - 1.5714285714285714*t10;
-    const double t13 = t11 - t9;
-    M[4] = t13 + 2.25034e-05 - t9;
-    const double t14 = t13 - 1.160000599577607e-06*(a0.cos[2]*a0.sin[1] - a0.sin[2]*a0.cos[1]) - 0.7857142857142857*t10;
-    M[5] = t14;
-    M[7] = t14;
-    s12 += 2.9889469387755104e-07;
-    M[8] = s12;
+    const double t10 = 1.5186117470838444e-07*a0.cos[1] - 1.0664033896870507e-09*a0.sin[1];
+    const double t11 = 1.0982710776488653e-06*(a0.cos[0]*a0.sin[1] - a0.sin[0]*a0.cos[1]);
+    const double t12 = 5.44e-09*a0.cos[0] + 6.2216e-07*a0.sin[0] + t10;
+    s8 += t12;
+    M[1] = s8;
+    M[3] = s8;
+    const double t13 = t12 + 0.7857142857142857*t10;
+    M[2] = t13;
+    M[6] = t13;
+    s9 += a0.sin[2]*(4.92e-08*a0.cos[0] + 8.6428e-06*a0.sin[0]);
+    const double t14 = t11 - 4.8416e-07;
+    const double t15 = 5.53848e-06 - t11 - t14;
+    double s16 = t15 - 1.5714285714285714*t14;
+    const double t17 = t15 + s9;
+    M[4] = s9 + t17 + 2.25034e-05;
+    const double t18 = 0.7857142857142857*(t7 - t14) + t17;
+    M[5] = t18;
+    M[7] = t18;
+    s16 += 2.9889469387755104e-07;
+    M[8] = s16;
 }

@@ -5,7 +5,7 @@
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   in   f[8] in N, 0 to 100
  *   out  tau[4] in N m
- * Cost: 60 add, 54 mul, 4 div, 4 sqrt, 2 sincos.
+ * Cost: 61 add, 52 mul, 4 div, 4 sqrt, 2 sincos.
  * Inputs: sha256 587a65bca3163563dc3b07fe3ba2c07934dd21d567d7f82f1bc6b0fb691a7376.
  */
 #include <math.h>
@@ -14,56 +14,69 @@
 
 void awiwi_thumb_joint_torque(const double q[restrict 4], const double f[restrict 8], double tau[restrict 4])
 {
-    const double t0 = f[6] - f[7];
-    tau[2] = -0.008*(f[4] - f[5] - t0);
-    tau[3] = -0.006*t0;
     const awiwi_turn2 a0 = awiwi_sincos2(q[0], q[1]);
-    const double t1 = 0.003*a0.cos[0] - 0.03;
-    const double t2 = 0.003*a0.sin[0];
-    const double t3 = 0.006 + 0.047*a0.cos[1];
-    const double t4 = 0.0025*a0.cos[1] - 0.025;
-    const double t5 = 0.0025*a0.sin[1];
-    const double t6 = t5 - t3;
-    const double t7 = 0.002 + a0.cos[0]*t6;
-    const double t8 = t2 + t7;
-    const double t9 = t2 - t7;
-    const double t10 = t5 + t3;
-    const double t11 = a0.cos[0]*t10 - 0.002;
-    const double t12 = t2 + t11;
-    const double t13 = t2 - t11;
-    const double t14 = a0.sin[0]*t6;
-    const double t15 = t1 - t14;
-    const double t16 = t1 + t14;
-    const double t17 = 0.047*a0.sin[1];
-    const double t18 = t17 + t4;
-    const double t19 = t17 - t4;
-    const double t20 = t18*t18;
-    const double t21 = f[1]/sqrt(t20 + t15*t15 + t8*t8);
-    const double t22 = t15*t21;
-    const double t23 = f[3]/sqrt(t20 + t16*t16 + t9*t9);
-    const double t24 = t16*t23;
-    const double t25 = t9*t23;
-    const double t26 = t8*t21;
-    const double t27 = t18*(t21 + t23);
-    const double t28 = a0.sin[0]*t10;
-    const double t29 = t1 - t28;
-    const double t30 = t1 + t28;
-    const double t31 = t19*t19;
-    const double t32 = f[2]/sqrt(t31 + t29*t29 + t12*t12);
-    const double t33 = t29*t32;
-    const double t34 = f[0]/sqrt(t31 + t30*t30 + t13*t13);
-    const double t35 = t30*t34;
-    const double t36 = t13*t34;
-    const double t37 = t12*t32;
-    const double t38 = t19*(t34 + t32);
-    double s39 = 0.003*(t22 + t24 + t33 + t35) - t6*(t25 - t26);
-    s39 -= t10*(t36 - t37);
-    const double t40 = a0.cos[0]*t25 - a0.sin[0]*t24;
-    double s41 = 0.003*(t25 + t26 + t36 + t37) - t6*(t22 - t24);
-    const double t42 = a0.sin[0]*t22 - a0.cos[0]*t26;
-    const double t43 = a0.cos[0]*t36 - a0.sin[0]*t35;
-    s41 -= t10*(t33 - t35);
-    tau[0] = a0.sin[0]*s39 - a0.cos[0]*s41;
-    const double t44 = a0.cos[0]*t37 - a0.sin[0]*t33;
-    tau[1] = a0.cos[1]*(0.0025*(t40 + t42 + t43 - t44) - 0.047*(t38 + t27)) - a0.sin[1]*(0.0025*(t38 - t27) - 0.047*(t40 + t42 + t44 - t43));
+    const double t0 = 0.003*a0.sin[0];
+    const double t1 = 0.003*a0.cos[0];
+    const double t2 = t1 - 0.03;
+    const double t3 = f[6] - f[7];
+    const double t4 = 0.0025*a0.sin[1];
+    const double t5 = 0.047*a0.sin[1];
+    const double t6 = a0.cos[0]*t4;
+    const double t7 = t0 - t6;
+    const double t8 = t0 + t6;
+    const double t9 = 0.047*a0.cos[1];
+    const double t10 = 0.006 + t9;
+    const double t11 = 0.0025*a0.cos[1];
+    const double t12 = t11 - 0.025;
+    const double t13 = a0.cos[0]*t10;
+    const double t14 = a0.sin[0]*t10;
+    const double t15 = t13 - 0.002;
+    const double t16 = a0.sin[0]*t4;
+    const double t17 = t16 + t14;
+    const double t18 = t2 + t17;
+    const double t19 = t16 - t14;
+    const double t20 = t2 + t19;
+    const double t21 = t2 - t19;
+    const double t22 = t2 - t17;
+    const double t23 = t7 - t15;
+    const double t24 = t5 - t12;
+    const double t25 = t12 + t5;
+    const double t26 = t24*t24;
+    const double t27 = f[0]/sqrt(t26 + t18*t18 + t23*t23);
+    double s28 = t26 + t22*t22;
+    const double t29 = t7 + t15;
+    const double t30 = t25*t25;
+    const double t31 = f[3]/sqrt(t30 + t20*t20 + t29*t29);
+    double s32 = t30 + t21*t21;
+    double s33 = ((t7 - t13)*t18 - (t1 + t17)*t23)*t27 + ((t7 + t13)*t20 - (t1 + t19)*t29)*t31;
+    const double t34 = t8 - t15;
+    s32 += t34*t34;
+    const double t35 = f[1]/sqrt(s32);
+    const double t36 = t8 + t15;
+    s28 += t36*t36;
+    const double t37 = f[2]/sqrt(s28);
+    s33 += ((t8 - t13)*t21 - (t1 - t19)*t34)*t35;
+    s33 += ((t13 + t8)*t22 - (t1 - t17)*t36)*t37;
+    tau[0] = s33;
+    const double t38 = a0.sin[0]*t11;
+    const double t39 = a0.sin[0]*t5;
+    const double t40 = a0.cos[0]*t11;
+    const double t41 = a0.cos[0]*t5;
+    const double t42 = t38 - t39;
+    const double t43 = t38 + t39;
+    const double t44 = (t9 + t4)*t24;
+    double s45 = t42*t22 - t44;
+    const double t46 = (t9 - t4)*t25;
+    double s47 = t43*t20 + t46;
+    double s48 = t46 - t43*t21;
+    double s49 = t42*t18 + t44;
+    const double t50 = t40 - t41;
+    s45 -= t50*t36;
+    const double t51 = t40 + t41;
+    s47 -= t51*t29;
+    s48 += t51*t34;
+    s49 -= t50*t23;
+    tau[1] = s45*t37 - s47*t31 - s48*t35 - s49*t27;
+    tau[2] = -0.008*(f[4] - f[5] - t3);
+    tau[3] = -0.006*t3;
 }
