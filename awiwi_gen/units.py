@@ -208,7 +208,7 @@ _SYMBOLS: dict[str, tuple[Fraction, Unit]] = {
 _MOST_TEXT = 80
 _MOST_POWER_OF_TEN = 30  # refused before any arithmetic: Fraction("1e999999999") would fill the memory
 _NUMBER = re.compile(r"(?P<mantissa>[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+))(?:[eE](?P<power>[+-]?[0-9]+))?")
-_FACTOR = re.compile(r"(?P<symbol>[^\W\d_]+|°)(?:\^(?P<power>-?[1-9][0-9]?))?")
+_FACTOR = re.compile(r"(?P<symbol>[^\W\d_]+|°)(?:\^(?P<power>-?(?:[1-3][0-9]|[1-9])))?")
 
 
 def parse_quantity(text: str) -> Quantity:
