@@ -11,8 +11,8 @@ from __future__ import annotations
 import fnmatch
 import json
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
 from functools import cached_property, partial
@@ -40,7 +40,7 @@ GENERATOR = (
     "templates",
 )
 Progress = Callable[[str, int, int], None]
-# A kernel, what its record is made from (of graphs their fingerprints), and its key.
+# A kernel, what its record is made from (fingerprints of graphs, keys of other kernels' records), and its key.
 Task = tuple[Any, Mapping[str, Any], str]
 
 
@@ -88,30 +88,46 @@ class Job:
         """All that is known of the kernels before they are compiled."""
         return make_records(self)
 
-    def parallel(self, stage: str, function: Callable[[Any], Any], items: Sequence[Any]) -> list[Any]:
-        """Apply a function to items on all cores, in order, with progress."""
-        with self.begun(stage, function, items) as results:
-            return results()
+    def parallel(
+        self, stage: str, function: Callable[[Any], Any], items: Sequence[Any], after: Sequence[set[int]] = ()
+    ) -> None:
+        """Apply a function to items on all cores, with progress; to each when those `after` has for it are done."""
+        with self.begun(stage, function, items, after) as finish:
+            finish()
 
     @contextmanager
     def begun(
-        self, stage: str, function: Callable[[Any], Any], items: Sequence[Any]
-    ) -> Iterator[Callable[[], list[Any]]]:
-        """The same while something else is done inside; what it gives waits for the results."""
+        self, stage: str, function: Callable[[Any], Any], items: Sequence[Any], after: Sequence[set[int]] = ()
+    ) -> Iterator[Callable[[], object]]:
+        """The same while something else is done inside; what it gives waits for the end."""
         if len(items) <= 1:
             yield lambda: [function(item) for item in items]
             return
-
-        def results() -> list[Any]:
-            made: list[Any] = []
-            for result in found:
-                made.append(result)
-                self.progress(stage, len(made), len(items))
-            return made
-
+        waiting = dict(enumerate(after or [set() for _ in items]))
+        running: dict[Future[Any], int] = {}
         with ProcessPoolExecutor(min(os.cpu_count() or 1, len(items))) as pool:
-            found = pool.map(function, items)
-            yield results
+
+            def start() -> None:
+                for place in [place for place, others in waiting.items() if not others]:
+                    del waiting[place]
+                    running[pool.submit(function, items[place])] = place
+
+            def finish() -> None:
+                while running:
+                    for future in sorted(wait(running, return_when=FIRST_COMPLETED).done, key=running.__getitem__):
+                        future.result()
+                        done = running.pop(future)
+                        for others in waiting.values():
+                            others.discard(done)
+                    start()
+                    self.progress(stage, len(items) - len(waiting) - len(running), len(items))
+
+            start()
+            try:
+                yield finish
+            except BaseException:
+                pool.shutdown(wait=False, cancel_futures=True)
+                raise
 
 
 def state(job: Job, directory: Path) -> State:
@@ -162,40 +178,45 @@ def generate(job: Job, directory: Path) -> bool:
 
 
 def make_records(job: Job) -> dict[str, Record]:
-    """Derive what is not derived yet, then bind, compare, optimise and print every kernel.
-
-    Kernels with solvers come second: they are built from the records of the kernels they call.
-    """
+    """Derive what is not derived yet, then bind, compare, optimise and print every kernel."""
     from awiwi_gen.records import fingerprints, record_key, solver_key
 
     derive_missing(job)
-    closed = [kernel for kernel in job.kernels if kernel.solver is None]
-    tasks: list[Task] = []
-    for kernel in closed:
-        prints = fingerprints(kernel, job.store)
-        tasks.append((kernel, prints, record_key(kernel, prints, job.hand.prefix, job.options)))
-    made = dict(zip((kernel.name for kernel in closed), _kept_records(job, "emit", tasks), strict=True))
-    iterating = [kernel for kernel in job.kernels if kernel.solver is not None]
-    solving: list[Task] = []
-    for kernel in iterating:
-        used = {family: made[name] for family, name in kernel.needs.items()}
-        solving.append((kernel, used, solver_key(kernel, used, job.hand.prefix, job.options)))
-    made |= zip((kernel.name for kernel in iterating), _kept_records(job, "solve", solving), strict=True)
-    return {kernel.name: made[kernel.name] for kernel in job.kernels}
+    tasks: dict[str, Task] = {}
+    for kernel in sorted(job.kernels, key=lambda kernel: kernel.solver is not None):
+        if kernel.solver is None:
+            given = fingerprints(kernel, job.store)
+            tasks[kernel.name] = kernel, given, record_key(kernel, given, job.hand.prefix, job.options)
+        else:  # built from the records of the kernels it calls
+            used = {family: tasks[name][2] for family, name in kernel.needs.items()}
+            tasks[kernel.name] = kernel, used, solver_key(kernel, used, job.hand.prefix, job.options)
+    _make_absent(job, tasks.values())
+    return {kernel.name: _kept(job.store, tasks[kernel.name][2]) for kernel in job.kernels}
 
 
-def _kept_records(job: Job, stage: str, tasks: Sequence[Task]) -> list[Any]:
-    """Records by their keys; those that are not kept yet are made on all cores, part by part."""
+def _kept(store: Cache, digest: str) -> Record:
+    return store.get("records", digest)  # type: ignore[return-value]
+
+
+def _make_absent(job: Job, tasks: Collection[Task]) -> None:
+    """Make the records that are not kept yet on all cores, part by part, those that others wait for first."""
     absent = set(job.store.missing("records", [digest for _, _, digest in tasks]))
     parts: dict[str, list[Task]] = {}
     for kernel, given, digest in tasks:
         if digest in absent:
             group = kernel.path if kernel.solver is None else kernel.name
             parts.setdefault(group, []).append((kernel, given, digest))
-    work = [(members, job.hand.prefix, job.options, job.store) for members in _shares(list(parts.values()))]
-    work.sort(key=lambda task: -sum(map(_size, task[0])))  # the long ones first, so that no core waits in the end
-    job.parallel(stage, _record_task, work)
-    return [job.store.get("records", digest) for _, _, digest in tasks]
+    work = _shares(list(parts.values()))
+    awaited = {digest for members in work for task in members for digest in _needs(task)}
+    work.sort(key=lambda members: (awaited.isdisjoint(task[2] for task in members), -sum(map(_size, members))))
+    place = {digest: number for number, members in enumerate(work) for _, _, digest in members}
+    after = [{place[one] for task in members for one in _needs(task) if one in place} for members in work]
+    job.parallel("emit", _record_task, [(members, job.hand.prefix, job.options, job.store) for members in work], after)
+
+
+def _needs(task: Task) -> Collection[str]:
+    """Keys of the records that a record is made from."""
+    return task[1].values() if task[0].solver is not None else ()
 
 
 def _shares(parts: Sequence[list[Task]]) -> list[list[Task]]:
@@ -223,7 +244,10 @@ def _record_task(task: tuple[list[Task], str, Options, Cache]) -> None:
         loaded = [(kernel, load_graphs(kernel, store), digest) for kernel, _, digest in members]
         made = make_records(loaded, prefix, options)
     else:
-        made = [make_solver_record(*member, prefix, options) for member in members]
+        made = []
+        for kernel, needs, digest in members:
+            used = {family: _kept(store, one) for family, one in needs.items()}
+            made.append(make_solver_record(kernel, used, digest, prefix, options))
     for record in made:
         store.put("records", record.digest, record)
 

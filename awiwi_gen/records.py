@@ -105,9 +105,9 @@ def record_key(kernel: Kernel, graphs: Mapping[str, Fingerprint], prefix: str, o
     return key(kernel.name, digests, json.dumps(used, sort_keys=True), ports, prefix, options, code, libraries())
 
 
-def solver_key(kernel: Kernel, used: Mapping[str, Record], prefix: str, options: Options) -> str:
-    """What a record of a kernel with a solver depends on: the kernels it calls, and itself."""
-    return key(record_key(kernel, {}, prefix, options), *(record.digest for record in used.values()))
+def solver_key(kernel: Kernel, used: Mapping[str, str], prefix: str, options: Options) -> str:
+    """What a record of a kernel with a solver depends on: the keys of the records it uses, and itself."""
+    return key(record_key(kernel, {}, prefix, options), *used.values())
 
 
 def load_graphs(kernel: Kernel, cache: Cache, *routes: str) -> dict[str, Graph]:

@@ -57,7 +57,7 @@ spent.append(["start, read the hand, make the catalogue", *(a - b for a, b in zi
 from awiwi_gen import build
 import awiwi_gen.records
 timed(pipeline, "derive_missing", "derive, check units")
-timed(pipeline, "_kept_records", "bind, compare, optimise, print")
+timed(pipeline, "_make_absent", "bind, compare, optimise, print")
 timed(sys.modules["awiwi_gen.build"], "load", "compile, link, load")
 timed(pipeline, "_judged", "compare the compiled kernels")
 timed(pipeline, "_examine", "laws of physics, beyond what compiling hides")
