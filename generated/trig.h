@@ -35,7 +35,7 @@ typedef struct awiwi_trig_numbers {
 #define AWIWI_FOUR(x) {x, x, x, x}
 #define AWIWI_TRIG_NUMBERS { \
     AWIWI_FOUR(1.7555597020139804e+305), \
-    AWIWI_FOUR(3.626306594058011e-306), \
+    AWIWI_FOUR(0.6366197723675814), \
     AWIWI_FOUR(6755399441055744.0), \
     {AWIWI_FOUR(1.5707963267341256), AWIWI_FOUR(6.077100506303966e-11), AWIWI_FOUR(2.0222662487959506e-21)}, \
     AWIWI_FOUR(412316860416.0), \
@@ -56,11 +56,12 @@ typedef struct awiwi_turn {
 /* Sine and cosine of x with the numbers in column i. Only + - * and moves of bits; see awiwi_gen/ir/trig.py. */
 static inline awiwi_turn awiwi_sincos_by(double x, const awiwi_trig_numbers *k, int i)
 {
-    const double shifted = (x * k->overflow[i]) * k->quarters[i] + k->integer[i]; /* its last bits: the quadrant */
+    const double shifted = x * k->quarters[i] + k->integer[i]; /* its last bits: the quadrant */
     const double n = shifted - k->integer[i];
     const double a = x - n * k->half_pi[0][i], b = n * k->half_pi[1][i], r = a - b;
     const double rest = ((a - r) - b) - n * k->half_pi[2][i];
-    const double high = (r + k->split[i]) - k->split[i]; /* its square and cube are exact */
+    const double split = k->split[i] + (x * k->overflow[i]) * 0; /* NaN beyond the domain: infinity times 0 */
+    const double high = (r + split) - k->split[i]; /* its square and cube are exact */
     const double low = (r - high) + rest;
     const double z = r * r, square = high * high, gap = low * (high + k->half[i] * low); /* half of r^2 - high^2 */
     const double zz = z * z, part = k->sixth[i] * square;

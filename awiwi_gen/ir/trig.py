@@ -3,9 +3,10 @@
 Only + - * and moves of bits, no branches, so every IEEE machine computes the same bits, one angle at a time or several
 in lanes. The steps, with h the upper bits of the reduced angle r and l the rest of it:
 
-- Scaling by ``overflow`` overflows beyond the domain, and infinity becomes NaN in the next subtraction.
 - r = x - n pi/2, where pi/2 has three parts and the first two products and differences are exact; the third is added
   last, for it matters only where r is tiny.
+- h is r rounded by adding and subtracting ``split``. Beyond the domain an angle times ``overflow`` is infinite, and that
+  times 0 is NaN, as are h and all results then. None of the steps to r waits for that.
 - h has so few bits that h^2, h (1 - sixth h^2) and 1 - h^2/2 are exact, where ``sixth`` is a short number near 1/6.
 - sin r = h (1 - sixth h^2) + small terms, cos r = (1 - h^2/2) + small terms; what rounding does to the small terms is
   a few hundredths of the last place of the sum.
@@ -30,7 +31,7 @@ class Trig:
     """Constants for one scalar type; all are exact in it."""
 
     overflow: float  # an angle times this is infinite from `limit` on
-    quarters: float  # 2/pi, without that factor
+    quarters: float  # 2/pi
     integer: float  # adding it rounds to an integer, which the lowest bits of the sum then hold
     half_pi: tuple[float, float, float]
     split: float  # adding and subtracting it keeps the upper bits
@@ -49,7 +50,7 @@ class Trig:
 
 DOUBLE = Trig(
     overflow=2.0**1014,
-    quarters=0.6366197723675814 * 2.0**-1014,
+    quarters=0.6366197723675814,
     integer=6755399441055744.0,
     half_pi=(1.5707963267341256, 6.077100506303966e-11, 2.0222662487959506e-21),
     split=1.5 * 2.0**38,
@@ -69,7 +70,7 @@ DOUBLE = Trig(
 
 SINGLE = Trig(
     overflow=2.0**119,
-    quarters=0.6366197466850281 * 2.0**-119,
+    quarters=0.6366197466850281,
     integer=12582912.0,
     half_pi=(1.57080078125, -4.454515874385834e-06, 6.07710062827671e-11),
     split=1.5 * 2.0**17,
@@ -93,12 +94,13 @@ def sincos(x: Any, dtype: type) -> tuple[Any, Any]:
     bits: Any = np.uint32 if dtype is np.float32 else np.uint64
     one, half, sixth, third = dtype(k.one), dtype(k.half), dtype(k.sixth), dtype(k.third)
     x = np.asarray(x, dtype)
-    shifted = (x * dtype(k.overflow)) * dtype(k.quarters) + dtype(k.integer)
+    shifted = x * dtype(k.quarters) + dtype(k.integer)
     n = shifted - dtype(k.integer)
     a, b, tail = x - n * dtype(k.half_pi[0]), n * dtype(k.half_pi[1]), n * dtype(k.half_pi[2])
     r = a - b
     rest = ((a - r) - b) - tail
-    high = (r + dtype(k.split)) - dtype(k.split)
+    split = dtype(k.split) + (x * dtype(k.overflow)) * dtype(0)
+    high = (r + split) - dtype(k.split)
     low = (r - high) + rest
     z, square, gap = r * r, high * high, low * (high + half * low)
     zz, part = z * z, sixth * square
