@@ -35,7 +35,7 @@
 
 void awiwi_antagonistic_observer(const double memory[restrict 13], const double thetas[restrict 2], const double stretches[restrict 2], const double measured[restrict 2], const double acted[restrict 2], const double acting[restrict 2], const double inertias[restrict 3], const double tendons[restrict 6], const double damping[restrict 1], const double friction[restrict 3], const double bandwidths[restrict 4], const double period[restrict 1], double memory_next[restrict 13], double joint[restrict 2], double motors[restrict 4], double torques[restrict 4], double springs[restrict 4], double load[restrict 1], double modelled[restrict 2], double resistance[restrict 2])
 {
-    double s0 = stretches[0] + thetas[1] - stretches[1];
+    double s0 = stretches[0] - stretches[1] + thetas[1];
     s0 -= thetas[0];
     double s1 = acted[0] - memory[9];
     double s2 = memory[9] - memory[10];

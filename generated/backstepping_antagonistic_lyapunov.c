@@ -40,7 +40,7 @@ void awiwi_backstepping_antagonistic_lyapunov(const double joint[restrict 2], co
     controls[2] = t11;
     const double t12 = torques[0] - t10;
     const double t13 = torques[2] - t11;
-    s6 += t9*(desired[2] - (torques[0] + external[0] - torques[2])/inertias[0]);
+    s6 += t9*(desired[2] - (torques[0] - torques[2] + external[0])/inertias[0]);
     const double t14 = tunings[0]*t12;
     double s15 = s6 - t14;
     s15 += pretension[1];

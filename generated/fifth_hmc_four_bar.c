@@ -27,7 +27,7 @@ int awiwi_fifth_hmc_four_bar(const double q[restrict 1], double coupler[restrict
     const double t2 = 0.01*a0.cos;
     const double t3 = 1.0/t1;
     const double t4 = 0.01*a0.sin;
-    const double t5 = 0.5*(t1 + 0.000121 - 5.625e-05);
+    const double t5 = 0.5*(t1 - 5.625e-05 + 0.000121);
     const double t6 = t2 - 0.012;
     const double t7 = sqrt(-5.625e-05*t1 - t5*t5);
     const double t8 = t3*(t4*t5 + t6*t7);

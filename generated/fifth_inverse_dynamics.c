@@ -35,7 +35,7 @@ void awiwi_fifth_inverse_dynamics(const double q[restrict 4], const double qd[re
     const double t14 = 115.1482661348124*t9 + 67.22093858258893*t12;
     const double t15 = t3*t9 - t11*t12;
     const double t16 = 0.00012*a0.sin[0] - t15;
-    const double t17 = t13*t16 + 1.0 - 1.0;
+    const double t17 = t13*t16 - 1.0 + 1.0;
     double s18 = t3*(t8 - t12) - t13*t13*(0.000121*t15*t15 - (t10 + 5.625e-05)*t16*t16);
     const double t19 = 67.22093858258893*t9 - 115.1482661348124*t12;
     s18 += t11*(t11 - t9);

@@ -15,7 +15,7 @@ void awiwi_index_coriolis_matrix(const double q[restrict 4], const double qd[res
 {
     C[15] = 0.0;
     const double t0 = q[2] + q[1];
-    const double t1 = q[3] + t0 - 1.5458015331759765;
+    const double t1 = q[3] - 1.5458015331759765 + t0;
     const awiwi_turn3 a0 = awiwi_sincos3(q[1], t0, t1);
     const double t2 = a0.cos[0] + 0.1485884101040119;
     const double t3 = 0.7379891035165924*a0.cos[1];
@@ -31,7 +31,7 @@ void awiwi_index_coriolis_matrix(const double q[restrict 4], const double qd[res
     const double t11 = a0.cos[0]*t4 + a0.sin[0]*t9;
     const double t12 = 8.326356e-06*a0.cos[1] - t9 - 4.8456e-08*a0.sin[1];
     const double t13 = a0.cos[0]*(t6 + t4) - a0.sin[0]*t12;
-    const double t14 = a0.sin[0]*(t12 + 2.1654944e-05*a0.cos[0] + 3.6348e-06 - 7.72e-08*a0.sin[0]) + 1.8e-08*a0.cos[0] + s7 + 3.86e-08;
+    const double t14 = a0.sin[0]*(t12 + 2.1654944e-05*a0.cos[0] - 7.72e-08*a0.sin[0] + 3.6348e-06) + 1.8e-08*a0.cos[0] + s7 + 3.86e-08;
     double s15 = qd[3]*s5 - qd[1]*t14;
     s15 -= qd[2]*s7;
     C[0] = s15;

@@ -19,7 +19,7 @@ void awiwi_index_dynamics(const double q[restrict 4], const double qd[restrict 4
     M[15] = 4.1116e-07;
     C[15] = 0.0;
     const double t0 = q[2] + q[1];
-    const double t1 = q[3] + t0 - 1.539354111254972;
+    const double t1 = q[3] - 1.539354111254972 + t0;
     const awiwi_turn4 a0 = awiwi_sincos4(q[1], t0, t1, q[0]);
     const double t2 = 2.063805357661431e-07*a0.cos[2] - 3.200933312448819e-05*a0.sin[2];
     const double t3 = 0.0002062*a0.cos[1] + t2 - 1.2e-06*a0.sin[1];

@@ -16,7 +16,7 @@
 void awiwi_index_energy(const double q[restrict 4], const double qd[restrict 4], const double g[restrict 3], double kinetic[restrict 1], double potential[restrict 1])
 {
     const double t0 = q[2] + q[1];
-    const double t1 = q[3] + t0 - 1.5458015331759765;
+    const double t1 = q[3] - 1.5458015331759765 + t0;
     const double t2 = qd[2] + qd[1];
     const awiwi_turn4 a0 = awiwi_sincos4(q[1], t0, t1, q[0]);
     const double t3 = 0.04038*qd[1];

@@ -18,7 +18,7 @@ void awiwi_index_inverse_dynamics_derivatives(const double q[restrict 4], const 
 {
     dtau_dqd[15] = 0.0;
     const double t0 = q[2] + q[1];
-    const double t1 = q[3] + t0 - 1.539354111254972;
+    const double t1 = q[3] - 1.539354111254972 + t0;
     const double t2 = 24.764735017335315*g[1];
     const double t3 = 24.764735017335315*g[0];
     const awiwi_turn4 a0 = awiwi_sincos4(q[1], t0, t1, q[0]);

@@ -14,7 +14,7 @@ void awiwi_index_mass_matrix(const double q[restrict 4], double M[restrict 16])
 {
     M[15] = 4.1116e-07;
     const double t0 = q[2] + q[1];
-    const double t1 = q[3] + t0 - 1.5458015331759765;
+    const double t1 = q[3] - 1.5458015331759765 + t0;
     const awiwi_turn3 a0 = awiwi_sincos3(t0, t1, q[1]);
     const double t2 = a0.sin[0] - 171.83333333333334*a0.cos[0];
     const double t3 = t2 + 26.67499869832341*a0.sin[1];

@@ -30,7 +30,7 @@ void awiwi_joint_impedance(const double M[restrict 16], const double C[restrict 
     const double t5 = q[1] - q_des[1];
     const double t6 = q[2] - q_des[2];
     const double t7 = q[3] - q_des[3];
-    tau[0] = gravity[0] + C[0]*qd_des[0] + C[1]*qd_des[1] + C[2]*qd_des[2] + C[3]*qd_des[3] + M[0]*qdd_des[0] + M[1]*qdd_des[1] + M[2]*qdd_des[2] + M[3]*qdd_des[3] - D[0]*t0 - D[1]*t1 - D[2]*t2 - D[3]*t3 - K[0]*t4 - K[1]*t5 - K[2]*t6 - K[3]*t7;
+    tau[0] = gravity[0] + C[0]*qd_des[0] + C[1]*qd_des[1] + C[2]*qd_des[2] + C[3]*qd_des[3] - D[0]*t0 - D[1]*t1 - D[2]*t2 - D[3]*t3 - K[0]*t4 - K[1]*t5 - K[2]*t6 - K[3]*t7 + M[0]*qdd_des[0] + M[1]*qdd_des[1] + M[2]*qdd_des[2] + M[3]*qdd_des[3];
     tau[1] = gravity[1] + C[4]*qd_des[0] + C[5]*qd_des[1] + C[6]*qd_des[2] + C[7]*qd_des[3] + M[4]*qdd_des[0] + M[5]*qdd_des[1] + M[6]*qdd_des[2] + M[7]*qdd_des[3] - D[4]*t0 - D[5]*t1 - D[6]*t2 - D[7]*t3 - K[4]*t4 - K[5]*t5 - K[6]*t6 - K[7]*t7;
     tau[2] = gravity[2] + C[8]*qd_des[0] + C[9]*qd_des[1] + C[10]*qd_des[2] + C[11]*qd_des[3] + M[8]*qdd_des[0] + M[9]*qdd_des[1] + M[10]*qdd_des[2] + M[11]*qdd_des[3] - D[8]*t0 - D[9]*t1 - D[10]*t2 - D[11]*t3 - K[8]*t4 - K[9]*t5 - K[10]*t6 - K[11]*t7;
     tau[3] = C[12]*qd_des[0] + gravity[3] + C[13]*qd_des[1] + C[14]*qd_des[2] + C[15]*qd_des[3] + M[12]*qdd_des[0] + M[13]*qdd_des[1] + M[14]*qdd_des[2] + M[15]*qdd_des[3] - D[12]*t0 - D[13]*t1 - D[14]*t2 - D[15]*t3 - K[12]*t4 - K[13]*t5 - K[14]*t6 - K[15]*t7;

@@ -15,7 +15,7 @@ void awiwi_middle_coriolis_matrix(const double q[restrict 4], const double qd[re
 {
     C[15] = 0.0;
     const double t0 = q[2] + q[1];
-    const double t1 = q[3] + t0 - 1.5485777614681775;
+    const double t1 = q[3] - 1.5485777614681775 + t0;
     const awiwi_turn3 a0 = awiwi_sincos3(q[1], t0, t1);
     const double t2 = a0.cos[0] + 0.13636363636363635;
     const double t3 = 0.75*a0.cos[1];
@@ -31,7 +31,7 @@ void awiwi_middle_coriolis_matrix(const double q[restrict 4], const double qd[re
     const double t11 = a0.cos[0]*t4 + a0.sin[0]*t9;
     const double t12 = 1.06744e-05*a0.cos[1] - t9 - 5.72e-08*a0.sin[1];
     const double t13 = a0.cos[0]*(t6 + t4) - a0.sin[0]*t12;
-    const double t14 = a0.sin[0]*(t12 + 2.771021e-05*a0.cos[0] + 4.2768e-06 - 8.92e-08*a0.sin[0]) + 1.98e-08*a0.cos[0] + s7 + 4.46e-08;
+    const double t14 = a0.sin[0]*(t12 + 2.771021e-05*a0.cos[0] - 8.92e-08*a0.sin[0] + 4.2768e-06) + 1.98e-08*a0.cos[0] + s7 + 4.46e-08;
     double s15 = qd[3]*s5 - qd[1]*t14;
     s15 -= qd[2]*s7;
     C[0] = s15;

@@ -19,7 +19,7 @@ void awiwi_middle_dynamics(const double q[restrict 4], const double qd[restrict 
     M[15] = 5.16368e-07;
     C[15] = 0.0;
     const double t0 = q[2] + q[1];
-    const double t1 = q[3] + t0 - 1.5418962645735244;
+    const double t1 = q[3] - 1.5418962645735244 + t0;
     const awiwi_turn4 a0 = awiwi_sincos4(q[1], t0, t1, q[0]);
     const double t2 = 2.526210559471061e-07*a0.cos[2] - 3.7808488234814314e-05*a0.sin[2];
     const double t3 = 0.0002426*a0.cos[1] + t2 - 1.3e-06*a0.sin[1];

@@ -16,7 +16,7 @@
 void awiwi_middle_forward_dynamics(const double q[restrict 4], const double qd[restrict 4], const double tau[restrict 4], const double g[restrict 3], double qdd[restrict 4])
 {
     const double t0 = q[2] + q[1];
-    const double t1 = q[3] + t0 - 1.5418962645735244;
+    const double t1 = q[3] - 1.5418962645735244 + t0;
     const double t2 = qd[2] + qd[1];
     const double t3 = qd[3] + t2;
     const double t4 = t3*t3;

@@ -16,7 +16,7 @@
 void awiwi_middle_inverse_dynamics(const double q[restrict 4], const double qd[restrict 4], const double qdd[restrict 4], const double g[restrict 3], double tau[restrict 4])
 {
     const double t0 = q[2] + q[1];
-    const double t1 = q[3] + t0 - 1.5485777614681775;
+    const double t1 = q[3] - 1.5485777614681775 + t0;
     const awiwi_turn4 a0 = awiwi_sincos4(q[1], t0, t1, q[0]);
     const double t2 = 22.727272727272727*g[0];
     const double t3 = 22.727272727272727*g[1];

@@ -18,7 +18,7 @@ void awiwi_middle_inverse_dynamics_derivatives(const double q[restrict 4], const
 {
     dtau_dqd[15] = 0.0;
     const double t0 = q[2] + q[1];
-    const double t1 = q[3] + t0 - 1.5418962645735244;
+    const double t1 = q[3] - 1.5418962645735244 + t0;
     const double t2 = 22.727272727272727*g[1];
     const double t3 = 22.727272727272727*g[0];
     const awiwi_turn4 a0 = awiwi_sincos4(q[1], t0, t1, q[0]);

@@ -14,7 +14,7 @@ void awiwi_middle_mass_matrix(const double q[restrict 4], double M[restrict 16])
 {
     M[15] = 5.16368e-07;
     const double t0 = q[2] + q[1];
-    const double t1 = q[3] + t0 - 1.5485777614681775;
+    const double t1 = q[3] - 1.5485777614681775 + t0;
     const awiwi_turn3 a0 = awiwi_sincos3(t0, t1, q[1]);
     const double t2 = a0.sin[0] - 186.6153846153846*a0.cos[0];
     const double t3 = t2 + 29.08410167796491*a0.sin[1];

@@ -18,7 +18,7 @@
 
 void awiwi_plant_finger_forces(const double thetas[restrict 8], const double path[restrict 8], const double slack[restrict 8], const double motor[restrict 2], const double line[restrict 3], double f[restrict 8])
 {
-    const double t0 = path[0] + motor[1]*thetas[0] - slack[0];
+    const double t0 = path[0] - slack[0] + motor[1]*thetas[0];
     const double t1 = t0 + fabs(t0);
     const double t2 = 0.5*line[0];
     const double t3 = 0.25*line[1];

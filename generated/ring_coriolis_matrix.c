@@ -31,7 +31,7 @@ void awiwi_ring_coriolis_matrix(const double q[restrict 3], const double qd[rest
     const double t11 = a0.cos[0]*t4 + a0.sin[0]*t9;
     const double t12 = 8.6428e-06*a0.cos[1] - t9 - 4.92e-08*a0.sin[1];
     const double t13 = a0.cos[0]*(t6 + t4) - a0.sin[0]*t12;
-    const double t14 = a0.sin[0]*(t12 + 2.23216e-05*a0.cos[0] + 3.69e-06 - 7.9e-08*a0.sin[0]) + 1.8e-08*a0.cos[0] + s7 + 3.95e-08;
+    const double t14 = a0.sin[0]*(t12 + 2.23216e-05*a0.cos[0] - 7.9e-08*a0.sin[0] + 3.69e-06) + 1.8e-08*a0.cos[0] + s7 + 3.95e-08;
     const double t15 = 0.7857142857142857*qd[2];
     C[0] = t15*s5 - qd[1]*t14 - qd[2]*s7;
     const double t16 = qd[2] + qd[1];

@@ -33,7 +33,7 @@ void awiwi_thumb_energy(const double q[restrict 4], const double qd[restrict 4],
     const double t13 = a0.cos[0]*t11 - a0.cos[1]*t12;
     s6 -= a0.sin[1]*t12;
     const double t14 = 3.6055512754639894e-09*a0.sin[1];
-    const double t15 = 0.0003315*a0.cos[0] + t2 - 2.7e-06*a0.sin[0];
+    const double t15 = 0.0003315*a0.cos[0] - 2.7e-06*a0.sin[0] + t2;
     const double t16 = 0.09*t15;
     const double t17 = t16 + t8 + 4.258586e-05;
     double s18 = t16 + 0.064*a0.cos[0]*t2 + t13;

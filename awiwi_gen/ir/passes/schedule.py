@@ -33,18 +33,29 @@ def schedule(graph: Graph) -> Graph:
 
 
 def merged(graph: Graph) -> Graph:
-    """Sums that one sum alone reads become part of it: passes after `flatten` leave such."""
+    """Sums that one sum alone reads become part of it: passes after `flatten` leave such.
+
+    Angles, which so much waits for, begin with what is there from the start.
+    """
     nodes: list[Node] = []
-    for node in graph.nodes:
+    angles = {node_of(node[1]) for node in graph.nodes if node[0] in ("sin", "cos")}
+    for index, node in enumerate(graph.nodes):
         if node[0] == "add":
             terms: list[Ref] = []
             for ref in node[1:]:
                 inner = nodes[node_of(ref)]
                 lone = inner[0] == "add" and graph.uses[node_of(ref)] == 1
                 terms += [r if ref >= 0 else ~r for r in inner[1:]] if lone else [ref]
-            node = ("add", *sorted(terms, key=lambda ref: ref < 0 and terms[0] < 0))
+            if index in angles:
+                terms.sort(key=lambda ref: nodes[node_of(ref)][0] not in LEAVES)
+            node = ("add", *_positive_first(terms))
         nodes.append(node)
     return Graph(tuple(nodes), graph.outputs)
+
+
+def _positive_first(terms: list[Ref]) -> list[Ref]:
+    """Negative terms go last where one would be the first: it would need an operation of its own."""
+    return sorted(terms, key=lambda ref: ref < 0 and terms[0] < 0)
 
 
 def depth_first(graph: Graph) -> Graph:
@@ -190,7 +201,9 @@ class Writer:
             return
         refs = [self.new(ref) for ref in terms]
         so_far = [self.partial[index]] if index in self.partial else []
-        self.partial[index] = self._write(("add", *so_far, *sorted(refs, key=lambda ref: not so_far and ref < 0)))
+        if not so_far:
+            refs = _positive_first(refs)
+        self.partial[index] = self._write(("add", *so_far, *refs))
         if not self.coming[index]:
             self.renamed[index] = self.partial[index]
 
