@@ -103,6 +103,8 @@ class KernelFunction:
         by_element = steps == {True}
         results = self._targets(lead, by_element, out, arrays)
         self._evaluate(lead, by_element, samples, results)
+        if out is not None:
+            return out
         if by_element:
             results = [_rolled(result, result.ndim - len(lead)) for result in results]
         return results[0] if len(results) == 1 else self._result(*results)
@@ -112,11 +114,17 @@ class KernelFunction:
         shapes = [shape + lead if by_element else lead + shape for shape, _, _ in self._results]
         if out is None:
             return [np.empty(shape, dtype) for shape, (_, _, dtype) in zip(shapes, self._results, strict=True)]
-        given = [np.asanyarray(one) for one in ((out,) if len(shapes) == 1 else out)]
+        given = [np.asanyarray(one) for one in (out if isinstance(out, tuple) else (out,))]
+        found = [(one.shape, one.dtype) for one in given]
+        wanted = [(lead + shape, dtype) for shape, _, dtype in self._results]
+        if found != wanted:
+            raise InputError(f"{self.name}: out is {_told(found)}; expected {_told(wanted)}")
         targets = [_rolled(one, len(lead)) if by_element else one for one in given]
-        kinds = [(one.shape, one.dtype, one.flags.carray) for one in targets]
-        if kinds != [(shape, dtype, True) for shape, (_, _, dtype) in zip(shapes, self._results, strict=True)]:
-            raise InputError(f"{self.name}: out is not what a call with such inputs returns")
+        if not all(one.flags.carray for one in targets):
+            order = "elements" if by_element else "samples"
+            raise InputError(
+                f"{self.name}: out is not writeable with its {order} one after another, as such inputs have"
+            )
         if any(np.may_share_memory(one, array) for one in targets for array in arrays):
             raise InputError(f"{self.name}: out overlaps an input")
         return targets
@@ -193,6 +201,10 @@ class KernelFunction:
             wanted = ", ".join(["...", *map(str, shape)])
             raise InputError(f"{self.name}: {name} has shape {array.shape}, expected ({wanted})")
         return array
+
+
+def _told(arrays: list[tuple[tuple[int, ...], Any]]) -> str:
+    return ", ".join(f"{shape} of {dtype}" for shape, dtype in arrays)
 
 
 def _samples(array: Array, own: tuple[int, ...], lead: tuple[int, ...], shape: tuple[int, ...]) -> Samples:
