@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from awiwi_gen.errors import BuildError, InputError
+from awiwi_gen.ir.cost import SINCOS
 
 Array = np.ndarray[Any, Any]
 Samples = tuple[Array, int, int]  # an array to point at, the steps from sample to sample and element to element
@@ -21,7 +22,7 @@ Place = tuple[Any, int, tuple[int, ...]]  # where samples begin, the step from o
 
 C_TYPES = {"d": "double", "f": "float", "i": "int"}  # by NumPy's characters
 VECTORISE_AFTER = 100_000  # samples of a kernel
-SINCOS, CALL = 60, 20  # operations that a sine and cosine, and a call, are worth
+CALL = 20  # operations that a call is worth
 WORTH_A_THREAD = 30_000_000  # operations: a millisecond in vector units, against a tenth for starting a thread
 
 

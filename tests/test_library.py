@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from samples import fields
 
 import awiwi_gen
 from awiwi_gen.errors import InputError
@@ -24,10 +25,6 @@ def points(function, *lead: int) -> dict[str, np.ndarray]:
         )
         for port in function.inputs
     }
-
-
-def fields(result) -> tuple[np.ndarray, ...]:
-    return result if isinstance(result, tuple) else (result,)
 
 
 @pytest.fixture(scope="module")

@@ -14,6 +14,7 @@ from typing import Any
 
 from awiwi_gen.emit.files import banner, render
 from awiwi_gen.emit.options import Options
+from awiwi_gen.ir.cost import SINCOS
 
 BATCHES = "batches"  # the directory of these files inside the generated one
 USAGE = (
@@ -27,7 +28,6 @@ USAGE = (
     "Outputs overlap nothing. Every result has the bits that the kernel alone computes.",
 )
 LIBRARY_CALL = re.compile(r"\b(sin|cos|tan|asin|acos|atan|atan2|exp|log|pow)f?\(")
-SINCOS = 60  # operations of one sine and cosine
 Entry = Mapping[str, Any]  # a kernel in the manifest
 
 

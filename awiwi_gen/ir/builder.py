@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from fractions import Fraction
 from math import prod
 
@@ -269,15 +269,3 @@ def copy_node(builder: Builder, node: Node, refs: tuple[Ref, ...]) -> Ref:
     if node[0] == "param":
         return builder.param(node[1])
     return builder.make(node[0], refs)
-
-
-def graft(builder: Builder, graph: Graph, leaves: Mapping[Node, Ref]) -> dict[str, list[Ref]]:
-    """Replay a graph inside another builder with some leaves replaced; returns the output references."""
-    renamed: list[Ref] = []
-    for node in graph.nodes:
-        given = leaves.get(node)
-        if given is None:
-            refs = [renamed[ref] if ref >= 0 else ~renamed[~ref] for ref in operands(node)]
-            given = copy_node(builder, node, tuple(refs))
-        renamed.append(given)
-    return {output.name: list(output.renamed(renamed).elements) for output in graph.outputs}

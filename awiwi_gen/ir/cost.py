@@ -6,6 +6,8 @@ from dataclasses import asdict, astuple, dataclass
 
 from awiwi_gen.ir.graph import LEAVES, Graph
 
+SINCOS = 60  # operations that one sine and cosine take
+
 
 @dataclass(frozen=True)
 class Cost:

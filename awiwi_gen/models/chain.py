@@ -44,11 +44,6 @@ def joint_angles(finger: Finger, q: Matrix) -> dict[str, Expr]:
     return angles
 
 
-def chain_angles(finger: Finger, q: Matrix) -> list[Expr]:
-    """Angles [rad] of the chain's joints: one per link, and one more for the crank before each four-bar's coupler."""
-    return _chain_angles(finger, q, Derivation())
-
-
 def link_poses(finger: Finger, q: Matrix) -> list[Matrix]:
     """Poses (4 x 4 each) of the links' frames in the base: at their joints, after their rotations (eq. 5.2)."""
     return [frame.matrix() for frame in frames(finger, q, Derivation())[1:-1]]
