@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 import shutil
 import subprocess
@@ -36,10 +35,7 @@ class Line:
 class Driver:
     """The compiled driver, its inputs and its plan, in a directory."""
 
-    def __init__(
-        self, directory: Path, built: list[Built], ranges: dict[str, Any], environment: dict[str, str]
-    ) -> None:
-        self.environment = {**os.environ, **environment}
+    def __init__(self, directory: Path, built: list[Built], ranges: dict[str, Any]) -> None:
         self.directory, self.program = directory, directory / "driver"
         source = Path(__file__).with_name("driver.c")
         command = [*COMPILER["c"], "-std=c99", "-O2", "-rdynamic", str(source), "-o", str(self.program), "-ldl"]
@@ -69,7 +65,7 @@ class Driver:
             rows.append(" ".join(map(str, words)))
         plan.write_text("\n".join(rows) + "\n", encoding="utf-8")
         command = [*before, str(self.program), mode, str(rounds), str(samples), str(plan), str(result)]
-        done = subprocess.run(command, capture_output=True, text=True, env=self.environment, check=False)
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
         if done.returncode:
             raise RuntimeError(f"{' '.join(command)} ended with {done.returncode}: {done.stderr[-2000:]}")
         return result

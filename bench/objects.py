@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 import platform
-import shutil
 import subprocess
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -70,11 +68,7 @@ def build(contender: dict[str, Any], variant: str) -> Built:
             for source, object_ in zip(kernel["sources"], made, strict=True):
                 if object_ in objects:
                     continue
-                command = [*compiler, *flags, "-c", str(directory / source)]
-                if contender.get("kept"):
-                    _kept(command, directory / source, object_)
-                else:
-                    _run(*command, "-o", str(object_))
+                _run(*compiler, *flags, "-c", str(directory / source), "-o", str(object_))
                 objects[object_] = None
             sizes[name] = sum(code_bytes(o, [call[0] for call in kernel["calls"]]) for o in made)
         for source in contender.get("support", ()):
@@ -90,18 +84,6 @@ def build(contender: dict[str, Any], variant: str) -> Built:
         said = error.stderr.strip().splitlines() or ["failed"]
         return Built(contender["name"], variant, target, {}, next((line for line in said if "error" in line), said[0]))
     return Built(contender["name"], variant, target, sizes)
-
-
-def _kept(command: list[str], source: Path, object_: Path) -> None:
-    """Compile what takes long and depends on no hand once; headers of a pinned version do not change."""
-    said = "\0".join([*command[:-1], source.read_text(encoding="utf-8")])
-    store = source.parent.parent.parent / "kept"
-    store.mkdir(exist_ok=True)
-    made = store / f"{hashlib.sha256(said.encode()).hexdigest()}.o"
-    if not made.exists():
-        _run(*command, "-o", str(object_))
-        shutil.copy(object_, made)
-    shutil.copy(made, object_)
 
 
 def loop_source(contender: dict[str, Any]) -> str:

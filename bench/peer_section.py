@@ -71,8 +71,7 @@ def _measure(contenders: list[dict[str, Any]], place: Path, finger: dict[str, An
     for one in built:
         if one.problem:
             print(f"  {one.contender}, {one.variant}: left out, {one.problem}", flush=True)
-    environment = {key: value for c in contenders for key, value in c.get("environment", {}).items()}
-    driver = Driver(place, [one for one in built if not one.problem], finger["ranges"], environment)
+    driver = Driver(place, [one for one in built if not one.problem], finger["ranges"])
     print("  comparing results ...", flush=True)
     checks = driver.disagreements()
     for check in checks:

@@ -96,7 +96,7 @@ def contender(directory: Path, name: str, entry: str) -> dict:
 def test_who_disagrees_is_named(tmp_path):
     entries = {"one": "2*q[0]", "two": "q[0] + q[0]", "wrong": "2*q[0]*(1 + 1e-11)", "absent": "0/(q[0] - q[0])"}
     built = [build(contender(tmp_path, name, entry), "portable") for name, entry in entries.items()]
-    checks = Driver(tmp_path, built, hands.spec(hands.packaged())["ranges"], {}).disagreements()
+    checks = Driver(tmp_path, built, hands.spec(hands.packaged())["ranges"]).disagreements()
 
     assert {check["contender"]: check["agrees"] for check in checks} == {
         "one": True,

@@ -33,8 +33,6 @@ class Contender:
     libraries: list[str] = field(default_factory=list)
     variants: list[str] | None = None
     note: str = ""
-    environment: dict[str, str] = field(default_factory=dict)
-    kept: bool = False
     kernels: dict[str, Any] = field(default_factory=dict)
 
     def add(self, quantity: Quantity, text: str, call: str, seconds: float) -> None:
