@@ -1,16 +1,29 @@
-"""What a kernel is: typed ports, a definition, and a second route to the same numbers."""
+"""What a kernel is: typed ports, and two routes to its outputs, one in each wing."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from importlib import import_module
 from math import prod
 from typing import Any
 
 from awiwi_gen.units import Unit
 
-Route = Callable[..., Any]
 GUARDS = "guards"
+WINGS = {"sympy": "awiwi_gen.definitions", "casadi": "awiwi_gen.witnesses"}  # the library each wing derives with
+
+
+@dataclass(frozen=True)
+class Route:
+    """A function of a wing, by the names of its module and itself; the module is imported at the first call."""
+
+    module: str
+    function: str
+
+    def __call__(self, part: Any, *arguments: Any) -> Any:
+        """Outputs, then guards, of a part with symbols for its numbers and one column of symbols per input port."""
+        return getattr(import_module(self.module), self.function)(part, *arguments)
 
 
 @dataclass(frozen=True)
@@ -87,7 +100,7 @@ class Kernel:
     source: str
     inputs: Mapping[str, Port]
     outputs: Mapping[str, Port]
-    routes: Mapping[str, Route]
+    routes: Mapping[str, Callable[..., Any]]
     part: Any = field(repr=False)
     path: str = ""
     structure: str = ""

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from awiwi_gen.hand import Hand
-from awiwi_gen.models.tree import quarter_turns, sense
+from awiwi_gen.structure import quarter_turns, sense
 
 SEED = 20
 FINGER = "index"

@@ -13,8 +13,12 @@ import casadi as ca
 import numpy as np
 import sympy
 
-from awiwi_gen.models import chain, lagrange, recursive, tendons, tendons_ad
-from awiwi_gen.models.naming import definitions
+from awiwi_gen.definitions import kinematics as chain
+from awiwi_gen.definitions import tendons
+from awiwi_gen.definitions.dynamics import lagrange
+from awiwi_gen.definitions.naming import definitions
+from awiwi_gen.witnesses import tendons as tendons_ad
+from awiwi_gen.witnesses.dynamics import recursion as recursive
 
 SAMPLES = 3
 BASE = [[f"{a}abduction", f"{b}flexion"] for a, b in ("++", "+-", "-+", "--")]

@@ -7,7 +7,7 @@ import itertools
 import sympy
 from sympy import Matrix, symbols
 
-from awiwi_gen.models.naming import definitions
+from awiwi_gen.definitions.naming import definitions
 
 
 def column(names: str) -> Matrix:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from proofs import column, rate, shifts, spelled_out, vanishes
 
-from awiwi_gen.control.backstepping_laws import antagonistic_law
+from awiwi_gen.definitions.backstepping.laws import antagonistic_law
 
 JOINT = q, qd = column("q qd")
 TORQUES = tau1, tau1d, tau2, tau2d = column("tau1 tau1d tau2 tau2d")

@@ -7,7 +7,7 @@ import pytest
 from proofs import column, rate, shifts, spelled_out, vanishes
 from sympy import Matrix, symbols
 
-from awiwi_gen.control.backstepping_adaptive import adaptive_law, backstepping_adaptive
+from awiwi_gen.definitions.backstepping.adaptive import adaptive_law, backstepping_adaptive
 
 PERIOD = 1 / 3000
 INERTIAS, TENDONS = (2e-5, 2e-3, 3e-3), np.array([(0.3, 0.2, 1.0), (0.4, 0.1, 2.0)])

@@ -6,10 +6,10 @@ import sympy
 from proofs import column, rate, shifts, spelled_out, vanishes
 from sympy import Matrix, Symbol
 
-from awiwi_gen.control.backstepping import Level, Start, Tuning, backstep
-from awiwi_gen.control.backstepping_gains import state_gains
-from awiwi_gen.control.backstepping_laws import academic_law, impedance_law, nonlinear_law, position_law
-from awiwi_gen.models.naming import Derivation
+from awiwi_gen.definitions.backstepping.gains import state_gains
+from awiwi_gen.definitions.backstepping.laws import academic_law, impedance_law, nonlinear_law, position_law
+from awiwi_gen.definitions.backstepping.recursion import Level, Start, Tuning, backstep
+from awiwi_gen.definitions.naming import Derivation
 
 PLANT = m, b, k = column("m b k")
 GAINS = K_p, K_d, K_3, K_4 = column("K_p K_d K_3 K_4")

@@ -8,8 +8,8 @@ import sympy
 from proofs import vanishes
 from sympy import Matrix, Rational, cos, diff, eye, simplify, symbols
 
-from awiwi_gen.control.cascade_certificate import cascade_certificate
-from awiwi_gen.control.impedance import cascade, joint_impedance, motor_impedance
+from awiwi_gen.definitions.cascade_certificate import cascade_certificate
+from awiwi_gen.definitions.impedance import cascade, joint_impedance, motor_impedance
 
 T = sympy.Symbol("t")
 ARM = a, b, c, d, e = symbols("a b c d e", positive=True)

@@ -6,7 +6,7 @@ import sympy
 from proofs import column, rate, spelled_out, vanishes
 from sympy import Matrix, Rational, symbols
 
-from awiwi_gen.control.backstepping_gains import state_gains
+from awiwi_gen.definitions.backstepping.gains import state_gains
 
 m, b, k = PLANT = column("m b k")
 K_p, K_d, K_3, K_4 = GAINS = column("K_p K_d K_3 K_4")

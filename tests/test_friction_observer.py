@@ -7,7 +7,7 @@ import pytest
 import sympy
 from proofs import vanishes
 
-from awiwi_gen.control.friction_observer import friction_observer
+from awiwi_gen.definitions.friction_observer import friction_observer
 
 PERIOD, INERTIA = 1 / 3000, 2e-3
 NAMES = "momentum u tau thd B gain period"

@@ -26,10 +26,12 @@ from finger_models import (
     witness,
 )
 
-from awiwi_gen.models import chain, lagrange, recursive
-from awiwi_gen.models.four_bar import four_bar_angles
-from awiwi_gen.models.linkage import FourBar
-from awiwi_gen.models.naming import Derivation, definitions
+from awiwi_gen.definitions import kinematics as chain
+from awiwi_gen.definitions.dynamics import lagrange
+from awiwi_gen.definitions.four_bar import four_bar_angles
+from awiwi_gen.definitions.naming import Derivation, definitions
+from awiwi_gen.witnesses.dynamics import recursion as recursive
+from awiwi_gen.witnesses.four_bar import FourBar
 
 # -- two routes -----------------------------------------------------------------------------------------------------
 

@@ -7,7 +7,7 @@ import pytest
 import sympy
 from sympy import Matrix, diff, exp, simplify, symbols
 
-from awiwi_gen.control.pole_placement import joint_gains, motor_gains, target
+from awiwi_gen.definitions.pole_placement import joint_gains, motor_gains, target
 from awiwi_gen.verify.problems_riccati import joint
 
 m, b, k, dq, dtheta, w1, w2, x1, x2 = symbols("m b k d_q d_theta omega_1 omega_2 xi_1 xi_2", positive=True)

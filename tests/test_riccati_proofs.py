@@ -6,7 +6,7 @@ import numpy as np
 import sympy
 from sympy import Function, Matrix, Symbol, diff, expand, simplify, sqrt, symbols
 
-from awiwi_gen.control.state_dependent import motor_regulator, secant, torque
+from awiwi_gen.definitions.state_dependent import motor_regulator, secant, torque
 from awiwi_gen.verify.problems_riccati import tables
 
 s = Symbol("s")

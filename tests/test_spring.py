@@ -11,6 +11,8 @@ import sympy
 from actuators import compiled, hand_text
 from flint import arb, ctx
 
+from awiwi_gen.definitions import spring as springs
+from awiwi_gen.definitions.naming import Derivation
 from awiwi_gen.derive import Deriver
 from awiwi_gen.errors import InputError
 from awiwi_gen.hand import Hand
@@ -22,8 +24,6 @@ from awiwi_gen.ir.graph import Output
 from awiwi_gen.ir.interpret import evaluate
 from awiwi_gen.ir.passes.bind import bind
 from awiwi_gen.kernels import catalog
-from awiwi_gen.models import spring as springs
-from awiwi_gen.models.naming import Derivation
 
 SLACK, TAUT = 3.25, 3.62
 

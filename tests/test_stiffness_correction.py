@@ -7,7 +7,7 @@ import pytest
 import sympy
 from proofs import vanishes
 
-from awiwi_gen.control.stiffness_correction import stiffness_correction, stiffness_correction_scalar
+from awiwi_gen.definitions.stiffness_correction import stiffness_correction, stiffness_correction_scalar
 
 SAMPLES = 400
 UNIT = np.eye(4)

@@ -7,7 +7,7 @@ import pytest
 import sympy
 from sympy import Function, S, diff, simplify, solve, symbols
 
-from awiwi_gen.control.tendon_force import effort, scheduled_gains
+from awiwi_gen.definitions.tendon_force import effort, scheduled_gains
 
 B, kp, kd, r, omega, xi = symbols("B k_p k_d r omega xi", positive=True)
 f, fd, f_des, fd_des, friction, load = symbols("f fd f_des fd_des friction load", real=True)

@@ -7,14 +7,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from awiwi_gen.control import antagonistic_linear as linear
-from awiwi_gen.control import antagonistic_linear_modes as modes
-from awiwi_gen.control import antagonistic_observer as observer
-from awiwi_gen.control import antagonistic_observer_matrices as matrices
-from awiwi_gen.control import backstepping_adaptive as adaptive
-from awiwi_gen.control import backstepping_adaptive_loop as loop
-from awiwi_gen.control import reference_filter as reference
-from awiwi_gen.control import reference_filter_stages as stages
 from awiwi_gen.kernel import Kernel, Port
 from awiwi_gen.kernels import plants
 from awiwi_gen.kernels.control_backstepping import MOTION, PAIR, PORTS, TORQUES, Nm, box, positive, symmetric
@@ -64,7 +56,7 @@ OWN = {
 @of_pair(
     lambda _: {"motion_next": Port((5,), MOTION)},
     "Bessel's filter of fifth order",
-    witness=stages.reference_filter,
+    subject="reference_filter",
     guards=positive("the delay", "the period"),
 )
 def reference_filter(_: Any, motion: Any, desired: Any, delay: Any, period: Any) -> Any:
@@ -73,7 +65,6 @@ def reference_filter(_: Any, motion: Any, desired: Any, delay: Any, period: Any)
     What is desired with all its derivatives is reached without error, and a jump after 1.7 times the delay. motion is
     the filter's memory: begin with where the joint is, at rest, and pass on what is returned.
     """
-    return reference.reference_filter(_, motion, desired, delay, period)
 
 
 @of_pair(
@@ -88,7 +79,7 @@ def reference_filter(_: Any, motion: Any, desired: Any, delay: Any, period: Any)
         "resistance": Port((2,), Nm),
     },
     "eq. 15.82, observed",
-    witness=matrices.antagonistic_observer,
+    subject="antagonistic_observer",
 )
 def antagonistic_observer(
     _: Any, memory: Any, thetas: Any, stretches: Any, measured: Any, acted: Any, acting: Any,
@@ -100,50 +91,43 @@ def antagonistic_observer(
     motors, the torques and the springs' scales. resistance is what the motors must overcome, modelled what they would
     by the friction model alone. The memory begins with angles at rest, the torques, and scales of 1.
     """
-    return observer.antagonistic_observer(
-        _, memory, thetas, stretches, measured, acted, acting, inertias, tendons, damping, friction, bandwidths, period
-    )
 
 
 @of_pair(
     lambda _: {"x_des": plants.state(3), "u_des": Port((2,), Nm)},
     "eq. 15.82, solved for a desired motion",
-    witness=modes.antagonistic_setpoint,
+    subject="antagonistic_linear",
     guards=positive("slope 1", "slope 2"),
 )
 def antagonistic_setpoint(
     _: Any, desired: Any, pretension: Any, elongations: Any, slopes: Any, inertias: Any, damping: Any
 ) -> Any:
     """State and motor torques of a desired motion, with springs that are linear about their elongations."""
-    return linear.antagonistic_setpoint(_, desired, pretension, elongations, slopes, inertias, damping)
 
 
-@of_pair(lambda _: {"tau_m": Port((2,), Nm)}, "eq. 12.2, 13.3, for two motors", witness=modes.antagonistic_feedback)
+@of_pair(lambda _: {"tau_m": Port((2,), Nm)}, "eq. 12.2, 13.3, for two motors", subject="antagonistic_linear")
 def antagonistic_feedback(_: Any, x: Any, x_des: Any, u_des: Any, feedback: Any, resistance: Any) -> Any:
     """Motor torques u_des - K (x - x_des), with the gains K = feedback, and what the motors must overcome besides."""
-    return linear.antagonistic_feedback(_, x, x_des, u_des, feedback, resistance)
 
 
 @of_pair(
     lambda _: {"against": Port((2,), MOTION[:2]), "together": Port((2,), MOTION[:2])},
     "eq. 15.82, for equal motors",
-    witness=modes.antagonistic_modes,
+    subject="antagonistic_linear",
 )
 def antagonistic_modes(_: Any, motors: Any) -> Any:
     """Angle and speed of half the motors' difference, which moves the link, and of half their sum, which pulls."""
-    return linear.antagonistic_modes(_, motors)
 
 
-@of_pair(lambda _: {"shares": Port((2,), Nm)}, "eq. 15.88", witness=modes.antagonistic_sharing)
+@of_pair(lambda _: {"shares": Port((2,), Nm)}, "eq. 15.88", subject="antagonistic_linear")
 def antagonistic_sharing(_: Any, torque: Any, pretension: Any) -> Any:
     """Torques of the springs that together pull the link with a torque, about a common pretension."""
-    return linear.antagonistic_sharing(_, torque, pretension)
 
 
 @of_pair(
     lambda _: {"tau_m": Port((2,), Nm)},
     "eq. 15.82 to 15.106, mended, with the link's damping and an observer",
-    witness=loop.backstepping_adaptive,
+    subject="backstepping.adaptive",
     guards=positive(*PAIR),
 )
 def backstepping_adaptive(
@@ -151,6 +135,3 @@ def backstepping_adaptive(
     damping: Any, impedance: Any, tunings: Any, resistance: Any,
 ) -> Any:  # fmt: skip
     """The antagonistic law for a link with damping; springs, external torque and resistance are those observed."""
-    return adaptive.backstepping_adaptive(
-        _, joint, torques, desired, pretension, external, inertias, springs, damping, impedance, tunings, resistance
-    )

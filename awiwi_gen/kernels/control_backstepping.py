@@ -9,13 +9,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from awiwi_gen.control import backstepping_flatness as flat
-from awiwi_gen.control import backstepping_laws as laws
 from awiwi_gen.kernel import Kernel, Port
 from awiwi_gen.kernels.declare import Family, Parameterless
 from awiwi_gen.units import J, N, Unit, W, kg, m, one, rad, s
 
-backstepping: Family[None] = Family()
+backstepping: Family[None] = Family("backstepping.laws")
 
 
 def backstepping_laws() -> list[Kernel]:
@@ -95,44 +93,31 @@ def lyapunov(energy: Unit, power: Unit, controls: Port) -> dict[str, Port]:
 # -- the example, and a joint in its link's derivatives ----------------------------------------------------
 
 
-@backstepping(
-    lambda _: {"u": Port((), one)}, "eq. 15.1 to 15.10, mended", witness=flat.academic, guards=positive("k1", "k2")
-)
+@backstepping(lambda _: {"u": Port((), one)}, "eq. 15.1 to 15.10, mended", guards=positive("k1", "k2"))
 def backstepping_academic(_: Any, x: Any, k: Any) -> Any:
     """Control of the example x1' = -x1^3 + x1^2 + x2, x2' = u."""
-    return laws.academic_law(x, k).control, [*k]
 
 
-@backstepping(
-    lambda _: lyapunov(one, one, Port((), one)), "eq. 15.2, 15.6, 15.9, mended", witness=flat.academic_lyapunov
-)
+@backstepping(lambda _: lyapunov(one, one, Port((), one)), "eq. 15.2, 15.6, 15.9, mended")
 def backstepping_academic_lyapunov(_: Any, x: Any, k: Any) -> Any:
     """Energy of the example, its rate under the law, and the virtual control of x2."""
-    law = laws.academic_law(x, k)
-    return law.energy, law.rate, law.targets[0]
 
 
 @backstepping(
     torque_of_motor,
     "eq. 15.17 to 15.50",
-    witness=flat.position,
     guards=positive(*PLANT, "k1", "k2", "k3", "k4", "c2", "c3", "c4"),
 )
 def backstepping_position(_: Any, motion: Any, desired: Any, plant: Any, rates: Any, scales: Any) -> Any:
     """Motor torque that takes the link (q and three derivatives) to desired (q_d and four); scales of 1 as printed."""
-    law = laws.position_law(motion, desired, plant, rates, scales)
-    return law.control, [*plant, *rates, *scales]
 
 
 @backstepping(
     lambda _: lyapunov(rad**2, rad**2 / s, Port((3,), MOTION[1:4])),
     "eq. 15.27 to 15.46",
-    witness=flat.position_lyapunov,
 )
 def backstepping_position_lyapunov(_: Any, motion: Any, desired: Any, plant: Any, rates: Any, scales: Any) -> Any:
     """Energy of the position law's errors, its rate under the law, and the virtual controls of q', q'' and q'''."""
-    law = laws.position_law(motion, desired, plant, rates, scales)
-    return law.energy, law.rate, [target[0] for target in law.targets[1:]]
 
 
 # -- impedance of a joint behind one spring ----------------------------------------------------------------
@@ -141,7 +126,6 @@ def backstepping_position_lyapunov(_: Any, motion: Any, desired: Any, plant: Any
 @backstepping(
     torque_of_motor,
     "eq. 15.51 to 15.70, mended",
-    witness=flat.impedance,
     guards=positive(*PLANT, *GAINS, "C_t", "C_s"),
 )
 def backstepping_impedance(
@@ -153,14 +137,11 @@ def backstepping_impedance(
     the static stiffness is wrong. plant is (link, motor, spring); gains are (K_p, K_d, K_3, K_4); weights (C_t, C_s)
     are 1 as printed.
     """
-    law = laws.impedance_law(state, desired, external, plant, gains, weights)
-    return law.control, [*plant, *gains, *weights]
 
 
 @backstepping(
     lambda _: lyapunov(J, W, Port((2,), TORQUES[:2])),
     "eq. 15.54, 15.57, 15.64, 15.66, mended",
-    witness=flat.impedance_lyapunov,
 )
 def backstepping_impedance_lyapunov(
     _: Any, state: Any, desired: Any, external: Any, plant: Any, gains: Any, weights: Any
@@ -169,14 +150,11 @@ def backstepping_impedance_lyapunov(
 
     Serves the law for nonlinear springs too: neither depends on the spring.
     """
-    law = laws.impedance_law(state, desired, external, plant, gains, weights)
-    return law.energy, law.rate, [target[0] for target in law.targets]
 
 
 @backstepping(
     torque_of_motor,
     "eq. 15.71 to 15.81, mended",
-    witness=flat.nonlinear,
     guards=positive(*PLANT[:2], "the spring's slope", *GAINS, "C_t", "C_s"),
 )
 def backstepping_nonlinear(
@@ -186,14 +164,12 @@ def backstepping_nonlinear(
 
     bodies are the inertias of link and motor.
     """
-    law = laws.nonlinear_law(state, desired, external, bodies, spring, gains, weights)
-    return law.control, [*bodies, spring[0], *gains, *weights]
 
 
 # -- impedance of a joint between two tendons --------------------------------------------------------------
 
 
-@backstepping(torques_of_motors, "eq. 15.82 to 15.106, mended", witness=flat.antagonistic, guards=positive(*PAIR))
+@backstepping(torques_of_motors, "eq. 15.82 to 15.106, mended", guards=positive(*PAIR))
 def backstepping_antagonistic(
     _: Any, joint: Any, torques: Any, desired: Any, pretension: Any, external: Any,
     inertias: Any, springs: Any, impedance: Any, tunings: Any,
@@ -203,30 +179,22 @@ def backstepping_antagonistic(
     By motor: torques (tau, tau') of its spring, springs (phi', phi'') at its elongation, tunings (K_3, K_4, C_t, C_s).
     inertias are (link, motor 1, motor 2), impedance is (K_p, K_d), pretension the common torque with two derivatives.
     """
-    law = laws.antagonistic_law(joint, torques, desired, pretension, external, inertias, springs, impedance, tunings)
-    return law.control, [*inertias, springs[0], springs[2], *impedance, *tunings]
 
 
 @backstepping(
     lambda _: lyapunov(J, W, Port((2, 2), TORQUES[:2] * 2)),
     "eq. 15.88, 15.95, 15.97, 15.105, mended",
-    witness=flat.antagonistic_lyapunov,
 )
 def backstepping_antagonistic_lyapunov(
     _: Any, joint: Any, torques: Any, desired: Any, pretension: Any, external: Any,
     inertias: Any, springs: Any, impedance: Any, tunings: Any,
 ) -> Any:  # fmt: skip
     """Energy of the six states, its rate under the law, and the virtual controls of each motor's torque and rate."""
-    law = laws.antagonistic_law(joint, torques, desired, pretension, external, inertias, springs, impedance, tunings)
-    torque, rate = law.targets
-    return law.energy, law.rate, torque.row_join(rate)
 
 
-@backstepping(torques_of_motors, "eq. 15.84 to 15.88, as printed", witness=flat.decoupled, guards=positive(*PAIR))
+@backstepping(torques_of_motors, "eq. 15.84 to 15.88, as printed", guards=positive(*PAIR))
 def backstepping_antagonistic_decoupled(
     _: Any, joint: Any, torques: Any, desired: Any, pretension: Any, external: Any,
     inertias: Any, springs: Any, impedance: Any, tunings: Any,
 ) -> Any:  # fmt: skip
     """The printed decoupling of the motors, for comparison only: it takes the pretension for motion and releases it."""
-    pair = laws.decoupled_laws(joint, torques, desired, pretension, external, inertias, springs, impedance, tunings)
-    return [law.control[0] for law in pair], [*inertias, springs[0], springs[2], *impedance, *tunings]

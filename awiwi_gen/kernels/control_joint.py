@@ -8,13 +8,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from awiwi_gen.control import cascade_certificate as certificate
-from awiwi_gen.control import cascade_certificate_minors as certificate_minors
-from awiwi_gen.control import friction_observer as observer
-from awiwi_gen.control import friction_observer_cramer as observer_cramer
-from awiwi_gen.control import impedance, impedance_work
-from awiwi_gen.control import stiffness_correction as correction
-from awiwi_gen.control import stiffness_correction_series as correction_series
 from awiwi_gen.kernel import Kernel, Port
 from awiwi_gen.kernels.declare import Family, Parameterless
 from awiwi_gen.units import N, Unit, kg, m, one, rad, s
@@ -108,7 +101,7 @@ def pivots(of: str) -> tuple[str, ...]:
 @laws(
     lambda _: {"K_imp": Port((JOINTS, JOINTS), STIFFNESS)},
     "eq. 8.1, with the condition of section 8.2 mended",
-    witness=correction_series.stiffness_correction,
+    subject="stiffness_correction",
     guards=pivots("K_eff") + pivots("K_mech - K_eff"),
 )
 def stiffness_correction(_: Any, K_eff: Any, K_mech: Any) -> Any:
@@ -118,18 +111,16 @@ def stiffness_correction(_: Any, K_eff: Any, K_mech: Any) -> Any:
     direction; where they are not, no positive definite controller exists. Stiffer by a factor eps, as eq. 8.2 has it,
     gives eps / (eps - 1) K_eff.
     """
-    return correction.stiffness_correction(_, K_eff, K_mech)
 
 
 @laws(
     lambda _: {"k_imp": Port((), STIFFNESS), "sensitivity": Port((), STIFFNESS / STIFFNESS)},
     "eq. 8.1",
-    witness=correction_series.stiffness_correction_scalar,
+    subject="stiffness_correction",
     guards=positive("k_eff", "k_mech - k_eff"),
 )
 def stiffness_correction_scalar(_: Any, k_eff: Any, k_mech: Any) -> Any:
     """The same for one joint, and by how much k_imp changes with k_mech: what a poor guess of the tendons costs."""
-    return correction.stiffness_correction_scalar(_, k_eff, k_mech)
 
 
 # -- chapter 9 ----------------------------------------------------------------------------------------------
@@ -138,7 +129,7 @@ def stiffness_correction_scalar(_: Any, k_eff: Any, k_mech: Any) -> Any:
 @laws(
     lambda _: {"momentum_next": Port((), MOMENTUM), "friction": Port((), TORQUE)},
     "eq. 9.1, 9.2, mended, over one sample",
-    witness=observer_cramer.friction_observer,
+    subject="friction_observer",
     guards=positive("the motor's inertia", "the gain", "the period"),
 )
 def friction_observer(_: Any, momentum: Any, u: Any, tau: Any, thd: Any, B: Any, gain: Any, period: Any) -> Any:
@@ -147,13 +138,12 @@ def friction_observer(_: Any, momentum: Any, u: Any, tau: Any, thd: Any, B: Any,
     thd is the velocity at the end of that sample. The momentum is the observer's memory: begin with that of the motor
     at rest, zero, and pass on what is returned. Stable for all gains and periods.
     """
-    return observer.friction_observer(_, momentum, u, tau, thd, B, gain, period)
 
 
 # -- chapter 11 ---------------------------------------------------------------------------------------------
 
 
-@laws(lambda _: {"tau": Port((JOINTS,), TORQUE)}, "eq. 11.4, 11.10, mended", witness=impedance_work.joint_impedance)
+@laws(lambda _: {"tau": Port((JOINTS,), TORQUE)}, "eq. 11.4, 11.10, mended", subject="impedance")
 def joint_impedance(
     _: Any, M: Any, C: Any, gravity: Any, q: Any, qd: Any, q_des: Any, qd_des: Any, qdd_des: Any, K: Any, D: Any
 ) -> Any:
@@ -162,13 +152,12 @@ def joint_impedance(
     M, C and gravity are those of the joints where they are; C must make dM/dt - 2 C skew-symmetric. It acts on the
     desired velocity: so the joints stay passive.
     """
-    return impedance.joint_impedance(_, M, C, gravity, q, qd, q_des, qd_des, qdd_des, K, D)
 
 
 @laws(
     lambda _: {"tau": Port((), TORQUE)},
     "eq. 11.3, mended",
-    witness=impedance_work.motor_impedance,
+    subject="impedance",
     guards=positive("the pulley's radius", "the proportional gain", "the derivative gain"),
 )
 def motor_impedance(
@@ -178,13 +167,12 @@ def motor_impedance(
 
     For joints that are slow against it: the law of the two time scales. friction is the torque to compensate.
     """
-    return impedance.motor_impedance(_, theta, thd, theta_des, f_des, friction, r, motor_kp, motor_kd)
 
 
 @laws(
     lambda _: {"tau": Port((), TORQUE)},
     "eq. 11.16, mended",
-    witness=impedance_work.cascade,
+    subject="impedance",
     guards=positive(
         "the tendon's stiffness", "the pulley's radius", "the motor's inertia", "the gain kp", "the gain kd"
     ),
@@ -198,9 +186,6 @@ def cascade(
     The tendon has the stiffness k, with the slope dk/df, and is stretched at the rate xd; hdd is the acceleration of
     its path, by which the joints stretch it.
     """
-    return impedance.cascade(
-        _, f, xd, stiffness, slope, hdd, f_des, fd_des, fdd_des, friction, r, B, force_kp, force_kd
-    )
 
 
 @laws(
@@ -209,7 +194,7 @@ def cascade(
         "S": Port((TENDONS, 3), (m / N, m * s / N, m * s**2 / N) * TENDONS),
     },
     "eq. 11.17 to 11.21, mended",
-    witness=certificate_minors.cascade_certificate,
+    subject="cascade_certificate",
     guards=positive("the weight", "the frequency omega"),
 )
 def cascade_certificate(_: Any, D: Any, P: Any, kp: Any, kd: Any, weight: Any, omega: Any) -> Any:
@@ -218,4 +203,3 @@ def cascade_certificate(_: Any, D: Any, P: Any, kp: Any, kd: Any, weight: Any, o
     The proof is the energy qd' M qd / 2 + q' K q / 2 + sum (S11 e^2 + 2 S12 e e' + S22 e'^2), which falls. weight and
     omega choose it: force errors cost weight (e^2 + e'^2 / omega^2). A heavier weight proves more, and bounds less.
     """
-    return certificate.cascade_certificate(_, D, P, kp, kd, weight, omega)

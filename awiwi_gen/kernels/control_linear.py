@@ -7,9 +7,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from awiwi_gen.control import pole_placement as placed
-from awiwi_gen.control import pole_placement_ackermann as ackermann
-from awiwi_gen.control import state_dependent, state_dependent_spectral, tendon_force, tendon_force_energy
 from awiwi_gen.kernel import Kernel, Port, Solver
 from awiwi_gen.kernels.declare import Family, Parameterless
 from awiwi_gen.units import N, kg, m, one, rad, s
@@ -95,7 +92,7 @@ PLANT = {
 @of_tendon(
     lambda _: {"tau": TORQUE},
     "eq. 10.2, with the signs mended",
-    witness=tendon_force_energy.tendon_force_pd,
+    subject="tendon_force",
     guards=positive("the pulley's radius", "the proportional gain", "the derivative gain"),
 )
 def tendon_force_pd(
@@ -105,13 +102,12 @@ def tendon_force_pd(
 
     f_hat is the force whose torque is fed forward: the measured one cancels it, the desired one adds no feedback.
     """
-    return tendon_force.tendon_force_pd(_, f, fd, f_des, fd_des, f_hat, friction, r, kp, kd)
 
 
 @of_tendon(
     lambda _: {"tau": TORQUE, "gains": Port((2,), (m, m * s))},
     "eq. 10.8 to 10.12, mended",
-    witness=tendon_force_energy.tendon_force_scheduled,
+    subject="tendon_force",
     guards=positive(
         "the pulley's radius", "the motor's inertia", "the tendon's stiffness", "the target's frequency",
         "the target's damping ratio", "the proportional gain",
@@ -126,9 +122,6 @@ def tendon_force_scheduled(
     The gains (kp, kd) follow from the tendon's stiffness at the desired force and from its rate, which is zero where
     the desired force rests.
     """
-    return tendon_force.tendon_force_scheduled(
-        _, f, fd, f_des, fd_des, f_hat, friction, r, b, stiffness, stiffness_rate, omega0, xi0
-    )
 
 
 # -- poles --------------------------------------------------------------------------------------------------
@@ -137,18 +130,17 @@ def tendon_force_scheduled(
 @of_tendon(
     lambda _: {"K": Port((2,), GAINS[:2])},
     "eq. 12.7",
-    witness=ackermann.pole_placement_motor,
+    subject="pole_placement",
     guards=positive("the motor's inertia", "the target's frequency", "the target's damping ratio"),
 )
 def pole_placement_motor(_: Any, b: Any, dtheta: Any, k: Any, omega0: Any, xi0: Any) -> Any:
     """Gains of a motor that pulls against a grounded spring k: poles of frequency omega0 and damping ratio xi0."""
-    return placed.pole_placement_motor(_, b, dtheta, k, omega0, xi0)
 
 
 @of_joint(
     lambda _: {"K": Port((4,), GAINS)},
     "eq. 12.13 to 12.16, mended",
-    witness=ackermann.pole_placement,
+    subject="pole_placement",
     guards=positive(
         "the link's inertia", "the motor's inertia", "the stiffness", "the first frequency", "the second frequency",
         "the first damping ratio", "the second damping ratio",
@@ -156,13 +148,11 @@ def pole_placement_motor(_: Any, b: Any, dtheta: Any, k: Any, omega0: Any, xi0: 
 )  # fmt: skip
 def pole_placement(_: Any, m: Any, b: Any, k: Any, dq: Any, dtheta: Any, omega: Any, xi: Any) -> Any:
     """Gains on (q, dq/dt, theta, dtheta/dt) that make a joint with a spring k two oscillators omega and xi."""
-    return placed.pole_placement(_, m, b, k, dq, dtheta, omega, xi)
 
 
-@of_joint(lambda _: {"u": TORQUE}, "eq. 12.2, 13.3, 14.12", witness=ackermann.state_feedback)
+@of_joint(lambda _: {"u": TORQUE}, "eq. 12.2, 13.3, 14.12", subject="pole_placement")
 def pole_placement_law(_: Any, K: Any, x: Any, x_des: Any, u_des: Any) -> Any:
     """Motor torque u_des - K (x - x_des), where u_des holds the desired state; for optimal gains just as well."""
-    return placed.state_feedback(_, K, x, x_des, u_des)
 
 
 # -- optima -------------------------------------------------------------------------------------------------
@@ -214,17 +204,16 @@ def lqr(_: Any, A: Any, B: Any, Q: Any, R: Any) -> Any:
 @of_joint(
     lambda _: {"k": Port((), N * m / rad), "torque": TORQUE},
     "eq. 14.10, with the secant",
-    witness=state_dependent_spectral.secant_stiffness,
+    subject="state_dependent",
 )
 def secant_stiffness(_: Any, spring: Any, deflexion: Any, deflexion_des: Any) -> Any:
     """Secant stiffness of a cubic spring between two deflexions, and its torque at the second."""
-    return state_dependent.secant_stiffness(_, spring, deflexion, deflexion_des)
 
 
 @of_tendon(
     lambda _: {"K": Port((2,), GAINS[:2]), "u": TORQUE},
     "eq. 14.4 to 14.9, mended",
-    witness=state_dependent_spectral.sdre_tendon,
+    subject="state_dependent",
     guards=positive("the motor's inertia", "the torque's weight", "the angle's weight", "the speed's weight"),
 )
 def sdre_tendon(
@@ -234,7 +223,6 @@ def sdre_tendon(
 
     The tendon's torque is spring . (theta, theta^2, theta^3).
     """
-    return state_dependent.sdre_tendon(_, theta, thd, theta_des, b, dtheta, spring, weights, R)
 
 
 @of_joint(lambda _: {"K": Port((4,), GAINS), "u": TORQUE}, "eq. 14.10 to 14.12, mended", solver=descent)

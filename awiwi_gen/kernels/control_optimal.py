@@ -10,8 +10,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from awiwi_gen.control import backstepping_gains as gain
-from awiwi_gen.control import backstepping_gains_ad as gain_ad
 from awiwi_gen.kernel import Kernel, Port, Solver
 from awiwi_gen.kernels.control_backstepping import (
     DAMPING,
@@ -25,7 +23,6 @@ from awiwi_gen.kernels.control_backstepping import (
     positive,
 )
 from awiwi_gen.kernels.declare import Family, Parameterless
-from awiwi_gen.models.derivatives import derivatives_of
 from awiwi_gen.units import Unit, one, s
 
 FEEDBACK = (STIFFNESS, DAMPING, one, s)
@@ -33,9 +30,9 @@ EXTERNAL = (one, s)
 REACH = 1e6  # how many times the start, or how small a part of it, a gain may be
 MATCHED = 1 << 14  # roundings of a feedback gain: what counts as equal
 
-feedback: Family[None] = Family()
-by_rates: Family[None] = Family()
-by_weights: Family[None] = Family()
+feedback: Family[None] = Family("backstepping.gains")
+by_rates: Family[None] = Family("backstepping.gains")
+by_weights: Family[None] = Family("backstepping.gains")
 by_iteration: Family[None] = Family()
 
 
@@ -78,33 +75,25 @@ WIDE = PORTS | {
 @feedback(
     lambda _: {"K": Port((4,), FEEDBACK), "K_cancelled": Port((4,), FEEDBACK), "h": Port((2,), EXTERNAL)},
     "eq. 15.70, 16.1 to 16.3, mended",
-    witness=gain_ad.state_gains,
 )
 def backstepping_state_gains(_: Any, plant: Any, gains: Any, weights: Any) -> Any:
     """The impedance law as tau_m = -K (q, q', tau, tau') + h (tau_ext, tau_ext'), linear spring, q_d = 0.
 
     K_cancelled are the gains for a plant whose spring's torque is cancelled: tau_m = (m + b) / m tau - K_cancelled x.
     """
-    return gain.state_gains(plant, gains, weights)
-
-
-slopes, slopes_ad = derivatives_of(gain.linearised_gains, gain_ad.linearised_gains, "gains")
 
 
 @feedback(
     lambda _: {"dK": Port((4, 4), tuple(k / g for k in FEEDBACK for g in (STIFFNESS, DAMPING, *RATES)))},
     "eq. 16.3, mended and differentiated",
-    witness=slopes_ad,
 )
 def backstepping_state_gains_derivatives(_: Any, plant: Any, gains: Any, weights: Any) -> Any:
     """Slopes of K_cancelled by the gains K_p, K_d, K_3, K_4."""
-    return slopes(_, plant, gains, weights)
 
 
 @by_rates(
     lambda _: {"rates": Port((2,), RATES)},
     "eq. 16.3, 16.4, solved",
-    witness=gain_ad.matched_rates,
     guards=(
         *positive(*PLANT, "K_p", "K_d", "C_t", "C_s"),
         *("K_3 and K_4 are real and differ", "their sum is positive", "their product is positive"),
@@ -112,13 +101,11 @@ def backstepping_state_gains_derivatives(_: Any, plant: Any, gains: Any, weights
 )
 def optimal_backstepping_rates(_: Any, K_opt: Any, plant: Any, impedance: Any, weights: Any) -> Any:
     """K_3 and K_4 that give tau and tau' the feedback gains K_opt, with (K_p, K_d) and the weights given."""
-    return gain.matched_rates(K_opt, plant, impedance, weights)
 
 
 @by_weights(
     lambda _: {"rates": Port((2,), RATES), "weights": Port((2,), WEIGHTS)},
     "eq. 15.89, 15.97, 16.3, 16.4, solved",
-    witness=gain_ad.matched_weights,
     guards=positive(*PLANT, "K_p", "K_d", "C_t", "K_3", "K_4", "C_s"),
 )
 def optimal_backstepping_weights(_: Any, K_opt: Any, plant: Any, impedance: Any) -> Any:
@@ -126,7 +113,6 @@ def optimal_backstepping_weights(_: Any, K_opt: Any, plant: Any, impedance: Any)
 
     Some K_p and K_d do whenever the closed loop is stable and has two different pairs of poles: near those of one pair.
     """
-    return gain.matched_weights(K_opt, plant, impedance)
 
 
 def newton(_: Any, iterations: int = 40) -> Solver:

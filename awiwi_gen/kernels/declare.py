@@ -1,8 +1,8 @@
 """How kernels are declared: one decorated function each, collected in the family of the parts that have it.
 
 A kernel's argument names choose its input ports, its name (after the part's) is the C symbol, its docstring the
-documentation. The function is the definition, in SymPy; the ``witness`` is another road to the same numbers, in CasADi.
-Both receive the part with symbols for numbers.
+documentation. The function has no body: the mathematics is in the function of the same name in the module ``subject``
+of both wings, `definitions/` (SymPy) and `witnesses/` (CasADi). These are imported when a kernel is derived, not before.
 """
 
 from __future__ import annotations
@@ -13,9 +13,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
-from awiwi_gen.kernel import Kernel, Port, Route, Solver
+from awiwi_gen.kernel import WINGS, Kernel, Port, Route, Solver
 
 Size = TypeVar("Size")
+Declaration = Callable[..., Any]
 
 
 @dataclass(frozen=True)
@@ -25,8 +26,9 @@ class Template(Generic[Size]):
     name: str
     outputs: Callable[[Size], dict[str, Port]]
     source: str
-    definition: Route
-    witness: Route | None
+    subject: str
+    arguments: tuple[str, ...]
+    doc: str
     guards: tuple[str, ...]
     solver: Callable[[Any], Solver | None]
 
@@ -34,15 +36,17 @@ class Template(Generic[Size]):
         self, prefix: str, part: Any, path: str, structure: Mapping[str, Any], ports: Mapping[str, Port], size: Size
     ) -> Kernel:
         """The kernel of one part. An argument that the part has no port for is left out, so it needs a default."""
-        arguments = [*inspect.signature(self.definition).parameters][1:]
         solver = self.solver(part)
+        routes = {library: Route(f"{wing}.{self.subject}", self.name) for library, wing in WINGS.items()}
         return Kernel(
             name=f"{prefix}_{self.name}" if prefix else self.name,
-            doc=inspect.getdoc(self.definition) or "",
+            doc=self.doc,
             source=self.source,
-            inputs={name: ports[name] for name in arguments if name in ports},
+            inputs={name: ports[name] for name in self.arguments if name in ports},
             outputs=self.outputs(size),
-            routes={} if solver or not self.witness else {"sympy": self.definition, "casadi": self.witness},
+            routes={}
+            if solver
+            else {library: Route(f"{wing}.{self.subject}", self.name) for library, wing in WINGS.items()},
             part=part,
             path=path,
             structure=json.dumps(structure, sort_keys=True),
@@ -56,27 +60,33 @@ def straight_line(part: Any) -> None:
 
 
 class Family(Generic[Size]):
-    """The kernels that all parts of one kind have; an instance is the decorator that declares one more."""
+    """The kernels that all parts of one kind have; an instance is the decorator that declares one more.
 
-    def __init__(self) -> None:
+    ``subject`` is the module of both wings that derives them, where a kernel does not name another.
+    """
+
+    def __init__(self, subject: str = "") -> None:
+        self.subject = subject
         self.templates: list[Template[Size]] = []
 
     def __call__(
         self,
         outputs: Callable[[Size], dict[str, Port]],
         source: str,
-        witness: Route | None = None,
+        subject: str = "",
         guards: tuple[str, ...] = (),
         solver: Callable[[Any], Solver | None] = straight_line,
-    ) -> Callable[[Route], Route]:
-        """Declare a kernel: its outputs for a part of some size, where it comes from, and the other road to it.
+    ) -> Callable[[Declaration], Declaration]:
+        """Declare a kernel: its outputs for a part of some size, its source, and the module that derives it.
 
-        For parts that ``solver`` answers for, it iterates instead; what always iterates needs no witness.
+        For parts that ``solver`` returns a solver for, the kernel iterates instead and needs no derivation.
         """
 
-        def declare(definition: Route) -> Route:
-            self.templates.append(Template(definition.__name__, outputs, source, definition, witness, guards, solver))
-            return definition
+        def declare(function: Declaration) -> Declaration:
+            arguments, doc = tuple(inspect.signature(function).parameters)[1:], inspect.getdoc(function) or ""
+            where = subject or self.subject
+            self.templates.append(Template(function.__name__, outputs, source, where, arguments, doc, guards, solver))
+            return function
 
         return declare
 

@@ -7,12 +7,10 @@ from typing import Any
 from awiwi_gen.hand import Fibre, Hand
 from awiwi_gen.kernel import Kernel, Port
 from awiwi_gen.kernels.declare import Family
-from awiwi_gen.models import fibre as fibres
-from awiwi_gen.models import fibre_energy
 from awiwi_gen.units import N, m, rad
 
-of_fibre: Family[None] = Family()
-of_guidings: Family[None] = Family()
+of_fibre: Family[None] = Family("fibre")
+of_guidings: Family[None] = Family("fibre")
 
 
 def fibre_kernels(hand: Hand, fibre: Fibre) -> list[Kernel]:
@@ -34,19 +32,16 @@ def fibre_ports(hand: Hand, fibre: Fibre) -> dict[str, Port]:
     }
 
 
-@of_fibre(lambda _: {"x": Port((), m)}, "section 5.1", witness=fibre_energy.stretch)
+@of_fibre(lambda _: {"x": Port((), m)}, "section 5.1")
 def stretch(fibre: Any, f: Any) -> Any:
     """Elongation of the fibre under the force f."""
-    return fibres.stretch(fibre, f)
 
 
-@of_fibre(lambda _: {"stiffness": Port((), N / m)}, "section 4.3", witness=fibre_energy.stiffness)
+@of_fibre(lambda _: {"stiffness": Port((), N / m)}, "section 4.3")
 def stiffness(fibre: Any, k: Any) -> Any:
     """Stiffness of a whole tendon: of the fibre, in series with its mechanism of stiffness k."""
-    return fibres.stiffness(fibre, k)
 
 
-@of_guidings(lambda _: {"loss": Port((), N)}, "eq. 4.1", witness=fibre_energy.guiding_friction)
+@of_guidings(lambda _: {"loss": Port((), N)}, "eq. 4.1")
 def friction(fibre: Any, f: Any, bend: Any) -> Any:
     """Force lost in the guidings by a tendon that is pulled with the force f and bent by the angle bend in all."""
-    return fibres.guiding_friction(fibre, f, bend)

@@ -10,8 +10,6 @@ from awiwi_gen.hand.lever import Lever
 from awiwi_gen.hand.parts import Finger, Tendon
 from awiwi_gen.kernel import Kernel, Port, Solver
 from awiwi_gen.kernels.declare import Family
-from awiwi_gen.models import chain, estimate, estimate_qr, lagrange, recursive, tendons, tendons_ad
-from awiwi_gen.models.derivatives import derivatives_of
 from awiwi_gen.units import J, N, Unit, kg, m, one, rad, s
 
 
@@ -124,147 +122,123 @@ def coriolis(size: Size) -> Port:
 # -- kinematics -------------------------------------------------------------------------------------------
 
 
-@per_finger(lambda z: {"T": Port((4, 4), POSE)}, "eq. 5.2, 5.3, table 5.1", witness=recursive.fingertip_pose)
+@per_finger(lambda z: {"T": Port((4, 4), POSE)}, "eq. 5.2, 5.3, table 5.1", subject="kinematics")
 def fingertip_pose(finger: Any, q: Any) -> Any:
     """Pose of the fingertip: maps fingertip coordinates into the finger's base frame."""
-    return chain.fingertip_pose(finger, q)
 
 
-@per_finger(lambda z: {"T": Port((z.links, 4, 4), POSE * z.links)}, "eq. 5.2", witness=recursive.link_poses)
+@per_finger(lambda z: {"T": Port((z.links, 4, 4), POSE * z.links)}, "eq. 5.2", subject="kinematics")
 def link_poses(finger: Any, q: Any) -> Any:
     """Pose of every link frame (at its joint, turning with the link) in the finger's base frame."""
-    return chain.link_poses(finger, q)
 
 
 @per_finger(
     lambda z: {"J": jacobian_port(z)},
     "eq. 5.3, differentiated",
-    witness=recursive.jacobian,
+    subject="kinematics",
 )
 def jacobian(finger: Any, q: Any) -> Any:
     """Fingertip Jacobian in base axes: velocity of the tip (rows 0-2) and angular velocity (rows 3-5)."""
-    return chain.jacobian(finger, q)
 
 
 @per_finger(
     lambda z: {"T": Port((4, 4), POSE), "J": jacobian_port(z)},
     "eq. 5.2, 5.3, table 5.1, differentiated",
-    witness=recursive.pose_and_jacobian,
+    subject="kinematics",
 )
 def pose_and_jacobian(finger: Any, q: Any) -> Any:
     """Pose of the fingertip and its Jacobian, both in base axes, in one call that shares their work."""
-    return chain.fingertip_pose(finger, q), chain.jacobian(finger, q)
 
 
 # -- dynamics ---------------------------------------------------------------------------------------------
 
 
-@per_finger(lambda z: {"M": inertia(z)}, "eq. 2.17, 5.4", witness=recursive.mass_matrix)
+@per_finger(lambda z: {"M": inertia(z)}, "eq. 2.17, 5.4", subject="dynamics")
 def mass_matrix(finger: Any, q: Any) -> Any:
     """Mass matrix: the kinetic energy is half qd' M qd."""
-    return lagrange.mass_matrix(finger, q)
 
 
-@per_finger(lambda z: {"C": coriolis(z)}, "eq. 2.17", witness=recursive.coriolis_matrix)
+@per_finger(lambda z: {"C": coriolis(z)}, "eq. 2.17", subject="dynamics")
 def coriolis_matrix(finger: Any, q: Any, qd: Any) -> Any:
     """Coriolis matrix of Christoffel symbols, so that dM/dt - 2 C is skew-symmetric."""
-    return lagrange.coriolis_matrix(finger, q, qd)
 
 
-@per_finger(lambda z: {"gravity": torque(z)}, "eq. 2.17, 5.4", witness=recursive.gravity)
+@per_finger(lambda z: {"gravity": torque(z)}, "eq. 2.17, 5.4", subject="dynamics")
 def gravity(finger: Any, q: Any, g: Any) -> Any:
     """Joint torques that hold the finger still against gravity g (in base axes)."""
-    return lagrange.gravity(finger, q, g)
 
 
-@per_finger(lambda z: {"bias": torque(z)}, "eq. 2.17", witness=recursive.bias)
+@per_finger(lambda z: {"bias": torque(z)}, "eq. 2.17", subject="dynamics")
 def bias(finger: Any, q: Any, qd: Any, g: Any) -> Any:
     """Coriolis, centrifugal and gravity torques together: C qd + gravity."""
-    return lagrange.bias(finger, q, qd, g)
 
 
-@per_finger(lambda z: {"tau": torque(z)}, "eq. 2.4 to 2.15, 2.17", witness=recursive.inverse_dynamics)
+@per_finger(lambda z: {"tau": torque(z)}, "eq. 2.4 to 2.15, 2.17", subject="dynamics")
 def inverse_dynamics(finger: Any, q: Any, qd: Any, qdd: Any, g: Any) -> Any:
     """Joint torques that produce the accelerations qdd: M qdd + C qd + gravity."""
-    return lagrange.inverse_dynamics(finger, q, qd, qdd, g)
-
-
-by_definition, by_witness = derivatives_of(lagrange.inverse_dynamics, recursive.inverse_dynamics_by_vector, "q", "qd")
 
 
 @per_finger(
-    lambda z: {"dtau_dq": stiffness(z), "dtau_dqd": coriolis(z)}, "eq. 2.17, differentiated", witness=by_witness
+    lambda z: {"dtau_dq": stiffness(z), "dtau_dqd": coriolis(z)}, "eq. 2.17, differentiated", subject="dynamics"
 )
 def inverse_dynamics_derivatives(finger: Any, q: Any, qd: Any, qdd: Any, g: Any) -> Any:
     """Partial derivatives of the inverse dynamics with respect to the positions and the velocities."""
-    return by_definition(finger, q, qd, qdd, g)
 
 
-@per_finger(
-    lambda z: {"qdd": Port((z.joints,), rad / s**2)}, "eq. 2.1, solved for qdd", witness=recursive.forward_dynamics
-)
+@per_finger(lambda z: {"qdd": Port((z.joints,), rad / s**2)}, "eq. 2.1, solved for qdd", subject="dynamics")
 def forward_dynamics(finger: Any, q: Any, qd: Any, tau: Any, g: Any) -> Any:
     """Joint accelerations under the joint torques tau."""
-    return lagrange.forward_dynamics(finger, q, qd, tau, g)
 
 
-@per_finger(lambda z: {"M": inertia(z), "C": coriolis(z), "gravity": torque(z)}, "eq. 2.17", witness=recursive.dynamics)
+@per_finger(lambda z: {"M": inertia(z), "C": coriolis(z), "gravity": torque(z)}, "eq. 2.17", subject="dynamics")
 def dynamics(finger: Any, q: Any, qd: Any, g: Any) -> Any:
     """Mass matrix, Coriolis matrix and gravity torques in one call that shares their work."""
-    return lagrange.dynamics(finger, q, qd, g)
 
 
-@per_finger(lambda z: {"kinetic": Port((), J), "potential": Port((), J)}, "eq. 2.16, 5.4", witness=recursive.energy)
+@per_finger(lambda z: {"kinetic": Port((), J), "potential": Port((), J)}, "eq. 2.16, 5.4", subject="dynamics")
 def energy(finger: Any, q: Any, qd: Any, g: Any) -> Any:
     """Kinetic energy and potential energy in the gravity field g (zero at the base frame's origin)."""
-    return lagrange.energy(finger, q, qd, g)
 
 
 # -- tendons ----------------------------------------------------------------------------------------------
 
 
-@per_finger(lambda z: {"h": Port((z.tendons,), m)}, "eq. 5.5, 5.18, 5.22", witness=tendons_ad.tendon_lengths)
+@per_finger(lambda z: {"h": Port((z.tendons,), m)}, "eq. 5.5, 5.18, 5.22", subject="tendons")
 def tendon_lengths(finger: Any, q: Any) -> Any:
     """Length of every tendon's path in the finger, from its routing."""
-    return tendons.tendon_lengths(finger, q)
 
 
-@per_finger(lambda z: {"P": Port((z.tendons, z.joints), m / rad)}, "eq. 5.6, 5.9, 5.21", witness=tendons_ad.coupling)
+@per_finger(lambda z: {"P": Port((z.tendons, z.joints), m / rad)}, "eq. 5.6, 5.9, 5.21", subject="tendons")
 def coupling(finger: Any, q: Any) -> Any:
     """Coupling matrix P = dh/dq: tendon velocities are P qd."""
-    return tendons.coupling(finger, q)
 
 
 @per_finger(
     lambda z: {"dP": Port((z.tendons, z.joints, z.joints), m / rad**2)},
     "eq. 5.11",
-    witness=tendons_ad.coupling_derivative,
+    subject="tendons",
 )
 def coupling_derivative(finger: Any, q: Any) -> Any:
     """Second derivatives of the tendon lengths: dP[i, j, k] = d2 h_i / dq_j dq_k."""
-    return tendons.coupling_derivative(finger, q)
 
 
-@per_finger(lambda z: {"tau": torque(z)}, "eq. 5.8", witness=tendons_ad.joint_torque)
+@per_finger(lambda z: {"tau": torque(z)}, "eq. 5.8", subject="tendons")
 def joint_torque(finger: Any, q: Any, f: Any) -> Any:
     """Joint torques -P' f of the tendon forces f."""
-    return tendons.joint_torque(finger, q, f)
 
 
-@per_finger(lambda z: {"K": stiffness(z)}, "eq. 5.12, 5.23", witness=tendons_ad.joint_stiffness)
+@per_finger(lambda z: {"K": stiffness(z)}, "eq. 5.12, 5.23", subject="tendons")
 def joint_stiffness(finger: Any, q: Any, f: Any, k: Any) -> Any:
     """Joint stiffness -d tau/dq felt through tendons of stiffness k that pull with forces f."""
-    return tendons.joint_stiffness(finger, q, f, k)
 
 
 @per_finger(
     lambda z: {"tau": torque(z), "K": stiffness(z)},
     "eq. 5.8, 5.12, 5.23",
-    witness=tendons_ad.joint_torque_and_stiffness,
+    subject="tendons",
 )
 def joint_torque_and_stiffness(finger: Any, q: Any, f: Any, k: Any) -> Any:
     """Joint torques and joint stiffness of the tendons in one call that shares their work."""
-    return tendons.joint_torque_and_stiffness(finger, q, f, k)
 
 
 # -- where the joints are ---------------------------------------------------------------------------------
@@ -291,19 +265,17 @@ def nonlinear_estimate(finger: Finger, iterations: int = 24) -> Solver | None:
 @per_finger(
     lambda z: {"q": Port((z.joints,), rad)},
     "eq. 5.14, 5.15, 5.24",
-    witness=estimate_qr.joint_estimate,
+    subject="joint_estimate",
     solver=nonlinear_estimate,
 )
 def joint_estimate(finger: Any, h: Any, start: Any) -> Any:
     """Joint angles whose tendon lengths are nearest to the measured h; start is the last estimate."""
-    return estimate.joint_estimate(finger, h, start)
 
 
 @per_finger(
     lambda z: {"covariance": Port((z.joints, z.joints), rad**2), "worst": Port((z.joints,), rad)},
     "eq. 5.14, linearised",
-    witness=estimate_qr.joint_estimate_error,
+    subject="joint_estimate",
 )
 def joint_estimate_error(finger: Any, q: Any, noise: Any) -> Any:
     """Error of the joint estimate: covariance for lengths of standard deviation noise, worst for errors up to noise."""
-    return estimate.joint_estimate_error(finger, q, noise)

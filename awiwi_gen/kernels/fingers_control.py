@@ -12,8 +12,6 @@ from awiwi_gen.hand.parts import Tendon
 from awiwi_gen.kernel import Kernel, Port, Solver
 from awiwi_gen.kernels.declare import Family
 from awiwi_gen.kernels.fingers import force_range, per_finger
-from awiwi_gen.models import tendon_stiffness as curves
-from awiwi_gen.models import tendon_stiffness_neville as curves_neville
 from awiwi_gen.units import N, m, one
 
 SEARCHES, INVERSIONS = 3 * 97, 66  # evaluations of the curve in the worst case, see csrc/awiwi_distribution.h
@@ -72,7 +70,7 @@ class Elastic:
         return max(slack for slack, _ in ends), min(taut for _, taut in ends)
 
 
-of_elastic: Family[int] = Family()  # sized by the number of tendons
+of_elastic: Family[int] = Family("tendon_stiffness")  # sized by the number of tendons
 
 
 def elastic_kernels(hand: Hand, name: str, finger: Finger) -> list[Kernel]:
@@ -88,7 +86,6 @@ def elastic_kernels(hand: Hand, name: str, finger: Finger) -> list[Kernel]:
         "k": Port((tendons,), N / m), "slope": Port((tendons,), one / m), "curvature": Port((tendons,), one / (N * m)),
     },
     "figure 4.7, section 4.3",
-    witness=curves_neville.tendon_stiffness,
     guards=("every tension is on its spring's curve, give or take a hundredth",),
 )  # fmt: skip
 def tendon_stiffness(elastic: Any, tension: Any) -> Any:
@@ -96,7 +93,6 @@ def tendon_stiffness(elastic: Any, tension: Any) -> Any:
 
     slope and curvature are dk/df and d2k/df2.
     """
-    return curves.tendon_stiffness(elastic, tension)
 
 
 # -- forces for a torque and a stiffness --------------------------------------------------------------------

@@ -7,10 +7,9 @@ from typing import Any
 from awiwi_gen.hand import Finger, Link
 from awiwi_gen.kernel import Kernel, Port
 from awiwi_gen.kernels.declare import Family
-from awiwi_gen.models import transmission, transmission_vectors
 from awiwi_gen.units import one, rad
 
-of_four_bar: Family[None] = Family()
+of_four_bar: Family[None] = Family("four_bar")
 
 
 def four_bar_kernels(name: str, finger: Finger) -> list[Kernel]:
@@ -44,7 +43,6 @@ def joint_port(link: Link) -> Port:
         "transmission": Port((), one),
     },
     "section 5.5",
-    witness=transmission_vectors.four_bar,
     guards=("the loop closes",),
 )
 def four_bar(bar: Any, q: Any) -> Any:
@@ -52,4 +50,3 @@ def four_bar(bar: Any, q: Any) -> Any:
 
     The transmission is the sine of the angle between coupler and rocker: where it is zero the linkage locks.
     """
-    return transmission.four_bar(bar, q)

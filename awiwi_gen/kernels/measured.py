@@ -11,10 +11,9 @@ from typing import Any
 from awiwi_gen.hand import Hand
 from awiwi_gen.kernel import Kernel, Port
 from awiwi_gen.kernels.declare import Family
-from awiwi_gen.models import estimate, estimate_qr
 from awiwi_gen.units import m, rad
 
-of_driven: Family[int] = Family()  # sized by the number of tendons
+of_driven: Family[int] = Family("joint_estimate")  # sized by the number of tendons
 
 
 def measured_kernels(hand: Hand) -> list[Kernel]:
@@ -41,10 +40,9 @@ def measured_ports(hand: Hand) -> dict[str, Port]:
     return ports
 
 
-@of_driven(lambda tendons: {"h": Port((tendons,), m)}, "eq. 5.1", witness=estimate_qr.measured_lengths)
+@of_driven(lambda tendons: {"h": Port((tendons,), m)}, "eq. 5.1")
 def measured_lengths(hand: Any, theta: Any, x: Any, w: Any = None) -> Any:
     """Tendon lengths in the finger, of motor angles theta, elongations x and changes w of the lengths in the wrist.
 
     All three count from the straight finger at which they were zeroed. The motor reels in for positive theta.
     """
-    return estimate.measured_lengths(hand, theta, x, w)

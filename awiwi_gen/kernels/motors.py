@@ -7,11 +7,9 @@ from typing import Any
 from awiwi_gen.hand import Hand, Motor
 from awiwi_gen.kernel import Kernel, Port
 from awiwi_gen.kernels.declare import Family
-from awiwi_gen.models import motor as motors
-from awiwi_gen.models import motor_potentials as potentials
 from awiwi_gen.units import J, N, Unit, m, rad, s
 
-of_motor: Family[None] = Family()
+of_motor: Family[None] = Family("motor")
 
 
 def motor_kernels(hand: Hand, motor: Motor) -> list[Kernel]:
@@ -37,43 +35,36 @@ def motor_ports(hand: Hand, motor: Motor) -> dict[str, Port]:
 TORQUE = {"tau": Port((), N * m)}
 
 
-@of_motor(lambda _: {"energy": Port((), J)}, "eq. 3.1", witness=potentials.energy)
+@of_motor(lambda _: {"energy": Port((), J)}, "eq. 3.1")
 def energy(motor: Any, thd: Any) -> Any:
     """Kinetic energy of rotor and gear: half of B thd^2, with the inertia B that the output shaft feels."""
-    return motors.energy(motor, thd)
 
 
-@of_motor(lambda _: TORQUE, "eq. 3.8", witness=potentials.friction)
+@of_motor(lambda _: TORQUE, "eq. 3.8")
 def friction(motor: Any, thd: Any) -> Any:
     """Friction torque of motor and gear at the speed thd: what the motor must overcome, positive for positive thd."""
-    return motors.friction(motor, thd)
 
 
-@of_motor(lambda _: {"damping": Port((), N * m * s / rad)}, "eq. 3.8, differentiated", witness=potentials.damping)
+@of_motor(lambda _: {"damping": Port((), N * m * s / rad)}, "eq. 3.8, differentiated")
 def damping(motor: Any, thd: Any) -> Any:
     """Slope of the friction torque; an explicit step of a simulation must stay below 2 B / damping."""
-    return motors.damping(motor, thd)
 
 
-@of_motor(lambda _: TORQUE, "eq. 3.4, 3.5", witness=potentials.ripple)
+@of_motor(lambda _: TORQUE, "eq. 3.4, 3.5")
 def ripple(motor: Any, theta: Any) -> Any:
     """Periodic disturbance torque of both shafts at the angle theta: what the motor must overcome."""
-    return motors.ripple(motor, theta)
 
 
-@of_motor(lambda _: TORQUE, "section 3.2", witness=potentials.compensation)
+@of_motor(lambda _: TORQUE, "section 3.2")
 def compensation(motor: Any, theta: Any, thd: Any) -> Any:
     """Motor torque to feed forward against friction and ripple: the share of both that is safe to compensate."""
-    return motors.compensation(motor, theta, thd)
 
 
-@of_motor(lambda _: {"thdd": Port((), rad / s**2)}, "eq. 3.2, 3.5", witness=potentials.acceleration)
+@of_motor(lambda _: {"thdd": Port((), rad / s**2)}, "eq. 3.2, 3.5")
 def acceleration(motor: Any, theta: Any, thd: Any, tau: Any, f: Any) -> Any:
     """Acceleration under the motor torque tau and the tendon force f: (tau - friction - ripple - r f) / B."""
-    return motors.acceleration(motor, theta, thd, tau, f)
 
 
-@of_motor(lambda _: TORQUE, "eq. 3.2, 3.5, solved for the torque", witness=potentials.torque)
+@of_motor(lambda _: TORQUE, "eq. 3.2, 3.5, solved for the torque")
 def torque(motor: Any, theta: Any, thd: Any, thdd: Any, f: Any) -> Any:
     """Motor torque of a motion under the tendon force f: B thdd + friction + ripple + r f."""
-    return motors.torque(motor, theta, thd, thdd, f)

@@ -10,7 +10,6 @@ from typing import Any
 
 from awiwi_gen.kernel import Kernel, Port
 from awiwi_gen.kernels.declare import Family, Parameterless
-from awiwi_gen.models import plants, plants_energy
 from awiwi_gen.units import N, Unit, kg, m, rad, s
 
 
@@ -23,10 +22,10 @@ def plant_kernels() -> list[Kernel]:
     ]
 
 
-of_tendon: Family[None] = Family()
-of_joint: Family[None] = Family()
-of_pair: Family[None] = Family()
-of_finger: Family[None] = Family()
+of_tendon: Family[None] = Family("plants")
+of_joint: Family[None] = Family("plants")
+of_pair: Family[None] = Family("plants")
+of_finger: Family[None] = Family("plants")
 
 TORQUE, INERTIA, STIFFNESS, DAMPING = N * m, kg * m**2, N * m / rad, N * m * s / rad
 MOTION, RATES = (rad, rad / s), (rad / s, rad / s**2)
@@ -91,45 +90,37 @@ FINGER_RATES = (rad / s,) * JOINTS + (rad / s**2,) * JOINTS + (rad / s,) * TENDO
 TORQUES, LOCAL = (TORQUE, TORQUE / s), (STIFFNESS, TORQUE / rad**2)
 
 
-@of_tendon(
-    lambda _: {"xd": rates(1), "f": Port((), N)}, "eq. 10.1, mended; eq. 3.8", witness=plants_energy.plant_tendon
-)
+@of_tendon(lambda _: {"xd": rates(1), "f": Port((), N)}, "eq. 10.1, mended; eq. 3.8")
 def plant_tendon(_: Any, x: Any, u: Any, path: Any, motor: Any, line: Any, friction: Any) -> Any:
     """A motor that winds up a tendon with a spring, the joint held: rates of x = (theta, theta'), and the force f.
 
     path is what the joint takes of the tendon; motor is (inertia, pulley's radius), line the spring's (k1, k2, k3) of
     f = k1 p + k2 p^2 + k3 p^3 where it is taut, friction is (steepness, level, viscosity).
     """
-    return plants.plant_tendon(_, x, u, path, motor, line, friction)
 
 
 @of_joint(
     lambda _: {"xd": rates(2), "tau": Port((2,), TORQUES)},
     "eq. 15.11, 15.12",
-    witness=plants_energy.plant_joint_linear,
 )
 def plant_joint_linear(_: Any, x: Any, u: Any, load: Any, plant: Any, damping: Any) -> Any:
     """A link behind a linear spring: rates of x = (q, q', theta, theta'), and the spring's torque tau with its rate.
 
     plant is (link, motor, spring), damping what holds link and motor back.
     """
-    return plants.plant_joint_linear(_, x, u, load, plant, damping)
 
 
 @of_joint(
     lambda _: {"xd": rates(2), "tau": Port((2,), TORQUES), "spring": Port((2,), LOCAL)},
     "eq. 15.71",
-    witness=plants_energy.plant_joint_nonlinear,
 )
 def plant_joint_nonlinear(_: Any, x: Any, u: Any, load: Any, bodies: Any, curve: Any, damping: Any) -> Any:
     """The same behind a spring phi(d) = k1 d + k3 d^3, with the coefficients curve; spring is (phi', phi'')."""
-    return plants.plant_joint_nonlinear(_, x, u, load, bodies, curve, damping)
 
 
 @of_pair(
     lambda _: {"xd": rates(3), "stretches": Port((2,), rad), "tau": Port((2,), TORQUE)},
     "eq. 15.82, with friction and springs that only pull",
-    witness=plants_energy.plant_antagonistic,
 )
 def plant_antagonistic(
     _: Any, x: Any, u: Any, load: Any, inertias: Any, tendons: Any, damping: Any, friction: Any
@@ -139,31 +130,24 @@ def plant_antagonistic(
     inertias are (link, motor 1, motor 2), a row of tendons is (k1, k2, k3) of phi = k1 p + k2 p^2 + k3 p^3, where p is
     the elongation theta1 - q or theta2 + q of a taut tendon; friction of either motor is (steepness, level, viscosity).
     """
-    return plants.plant_antagonistic(_, x, u, load, inertias, tendons, damping, friction)
 
 
 @of_pair(
     lambda _: {"torques": Port((2, 2), TORQUES * 2), "springs": Port((2, 2), LOCAL * 2)},
     "eq. 15.71, 15.82",
-    witness=plants_energy.antagonistic_springs,
 )
 def antagonistic_springs(_: Any, stretches: Any, speeds: Any, tendons: Any) -> Any:
     """What both springs of such a joint do at given elongations: a row (tau, tau') and a row (phi', phi'') for each."""
-    return plants.antagonistic_springs(_, stretches, speeds, tendons)
 
 
-@of_finger(lambda _: {"f": Port((TENDONS,), N)}, "section 5.1, eq. 10.1", witness=plants_energy.plant_finger_forces)
+@of_finger(lambda _: {"f": Port((TENDONS,), N)}, "section 5.1, eq. 10.1")
 def plant_finger_forces(_: Any, thetas: Any, path: Any, slack: Any, motor: Any, line: Any) -> Any:
     """Forces of a finger's tendons: path is what its joints take of each, slack where it begins to pull.
 
     The first half of a finger's plant. Joint torques and the joints' acceleration follow from the finger's own kernels.
     """
-    return plants.plant_finger_forces(_, thetas, path, slack, motor, line)
 
 
-@of_finger(
-    lambda _: {"xd": Port((len(FINGER_RATES),), FINGER_RATES)}, "eq. 10.1, mended", witness=plants_energy.plant_finger
-)
+@of_finger(lambda _: {"xd": Port((len(FINGER_RATES),), FINGER_RATES)}, "eq. 10.1, mended")
 def plant_finger(_: Any, qd: Any, qdd: Any, thds: Any, f: Any, u: Any, motor: Any, friction: Any) -> Any:
     """The other half: rates of (q, q', theta, theta') of four joints, which accelerate with qdd, and eight motors."""
-    return plants.plant_finger(_, qd, qdd, thds, f, u, motor, friction)

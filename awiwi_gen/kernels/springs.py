@@ -8,14 +8,11 @@ from awiwi_gen.hand import Hand, Spring
 from awiwi_gen.hand.lever import POWERS, Lever
 from awiwi_gen.kernel import Kernel, Port
 from awiwi_gen.kernels.declare import Family, Parameterless
-from awiwi_gen.models import calibration, calibration_horner, spring_curve, spring_statics
-from awiwi_gen.models import spring as springs
-from awiwi_gen.models import spring_curve_neville as neville
 from awiwi_gen.units import N, m, one, rad
 
-of_spring: Family[None] = Family()
-of_sensors: Family[int] = Family()  # sized by the number of tendons
-of_bench: Family[None] = Family()
+of_spring: Family[None] = Family("spring_curve")
+of_sensors: Family[int] = Family("spring_curve")  # sized by the number of tendons
+of_bench: Family[None] = Family("calibration")
 
 WITHIN = ("the argument is within the lever's travel, give or take a hundredth",)
 
@@ -74,7 +71,7 @@ def tendon_state(shape: tuple[int, ...]) -> dict[str, Port]:
 @of_spring(
     lambda _: tendon_state(()),
     "table 4.1, figure 4.6",
-    witness=spring_statics.lever,
+    subject="spring",
     guards=(
         "the roller is clear of the motor's pulley",
         "the roller is clear of the fixed pulley",
@@ -84,40 +81,34 @@ def tendon_state(shape: tuple[int, ...]) -> dict[str, Port]:
 )
 def lever(spring: Any, theta: Any) -> Any:
     """Length dL of tendon in the mechanism, force and stiffness of the tendon at the lever angle theta."""
-    return springs.lever(spring, theta)
 
 
-@of_spring(lambda _: {"f": Port((), N)}, "figure 4.7", witness=neville.force, guards=WITHIN)
+@of_spring(lambda _: {"f": Port((), N)}, "figure 4.7", guards=WITHIN)
 def force(spring: Any, x: Any) -> Any:
     """Tendon force at the elongation x, counted from the slack end of the lever's travel.
 
     A polynomial that the check of the hand file has found within 1e-6 of the largest force from the lever's own.
     """
-    return spring_curve.force(spring, x)
 
 
-@of_spring(lambda _: {"k": Port((), N / m)}, "figure 4.7", witness=neville.stiffness, guards=WITHIN)
+@of_spring(lambda _: {"k": Port((), N / m)}, "figure 4.7", guards=WITHIN)
 def stiffness(spring: Any, x: Any) -> Any:
     """Tendon stiffness at the elongation x, counted from the slack end of the lever's travel."""
-    return spring_curve.stiffness(spring, x)
 
 
-@of_spring(lambda _: {"x": Port((), m)}, "figure 4.7", witness=neville.elongation, guards=WITHIN)
+@of_spring(lambda _: {"x": Port((), m)}, "figure 4.7", guards=WITHIN)
 def elongation(spring: Any, f: Any) -> Any:
     """Elongation at which the tendon's force is f: the inverse of the force."""
-    return spring_curve.elongation(spring, f)
 
 
-@of_sensors(lambda tendons: tendon_state((tendons,)), "section 4.1", witness=neville.readings, guards=WITHIN)
+@of_sensors(lambda tendons: tendon_state((tendons,)), "section 4.1", guards=WITHIN)
 def readings(spring: Any, readings: Any) -> Any:
     """dL, force and stiffness of every tendon from its sensor: the design's, or its own where it was calibrated."""
-    return spring_curve.readings(spring, readings)
 
 
-@of_bench(lambda _: tendon_state(()), "section 4.1", witness=calibration_horner.polynomials, guards=WITHIN)
+@of_bench(lambda _: tendon_state(()), "section 4.1", guards=WITHIN)
 def polynomials(_: Any, counts: Any, ends: Any, length_powers: Any, force_powers: Any, stiffness_powers: Any) -> Any:
     """dL, force and stiffness of one sensor's counts by polynomials from the bench, coefficients from the constant up.
 
     Their argument is (2 counts - ends[0] - ends[1]) / (ends[1] - ends[0]): -1 at the slack end, 1 at the taut one.
     """
-    return calibration.polynomials(counts, ends, length_powers, force_powers, stiffness_powers)

@@ -15,10 +15,9 @@ from awiwi_gen.kernel import Kernel, Port
 from awiwi_gen.kernels.declare import Family
 from awiwi_gen.kernels.fingers import Size, input_ports
 from awiwi_gen.kernels.wrist import BARS_CLOSE, wrist_ports
-from awiwi_gen.models import hand_tendons, hand_tendons_ad
 from awiwi_gen.units import N, m, rad
 
-of_hand: Family[Size] = Family()
+of_hand: Family[Size] = Family("hand_tendons")
 
 
 def hand_kernels(hand: Hand) -> list[Kernel]:
@@ -42,31 +41,25 @@ def joined(ports: list[Port]) -> Port:
 @of_hand(
     lambda z: {"h": Port((z.tendons,), m)},
     "eq. 5.1, 5.5, 6.9",
-    witness=hand_tendons_ad.tendon_lengths,
     guards=BARS_CLOSE,
 )
 def tendon_lengths(hand: Any, q: Any, wrist: Any = None) -> Any:
     """Length of every tendon's path in its finger and in the wrist, whose internal angles are wrist = (q71, q73)."""
-    return hand_tendons.tendon_lengths(hand, q, wrist)
 
 
-@of_hand(lambda z: {"P": Port((z.tendons, z.joints), m / rad)}, "eq. 5.6, 5.9, 5.21", witness=hand_tendons_ad.coupling)
+@of_hand(lambda z: {"P": Port((z.tendons, z.joints), m / rad)}, "eq. 5.6, 5.9, 5.21")
 def coupling(hand: Any, q: Any) -> Any:
     """Coupling matrix P = dh/dq of all tendons and joints; zero outside the blocks of the fingers."""
-    return hand_tendons.coupling(hand, q)
 
 
-@of_hand(lambda z: {"tau": Port((z.joints,), N * m)}, "eq. 5.8", witness=hand_tendons_ad.joint_torque)
+@of_hand(lambda z: {"tau": Port((z.joints,), N * m)}, "eq. 5.8")
 def joint_torque(hand: Any, q: Any, f: Any) -> Any:
     """Joint torques -P' f of the tendon forces f."""
-    return hand_tendons.joint_torque(hand, q, f)
 
 
 @of_hand(
     lambda z: {"K": Port((z.joints, z.joints), N * m / rad)},
     "eq. 5.12, 5.23",
-    witness=hand_tendons_ad.joint_stiffness,
 )
 def joint_stiffness(hand: Any, q: Any, f: Any, k: Any) -> Any:
     """Joint stiffness -d tau/dq through tendons of stiffness k that pull with forces f; zero outside the blocks."""
-    return hand_tendons.joint_stiffness(hand, q, f, k)

@@ -8,8 +8,6 @@ from awiwi_gen.hand import Wrist
 from awiwi_gen.kernel import Kernel, Port
 from awiwi_gen.kernels.declare import Family
 from awiwi_gen.kernels.fingers import POSE
-from awiwi_gen.models import wrist as angles
-from awiwi_gen.models import wrist_ad as algebra
 from awiwi_gen.units import m, rad
 
 BARS_CLOSE = (
@@ -18,7 +16,7 @@ BARS_CLOSE = (
     "bar AA0 reaches",
 )
 
-of_wrist: Family[int] = Family()  # sized by the number of tendons
+of_wrist: Family[int] = Family("wrist")  # sized by the number of tendons
 
 
 def wrist_kernels(wrist: Wrist) -> list[Kernel]:
@@ -31,32 +29,25 @@ def wrist_ports(wrist: Wrist) -> dict[str, Port]:
     return {name: Port((), rad, low, high) for name, low, high in zip(("q71", "q73"), *wrist.range, strict=True)}
 
 
-@of_wrist(
-    lambda _: {point: Port((3,), m) for point in "ABC"}, "eq. 6.1 to 6.8", witness=algebra.points, guards=BARS_CLOSE
-)
+@of_wrist(lambda _: {point: Port((3,), m) for point in "ABC"}, "eq. 6.1 to 6.8", guards=BARS_CLOSE)
 def points(wrist: Any, q71: Any, q73: Any) -> Any:
     """The palm's points A, B and C in frame {0} of the forearm."""
-    return angles.points(wrist, q71, q73)
 
 
-@of_wrist(lambda _: {"T": Port((4, 4), POSE)}, "fig. 6.8, eq. 6.9", witness=algebra.palm_pose, guards=BARS_CLOSE)
+@of_wrist(lambda _: {"T": Port((4, 4), POSE)}, "fig. 6.8, eq. 6.9", guards=BARS_CLOSE)
 def palm_pose(wrist: Any, q71: Any, q73: Any) -> Any:
     """Pose of the palm: maps palm coordinates into frame {0} of the forearm."""
-    return angles.palm_pose(wrist, q71, q73)
 
 
-@of_wrist(lambda tendons: {"h": Port((tendons,), m)}, "eq. 6.9", witness=algebra.tendon_lengths, guards=BARS_CLOSE)
+@of_wrist(lambda tendons: {"h": Port((tendons,), m)}, "eq. 6.9", guards=BARS_CLOSE)
 def tendon_lengths(wrist: Any, q71: Any, q73: Any) -> Any:
     """Length of every tendon's straight run through the wrist."""
-    return angles.tendon_lengths(wrist, q71, q73)
 
 
 @of_wrist(
     lambda tendons: {"dh": Port((tendons, 2), m / rad)},
     "eq. 6.9, differentiated",
-    witness=algebra.coupling,
     guards=BARS_CLOSE,
 )
 def coupling(wrist: Any, q71: Any, q73: Any) -> Any:
     """Derivatives of the tendons' lengths in the wrist with respect to q71 and q73."""
-    return angles.coupling(wrist, q71, q73)

@@ -1,0 +1,1 @@
+"""The backstepping laws of chapters 15 and 16."""

@@ -1,0 +1,48 @@
+"""The tendons of the whole hand (eq. 5.1), finger by finger: each feels the joints of its own finger, and the wrist.
+
+`hand.blocks` tells which rows (tendons) and columns (joints) of the hand's arrays belong to which finger. Everything
+outside these blocks is zero here already, not after simplification, so no operation is ever spent on it.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import sympy
+from sympy import Matrix
+
+from awiwi_gen.definitions import tendons
+from awiwi_gen.definitions import wrist as wrists
+
+Hand = Any
+
+
+def tendon_lengths(hand: Hand, q: Matrix, wrist: Matrix | None = None) -> Any:
+    """Path lengths (m) [m] in the fingers and, if the hand has one, in the wrist at its angles (2); then its guards."""
+    fingers = Matrix.vstack(*_blocks(hand, tendons.tendon_lengths, q))
+    if wrist is None:
+        return fingers
+    passing, guards = wrists.tendon_lengths(hand.wrist, wrist[:1], wrist[1:])
+    return fingers + passing, guards
+
+
+def coupling(hand: Hand, q: Matrix) -> Matrix:
+    """P = dh/dq (m x n) [m/rad] (eq. 5.6)."""
+    return sympy.diag(*_blocks(hand, tendons.coupling, q))
+
+
+def joint_torque(hand: Hand, q: Matrix, f: Matrix) -> Matrix:
+    """Joint torques (n) [N m] of the tendon forces f (m) [N] (eq. 5.8)."""
+    return Matrix.vstack(*_blocks(hand, tendons.joint_torque, q, f))
+
+
+def joint_stiffness(hand: Hand, q: Matrix, f: Matrix, k: Matrix) -> Matrix:
+    """-d tau/dq (n x n) [N m/rad] through tendons of stiffness k (m) [N/m] (eq. 5.12, 5.23)."""
+    return sympy.diag(*_blocks(hand, tendons.joint_stiffness, q, f, k))
+
+
+def _blocks(hand: Hand, of_finger: Callable[..., Matrix], q: Matrix, *by_tendon: Matrix) -> list[Matrix]:
+    """A quantity of each finger, from its share of the joint angles and of the arrays over tendons."""
+    return [
+        of_finger(hand.fingers[name], Matrix(q[joints]), *(Matrix(array[rows]) for array in by_tendon))
+        for name, (rows, joints) in hand.blocks.items()
+    ]

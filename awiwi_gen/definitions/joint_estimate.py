@@ -1,0 +1,54 @@
+"""Joint angles from tendon lengths, and how sure they are (SymPy: normal equations by cofactors)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import sympy
+from sympy import Matrix
+
+from awiwi_gen.definitions.dynamics.lagrange import cofactor_matrix
+from awiwi_gen.definitions.naming import Derivation
+from awiwi_gen.definitions.tendons import coupling, tendon_lengths
+from awiwi_gen.structure import Finger
+
+Hand = Any
+
+
+def measured_lengths(hand: Hand, theta: Matrix, x: Matrix, w: Matrix | None = None) -> Matrix:
+    """Lengths h (m) [m] in the fingers, with what the pulleys reel in and the wrist takes away: h(0) + x - r theta - w.
+
+    Motor angles theta (m) [rad], elongations x (m) [m] and wrist sections w (m) [m] count from the straight fingers.
+    """
+    fingers = hand.fingers.values()
+    straight = Matrix.vstack(*(tendon_lengths(finger, sympy.zeros(len(finger.joints), 1)) for finger in fingers))
+    lengths = straight + x - hand.motor.pulley * theta
+    return lengths if w is None else lengths - w
+
+
+def joint_estimate(finger: Finger, h: Matrix, start: Matrix) -> Matrix:
+    """Joint angles (n) [rad] whose lengths are nearest to h (m) [m], for constant couplings (eq. 5.15, mended).
+
+    The left inverse (P'P)^-1 P' acts on the change since the straight finger, h - h(0). No start is needed.
+    """
+    left, _ = _left_inverse(coupling(finger, start))  # it is the same everywhere
+    return left * (h - tendon_lengths(finger, sympy.zeros(len(start), 1)))
+
+
+def joint_estimate_error(finger: Finger, q: Matrix, noise: Any) -> tuple[Matrix, Matrix]:
+    """Error of the estimate at q: covariance (n x n) [rad^2] for independent errors of the lengths with
+    standard deviation `noise` [m], and worst errors (n) [rad] for errors of at most `noise`."""
+    left, inverse = _left_inverse(coupling(finger, q))
+    worst = Matrix([noise[0] * sum(abs(entry) for entry in left.row(j)) for j in range(left.rows)])
+    return noise[0] ** 2 * inverse, worst
+
+
+def _left_inverse(P: Matrix) -> tuple[Matrix, Matrix]:
+    """(P'P)^-1 P' and (P'P)^-1."""
+    derivation = Derivation()
+    P = derivation.name_all(P)
+    normal = derivation.name_all(P.T * P)
+    cofactors = derivation.name_all(cofactor_matrix(normal, derivation))
+    determinant = derivation.name((normal.row(0) * cofactors.row(0).T)[0])
+    inverse = derivation.name_all(cofactors.T / determinant)
+    return inverse * P.T, inverse

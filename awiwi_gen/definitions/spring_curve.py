@@ -1,0 +1,85 @@
+"""The lever spring as its tendon and its sensor know it: force and stiffness without a lever angle.
+
+The angle that joins elongation and force in closed form cannot be eliminated in closed form. So the mechanism is
+evaluated at Chebyshev points of its travel and polynomials through these samples take its place, as the calibration
+polynomials of section 4.1 do. The samples are formulas of the hand's numbers; the coefficients become constants with
+them. Arguments run from -1 at the slack end to 1 at the taut one; far beyond, polynomials mean nothing: guards tell.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+from sympy import Abs, Expr, Matrix, Rational
+
+from awiwi_gen.definitions.interpolation import coefficients, horner
+from awiwi_gen.definitions.naming import Derivation, Named
+from awiwi_gen.definitions.spring import Pose, pose_at
+from awiwi_gen.hand.lever import BEYOND, CURVE_NODES, READING_NODES, chebyshev
+
+Quantity = Callable[[Pose, Pose], Expr]
+"""Something about a pose, given the slack pose too."""
+
+
+def force(spring: Any, x: Matrix) -> tuple[Expr, list[Expr]]:
+    """Tendon force [N] of the elongation x [m], counted from the slack end of the lever's travel."""
+    return _curve(spring, x[0], _elongation, lambda pose, _: pose.force)
+
+
+def stiffness(spring: Any, x: Matrix) -> tuple[Expr, list[Expr]]:
+    """Tendon stiffness [N/m] at the elongation x [m]."""
+    return _curve(spring, x[0], _elongation, lambda pose, _: pose.stiffness)
+
+
+def elongation(spring: Any, f: Matrix) -> tuple[Expr, list[Expr]]:
+    """Elongation [m] at which the tendon's force is f [N]."""
+    return _curve(spring, f[0], lambda pose, _: pose.force, _elongation)
+
+
+def readings(spring: Any, readings: Matrix) -> tuple[Matrix, Matrix, Matrix, list[Expr]]:
+    """dL [m], force [N] and stiffness [N/m] of each tendon (m) from its sensor's readings (m), linear in the angle."""
+    derivation = Derivation("c")
+    own = spring.calibrated
+    powers = {tendon: _powers_of_readings(each, derivation) for tendon, each in {None: spring, **own}.items()}
+    rows, farthest = [], Rational(0)
+    for tendon, count in enumerate(readings):
+        sensor = own.get(tendon, spring).sensor
+        place = _place(count, sensor.slack, sensor.taut, derivation)
+        rows.append([horner(each, place, derivation) for each in powers.get(tendon, powers[None])])
+        farthest = derivation.name((farthest + place**2 + Abs(farthest - place**2)) / 2)  # the larger of the two
+    table = Matrix(rows)
+    return table[:, 0], table[:, 1], table[:, 2], [BEYOND - farthest]
+
+
+def _powers_of_readings(spring: Any, derivation: Derivation) -> list[list[Expr]]:
+    """Coefficients of dL, force and stiffness over the sensor's reading."""
+    shares = chebyshev(READING_NODES)
+    poses = [_pose(spring, share, derivation) for share in shares]
+    curves = zip(*((pose.length, pose.force, pose.stiffness) for pose in poses), strict=True)
+    return [coefficients([Rational(2 * share - 1) for share in shares], curve, derivation) for curve in curves]
+
+
+def _curve(spring: Any, argument: Expr, over: Quantity, of: Quantity) -> tuple[Expr, list[Expr]]:
+    derivation = Derivation("e")
+    slack, taut = (_pose(spring, Rational(end), derivation) for end in (0, 1))
+
+    def place(value: Expr) -> Expr:
+        return _place(value, over(slack, slack), over(taut, slack), derivation)
+
+    poses = [_pose(spring, share, derivation) for share in chebyshev(CURVE_NODES)]
+    powers = coefficients([place(over(pose, slack)) for pose in poses], [of(pose, slack) for pose in poses], derivation)
+    return horner(powers, place(argument), derivation), [BEYOND - place(argument) ** 2]
+
+
+def _elongation(pose: Pose, slack: Pose) -> Expr:
+    return slack.length - pose.length
+
+
+def _pose(spring: Any, share: Any, derivation: Derivation) -> Pose:
+    """The mechanism at a share of its travel, 0 at the slack end, 1 at the taut one."""
+    angle = Named(f"angle{share}", spring.slack + Rational(share) * (spring.taut - spring.slack))
+    return pose_at(spring, angle, derivation)
+
+
+def _place(value: Expr, slack: Expr, taut: Expr, derivation: Derivation) -> Expr:
+    """Where a value lies between those of both ends: from -1 to 1."""
+    return derivation.name((2 * value - slack - taut) / (taut - slack))

@@ -1,0 +1,46 @@
+"""Symmetric matrices as kernels take them, and whether they are positive definite (SymPy)."""
+
+from __future__ import annotations
+
+from functools import reduce
+
+import sympy
+from sympy import Expr, Matrix
+
+from awiwi_gen.definitions.naming import Derivation
+
+
+def symmetric(entries: Matrix, n: int) -> Matrix:
+    """A symmetric matrix (n x n) from the entries of a square one, row by row; only the lower triangle is read."""
+    return Matrix(n, n, lambda i, j: entries[max(i, j) * n + min(i, j)])
+
+
+def factors(matrix: Matrix, derivation: Derivation) -> tuple[Matrix, list[Expr]]:
+    """L, with ones on its diagonal, and d of matrix = L diag(d) L': Cholesky without roots.
+
+    The matrix is positive definite where all pivots d are positive, and only there.
+    """
+    n = matrix.rows
+    lower, pivots = sympy.eye(n), [sympy.S.Zero] * n
+    for j in range(n):
+        scaled = [derivation.name(lower[j, k] * pivots[k]) for k in range(j)]
+        pivots[j] = derivation.name(matrix[j, j] - sum(lower[j, k] * scaled[k] for k in range(j)))
+        for i in range(j + 1, n):
+            rest = matrix[i, j] - sum(lower[i, k] * scaled[k] for k in range(j))
+            lower[i, j] = derivation.name(rest / pivots[j])
+    return lower, pivots
+
+
+def solve_lower(lower: Matrix, right: Matrix, derivation: Derivation) -> Matrix:
+    """L^-1 B by forward substitution."""
+    solution = right.copy()
+    for i in range(lower.rows):
+        for k in range(right.cols):
+            known = sum(lower[i, j] * solution[j, k] for j in range(i))
+            solution[i, k] = derivation.name(right[i, k] - known)
+    return solution
+
+
+def least(values: list[Expr], derivation: Derivation) -> Expr:
+    """The least of several values."""
+    return reduce(lambda a, b: derivation.name((a + b - sympy.Abs(a - b)) / 2), values)

@@ -1,1 +1,0 @@
-"""One file per physical system: SymPy by definition, CasADi by another road."""

@@ -1,0 +1,43 @@
+"""The tendons of the whole hand by automatic differentiation of one vector of lengths; blocks are found, not placed."""
+
+from typing import Any
+
+import casadi as ca
+from casadi import SX
+
+from awiwi_gen.witnesses import tendons
+from awiwi_gen.witnesses import wrist as wrists
+
+Hand = Any
+
+
+def tendon_lengths(hand: Hand, q: SX, wrist: SX | None = None) -> Any:
+    """Path lengths (m) [m] in the fingers and, if the hand has one, in the wrist at its angles (2); then its guards."""
+    if wrist is None:
+        return _lengths(hand, q)
+    passing, guards = wrists.tendon_lengths(hand.wrist, wrist[0], wrist[1])
+    return _lengths(hand, q) + passing, guards
+
+
+def coupling(hand: Hand, q: SX) -> SX:
+    """P = dh/dq (m x n) [m/rad] (eq. 5.6)."""
+    return ca.densify(ca.jacobian(_lengths(hand, q), q))
+
+
+def joint_torque(hand: Hand, q: SX, f: SX) -> SX:
+    """Joint torques (n) [N m]: the work of all tendons, -f h, per joint angle (eq. 5.8)."""
+    return -ca.densify(ca.gradient(ca.dot(f, _lengths(hand, q)), q))
+
+
+def joint_stiffness(hand: Hand, q: SX, f: SX, k: SX) -> SX:
+    """-d tau/dq (n x n) [N m/rad] (eq. 5.12, 5.23): how the torques fall while tendons of stiffness k stretch by dh."""
+    h = _lengths(hand, q)
+    coupling = ca.jacobian(h, q)
+    geometric = ca.jacobian(ca.gradient(ca.dot(f, h), q), q)
+    return ca.densify(coupling.T @ (ca.repmat(k, 1, coupling.size2()) * coupling) + geometric)
+
+
+def _lengths(hand: Hand, q: SX) -> SX:
+    """Path lengths (m) [m] in the fingers."""
+    fingers = [tendons.tendon_lengths(hand.fingers[name], q[joints]) for name, (_, joints) in hand.blocks.items()]
+    return ca.vertcat(*fingers)

@@ -1,0 +1,58 @@
+"""Kinematics of a finger by recursion along the chain: velocities are axes times levers, nothing is differentiated."""
+
+import casadi as ca
+from casadi import SX
+
+from awiwi_gen.structure import Finger
+from awiwi_gen.witnesses.dynamics.assembly import assemble
+
+_Z = SX([0, 0, 1])
+
+
+def link_poses(finger: Finger, q: SX) -> list[SX]:
+    """Poses (4 x 4 each) of the links' frames in the base: at their joints, after their rotations (eq. 5.2)."""
+    assembly = assemble(finger, q)
+    origin, poses = SX.zeros(3), {}
+    for joint, axes in zip(assembly.joints, assembly.axes(), strict=True):
+        poses[joint.link] = _pose(axes @ joint.rotation, origin + axes @ (joint.axis * joint.slid))
+        origin = origin + axes @ joint.offset
+    return list(poses.values())
+
+
+def fingertip_pose(finger: Finger, q: SX) -> SX:
+    """Pose (4 x 4) of the fingertip in the base (eq. 5.3)."""
+    assembly = assemble(finger, q)
+    axes = assembly.axes()[-1] @ assembly.joints[-1].rotation
+    return _pose(axes, assembly.base_point(len(assembly.joints), SX.zeros(3)))
+
+
+def jacobian(finger: Finger, q: SX) -> SX:
+    """J (6 x n), in base axes: velocity [m/rad], then angular velocity [rad/rad] of the tip per unit joint velocity."""
+    assembly = assemble(finger, q)
+    lever, result = SX.zeros(3), SX.zeros(6, q.numel())
+    for joint, axes in reversed(list(zip(assembly.joints, assembly.axes(), strict=True))):
+        lever = joint.offset + lever
+        column = ca.vertcat(axes @ ca.cross(joint.axis, lever), axes @ joint.axis)
+        result[:, joint.coordinate] += joint.rate * column
+        lever = joint.back(lever)
+    return result
+
+
+def pose_and_jacobian(finger: Finger, q: SX) -> tuple[SX, SX]:
+    """Pose (4 x 4) of the fingertip and its Jacobian (6 x n), in base axes."""
+    return fingertip_pose(finger, q), jacobian(finger, q)
+
+
+def seat_point(finger: Finger, q: SX, joint: str, local: SX) -> SX:
+    """Base coordinates (3) [m] of a point (3) that `joint` does not move, given in the frame it turns in."""
+    assembly = assemble(finger, q)
+    index = next(i for i, link in enumerate(finger.links) if link.joint == joint)
+    before = [one for one in assembly.joints if one.link < index]
+    local = local + _Z * assembly.joints[len(before)].slid
+    if before and before[-1].turn is None:
+        local = before[-1].rotation @ local
+    return assembly.base_point(len(before), local)
+
+
+def _pose(axes: SX, origin: SX) -> SX:
+    return ca.vertcat(ca.horzcat(axes, origin), SX([[0, 0, 0, 1]]))
