@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
 from math import prod
@@ -100,7 +100,7 @@ class Kernel:
     source: str
     inputs: Mapping[str, Port]
     outputs: Mapping[str, Port]
-    routes: Mapping[str, Callable[..., Any]]
+    routes: Mapping[str, Route]
     part: Any = field(repr=False)
     path: str = ""
     structure: str = ""

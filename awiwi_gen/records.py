@@ -7,15 +7,13 @@ kernels that use it and no others.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import partial
 from typing import Any
 
-from awiwi_gen.build import load
 from awiwi_gen.cache import Cache, code_digest, key, libraries
-from awiwi_gen.derive import Deriver, check_dimensions
 from awiwi_gen.emit.c import CFunction, c_function
 from awiwi_gen.emit.files import cost_line, describe, kernel_file
 from awiwi_gen.emit.options import Options
@@ -25,9 +23,8 @@ from awiwi_gen.ir.cost import cost
 from awiwi_gen.ir.graph import Graph
 from awiwi_gen.ir.passes import optimise
 from awiwi_gen.ir.passes.bind import bind, fill
-from awiwi_gen.kernel import Kernel, Port, Solver
+from awiwi_gen.kernel import Kernel, Solver
 from awiwi_gen.sources import code_of
-from awiwi_gen.verify.physics import Law, obey
 from awiwi_gen.verify.problems import PROBLEMS, Problem
 from awiwi_gen.verify.reference import (
     BallArrays,
@@ -37,8 +34,7 @@ from awiwi_gen.verify.reference import (
     disagreement,
     reference,
 )
-from awiwi_gen.verify.samples import SEED, draw
-from awiwi_gen.verify.verdict import Verdict, judge, judge_solver
+from awiwi_gen.verify.samples import draw
 
 ROUTES_AGREE = 1e-40  # level 4
 PASSES_AGREE = 1e-50  # level 2
@@ -68,11 +64,10 @@ class Record:
 
 def derivation_key(kernel: Kernel, route: str) -> str:
     """What a derivation depends on: the structure of the part, the ports, the code of the route; no number."""
-    code = code_of(Deriver, check_dimensions, kernel.routes[route], type(kernel.part))
+    derived = kernel.routes[route]
+    code = code_of("awiwi_gen.derive", derived.module, type(kernel.part).__module__)
     ports = [(name, port.shape, port.unit) for side in (kernel.inputs, kernel.outputs) for name, port in side.items()]
-    function = kernel.routes[route]
-    name = getattr(function, "__qualname__", kernel.family)
-    return key(kernel.structure, function.__module__, name, ports, kernel.guards, code, libraries())
+    return key(kernel.structure, derived.module, derived.function, ports, kernel.guards, code, libraries())
 
 
 @dataclass(frozen=True)
@@ -97,9 +92,9 @@ def fingerprints(kernel: Kernel, cache: Cache) -> dict[str, Fingerprint]:
 
 def record_key(kernel: Kernel, graphs: Mapping[str, Fingerprint], prefix: str, options: Options) -> str:
     """What a record depends on: the derivations, the numbers in them, the ports, the compiler's own code."""
-    values = _values(kernel)
+    values = values_of(kernel)
     used = {path: str(values[path]) for graph in graphs.values() for path in graph.params}
-    code = code_of(make_solver_record if kernel.solver else make_records) + code_digest("templates")
+    code = code_of(__name__) + code_digest("templates")
     digests = {route: graph.digest for route, graph in graphs.items()}
     ports = (dict(kernel.inputs), dict(kernel.outputs), kernel.doc, kernel.source, kernel.solver)
     return key(kernel.name, digests, json.dumps(used, sort_keys=True), ports, prefix, options, code, libraries())
@@ -154,7 +149,7 @@ def make_records(
 
     Raises VerificationError where two routes, or the graphs before and after a pass, differ.
     """
-    values = _values(tasks[0][0])
+    values = values_of(tasks[0][0])
     numbers = values if options.params == "baked" else {}
     known: dict[tuple[str, ...], tuple[Mapping[str, Graph], str, Sequence[tuple[str, Graph]]]] = {}
     candidates = []
@@ -228,30 +223,32 @@ def make_solver_record(
     kernel: Kernel, used: Mapping[str, Record], digest: str, prefix: str, options: Options
 ) -> Record:
     """Bind a solver to the kernels it uses, and find the exact solutions it is to be held against."""
-    solver = _solver(kernel)
+    solver = solver_of(kernel)
     runtime = any(record.graph is not None and record.graph.params for record in used.values())
     functions = {family: record.function for family, record in used.items()}
     function, text = solver_function(kernel, solver, prefix, options, functions, runtime)
-    problem = _problem(kernel, used)
+    problem = problem_of(kernel, used)
     inputs = problem.sample(draw(kernel.inputs, kernel.path, options.dtype))
     costs = (("solver", function.cost.operations, round(function.cost.weight)),)
     return Record(digest, None, function, text, "solver", 0.0, 0.0, problem.solve(inputs), costs=costs, inputs=inputs)
 
 
-def _problem(kernel: Kernel, used: Mapping[str, Record]) -> Problem:
+def problem_of(kernel: Kernel, used: Mapping[str, Record]) -> Problem:
     """What a kernel with a solver solves; the kernels it calls may belong to other parts, so their numbers are bound."""
-    solver = _solver(kernel)
+    solver = solver_of(kernel)
     graphs = {family: fill(record.graph, record.values) for family, record in used.items() if record.graph is not None}
-    return PROBLEMS[solver.problem](solver, graphs, _values(kernel))
+    return PROBLEMS[solver.problem](solver, graphs, values_of(kernel))
 
 
-def _solver(kernel: Kernel) -> Solver:
+def solver_of(kernel: Kernel) -> Solver:
+    """The solver of a kernel. Raises ValueError if it has none."""
     if kernel.solver is None:
         raise ValueError(f"{kernel.name} has no solver")
     return kernel.solver
 
 
-def _values(kernel: Kernel) -> Mapping[str, Fraction]:
+def values_of(kernel: Kernel) -> Mapping[str, Fraction]:
+    """Exact SI values of the numbers of a kernel's part, by path."""
     part = kernel.part
     if id(part) not in _VALUES:
         _VALUES[id(part)] = part, {path: quantity.value for path, quantity in part.quantities().items()}
@@ -259,47 +256,6 @@ def _values(kernel: Kernel) -> Mapping[str, Fraction]:
 
 
 _VALUES: dict[int, tuple[Any, dict[str, Fraction]]] = {}  # many kernels share a part, which is kept with its numbers
-
-
-def verdict_key(record: Record, compiled: str) -> str:
-    """What a verdict depends on: the record, the compiled text, what compiles it, and the judge."""
-    return key(record.digest, compiled, code_of(judge_record, load), code_digest("csrc"))
-
-
-def laws_key(records: Sequence[Record]) -> str:
-    """What the laws of physics on a part depend on: its records, and the laws."""
-    return key(*(record.digest for record in records), code_of(physics))
-
-
-def judge_record(
-    kernel: Kernel, record: Record, used: Mapping[str, Record], function: Callable[..., Any], options: Options
-) -> Verdict:
-    """Levels 1 and 3 for one compiled kernel, joined with levels 2 and 4 of its record."""
-    if record.graph is None:
-        problem, tolerance = _problem(kernel, used), _solver(kernel).tolerance[options.scalar]
-        mirror = problem.mirror(record.inputs, options.math == "own")
-        return judge_solver(kernel.name, record.reference, mirror, record.inputs, function, tolerance, SEED)
-    return judge(
-        kernel.name,
-        record.graph,
-        record.reference,
-        draw(kernel.inputs, kernel.path, options.dtype),
-        _values(kernel),
-        function,
-        {name: port.shape for name, port in kernel.inputs.items()},
-        record.agreement,
-        record.passes,
-        SEED,
-        options.dtype,
-        options.math == "own",
-    )
-
-
-def physics(members: Sequence[tuple[Kernel, Record]], ports: Mapping[str, Port], options: Options) -> list[Law]:
-    """Level 5 for the kernels of one part."""
-    first = members[0][0]
-    graphs = {kernel.family: record.graph for kernel, record in members if record.graph is not None}
-    return obey(first.path or "hand", graphs, draw(ports, first.path, options.dtype), _values(first))
 
 
 def manifest_entry(kernel: Kernel, record: Record) -> dict[str, Any]:

@@ -7,11 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from awiwi_gen import sources
+from awiwi_gen import judge, records, sources
 from awiwi_gen.derive import Deriver, check_dimensions
-from awiwi_gen.ir import from_casadi, from_sympy
 from awiwi_gen.kernels import catalog
-from awiwi_gen.records import derivation_key, make_records, make_solver_record, physics
+from awiwi_gen.records import derivation_key
 from awiwi_gen.resources import PACKAGE
 
 # Of every room of the physics; small enough to be derived under a tracer.
@@ -30,8 +29,8 @@ def kernels(hand):
 
 @pytest.fixture
 def edit(monkeypatch):
-    """Change a word of a module as its keys see it: `edit("models.wrist", "old", "new")`."""
-    original = sources.module_text
+    """Change a word of a module as its keys see it: `edit("definitions.wrist", "old", "new")`."""
+    original = sources.module_text.__wrapped__
     caches = [f for f in vars(sources).values() if hasattr(f, "cache_clear")]
 
     def change(module, old, new):
@@ -59,29 +58,32 @@ def changed(before, after):
     return {name for name in before if before[name] != after[name]}
 
 
-def test_a_changed_model_changes_the_keys_of_what_is_derived_with_it_and_no_others(kernels, edit):
+def test_a_changed_definition_changes_the_keys_of_what_is_derived_with_it_and_no_others(kernels, edit):
     before = keys(kernels)
-    edit("models.wrist", "def coupling(", "def coupling( ")
+    edit("definitions.wrist", "def coupling(", "def coupling( ")
 
-    assert changed(before, keys(kernels)) == {("wrist_coupling", "sympy")}
+    found = changed(before, keys(kernels))
+    assert {route for _, route in found} == {"sympy"}
+    assert {name for name, _ in found} == {name for name in kernels if name.startswith("wrist_")} | {
+        f"hand_{what}" for what in ("tendon_lengths", "coupling", "joint_torque", "joint_stiffness")
+    }
 
 
-def test_a_changed_control_law_changes_the_keys_of_its_kernel_and_no_others(kernels, edit):
+def test_a_changed_witness_changes_no_key_of_a_definition(kernels, edit):
     before = keys(kernels)
-    edit("control.impedance_work", "def cascade(", "def cascade( ")
+    edit("witnesses.impedance", "def cascade(", "def cascade( ")
 
-    assert changed(before, keys(kernels)) == {("cascade", "casadi")}
+    assert changed(before, keys(kernels)) == {(n, "casadi") for n in ("joint_impedance", "motor_impedance", "cascade")}
 
 
 def test_a_change_deep_down_changes_the_keys_of_all_that_stands_on_it(kernels, edit):
     before = keys(kernels)
-    edit("models.newton_euler", "def torques(", "def torques( ")
-    recursive = {name for name in before if name[1] == "casadi" and name[0].endswith(("bias", "inverse_dynamics"))}
+    edit("witnesses.dynamics.newton_euler", "def torques(", "def torques( ")
     found = changed(before, keys(kernels))
 
-    assert recursive <= found
-    assert {name for name, route in found if route == "sympy"} == {n for n, _ in found if n.endswith("derivatives")}
-    assert not any(name.endswith(("mass_matrix", "coupling")) or name.startswith("motor") for name, _ in found)
+    assert {route for _, route in found} == {"casadi"}
+    assert {name for name in kernels if name.endswith(("_bias", "_inverse_dynamics"))} <= {name for name, _ in found}
+    assert not any(name.endswith("coupling") or name.startswith("motor") for name, _ in found)
 
 
 def test_a_changed_lowering_changes_all_keys(kernels, edit):
@@ -91,44 +93,37 @@ def test_a_changed_lowering_changes_all_keys(kernels, edit):
     assert changed(before, keys(kernels)) == before.keys()
 
 
-def test_documentation_changes_no_key(kernels, edit):
-    before = keys(kernels)
-    edit("kernels.fingers", "Mass matrix: the kinetic energy", "The kinetic energy")
-
-    assert not changed(before, keys(kernels))
-
-
 @pytest.mark.parametrize("name", TRACED)
 def test_all_that_runs_in_a_derivation_is_in_its_key(kernels, name):
     kernel = kernels[name]
-    for route in kernel.routes:
-        known = sources.reached(Deriver, check_dimensions, kernel.routes[route], type(kernel.part))
+    for route, where in kernel.routes.items():
+        known = frozenset().union(
+            *map(sources.closure, ("awiwi_gen.derive", where.module, type(kernel.part).__module__))
+        )
         ran = traced(lambda route=route: check_dimensions(kernel, Deriver(kernel.part).derive(kernel, route)))
 
         assert ran
         assert ran <= known
 
 
-def test_what_makes_records_does_not_depend_on_the_laws_of_physics_nor_they_on_it():
-    law, passes = ("awiwi_gen.verify.physics", "obey"), ("awiwi_gen.ir.passes.share", "share_sums")
+def test_what_makes_records_does_not_depend_on_the_wings_nor_on_the_judge():
+    made = sources.closure(records.__name__)
 
-    assert passes in sources.reached(make_records)
-    assert law not in sources.reached(make_records) | sources.reached(make_solver_record)
-    assert law in sources.reached(physics)
-    assert passes not in sources.reached(physics)
+    assert "awiwi_gen.ir.passes.share" in made
+    assert not {"awiwi_gen.verify.physics", "awiwi_gen.verify.verdict", "awiwi_gen.build"} & made
+    assert not [name for name in made if ".definitions" in name or ".witnesses" in name]
+    assert "awiwi_gen.verify.verdict" in sources.closure(judge.__name__)
 
 
-def traced(run) -> set[tuple[str, str]]:
-    """(module, top-level name) of every function of the package that runs."""
-    _ = from_casadi, from_sympy  # imported before: reading a module is not running its functions
+def traced(run) -> set[str]:
+    """The modules of the package of which a function runs."""
     found = set()
 
     def note(frame, event, _):
         code = frame.f_code
         if event == "call" and code.co_filename.startswith(str(PACKAGE)) and code.co_qualname[0] != "<":
             place = Path(code.co_filename).relative_to(PACKAGE.parent).with_suffix("")
-            module = ".".join(place.parts).removesuffix(".__init__")
-            found.add((module, code.co_qualname.partition(".")[0]))
+            found.add(".".join(place.parts).removesuffix(".__init__"))
 
     sys.setprofile(note)
     try:

@@ -3,14 +3,23 @@
 from __future__ import annotations
 
 import ast
+import inspect
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import pytest
 
+from awiwi_gen.kernels import catalog
+
 PACKAGE = Path(__file__).resolve().parent.parent / "awiwi_gen"
-PHYSICS = [["errors", "units", "resources"], ["hand", "kernel"], ["models"], ["control"], ["kernels"]]
+PHYSICS = [
+    ["errors", "units", "resources"],
+    ["hand", "kernel", "structure"],
+    ["definitions", "witnesses"],
+    ["kernels"],
+]
 COMPILER = [
     ["errors", "units", "resources"],
     ["kernel", "cache", "sources"],
@@ -22,14 +31,16 @@ COMPILER = [
 ]
 TOP = [
     ["derive", "records", "budget"],
+    ["judge"],
     ["pipeline"],
     ["report", "explain", "simulate", "studies"],
     ["__init__"],
     ["__main__"],
 ]
+WINGS = ("definitions", "witnesses")
 HOMES = {
-    "sympy": {"models", "ir/from_sympy.py", "derive.py", "control"},
-    "casadi": {"models", "ir/from_casadi.py", "derive.py", "control"},
+    "sympy": {"definitions", "ir/from_sympy.py", "derive.py"},
+    "casadi": {"witnesses", "ir/from_casadi.py", "derive.py"},
     "jinja2": {"emit/files.py"},
     "cffi": {"build.py"},
 }
@@ -71,6 +82,53 @@ def test_heavy_libraries_stay_in_their_rooms(path):
     place = str(path.relative_to(PACKAGE))
     for library in {m.split(".")[0] for m in imports(path)} & HOMES.keys():
         assert any(place == home or place.startswith(home + "/") for home in HOMES[library]), library
+
+
+def reached(path: Path) -> set[str]:
+    """All modules of the package that a file imports, directly or not."""
+    found, waiting = set(), [path]
+    while waiting:
+        new = {m for m in imports(waiting.pop()) if m.startswith("awiwi_gen.")} - found
+        found |= new
+        files = [PACKAGE.joinpath(*module.split(".")[1:]) for module in new]
+        waiting += [p for f in files for p in (f.with_suffix(".py"), f / "__init__.py") if p.is_file()]
+    return found
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda p: str(p.relative_to(PACKAGE)))
+def test_the_wings_share_nothing_but_the_structure_and_the_numbers(path):
+    own = path.relative_to(PACKAGE).parts[0]
+    if own in WINGS:
+        rooms = {room(module) for module in reached(path)} - {own}
+        assert rooms <= {"structure", "hand", "errors", "units", "resources"}
+
+
+def test_both_wings_derive_the_same_subjects():
+    left, right = ({p.name for p in (PACKAGE / wing).iterdir() if p.name != "__pycache__"} for wing in WINGS)
+
+    assert left - right == {"naming.py"}  # names for SymPy's subexpressions; CasADi's graphs share theirs
+    assert right <= left
+
+
+@pytest.mark.parametrize("library", ["sympy", "casadi"])
+def test_every_kernel_has_a_function_of_its_name_and_arguments_in_both_wings(hand, library):
+    for kernel in catalog(hand):
+        if kernel.routes:
+            route = kernel.routes[library]
+            function = getattr(import_module(route.module), route.function)
+            arguments = list(inspect.signature(function).parameters)[1:]
+            assert arguments[: len(kernel.inputs)] == list(kernel.inputs), route
+
+
+def test_listing_the_kernels_of_a_hand_imports_neither_wing(tmp_path):
+    code = (
+        "import sys; from awiwi_gen.hand import Hand; from awiwi_gen.kernels import catalog\n"
+        "assert catalog(Hand.load())\n"
+        "print(sorted(name for name in sys.modules if name in ('sympy', 'casadi') or 'definitions' in name))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=tmp_path, check=True)
+
+    assert done.stdout.strip() == "[]"
 
 
 @pytest.mark.parametrize("command", [["--help"], ["list", "--assumed"], ["check"]])

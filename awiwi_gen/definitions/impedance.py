@@ -30,7 +30,7 @@ def motor_impedance(
     """Motor torque [N m] of the fast loop (eq. 11.3, mended), and what must be positive.
 
     What is fed forward is the desired force: feeding forward the measured one cancels the spring, so that nothing
-    but motor_kp draws the motor to its place, and the energy of eq. 11.5 does not fall.
+    but kp draws the motor to its place, and the energy of eq. 11.5 does not fall.
     """
     tau = r[0] * f_des[0] + motor_kp[0] * (theta_des[0] - theta[0]) - motor_kd[0] * thd[0] + friction[0]
     return tau, [r[0], motor_kp[0], motor_kd[0]]
@@ -40,7 +40,7 @@ def cascade(
     _: Any, f: Matrix, xd: Matrix, stiffness: Matrix, slope: Matrix, hdd: Matrix, f_des: Matrix, fd_des: Matrix,
     fdd_des: Matrix, friction: Matrix, r: Matrix, B: Matrix, force_kp: Matrix, force_kd: Matrix,
 ) -> tuple[Expr, list[Expr]]:  # fmt: skip
-    """Motor torque [N m] that leaves e'' + force_kd e' + force_kp e = 0 of the force error (eq. 11.16), and what must be positive.
+    """Motor torque [N m] that leaves e'' + force_kd e' + force_kp e = 0 of the force error (eq. 11.16), and its guards.
 
     The elongation x = r theta + h grows by x'' = r theta'' + h''; the force by f' = k x', f'' = k x'' + dk/dx x'^2.
     The stiffness is a function of the force, so dk/dx is its slope dk/df times k.

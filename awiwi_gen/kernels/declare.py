@@ -44,9 +44,7 @@ class Template(Generic[Size]):
             source=self.source,
             inputs={name: ports[name] for name in self.arguments if name in ports},
             outputs=self.outputs(size),
-            routes={}
-            if solver
-            else {library: Route(f"{wing}.{self.subject}", self.name) for library, wing in WINGS.items()},
+            routes={} if solver else routes,
             part=part,
             path=path,
             structure=json.dumps(structure, sort_keys=True),
