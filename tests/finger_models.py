@@ -6,6 +6,7 @@ import math
 import random
 from collections.abc import Callable
 from functools import cache
+from importlib import import_module
 from types import SimpleNamespace as Tree
 from typing import Any
 
@@ -13,12 +14,8 @@ import casadi as ca
 import numpy as np
 import sympy
 
-from awiwi_gen.definitions import kinematics as chain
-from awiwi_gen.definitions import tendons
-from awiwi_gen.definitions.dynamics import lagrange
-from awiwi_gen.definitions.naming import definitions
-from awiwi_gen.witnesses import tendons as tendons_ad
-from awiwi_gen.witnesses.dynamics import recursion as recursive
+from awiwi_gen import definitions, witnesses
+from awiwi_gen.definitions.naming import definitions as meanings
 
 SAMPLES = 3
 BASE = [[f"{a}abduction", f"{b}flexion"] for a, b in ("++", "+-", "-+", "--")]
@@ -115,23 +112,23 @@ def plain(name: str, number: float) -> float:
     return number
 
 
-QUANTITIES: dict[str, tuple[Any, Any, str]] = {
-    "link_poses": (chain, recursive, "q"),
-    "fingertip_pose": (chain, recursive, "q"),
-    "jacobian": (chain, recursive, "q"),
-    "mass_matrix": (lagrange, recursive, "q"),
-    "coriolis_matrix": (lagrange, recursive, "q qd"),
-    "gravity": (lagrange, recursive, "q g"),
-    "bias": (lagrange, recursive, "q qd g"),
-    "inverse_dynamics": (lagrange, recursive, "q qd qdd g"),
-    "forward_dynamics": (lagrange, recursive, "q qd tau g"),
-    "dynamics": (lagrange, recursive, "q qd g"),
-    "energy": (lagrange, recursive, "q qd g"),
-    "tendon_lengths": (tendons, tendons_ad, "q"),
-    "coupling": (tendons, tendons_ad, "q"),
-    "coupling_derivative": (tendons, tendons_ad, "q"),
-    "joint_torque": (tendons, tendons_ad, "q f"),
-    "joint_stiffness": (tendons, tendons_ad, "q f k"),
+QUANTITIES: dict[str, tuple[str, str]] = {
+    "link_poses": ("kinematics", "q"),
+    "fingertip_pose": ("kinematics", "q"),
+    "jacobian": ("kinematics", "q"),
+    "mass_matrix": ("dynamics", "q"),
+    "coriolis_matrix": ("dynamics", "q qd"),
+    "gravity": ("dynamics", "q g"),
+    "bias": ("dynamics", "q qd g"),
+    "inverse_dynamics": ("dynamics", "q qd qdd g"),
+    "forward_dynamics": ("dynamics", "q qd tau g"),
+    "dynamics": ("dynamics", "q qd g"),
+    "energy": ("dynamics", "q qd g"),
+    "tendon_lengths": ("tendons", "q"),
+    "coupling": ("tendons", "q"),
+    "coupling_derivative": ("tendons", "q"),
+    "joint_torque": ("tendons", "q f"),
+    "joint_stiffness": ("tendons", "q f k"),
 }
 
 
@@ -154,16 +151,16 @@ def states(kind: str) -> list[dict[str, np.ndarray]]:
 @cache
 def function(kind: str, quantity: str) -> Any:
     """The CasADi route as a function of its arguments, elements row by row; symbols only where a user has them."""
-    _, module, names = QUANTITIES[quantity]
+    subject, names = QUANTITIES[quantity]
     arguments = [ca.SX.sym(name, sizes(kind)[name]) for name in names.split()]
-    result = getattr(module, quantity)(make(kind, plain), *arguments)
+    result = getattr(import_module(f"{witnesses.__name__}.{subject}"), quantity)(make(kind, plain), *arguments)
     parts = result if isinstance(result, (list, tuple)) else [result]
     return ca.Function(quantity, arguments, [ca.vertcat(*(ca.vec(ca.SX(part).T) for part in parts))])
 
 
 def witness(kind: str, quantity: str, state: dict[str, np.ndarray]) -> np.ndarray:
     """The CasADi route's numbers: one flat array."""
-    return np.array(function(kind, quantity)(*(state[name] for name in QUANTITIES[quantity][2].split()))).ravel()
+    return np.array(function(kind, quantity)(*(state[name] for name in QUANTITIES[quantity][1].split()))).ravel()
 
 
 def square(kind: str, quantity: str, state: dict[str, np.ndarray]) -> np.ndarray:
@@ -184,11 +181,12 @@ def definition(kind: str, quantity: str, leaf: Leaf | None = None) -> Definition
         numbers[named] = number
         return named
 
-    module, _, names = QUANTITIES[quantity]
+    subject, names = QUANTITIES[quantity]
     symbols = {
         name: [sympy.Symbol(f"{name}[{i}]", real=True) for i in range(sizes(kind)[name])] for name in names.split()
     }
-    result = getattr(module, quantity)(make(kind, leaf or symbol), *(sympy.Matrix(s) for s in symbols.values()))
+    derive = getattr(import_module(f"{definitions.__name__}.{subject}"), quantity)
+    result = derive(make(kind, leaf or symbol), *(sympy.Matrix(s) for s in symbols.values()))
     parts = result if isinstance(result, (list, tuple)) else [result]
     return [e for part in parts for e in (part.flat() if hasattr(part, "flat") else [part])], numbers, symbols
 
@@ -213,14 +211,14 @@ def evaluate(elements: list[sympy.Expr], known: dict[Any, float]) -> list[float]
             known[expr] = float(expr) if expr.is_number else functions[expr.func](*map(value, expr.args))
         return known[expr]
 
-    for name, meaning in definitions(elements):
+    for name, meaning in meanings(elements):
         known[name] = value(meaning)
     return [value(sympy.sympify(element)) for element in elements]
 
 
 def direction(kind: str, quantity: str, state: dict[str, np.ndarray], **rates: np.ndarray) -> np.ndarray:
     """Rate of a quantity while its arguments change at the given rates."""
-    names = QUANTITIES[quantity][2].split()
+    names = QUANTITIES[quantity][1].split()
     symbols = [ca.SX.sym(name, len(state[name])) for name in names]
     seeds = [ca.DM(rates.get(name, np.zeros(len(state[name])))) for name in names]
     rate = ca.jtimes(function(kind, quantity)(*symbols), ca.vertcat(*symbols), ca.vertcat(*seeds))

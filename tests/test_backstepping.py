@@ -6,7 +6,7 @@ import sympy
 from proofs import column, rate, shifts, spelled_out, vanishes
 from sympy import Matrix, Symbol
 
-from awiwi_gen.definitions.backstepping.gains import state_gains
+from awiwi_gen.definitions.backstepping.gains import backstepping_state_gains
 from awiwi_gen.definitions.backstepping.laws import academic_law, impedance_law, nonlinear_law, position_law
 from awiwi_gen.definitions.backstepping.recursion import Level, Start, Tuning, backstep
 from awiwi_gen.definitions.naming import Derivation
@@ -174,7 +174,7 @@ def feedback(weights=WEIGHTS):
 
 def test_the_state_feedback_is_the_law_differentiated():
     K, h = feedback()
-    closed = state_gains(PLANT, GAINS, WEIGHTS)
+    closed = backstepping_state_gains(None, PLANT, GAINS, WEIGHTS)
 
     assert all(map(vanishes, K - closed.K))
     assert all(map(vanishes, h - closed.h))

@@ -6,7 +6,7 @@ import sympy
 from proofs import column, rate, spelled_out, vanishes
 from sympy import Matrix, Rational, symbols
 
-from awiwi_gen.definitions.backstepping.gains import state_gains
+from awiwi_gen.definitions.backstepping.gains import backstepping_state_gains
 
 m, b, k = PLANT = column("m b k")
 K_p, K_d, K_3, K_4 = GAINS = column("K_p K_d K_3 K_4")
@@ -189,7 +189,7 @@ def test_eq_15_106_as_printed_has_a_growing_motion_where_the_mended_law_has_none
 
 def third_gain():
     """The gain of tau with weights of 1, and what is left of it without gains (eq. 16.3)."""
-    K = spelled_out(state_gains(PLANT, GAINS, Matrix([1, 1])).K[2])
+    K = spelled_out(backstepping_state_gains(None, PLANT, GAINS, Matrix([1, 1])).K[2])
     return K, K.subs(dict.fromkeys(GAINS, 0))
 
 

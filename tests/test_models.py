@@ -26,11 +26,11 @@ from finger_models import (
     witness,
 )
 
-from awiwi_gen.definitions import kinematics as chain
+from awiwi_gen.definitions import kinematics
 from awiwi_gen.definitions.dynamics import lagrange
 from awiwi_gen.definitions.four_bar import four_bar_angles
 from awiwi_gen.definitions.naming import Derivation, definitions
-from awiwi_gen.witnesses.dynamics import recursion as recursive
+from awiwi_gen.witnesses import kinematics as recursion
 from awiwi_gen.witnesses.four_bar import FourBar
 
 # -- two routes -----------------------------------------------------------------------------------------------------
@@ -113,7 +113,7 @@ def test_fingertip_of_table_5_1_is_its_closed_form():
     for joint, (x, y, z) in lengths.items():
         special |= {f"{joint}_length": x, f"{joint}_offset_y": y, f"{joint}_offset_z": z}
     q = ca.SX.sym("q", 4)
-    pose = ca.Function("pose", [q], [recursive.fingertip_pose(make("index", plain, **special), q)])
+    pose = ca.Function("pose", [q], [recursion.fingertip_pose(make("index", plain, **special), q)])
     for state in states("index"):
         (q0, q1, q2, q3) = state["q"]
         a1, a2, a3 = q1, q1 + q2, q1 + q2 + q3
@@ -146,7 +146,7 @@ def test_jacobian_gives_the_velocity_of_the_tip(kind):
 
 def test_coupled_joints_roll_equal_arcs():
     finger = make("ring", plain)
-    angles = chain.joint_angles(finger, sympy.Matrix(states("ring")[0]["q"]))
+    angles = kinematics.joint_angles(finger, sympy.Matrix(states("ring")[0]["q"]))
     radii = {pulley.joint: pulley.radius for pulley in finger.pulleys}
     assert float(radii["pip"] * angles["pip"]) == pytest.approx(float(radii["dip"] * angles["dip"]), rel=1e-15)
 
@@ -192,7 +192,7 @@ def test_four_bar_rates_are_the_derivatives_of_the_angles():
 
 def test_metacarpal_is_parallel_to_its_seat_at_zero():
     q = ca.SX.sym("q", 4)
-    poses = ca.Function("poses", [q], recursive.link_poses(make("fifth", plain), q))
+    poses = ca.Function("poses", [q], recursion.link_poses(make("fifth", plain), q))
     at_zero = np.array(poses(0)[0])
     assert_close(at_zero[:3, :3], np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]]), 1e-15)
     reference, crank = FOUR_BAR["reference"], FOUR_BAR["crank"]
