@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from awiwi_gen.ir.algebras import Bounded, Floats
+from awiwi_gen.ir.algebras import UNIT_ROUNDOFF, Bounded, Floats
 from awiwi_gen.ir.graph import Graph, Node
 from awiwi_gen.ir.interpret import evaluate
 from awiwi_gen.kernel import GUARDS
@@ -153,7 +153,9 @@ def judge(
         if not np.isfinite(values).all():
             reasons.append(f"{port} is not finite inside the documented range")
             error = np.where(np.isfinite(error), error, np.inf)
-        scale = float(np.max(np.abs(reference.high[port]), initial=0.0)) or 1.0
+        scale = float(np.max(np.abs(reference.high[port]), initial=0.0))
+        if scale == 0:  # everywhere; then what the rounding of its terms explains says how large these are
+            scale = float(np.max(limit, initial=0.0)) / UNIT_ROUNDOFF[dtype]
         spacing = np.spacing(np.abs(reference.high[port]).astype(dtype)).astype(np.float64)
         sizeable = np.abs(reference.high[port]) >= NEAR_ZERO * scale
         with np.errstate(over="ignore"):  # of errors near zero, which do not count
