@@ -28,7 +28,8 @@ from awiwi_gen.ir.passes.bind import bind, fill
 from awiwi_gen.kernel import Kernel, Port, Solver
 from awiwi_gen.sources import code_of
 from awiwi_gen.verify.physics import Law, obey
-from awiwi_gen.verify.problems import PROBLEMS, Problem
+from awiwi_gen.verify.problem import Problem
+from awiwi_gen.verify.problems import PROBLEMS
 from awiwi_gen.verify.reference import (
     BallArrays,
     Reference,
@@ -283,8 +284,11 @@ def judge_record(
     """Levels 1 and 3 for one compiled kernel, joined with levels 2 and 4 of its record."""
     if record.graph is None:
         problem, tolerance = _problem(kernel, used), _solver(kernel).tolerance[options.scalar]
-        mirror = problem.mirror(record.inputs, options.math == "own")
-        return judge_solver(kernel.name, record.reference, mirror, record.inputs, function, tolerance, SEED)
+        mirror, observed = (
+            problem.mirror(record.inputs, options.math == "own"),
+            partial(problem.observed, record.inputs),
+        )
+        return judge_solver(kernel.name, record.reference, mirror, observed, record.inputs, function, tolerance, SEED)
     return judge(
         kernel.name,
         record.graph,

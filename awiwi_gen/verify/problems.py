@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from flint import arb, arb_mat
@@ -14,6 +14,7 @@ from awiwi_gen.ir.algebras import Balls, Floats, ball
 from awiwi_gen.ir.graph import Graph, Node
 from awiwi_gen.ir.interpret import evaluate
 from awiwi_gen.kernel import Solver
+from awiwi_gen.verify.problem import Problem
 from awiwi_gen.verify.problems_distribution import Distribution
 from awiwi_gen.verify.problems_gains import GainMatching
 from awiwi_gen.verify.problems_riccati import JointRegulator, Riccati
@@ -21,35 +22,18 @@ from awiwi_gen.verify.reference import Reference, reference
 
 Array = np.ndarray[Any, Any]
 
-NOISE = 2.5e-4  # error of a measured length [m]; keeps the estimate inside the limits it starts in
-ROUNDS = 30  # of Gauss-Newton at 256 bits, at most: the residual is small, each round gains a digit at least
-SETTLED = 1e-40  # largest step [rad] after which the next would change nothing that two doubles show
-
-
-class Problem(Protocol):
-    """What a solver solves; made from the solver, the graphs of the kernels it calls, and the numbers of its part."""
-
-    def sample(self, drawn: dict[str, Array]) -> dict[str, Array]:
-        """Well-posed inputs."""
-
-    def solve(self, inputs: Mapping[str, Array]) -> Reference:
-        """Exact outputs; those named status are the status that must be returned, which is otherwise 0."""
-
-    def mirror(self, inputs: Mapping[str, Array], own: bool) -> Mapping[str, Array]:
-        """What the solver computes in floats, by output, where that is known to the last bit."""
+NOISE = 2.5e-4  # error of a measured length [m]
+ROUNDS = 100  # of Gauss-Newton at 256 bits, at most: the residual is small, so a round gains a digit or more
+LAST_STEP = 1e-40  # largest step [rad] after which the next would change nothing that two doubles show
 
 
 @dataclass(frozen=True)
-class LeastSquares:
+class LeastSquares(Problem):
     """Joint angles whose tendon lengths are nearest to the measured ones (eq. 5.14, 5.24).
 
-    Half of the samples are exact lengths of poses in the whole range, limits included; the others carry noise
-    on poses away from the limits, for there the exact solution is a stationary point.
+    Half of the samples are exact lengths of poses in the whole range, limits included; the others carry noise, on
+    poses in the middle of the range.
     """
-
-    solver: Solver
-    graphs: Mapping[str, Graph]
-    values: Mapping[str, Fraction]
 
     def sample(self, drawn: dict[str, Array]) -> dict[str, Array]:
         """Measured lengths ``h`` of poses, and starts up to 0.2 rad away from them."""
@@ -78,33 +62,46 @@ class LeastSquares:
         return h, P.reshape(len(q), h.shape[1], q.shape[1])
 
     def solve(self, inputs: Mapping[str, Array]) -> Reference:
-        """The stationary points near the starts, by undamped Gauss-Newton at 256 bits."""
+        """The minima near the starts, by undamped Gauss-Newton at 256 bits; an unknown pushed against a limit stays.
+
+        A noisy length leads past a limit where the joint's range is narrow.
+        """
         samples, n = inputs["start"].shape
         q = [[arb(x) for x in column] for column in inputs["start"].T.astype(np.float64).tolist()]
         measured = [[arb(x) for x in column] for column in inputs["h"].T.astype(np.float64).tolist()]
-        other = [arb(0)] * samples
+        low, high = ([arb(float(x)) for x in end] for end in self.limits(inputs["start"].dtype))
+        at_rest = [arb(0)] * samples
         for _ in range(ROUNDS):
             largest = 0.0
 
             def leaf(node: Node, q: Any = q) -> list[arb]:
-                return [ball(self.values[node[1]])] * samples if node[0] == "param" else self._angle(node, q, other)
+                return [ball(self.values[node[1]])] * samples if node[0] == "param" else self._angle(node, q, at_rest)
 
             h, P = self._evaluate(Balls(samples), leaf)
             for s in range(samples):
-                jacobian = arb_mat(len(h), n, [column[s] for column in P])
+                jacobian = arb_mat(len(h), n, [column[s].mid() for column in P])
                 residual = arb_mat(len(h), 1, [(a[s] - b[s]).mid() for a, b in zip(measured, h, strict=True)])
-                turned = jacobian.transpose()
-                step = (turned * jacobian).solve(turned * residual)
-                for j in range(n):
-                    q[j][s] = (q[j][s] + step[j, 0]).mid()
-                    largest = max(largest, abs(float(step[j, 0])))
-            if largest < SETTLED:
+                downhill = (jacobian.transpose() * residual).entries()
+                free = [
+                    j for j in range(n)
+                    if not (q[j][s] <= low[j] and downhill[j] <= 0) and not (q[j][s] >= high[j] and downhill[j] >= 0)
+                ]  # fmt: skip
+                if not free:
+                    continue
+                columns = arb_mat([[jacobian[i, j] for j in free] for i in range(len(h))])
+                step = (columns.transpose() * columns).solve(columns.transpose() * residual).entries()
+                for j, change in zip(free, step, strict=True):
+                    before = q[j][s]
+                    q[j][s] = min(max((before + change).mid(), low[j]), high[j])
+                    largest = max(largest, abs(float(q[j][s] - before)))
+            if largest < LAST_STEP:
                 break
         return reference({"q": q})
 
-    def mirror(self, inputs: Mapping[str, Array], own: bool) -> Mapping[str, Array]:
-        """What the solver computes in floats, by output, where that is known to the last bit."""
-        return {}
+    def limits(self, dtype: Any) -> tuple[Array, Array]:
+        """Lower and upper limits of the unknowns, as the C has them."""
+        low, high = (np.array(self.solver.arrays[end], dtype) for end in ("low", "high"))
+        return low, high
 
     def _angle(self, node: Node, q: Any, other: Any) -> Any:
         """A joint angle of the kernels used: one of the unknowns q (n, samples), or that of a joint at rest."""
@@ -125,7 +122,7 @@ class GradientSearch(LeastSquares):
     def mirror(self, inputs: Mapping[str, Array], own: bool) -> Mapping[str, Array]:
         """All trials, with the arithmetic and the order of csrc."""
         start, measured = inputs["start"], inputs["h"]
-        low, high = (np.array(self.solver.arrays[end], start.dtype) for end in ("low", "high"))
+        low, high = self.limits(start.dtype)
         q = _clamped(start, low, high)
         best, gradient, curvature = self._cost(q, measured, own)
         step = 1 / curvature

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,8 @@ from flint import arb
 from awiwi_gen.ir.algebras import Balls, Floats
 from awiwi_gen.ir.graph import Graph, prune
 from awiwi_gen.ir.interpret import evaluate
-from awiwi_gen.kernel import Solver
+from awiwi_gen.verify.distribution_answer import System
+from awiwi_gen.verify.problem import Problem
 from awiwi_gen.verify.reference import Reference, reference
 
 Array = np.ndarray[Any, Any]
@@ -26,8 +26,9 @@ UNREACHABLE = 0.05  # how far a stiffness is from what the tendons can do, in pa
 UNREACHABLE_TORQUE = 0.2  # [N m]
 MILDEST = 12  # halvings of a miss
 RAYS, POINTS = 48, 24  # along which it is looked for forces that are as near, and how many on each
+DETERMINED = 1e-4  # effect of a pattern of forces, in parts of the largest, by which they are found again
 ROUNDS = 8  # of Newton's method with a derivative in floats, at most: each gains ten digits at least
-SETTLED = 1e-40  # largest step [N] after which the next would change nothing that two doubles show
+LAST_STEP = 1e-40  # largest step [N] after which the next would change nothing that two doubles show
 
 
 @dataclass(frozen=True)
@@ -39,6 +40,7 @@ class Answer:
     tau: Array
     K: Array
     feasible: bool
+    unique: bool
 
 
 @dataclass(frozen=True)
@@ -62,17 +64,16 @@ class _Pull:
 
 
 @dataclass(frozen=True)
-class Distribution:
+class Distribution(Problem):
     """Demands made from their answers: forces first, then a torque and a stiffness for which nothing is better.
 
     By the sample's number modulo 4: forces inside the limits that give just what is asked for; the same with some at
     their limits; a stiffness out of reach, in a direction in which no move of the forces helps; a torque out of reach.
-    That no other forces are as near is made sure of by looking, so that the answer is the only one.
+    A search along rays makes sure that no other forces are as near, so that the answer is unique. Some fingers have
+    no unique answer: two equal pairs over one joint, or three tendons over one joint, can change their forces so that
+    neither torque nor stiffness changes. There the torque and the stiffness of the forces are compared, not the forces.
     """
 
-    solver: Solver
-    graphs: Mapping[str, Graph]
-    values: Mapping[str, Fraction]
     _known: dict[bytes, list[Answer]] = field(default_factory=dict, init=False, compare=False)
     _curves: dict[tuple[str, ...], Graph] = field(default_factory=dict, init=False, compare=False)
 
@@ -82,10 +83,6 @@ class Distribution:
         answers = self.answers(drawn["q"], low, high)
         tau, K = (np.array([getattr(a, name) for a in answers]).astype(dtype) for name in ("tau", "K"))
         return {"q": drawn["q"], "tau": tau, "K": K, "f_min": low, "f_max": high}
-
-    def mirror(self, inputs: Mapping[str, Array], own: bool) -> Mapping[str, Array]:
-        """No bits are known."""
-        return {}
 
     # -- demands ----------------------------------------------------------------------------------------------
 
@@ -112,7 +109,8 @@ class Distribution:
         pushed = bool(wish.push.any())
         for milder in 0.5 ** np.arange(MILDEST) * (wish.kind > 1):
             pulled, at, excess = self._out_of_reach(wish, pull, P, dP, ends, milder)
-            answer = Answer(pulled.f, at, wish.push - P.T @ pulled.f, pulled.K - excess, not pushed)
+            tau = wish.push - P.T @ pulled.f
+            answer = Answer(pulled.f, at, tau, pulled.K - excess, not pushed, _is_unique(P, pulled.growth))
             if self._is_nearest(answer, P, dP, ends):
                 return answer
         raise ValueError("no demand is answered best by the forces it was made from")
@@ -136,7 +134,8 @@ class Distribution:
     def _is_nearest(self, answer: Answer, P: Array, dP: Array, ends: Ends) -> bool:
         """Whether no forces along rays from the answer, through all that gives the same torque, are as near.
 
-        Of pairs this is known: their stiffness is linear in sums that grow with the forces.
+        Of pairs this is known: their stiffness is linear in sums that grow with the forces. Where the answer is not
+        unique, others are as near and none may be nearer.
         """
         group = [int(i) for i in self.solver.strings["searched"].split(",") if i]
         if not group:
@@ -151,7 +150,10 @@ class Distribution:
         distance = ((self._stiffness(f, P, dP) - answer.K) ** 2).sum(axis=(-2, -1))
         moved = np.abs(f - answer.f).max(axis=-1) > 1e-6 * ends[1]
         here = ((self._stiffness(answer.f, P, dP) - answer.K) ** 2).sum()
-        return not np.any(distance[moved] <= here)
+        if answer.unique:
+            return not np.any(distance[moved] <= here)
+        rounding = (1e-12 * np.abs(answer.K).max()) ** 2
+        return not np.any(distance[moved] < here * (1 - 1e-9) - rounding)
 
     def _stiffness(self, f: Array, P: Array, dP: Array) -> Array:
         """Joint stiffness (..., n, n) of forces (..., m)."""
@@ -201,8 +203,8 @@ class Distribution:
         floats = self.tendons(q)
         curves = self.curve(np.array([a.f for a in answers]).T, "k", "slope", "curvature")
         systems = [
-            _System(answer, inputs["tau"][s], inputs["K"][s], [c[s] for c in P], [c[s] for c in dP],
-                    (floats[0][s], floats[1][s]), [each[:, s] for each in curves])
+            System(answer.f, answer.held, inputs["tau"][s], inputs["K"][s], [c[s] for c in P], [c[s] for c in dP],
+                   (floats[0][s], floats[1][s]), [each[:, s] for each in curves])
             for s, answer in enumerate(answers)
         ]  # fmt: skip
         for _ in range(ROUNDS):
@@ -213,61 +215,31 @@ class Distribution:
                 steps += [float(abs(force - row[s])) for row, force in zip(f, here, strict=True)]
                 for row, force in zip(f, here, strict=True):
                     row[s] = force
-            if max(steps) < SETTLED:
+            if max(steps) < LAST_STEP:
                 break
         status = [[arb(0 if answer.feasible else INFEASIBLE) for answer in answers]]
-        return reference({"f": f, "status": status})
-
-
-class _System:
-    """The equations of one sample: no slope of the free forces beyond what the torques' prices explain, and the torque."""
-
-    def __init__(
-        self, answer: Answer, tau: Array, K: Array, P: list[arb], dP: list[arb], floats: tuple[Array, Array], curve: Any
-    ) -> None:
-        n = len(tau)
-        self.free, self.n = np.flatnonzero(answer.held == 0).tolist(), n
-        self.P = [P[i * n : i * n + n] for i in range(len(answer.f))]
-        self.dP = [dP[i * n * n : (i + 1) * n * n] for i in range(len(answer.f))]
-        self.tau = [arb(float(x)) for x in tau]
-        self.K = [arb(float(x)) for x in (K.astype(np.float64) + K.T.astype(np.float64)).flat]
-        coupling, bend = floats
-        self.rows = _independent(coupling[self.free])
-        k, slope, curvature = curve
-        pp = np.einsum("ia,ib->iab", coupling, coupling)
-        growth = slope[:, None, None] * pp + bend
-        excess = np.tensordot(k, pp, 1) + np.tensordot(answer.f, bend, 1) - (K + K.T) / 2
-        hessian = np.einsum("iab,lab->il", growth, growth)
-        hessian += np.diag(curvature * np.einsum("iab,ab->i", pp, excess))
-        count, rank = len(self.free), len(self.rows)
-        matrix = np.zeros((count + rank, count + rank))
-        matrix[:count, :count] = hessian[np.ix_(self.free, self.free)]
-        matrix[:count, count:] = coupling[np.ix_(self.free, self.rows)]
-        matrix[count:, :count] = matrix[:count, count:].T
-        self.inverse = np.linalg.inv(matrix)
-        self.prices = [arb(0)] * rank
-
-    def improved(self, f: list[arb], k: list[arb], slope: list[arb]) -> list[arb]:
-        """One step with the derivative that is known in floats."""
-        n = range(self.n)
-        excess = [
-            sum((k[i] * self.P[i][a] * self.P[i][b] + f[i] * self.dP[i][a * self.n + b] for i in range(len(f))),
-                -self.K[a * self.n + b] / 2)
-            for a in n for b in n
-        ]  # fmt: skip
-        misses = [
-            sum((excess[a * self.n + b] * (slope[i] * self.P[i][a] * self.P[i][b] + self.dP[i][a * self.n + b])
-                 for a in n for b in n), arb(0))
-            + sum((self.P[i][j] * price for j, price in zip(self.rows, self.prices, strict=True)), arb(0))
-            for i in self.free
-        ]  # fmt: skip
-        misses += [self.tau[j] + sum((self.P[i][j] * f[i] for i in range(len(f))), arb(0)) for j in self.rows]
-        steps = [
-            sum((arb(float(x)) * miss for x, miss in zip(row, misses, strict=True)), arb(0)) for row in self.inverse
+        if all(answer.unique for answer in answers):
+            return reference({"f": f, "status": status})
+        (k,) = self.curve(f, "k", algebra=balls)
+        effects = [
+            [*system.torque(forces), *system.stiffness(forces, [c[s] for c in k])]
+            for s, (system, forces) in enumerate(zip(systems, map(list, zip(*f, strict=True)), strict=True))
         ]
-        self.prices = [(price - step).mid() for price, step in zip(self.prices, steps[len(self.free) :], strict=True)]
-        moved = dict(zip(self.free, steps, strict=False))
-        return [(force - moved[i]).mid() if i in moved else force for i, force in enumerate(f)]
+        columns, n = [list(column) for column in zip(*effects, strict=True)], q.shape[1]
+        outside = [[arb(0)] * samples] * len(f)
+        return reference({"torque": columns[:n], "stiffness": columns[n:], "outside": outside, "status": status})
+
+    def observed(self, inputs: Mapping[str, Array], found: Any) -> Mapping[str, Array]:
+        """The forces found, their torque and stiffness, and how far they lie outside their limits."""
+        P, dP = self.tendons(inputs["q"])
+        f = found.f.astype(np.float64)
+        low, high = (inputs[end][:, None].astype(np.float64) for end in ("f_min", "f_max"))
+        k = self.curve(f.T, "k")[0].T
+        stiffness = np.einsum("si,sia,sib->sab", k, P, P) + np.einsum("si,siab->sab", f, dP)
+        outside = np.maximum(0, np.maximum(low - f, f - high))
+        return {
+            "f": found.f, "torque": -np.einsum("sia,si->sa", P, f), "stiffness": stiffness, "outside": outside,
+        }  # fmt: skip
 
 
 def _wish(kind: int, P: Array, random: Any) -> _Wish:
@@ -350,10 +322,8 @@ def _prices(P: Array, growth: Array, held: Array, excess: Array) -> Array:
     return prices
 
 
-def _independent(P: Array) -> list[int]:
-    """Joints whose torques by these tendons are independent, as many as there are."""
-    found: list[int] = []
-    for j in range(P.shape[1]):
-        if len(P) and np.linalg.matrix_rank(P[:, [*found, j]], tol=1e-9) > len(found):
-            found.append(j)
-    return found
+def _is_unique(P: Array, growth: Array) -> bool:
+    """Whether every pattern of forces changes the torque or the stiffness."""
+    effects = np.concatenate([P / np.abs(P).max(), growth.reshape(len(P), -1) / np.abs(growth).max()], axis=1)
+    sizes = np.linalg.svd(effects, compute_uv=False)
+    return bool(len(sizes) == len(P) and sizes[-1] > DETERMINED * sizes[0])

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import Any
 
 import numpy as np
 from flint import arb, arb_mat
 
 from awiwi_gen.ir.algebras import Balls, Floats
-from awiwi_gen.ir.graph import Graph, Node
+from awiwi_gen.ir.graph import Node
 from awiwi_gen.ir.interpret import evaluate
-from awiwi_gen.kernel import Solver
+from awiwi_gen.verify.problem import Problem
 from awiwi_gen.verify.reference import Reference, reference
 
 Array = np.ndarray[Any, Any]
@@ -23,12 +22,8 @@ AWAY = 0.05  # how far starts are from the gains, as a share: several gains can 
 
 
 @dataclass(frozen=True)
-class GainMatching:
+class GainMatching(Problem):
     """Joints of all sizes, with gains whose parts of the closed loop are of like size, so that all can be told."""
-
-    solver: Solver
-    graphs: Mapping[str, Graph]
-    values: Mapping[str, Fraction]
 
     def sample(self, drawn: dict[str, Array]) -> dict[str, Array]:
         """Feedback gains of known gains, and starts near these."""
@@ -72,7 +67,3 @@ class GainMatching:
                 for j in range(4):
                     gains[j][s] = (gains[j][s] + step[j, 0]).mid()
         return reference({"impedance": gains[:2], "rates": gains[2:]})
-
-    def mirror(self, inputs: Mapping[str, Array], own: bool) -> Mapping[str, Array]:
-        """No bits are known."""
-        return {}

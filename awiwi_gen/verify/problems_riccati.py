@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import Any
 
 import numpy as np
 from flint import arb, arb_mat, ctx
 
 from awiwi_gen.ir.algebras import PRECISION_BITS
-from awiwi_gen.ir.graph import Graph
-from awiwi_gen.kernel import Solver
+from awiwi_gen.verify.problem import Problem
 from awiwi_gen.verify.reference import Reference, reference
 
 Array = np.ndarray[Any, Any]
@@ -24,16 +22,12 @@ TABLE_WEIGHTS = (10.0, 0.01, 1.0, 0.01)  # table 13.1
 
 
 @dataclass(frozen=True)
-class Riccati:
+class Riccati(Problem):
     """Gains and least cost of a linear plant with one input (eq. 13.5).
 
     The first samples are the plants of tables 13.1, 14.2 and 16.1. Of the others each third is a joint with a spring,
     an integrator chain as in table 16.1, or a matrix without structure in coordinates of unlike size.
     """
-
-    solver: Solver
-    graphs: Mapping[str, Graph]
-    values: Mapping[str, Fraction]
 
     def sample(self, drawn: dict[str, Array]) -> dict[str, Array]:
         """Plants for as many samples as were drawn, costs included."""
@@ -50,18 +44,10 @@ class Riccati:
         samples = [optimum(*plant) for plant in zip(*(inputs[name] for name in ("A", "B", "Q", "R")), strict=True)]
         return _reference({"K": [K for K, _ in samples], "S": [S for _, S in samples]})
 
-    def mirror(self, inputs: Mapping[str, Array], own: bool) -> Mapping[str, Array]:
-        """No bits are known."""
-        return {}
-
 
 @dataclass(frozen=True)
-class JointRegulator:
+class JointRegulator(Problem):
     """Gains and torque of a joint with a spring that has a secant (eq. 14.10), from any last gains."""
-
-    solver: Solver
-    graphs: Mapping[str, Graph]
-    values: Mapping[str, Fraction]
 
     def sample(self, drawn: dict[str, Array]) -> dict[str, Array]:
         """What was drawn, with springs that always pull back and half a radian of deflexion at most."""
@@ -90,10 +76,6 @@ class JointRegulator:
             gains.append(K)
             torques.append([held - sum((g * (p - d) for g, p, d in zip(K, x, x_des, strict=True)), arb(0))])
         return _reference({"K": gains, "u": torques})
-
-    def mirror(self, inputs: Mapping[str, Array], own: bool) -> Mapping[str, Array]:
-        """No bits are known."""
-        return {}
 
 
 # -- the optimum -------------------------------------------------------------------------------------------
