@@ -1,4 +1,4 @@
-"""The best tendon forces for one demand at 256 bits: Newton's method with a derivative in floats."""
+"""Optimal tendon forces for one demand at 256 bits: Newton's method with a derivative in floats."""
 
 from __future__ import annotations
 
@@ -9,11 +9,15 @@ from flint import arb
 
 Array = np.ndarray[Any, Any]
 
-SINGULAR = 1e-9  # share of the largest singular value below which a pattern of forces changes nothing
+SINGULAR = 1e-9  # singular values below this share of the largest count as zero
 
 
 class System:
-    """The equations of one sample: no slope of the free forces beyond what the torques' prices explain, and the torque."""
+    """The optimality conditions of one sample: a stationary Lagrange function of the free forces, and the torque.
+
+    Forces f (m,), tendons held at limits (m,), demand tau (n,) and K (n, n), coupling P and its derivatives dP row by
+    row as balls, both as floats, and k, slope and curvature of the tendons (m,) as floats.
+    """
 
     def __init__(
         self,
@@ -46,7 +50,7 @@ class System:
         matrix[:count, count:] = coupling[np.ix_(self.free, self.rows)]
         matrix[count:, :count] = matrix[:count, count:].T
         self.inverse = _inverse(matrix)
-        self.prices = [arb(0)] * rank
+        self.multipliers = [arb(0)] * rank
 
     def torque(self, f: list[arb]) -> list[arb]:
         """The joint torque (n) of forces f (m)."""
@@ -62,27 +66,30 @@ class System:
         ]
 
     def improved(self, f: list[arb], k: list[arb], slope: list[arb]) -> list[arb]:
-        """One step with the derivative that is known in floats."""
+        """Forces after one Newton step."""
         n = range(self.n)
         excess = [found - twice / 2 for found, twice in zip(self.stiffness(f, k), self.K, strict=True)]
         torque = self.torque(f)
         misses = [
             sum((excess[a * self.n + b] * (slope[i] * self.P[i][a] * self.P[i][b] + self.dP[i][a * self.n + b])
                  for a in n for b in n), arb(0))
-            + sum((self.P[i][j] * price for j, price in zip(self.rows, self.prices, strict=True)), arb(0))
+            + sum((self.P[i][j] * multiplier for j, multiplier in zip(self.rows, self.multipliers, strict=True)), arb(0))
             for i in self.free
         ]  # fmt: skip
         misses += [self.tau[j] - torque[j] for j in self.rows]
         steps = [
             sum((arb(float(x)) * miss for x, miss in zip(row, misses, strict=True)), arb(0)) for row in self.inverse
         ]
-        self.prices = [(price - step).mid() for price, step in zip(self.prices, steps[len(self.free) :], strict=True)]
-        moved = dict(zip(self.free, steps, strict=False))
-        return [(force - moved[i]).mid() if i in moved else force for i, force in enumerate(f)]
+        self.multipliers = [
+            (multiplier - step).mid()
+            for multiplier, step in zip(self.multipliers, steps[len(self.free) :], strict=True)
+        ]
+        change = dict(zip(self.free, steps, strict=False))
+        return [(force - change[i]).mid() if i in change else force for i, force in enumerate(f)]
 
 
 def _independent(P: Array) -> list[int]:
-    """Joints whose torques by these tendons are independent, as many as there are."""
+    """A largest set of joints whose torques by these tendons are independent."""
     found: list[int] = []
     for j in range(P.shape[1]):
         if len(P) and np.linalg.matrix_rank(P[:, [*found, j]], tol=1e-9) > len(found):
@@ -91,7 +98,7 @@ def _independent(P: Array) -> list[int]:
 
 
 def _inverse(matrix: Array) -> Array:
-    """Its inverse; patterns of forces that change nothing do not move."""
+    """The pseudo-inverse, after equilibration: patterns of forces that change nothing stay as they are."""
     largest = np.abs(matrix).max(axis=1, initial=0)
     scale = 1 / np.sqrt(np.where(largest > 0, largest, 1))
     inverse: Array = np.linalg.pinv(matrix * np.outer(scale, scale), SINGULAR, hermitian=True)

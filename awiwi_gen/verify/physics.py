@@ -33,7 +33,7 @@ Tensor = np.ndarray[Any, Any]  # of balls; the first axis runs over the samples
 
 @dataclass(frozen=True)
 class Law:
-    """One law on one part: the worst residual relative to the size of its terms."""
+    """The result of one law for one part: the worst residual relative to the size of its terms."""
 
     part: str
     statement: str
@@ -54,7 +54,7 @@ class Motion:
         self.inputs = {n: np.vectorize(arb, otypes=[object])(a.astype(np.float64)) for n, a in inputs.items()}
 
     def at(self, family: str, inputs: Mapping[str, Tensor] | None = None) -> dict[str, Tensor]:
-        """The outputs of a kernel, shaped, at the samples or at other inputs."""
+        """The outputs of a kernel (samples, ...) at the samples or at other inputs."""
         graph, given = self.graphs[family], inputs or self.inputs
 
         def leaf(node: Node) -> list[arb]:
@@ -112,7 +112,7 @@ def _largest(values: Tensor) -> arb:
 ONE = np.array([arb(1)])  # the size of rotations
 
 
-# -- the laws: the arguments after the motion name the kernels' outputs they need --------------------------
+# -- the laws: the arguments after the motion name the kernels whose outputs they need ----------------------
 
 Residual = tuple[Tensor, Tensor]  # what must vanish, and the terms that cancel in it
 
@@ -230,7 +230,7 @@ def the_bars_of_the_wrist_keep_their_lengths(x: Motion, wrist_points: Any) -> Re
     return np.stack([_dot(moved[i] - p, moved[i] - p) for p, i in bars], axis=1) - length, length
 
 
-def the_wrist_turns_the_palm(x: Motion, wrist_palm_pose: Any) -> Residual:
+def the_wrist_rotates_the_palm(x: Motion, wrist_palm_pose: Any) -> Residual:
     R = wrist_palm_pose["T"][..., :3, :3]
     right_handed = np.cross(R[..., 0], R[..., 1]) - R[..., 2]
     return np.concatenate([R @ _transposed(R) - np.eye(3, dtype=int), right_handed[..., None]], axis=2), ONE
@@ -284,7 +284,7 @@ LAWS: tuple[Callable[..., Residual], ...] = (
     the_joint_stiffness_is_symmetric,
     the_joint_stiffness_is_the_falling_torque,
     the_bars_of_the_wrist_keep_their_lengths,
-    the_wrist_turns_the_palm,
+    the_wrist_rotates_the_palm,
     the_wrist_coupling_is_the_derivative_of_the_lengths,
     the_whole_coupling_is_the_derivative_of_the_lengths,
     the_whole_hand_takes_its_power_from_the_tendons,
@@ -295,7 +295,7 @@ LAWS: tuple[Callable[..., Residual], ...] = (
 def obey(
     part: str, graphs: Mapping[str, Graph], inputs: Mapping[str, Tensor], values: Mapping[str, Fraction]
 ) -> list[Law]:
-    """Check all laws that the given kernels (by family name) can be asked for."""
+    """Check all laws whose kernels, by family name, are given."""
     motion = Motion(graphs, inputs, values)
     needed = {law: list(inspect.signature(law).parameters)[1:] for law in LAWS}
     possible = [law for law in LAWS if graphs.keys() >= set(needed[law])]

@@ -1,4 +1,4 @@
-"""High-precision values of a kernel at the sample points, and how far its graphs agree on them."""
+"""High-precision values of a kernel at the sample points, and the difference between its graphs."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def ball_values(graph: Graph, inputs: Mapping[str, Array], values: Mapping[str, 
 def ball_values_together(
     cases: Sequence[tuple[Graph, Mapping[str, Array]]], values: Mapping[str, Fraction]
 ) -> list[BallArrays]:
-    """`ball_values` of several graphs, each at its own inputs; what they have in common is computed once."""
+    """`ball_values` of several graphs, each at its own inputs; common subexpressions are computed once."""
     columns: dict[bytes, Array] = {}
     joint, outputs = _joined(cases, values, columns)
 
@@ -56,9 +56,9 @@ def ball_values_together(
 def _joined(
     cases: Sequence[tuple[Graph, Mapping[str, Array]]], values: Mapping[str, Fraction], columns: dict[bytes, Array]
 ) -> tuple[Graph, list[dict[str, str]]]:
-    """One graph of all, depth first so that few values live at a time, and its names for each one's outputs.
+    """All graphs as one, depth first so that few values live at a time, and its output names for each graph.
 
-    An input is named by its values at the samples, which are put into `columns`; a parameter is its value.
+    An input is named by its values at the samples, which are added to `columns`; a parameter becomes a constant.
     """
     numbers: dict[Node, int] = {}
     outputs: list[Output] = []
@@ -86,7 +86,7 @@ def _joined(
 
 
 def reference(values: BallArrays) -> Reference:
-    """Round ball values to pairs of doubles; a ball that contains zero is zero."""
+    """Ball values rounded to pairs of doubles; a ball that contains zero becomes zero."""
     high, low = {}, {}
     for name, elements in values.items():
         centres = [[ZERO if x.contains(0) else x.mid() for x in column] for column in elements]
@@ -100,9 +100,9 @@ ZERO = arb(0)
 
 
 class Sizes:
-    """What an output is the sum of: a value is a pair (value, size of its terms) of arrays over the samples.
+    """The algebra of term sizes: a value is a pair (value, size of its terms) of arrays over the samples.
 
-    Terms do not cancel in the size: that of a sum is the sum of the sizes. Sines and angles count as 1.
+    The size of a sum is the sum of the sizes, so nothing cancels. Sines and angles have size 1.
     """
 
     def const(self, value: Fraction) -> Any:
@@ -156,9 +156,9 @@ def term_size(graph: Graph, inputs: Mapping[str, Array], values: Mapping[str, Fr
 def disagreement(a: BallArrays, b: BallArrays, size_of_terms: Callable[[str], float] = lambda _: 0.0) -> float:
     """Worst difference over all outputs and samples, relative to the largest value of that output.
 
-    An output that is zero at every sample, as the change of a torque with the velocity of a finger's only joint, has
-    no largest value; its differences are relative to the size of its terms. The radius of the balls counts, so two
-    results agree only if both are known well enough; anything that is not a number gives infinity.
+    An output can be zero at every sample: the torque of a finger's only joint does not depend on its velocity. Then the
+    difference is relative to the size of the terms. The radius of the balls counts, so two results agree only if both
+    are accurate; a value that is not a number gives infinity.
     """
     worst = 0.0
     for name, elements in a.items():
