@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 from awiwi_gen.cache import code_digest, key
@@ -32,7 +33,8 @@ def judge_record(
     if record.graph is None:
         problem, tolerance = problem_of(kernel, used), solver_of(kernel).tolerance[options.scalar]
         mirror = problem.mirror(record.inputs, options.math == "own")
-        return judge_solver(kernel.name, record.reference, mirror, record.inputs, function, tolerance, SEED)
+        observed = partial(problem.observed, record.inputs)
+        return judge_solver(kernel.name, record.reference, mirror, observed, record.inputs, function, tolerance, SEED)
     return judge(
         kernel.name,
         record.graph,

@@ -25,7 +25,8 @@ from awiwi_gen.ir.passes import optimise
 from awiwi_gen.ir.passes.bind import bind, fill
 from awiwi_gen.kernel import Kernel, Solver
 from awiwi_gen.sources import code_of
-from awiwi_gen.verify.problems import PROBLEMS, Problem
+from awiwi_gen.verify.problem import Problem
+from awiwi_gen.verify.problems import PROBLEMS
 from awiwi_gen.verify.reference import (
     BallArrays,
     Reference,
@@ -33,6 +34,7 @@ from awiwi_gen.verify.reference import (
     ball_values_together,
     disagreement,
     reference,
+    term_size,
 )
 from awiwi_gen.verify.samples import draw
 
@@ -181,10 +183,15 @@ def _record(
     """Compare, and print what agrees."""
     kernel, route, final = candidate.kernel, candidate.route, candidate.final
     definition = next(iter(exact.values()))
-    agreement = max(disagreement(definition, other) for other in exact.values())
+    graphs_compared = (*candidate.bound.values(), final)
+
+    def size_of_terms(output: str) -> float:
+        return max(term_size(graph, candidate.inputs, values, output) for graph in graphs_compared)
+
+    agreement = max(disagreement(definition, other, size_of_terms) for other in exact.values())
     if not agreement <= ROUTES_AGREE:
         raise VerificationError(f"{kernel.name}: its derivations {', '.join(exact)} differ by {agreement:.1e}")
-    passes = disagreement(exact[route], optimised)
+    passes = disagreement(exact[route], optimised, size_of_terms)
     if not passes <= PASSES_AGREE:
         raise VerificationError(f"{kernel.name}: {culprit(exact[route], candidate.stages, candidate.inputs, values)}")
     function = c_function(
@@ -212,7 +219,7 @@ def culprit(
     """Which of the passes changes the value, once their end result is known to."""
     for name, graph in stages:
         after = ball_values(graph, inputs, values)
-        change = disagreement(before, after)
+        change = disagreement(before, after, partial(term_size, graph, inputs, values))
         if not change <= PASSES_AGREE:
             return f"pass {name} changes its value by {change:.1e}"
         before = after

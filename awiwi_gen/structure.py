@@ -2,7 +2,7 @@
 
 A finger is anything with these attributes (the hand file's `Finger` and its symbolic copies are):
 
-    links[i]      joint, turn, offset[3], mass, com[3], inertia.{xx,yy,zz,xy,xz,yz}, four_bar (or None)
+    links[i]      joint, turn, offset[3], mass, com[3], inertia.{xx,yy,zz,xy,xz,yz}, start, four_bar (or None)
     pulleys[i]    joint, radius
     tendons[i]    rest, over (senses and joints: "+flexion", "-pip"), span (None or from_[3], to[3], joint)
     couplings[i]  follower, leader

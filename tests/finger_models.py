@@ -89,6 +89,7 @@ def make(kind: str, leaf: Leaf, **special: float) -> Tree:
             mass=number(f"{joint}_mass", 0.002, 0.02),
             com=point(f"{joint}_com", -0.01, 0.03),
             inertia=Tree(**moments, **products),
+            start=0,
             four_bar=Tree(**loop, branch=1) if joint == structure.get("four_bar") else None,
         )
 

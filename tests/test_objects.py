@@ -61,7 +61,7 @@ def test_without_a_disassembler_it_says_so_and_does_not_fail(monkeypatch):
     seal = examine({})
 
     assert seal.passed
-    assert seal_lines(seal) == ["single precision: objects not examined, there is no objdump to read objects with"]
+    assert seal_lines(seal) == ["single precision: objects not examined, objdump is not installed"]
 
 
 def test_a_proof_fails_where_an_object_computes_in_double():

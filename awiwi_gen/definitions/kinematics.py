@@ -3,7 +3,8 @@
 The frame of link i is T_i = T_(i-1) Trans(offset_(i-1)) R(turn_i) Rz(c_i), that of the fingertip lies one offset
 beyond the last. The chain angles c are functions of the n independent joint angles q: a coupled joint turns in
 proportion to its leader (eq. 5.16), and a four-bar counts twice, as its massless crank (angle q + reference, offset
-along the crank) and as its coupler, which is parallel to the turned frame at q = 0.
+along the crank) and as its coupler, which is parallel to the turned frame at q = 0, or at the end of the joint's range
+that is nearest to it.
 
 Velocities are derivatives of positions, nothing else. Entries of results may be `Named` symbols.
 """
@@ -123,6 +124,7 @@ def _chain_angles(finger: Finger, q: Matrix, derivation: Derivation) -> list[Exp
             angles.append(own)
         else:
             reference = link.four_bar.reference
-            now, at_zero = (four_bar_angles(link.four_bar, crank)[0] for crank in (own + reference, reference))
-            angles += [own + reference, derivation.name(now) - derivation.name(at_zero) - own - reference]
+            cranks = own + reference, link.start + reference
+            now, at_start = (four_bar_angles(link.four_bar, crank)[0] for crank in cranks)
+            angles += [own + reference, derivation.name(now) - derivation.name(at_start) - own - reference]
     return angles

@@ -15,7 +15,7 @@ from fractions import Fraction
 from functools import cached_property, partial
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, GetCoreSchemaHandler, PlainValidator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, GetCoreSchemaHandler, PlainValidator, PrivateAttr
 from pydantic_core import CoreSchema, core_schema
 
 from awiwi_gen.errors import InputError
@@ -297,6 +297,22 @@ class Link(Part):
     inertia: Annotated[Inertia, Field(examples=['{ xx = "35 g mm^2", ... }'])]
     four_bar: FourBar | None = None
     source: Source
+    _limit_next_to_zero: str = PrivateAttr("")  # structure: it stays where numbers become symbols
+
+    def model_post_init(self, context: Any, /) -> None:
+        """Note which limit is nearest to zero, if the range leaves zero out."""
+        above, below = (self.low and self.low.value > 0), (self.high and self.high.value < 0)
+        self._limit_next_to_zero = "low" if above else "high" if below else ""
+
+    @property
+    def start(self) -> Any:
+        """The joint angle of the range that is nearest to zero: there a coupler is parallel to the turned frame."""
+        return getattr(self, self._limit_next_to_zero) if self._limit_next_to_zero else 0
+
+    def four_bar_structure(self) -> Any:
+        """None, the branch, or the branch and the limit where the coupler starts."""
+        branch = self.four_bar and self.four_bar.branch
+        return [branch, self._limit_next_to_zero] if branch and self._limit_next_to_zero else branch
 
 
 class Pulley(Part):
@@ -361,7 +377,7 @@ class Finger(Part):
     def structure(self) -> dict[str, Any]:
         """All that is not a number, ready for JSON: fingers with equal structures share their derivations."""
         return {
-            "links": [[link.joint, link.turn, link.four_bar and link.four_bar.branch] for link in self.links],
+            "links": [[link.joint, link.turn, link.four_bar_structure()] for link in self.links],
             "pulleys": [pulley.joint for pulley in self.pulleys],
             "tendons": [[list(tendon.over), tendon.span and tendon.span.joint] for tendon in self.tendons],
             "couplings": [[coupling.follower, coupling.leader] for coupling in self.couplings],

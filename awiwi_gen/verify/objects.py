@@ -1,6 +1,6 @@
-"""Single precision as the processor sees it: no instruction of an object computes in double, no double function is called.
+"""Checks single-precision object files: no instruction computes in double, no double function is called.
 
-A compiler is silent where a literal without an ``f`` or a function of <math.h> widens a float; the object is not.
+A compiler does not warn where a literal without an ``f`` or a function of <math.h> widens a float; the object shows it.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ CALLED = re.compile(rf"(?:{FUNCTIONS}|floor|ceil|round|trunc|ldexp|frexp|fmod|__
 
 @dataclass(frozen=True)
 class Seal:
-    """What was found: per file, the double instructions and calls of its functions; or why nobody looked."""
+    """Per file, the double instructions and calls that were found; or why the objects were not examined."""
 
     examined: int = 0
     skipped: str = ""
@@ -33,15 +33,15 @@ class Seal:
 
     @property
     def passed(self) -> bool:
-        """Nothing found."""
+        """Whether no double arithmetic was found."""
         return not self.found
 
 
 def examine(objects: Mapping[str, Path]) -> Seal:
-    """Look for double arithmetic in objects, given by the names of their sources."""
+    """Look for double arithmetic in object files, given by the names of their sources."""
     tool = shutil.which("objdump")
     if tool is None:
-        return Seal(skipped="there is no objdump to read objects with")
+        return Seal(skipped="objdump is not installed")
     found: dict[str, tuple[str, ...]] = {}
     for name, path in objects.items():
         done = subprocess.run(
@@ -49,14 +49,14 @@ def examine(objects: Mapping[str, Path]) -> Seal:
         )
         machine = next((m for m in DOUBLE if f"file format elf64-{m}" in done.stdout or f"-{m}\n" in done.stdout), None)
         if done.returncode or machine is None:
-            return Seal(skipped=f"objdump cannot read {name} for a machine known here ({', '.join(DOUBLE)})")
+            return Seal(skipped=f"objdump does not show {name} as code of a supported machine ({', '.join(DOUBLE)})")
         if faults := doubles(done.stdout, machine):
             found[name] = faults
     return Seal(len(objects), "", found)
 
 
 def doubles(listing: str, machine: str) -> tuple[str, ...]:
-    """Double instructions, each with the function it is in, and double functions called, in a listing of objdump."""
+    """The double instructions in a listing of objdump, each with its function, and the double functions called."""
     instruction = re.compile(rf"^\s+[0-9a-f]+:\s+({DOUBLE[machine]})(?:\s|$)")
     faults: dict[str, None] = {}
     function = ""

@@ -1,8 +1,12 @@
 """Level 5: laws of mechanics that a finger's kernels must obey together, checked at 256 bits.
 
-Each law is a function of the finger's graphs at the sample points and returns a residual and a scale; it is
-skipped where a kernel it needs was not generated. Derivatives along the motion are central differences with
-a step of 2^-90, so their truncation stays below 1e-40.
+Each law is a function of the finger's graphs at the sample points. It returns a residual and the terms that cancel in
+it, whose largest is the scale; it is skipped where a kernel it needs was not generated. Derivatives along the motion
+are central differences with a step of 2^-90, so their truncation stays below 1e-40.
+
+A term may be zero on a legal finger: one joint has no Coriolis matrix, and a centre of mass on the axis no gravity
+torque. So the scale of such a law also counts what the term is derived from: a function of angles changes by about
+its own size per radian.
 """
 
 from __future__ import annotations
@@ -29,7 +33,7 @@ Tensor = np.ndarray[Any, Any]  # of balls; the first axis runs over the samples
 
 @dataclass(frozen=True)
 class Law:
-    """One law on one part: the worst residual relative to the size of its terms."""
+    """The result of one law for one part: the worst residual relative to the size of its terms."""
 
     part: str
     statement: str
@@ -42,7 +46,7 @@ class Law:
 
 
 class Motion:
-    """A finger in motion at the samples: its kernels there, and their rates along the motion."""
+    """A finger in motion at the samples: the outputs of its kernels, and their rates along the motion."""
 
     def __init__(self, graphs: Mapping[str, Graph], inputs: Mapping[str, Tensor], values: Mapping[str, Fraction]):
         self.graphs, self.values = graphs, values
@@ -50,7 +54,7 @@ class Motion:
         self.inputs = {n: np.vectorize(arb, otypes=[object])(a.astype(np.float64)) for n, a in inputs.items()}
 
     def at(self, family: str, inputs: Mapping[str, Tensor] | None = None) -> dict[str, Tensor]:
-        """The outputs of a kernel, shaped, at the samples or at other inputs."""
+        """The outputs of a kernel (samples, ...) at the samples or at other inputs."""
         graph, given = self.graphs[family], inputs or self.inputs
 
         def leaf(node: Node) -> list[arb]:
@@ -70,6 +74,10 @@ class Motion:
         rate: Tensor = (ahead - behind) / (2 * STEP)
         return rate
 
+    def per_radian(self, output: Tensor) -> Tensor:
+        """The size of the rate of an output of joint angles, whose derivatives are about as large as itself."""
+        return np.array([_largest(output) * _largest(self.inputs["qd"])])
+
 
 def _array(columns: list[list[arb]]) -> Tensor:
     array = np.empty((len(columns[0]) if columns else 0, len(columns)), dtype=object)
@@ -88,17 +96,29 @@ def _dot(a: Tensor, b: Tensor) -> Tensor:
     return product
 
 
-def _turned(matrix: Tensor) -> Tensor:
+def _transposed(matrix: Tensor) -> Tensor:
     return np.swapaxes(matrix, -1, -2)
 
 
-# -- the laws: the arguments after the motion name the kernels' outputs they need --------------------------
+def _terms(*terms: Tensor) -> Tensor:
+    return np.concatenate([term.ravel() for term in terms])
 
-Residual = tuple[Tensor, Tensor]
+
+def _largest(values: Tensor) -> arb:
+    """The largest absolute value; a ball that contains zero is zero."""
+    return max((abs(x).mid() for x in values.flat if not x.contains(0)), default=arb(0))
+
+
+ONE = np.array([arb(1)])  # the size of rotations
+
+
+# -- the laws: the arguments after the motion name the kernels whose outputs they need ----------------------
+
+Residual = tuple[Tensor, Tensor]  # what must vanish, and the terms that cancel in it
 
 
 def the_mass_matrix_is_symmetric(x: Motion, mass_matrix: Any) -> Residual:
-    return mass_matrix["M"] - _turned(mass_matrix["M"]), mass_matrix["M"]
+    return mass_matrix["M"] - _transposed(mass_matrix["M"]), mass_matrix["M"]
 
 
 def half_qd_M_qd_is_the_kinetic_energy(x: Motion, mass_matrix: Any, energy: Any) -> Residual:
@@ -108,16 +128,17 @@ def half_qd_M_qd_is_the_kinetic_energy(x: Motion, mass_matrix: Any, energy: Any)
 
 def the_rate_of_M_less_2C_is_skew_symmetric(x: Motion, mass_matrix: Any, coriolis_matrix: Any) -> Residual:
     skew = x.rate("mass_matrix", "M", q=x.inputs["qd"]) - 2 * coriolis_matrix["C"]
-    return skew + _turned(skew), coriolis_matrix["C"]
+    return skew + _transposed(skew), _terms(coriolis_matrix["C"], x.per_radian(mass_matrix["M"]))
 
 
 def gravity_is_the_gradient_of_the_potential(x: Motion, gravity: Any, energy: Any) -> Residual:
     power = x.rate("energy", "potential", q=x.inputs["qd"])
-    return power - _dot(gravity["gravity"], x.inputs["qd"]), power
+    return power - _dot(gravity["gravity"], x.inputs["qd"]), _terms(power, x.per_radian(energy["potential"]))
 
 
 def bias_is_C_qd_plus_gravity(x: Motion, bias: Any, coriolis_matrix: Any, gravity: Any) -> Residual:
-    return bias["bias"] - _times(coriolis_matrix["C"], x.inputs["qd"]) - gravity["gravity"], bias["bias"]
+    coriolis = _times(coriolis_matrix["C"], x.inputs["qd"])
+    return bias["bias"] - coriolis - gravity["gravity"], _terms(coriolis, gravity["gravity"])
 
 
 def inverse_dynamics_is_M_qdd_plus_bias(x: Motion, inverse_dynamics: Any, mass_matrix: Any, bias: Any) -> Residual:
@@ -136,8 +157,9 @@ def the_fused_dynamics_equal_the_separate_ones(
     x: Motion, dynamics: Any, mass_matrix: Any, coriolis_matrix: Any, gravity: Any
 ) -> Residual:
     parts = [("M", mass_matrix["M"]), ("C", coriolis_matrix["C"]), ("gravity", gravity["gravity"])]
-    scaled = [((dynamics[n] - v) / abs(v).max()).reshape(x.samples, -1) for n, v in parts]
-    return np.concatenate(scaled, axis=1), np.array([[arb(1)]])
+    sizes = [_largest(v) for _, v in parts]  # C of one joint is zero
+    scaled = [(dynamics[n] - v) / (size if size > 0 else 1) for (n, v), size in zip(parts, sizes, strict=True)]
+    return _terms(*scaled), ONE
 
 
 def energy_changes_by_the_power_of_the_joint_torques(x: Motion, energy: Any, inverse_dynamics: Any) -> Residual:
@@ -148,17 +170,17 @@ def energy_changes_by_the_power_of_the_joint_torques(x: Motion, energy: Any, inv
 
 def rotations_are_orthogonal(x: Motion, link_poses: Any) -> Residual:
     R = link_poses["T"][..., :3, :3]
-    return R @ _turned(R) - np.eye(3, dtype=int), np.array([[arb(1)]])
+    return R @ _transposed(R) - np.eye(3, dtype=int), ONE
 
 
 def the_jacobian_gives_the_velocity_of_the_tip(x: Motion, jacobian: Any, fingertip_pose: Any) -> Residual:
     twist, rate = _times(jacobian["J"], x.inputs["qd"]), x.rate("fingertip_pose", "T", q=x.inputs["qd"])
-    return rate[:, :3, 3] - twist[:, :3], twist[:, :3]
+    return rate[:, :3, 3] - twist[:, :3], _terms(twist[:, :3], x.per_radian(fingertip_pose["T"][:, :3, 3]))
 
 
 def the_jacobian_gives_the_angular_velocity_of_the_tip(x: Motion, jacobian: Any, fingertip_pose: Any) -> Residual:
     omega = _times(jacobian["J"], x.inputs["qd"])[:, 3:]
-    spin = x.rate("fingertip_pose", "T", q=x.inputs["qd"])[:, :3, :3] @ _turned(fingertip_pose["T"][:, :3, :3])
+    spin = x.rate("fingertip_pose", "T", q=x.inputs["qd"])[:, :3, :3] @ _transposed(fingertip_pose["T"][:, :3, :3])
     return np.stack([spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0]], axis=1) - omega, omega
 
 
@@ -186,7 +208,7 @@ def the_power_of_the_joints_is_taken_from_the_tendons(x: Motion, joint_torque: A
 
 
 def the_joint_stiffness_is_symmetric(x: Motion, joint_stiffness: Any) -> Residual:
-    return joint_stiffness["K"] - _turned(joint_stiffness["K"]), joint_stiffness["K"]
+    return joint_stiffness["K"] - _transposed(joint_stiffness["K"]), joint_stiffness["K"]
 
 
 def the_joint_stiffness_is_the_falling_torque(
@@ -208,10 +230,10 @@ def the_bars_of_the_wrist_keep_their_lengths(x: Motion, wrist_points: Any) -> Re
     return np.stack([_dot(moved[i] - p, moved[i] - p) for p, i in bars], axis=1) - length, length
 
 
-def the_wrist_turns_the_palm(x: Motion, wrist_palm_pose: Any) -> Residual:
+def the_wrist_rotates_the_palm(x: Motion, wrist_palm_pose: Any) -> Residual:
     R = wrist_palm_pose["T"][..., :3, :3]
     right_handed = np.cross(R[..., 0], R[..., 1]) - R[..., 2]
-    return np.concatenate([R @ _turned(R) - np.eye(3, dtype=int), right_handed[..., None]], axis=2), np.array([arb(1)])
+    return np.concatenate([R @ _transposed(R) - np.eye(3, dtype=int), right_handed[..., None]], axis=2), ONE
 
 
 def the_wrist_coupling_is_the_derivative_of_the_lengths(
@@ -262,7 +284,7 @@ LAWS: tuple[Callable[..., Residual], ...] = (
     the_joint_stiffness_is_symmetric,
     the_joint_stiffness_is_the_falling_torque,
     the_bars_of_the_wrist_keep_their_lengths,
-    the_wrist_turns_the_palm,
+    the_wrist_rotates_the_palm,
     the_wrist_coupling_is_the_derivative_of_the_lengths,
     the_whole_coupling_is_the_derivative_of_the_lengths,
     the_whole_hand_takes_its_power_from_the_tendons,
@@ -273,18 +295,18 @@ LAWS: tuple[Callable[..., Residual], ...] = (
 def obey(
     part: str, graphs: Mapping[str, Graph], inputs: Mapping[str, Tensor], values: Mapping[str, Fraction]
 ) -> list[Law]:
-    """Check all laws that the given kernels (by family name) can be asked for."""
+    """Check all laws whose kernels, by family name, are given."""
     motion = Motion(graphs, inputs, values)
     needed = {law: list(inspect.signature(law).parameters)[1:] for law in LAWS}
     possible = [law for law in LAWS if graphs.keys() >= set(needed[law])]
-    found = {family: motion.at(family) for family in {f for law in possible for f in needed[law]}}
+    outputs = {family: motion.at(family) for family in {f for law in possible for f in needed[law]}}
     laws = []
     for law in possible:
-        residual, terms = law(motion, *(found[family] for family in needed[law]))
+        residual, terms = law(motion, *(outputs[family] for family in needed[law]))
         worst = _relative(residual, terms)
         laws.append(Law(part, law.__name__.replace("_", " "), worst, worst <= LIMIT))
-    if "mass_matrix" in found:
-        eigenvalues = np.linalg.eigvalsh(np.vectorize(lambda x: float(x.mid()))(found["mass_matrix"]["M"]))
+    if "mass_matrix" in outputs:
+        eigenvalues = np.linalg.eigvalsh(np.vectorize(lambda x: float(x.mid()))(outputs["mass_matrix"]["M"]))
         ratio = float(np.min(eigenvalues[:, 0] / eigenvalues[:, -1]))
         laws.append(Law(part, "the mass matrix is positive definite", max(0.0, -ratio), ratio > POSITIVE))
     return laws
@@ -293,7 +315,7 @@ def obey(
 def _relative(residual: Tensor, terms: Tensor) -> float:
     """Largest residual over the largest term; infinity for anything that is not a number."""
     largest = max((x.abs_upper() for x in residual.flat), default=arb(0))
-    scale = max((abs(x).mid() for x in terms.flat), default=arb(0))
+    scale = _largest(terms)
     if not largest.is_finite() or not all(x.is_finite() for x in residual.flat):
         return float("inf")
     if largest == 0:

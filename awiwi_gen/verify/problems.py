@@ -1,11 +1,11 @@
-"""The problems that solvers of csrc solve: well-posed inputs, and exact solutions to hold the results against."""
+"""Estimation of joint angles from tendon lengths, and the table of all problems that solvers of csrc solve."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from flint import arb, arb_mat
@@ -14,6 +14,7 @@ from awiwi_gen.ir.algebras import Balls, Floats, ball
 from awiwi_gen.ir.graph import Graph, Node
 from awiwi_gen.ir.interpret import evaluate
 from awiwi_gen.kernel import Solver
+from awiwi_gen.verify.problem import Problem
 from awiwi_gen.verify.problems_distribution import Distribution
 from awiwi_gen.verify.problems_gains import GainMatching
 from awiwi_gen.verify.problems_riccati import JointRegulator, Riccati
@@ -21,38 +22,21 @@ from awiwi_gen.verify.reference import Reference, reference
 
 Array = np.ndarray[Any, Any]
 
-NOISE = 2.5e-4  # error of a measured length [m]; keeps the estimate inside the limits it starts in
-ROUNDS = 30  # of Gauss-Newton at 256 bits, at most: the residual is small, each round gains a digit at least
-SETTLED = 1e-40  # largest step [rad] after which the next would change nothing that two doubles show
-
-
-class Problem(Protocol):
-    """What a solver solves; made from the solver, the graphs of the kernels it calls, and the numbers of its part."""
-
-    def sample(self, drawn: dict[str, Array]) -> dict[str, Array]:
-        """Well-posed inputs."""
-
-    def solve(self, inputs: Mapping[str, Array]) -> Reference:
-        """Exact outputs; those named status are the status that must be returned, which is otherwise 0."""
-
-    def mirror(self, inputs: Mapping[str, Array], own: bool) -> Mapping[str, Array]:
-        """What the solver computes in floats, by output, where that is known to the last bit."""
+NOISE = 2.5e-4  # error of a measured length [m]
+ROUNDS = 100  # of Gauss-Newton at 256 bits, at most: the residual is small, so a round gains a digit or more
+LAST_STEP = 1e-40  # largest step [rad] after which another would not change the result as two doubles
 
 
 @dataclass(frozen=True)
-class LeastSquares:
+class LeastSquares(Problem):
     """Joint angles whose tendon lengths are nearest to the measured ones (eq. 5.14, 5.24).
 
-    Half of the samples are exact lengths of poses in the whole range, limits included; the others carry noise
-    on poses away from the limits, for there the exact solution is a stationary point.
+    Half of the samples are exact lengths of poses in the whole range, limits included; the others carry noise, on
+    poses in the middle of the range.
     """
 
-    solver: Solver
-    graphs: Mapping[str, Graph]
-    values: Mapping[str, Fraction]
-
     def sample(self, drawn: dict[str, Array]) -> dict[str, Array]:
-        """Measured lengths ``h`` of poses, and starts up to 0.2 rad away from them."""
+        """Measured lengths ``h`` of poses, and start angles up to 0.2 rad away from them."""
         start = drawn["start"]
         low, high = start.min(axis=0), start.max(axis=0)
         middle, noisy = (low + high) / 2, np.arange(len(start)) % 2 == 1
@@ -60,16 +44,16 @@ class LeastSquares:
         pose = np.where(noisy[:, None], middle + 0.7 * (start - middle), start)
         lengths, _ = self.model(pose.astype(np.float64))
         lengths = lengths + np.where(noisy[:, None], random.uniform(-NOISE, NOISE, lengths.shape), 0)
-        begun = np.clip(pose + random.uniform(-0.2, 0.2, pose.shape), low, high)
-        return {"h": lengths.astype(start.dtype), "start": begun.astype(start.dtype)}
+        nearby = np.clip(pose + random.uniform(-0.2, 0.2, pose.shape), low, high)
+        return {"h": lengths.astype(start.dtype), "start": nearby.astype(start.dtype)}
 
     def model(self, q: Array, own: bool = False) -> tuple[Array, Array]:
-        """Lengths (samples, m) and coupling (samples, m, n) at q (samples, n): in its arithmetic, bit for bit as C."""
+        """Lengths (samples, m) and coupling (samples, m, n) at q (samples, n), in the precision of q, bit for bit as C."""
         floats = Floats(q.dtype.type, own)
-        other = np.zeros(len(q), q.dtype)
+        at_rest = np.zeros(len(q), q.dtype)
 
         def leaf(node: Node) -> Any:
-            return floats.const(self.values[node[1]]) if node[0] == "param" else self._angle(node, q.T, other)
+            return floats.const(self.values[node[1]]) if node[0] == "param" else self._angle(node, q.T, at_rest)
 
         h, P = (
             np.stack([np.broadcast_to(c, len(q)) for c in columns], axis=1).astype(q.dtype)
@@ -78,41 +62,54 @@ class LeastSquares:
         return h, P.reshape(len(q), h.shape[1], q.shape[1])
 
     def solve(self, inputs: Mapping[str, Array]) -> Reference:
-        """The stationary points near the starts, by undamped Gauss-Newton at 256 bits."""
+        """The minima near the starts, by undamped Gauss-Newton at 256 bits; an unknown pushed against a limit stays.
+
+        A noisy length leads past a limit where the joint's range is narrow.
+        """
         samples, n = inputs["start"].shape
         q = [[arb(x) for x in column] for column in inputs["start"].T.astype(np.float64).tolist()]
         measured = [[arb(x) for x in column] for column in inputs["h"].T.astype(np.float64).tolist()]
-        other = [arb(0)] * samples
+        low, high = ([arb(float(x)) for x in end] for end in self.limits(inputs["start"].dtype))
+        at_rest = [arb(0)] * samples
         for _ in range(ROUNDS):
             largest = 0.0
 
             def leaf(node: Node, q: Any = q) -> list[arb]:
-                return [ball(self.values[node[1]])] * samples if node[0] == "param" else self._angle(node, q, other)
+                return [ball(self.values[node[1]])] * samples if node[0] == "param" else self._angle(node, q, at_rest)
 
             h, P = self._evaluate(Balls(samples), leaf)
             for s in range(samples):
-                jacobian = arb_mat(len(h), n, [column[s] for column in P])
+                jacobian = arb_mat(len(h), n, [column[s].mid() for column in P])
                 residual = arb_mat(len(h), 1, [(a[s] - b[s]).mid() for a, b in zip(measured, h, strict=True)])
-                turned = jacobian.transpose()
-                step = (turned * jacobian).solve(turned * residual)
-                for j in range(n):
-                    q[j][s] = (q[j][s] + step[j, 0]).mid()
-                    largest = max(largest, abs(float(step[j, 0])))
-            if largest < SETTLED:
+                downhill = (jacobian.transpose() * residual).entries()
+                free = [
+                    j for j in range(n)
+                    if not (q[j][s] <= low[j] and downhill[j] <= 0) and not (q[j][s] >= high[j] and downhill[j] >= 0)
+                ]  # fmt: skip
+                if not free:
+                    continue
+                columns = arb_mat([[jacobian[i, j] for j in free] for i in range(len(h))])
+                step = (columns.transpose() * columns).solve(columns.transpose() * residual).entries()
+                for j, change in zip(free, step, strict=True):
+                    before = q[j][s]
+                    q[j][s] = min(max((before + change).mid(), low[j]), high[j])
+                    largest = max(largest, abs(float(q[j][s] - before)))
+            if largest < LAST_STEP:
                 break
         return reference({"q": q})
 
-    def mirror(self, inputs: Mapping[str, Array], own: bool) -> Mapping[str, Array]:
-        """What the solver computes in floats, by output, where that is known to the last bit."""
-        return {}
+    def limits(self, dtype: Any) -> tuple[Array, Array]:
+        """Lower and upper limits of the unknowns, as the C has them."""
+        low, high = (np.array(self.solver.arrays[end], dtype) for end in ("low", "high"))
+        return low, high
 
-    def _angle(self, node: Node, q: Any, other: Any) -> Any:
-        """A joint angle of the kernels used: one of the unknowns q (n, samples), or that of a joint at rest."""
+    def _angle(self, node: Node, q: Any, at_rest: Any) -> Any:
+        """A joint angle for the kernels used: one of the unknowns q (n, samples), or the angle of a joint at rest."""
         unknowns = self.solver.unknowns
-        return q[unknowns.index(node[2])] if node[2] in unknowns else other
+        return q[unknowns.index(node[2])] if node[2] in unknowns else at_rest
 
     def _evaluate(self, algebra: Any, leaf: Any) -> tuple[list[Any], list[Any]]:
-        """The problem's rows of the lengths, and its rows and columns of the coupling, row by row."""
+        """The lengths in the problem's equations, and the coupling by its unknowns, row by row."""
         h = evaluate(self.graphs["tendon_lengths"], algebra, leaf)["h"]
         P = evaluate(self.graphs["coupling"], algebra, leaf)["P"]
         rows, columns, width = self.solver.equations, self.solver.unknowns, len(P) // len(h)
@@ -120,12 +117,42 @@ class LeastSquares:
 
 
 class GradientSearch(LeastSquares):
-    """The same by algorithm 1, mended: what it computes is repeated here operation by operation."""
+    """The same problem by the corrected algorithm 1, whose arithmetic is repeated here operation by operation.
+
+    It makes a fixed number of trials, so it reaches the minimum only where the spans determine the joints well. On
+    other fingers it must still match its mirror in every bit, and end no farther from the measured lengths than it
+    started.
+    """
+
+    def solve(self, inputs: Mapping[str, Array]) -> Reference:
+        """The minima near the starts; where the trials are too few for these, no increase of the cost."""
+        exact = super().solve(inputs)
+        if self.converges(exact.high["q"]):
+            return exact
+        return reference({"increase": [[arb(0)] * len(inputs["start"])]})
+
+    def converges(self, q: Array) -> bool:
+        """Whether a gradient descent with the same number of trials is within the tolerance of all minima q.
+
+        A trial of length s times the gradient leaves 1 - s lambda of the error along an eigenvector of P'P with the
+        eigenvalue lambda. The search begins with s = 2 / trace(P'P) and halves it where the cost grows.
+        """
+        _, P = self.model(q)
+        values = np.linalg.eigvalsh(np.swapaxes(P, 1, 2) @ P)
+        shares = values / values.sum(axis=1, keepdims=True)
+        left = np.min([np.abs(1 - step * shares).max(axis=1) for step in (2, 1)], axis=0) ** self.solver.iterations
+        return bool(left.max() < min(self.solver.tolerance.values()))
+
+    def observed(self, inputs: Mapping[str, Array], found: Any) -> Mapping[str, Array]:
+        """The angles found, and the increase of the cost from the start, relative to the cost of all lengths."""
+        start, h = (inputs[name].astype(np.float64) for name in ("start", "h"))
+        before, after = (self._cost(q.astype(np.float64), h, False)[0] for q in (start, found.q))
+        return {"q": found.q, "increase": np.maximum(0, after - before) / (h * h).sum(axis=1)}
 
     def mirror(self, inputs: Mapping[str, Array], own: bool) -> Mapping[str, Array]:
-        """All trials, with the arithmetic and the order of csrc."""
+        """The result after all trials, in the order of operations of csrc."""
         start, measured = inputs["start"], inputs["h"]
-        low, high = (np.array(self.solver.arrays[end], start.dtype) for end in ("low", "high"))
+        low, high = self.limits(start.dtype)
         q = _clamped(start, low, high)
         best, gradient, curvature = self._cost(q, measured, own)
         step = 1 / curvature
@@ -138,7 +165,7 @@ class GradientSearch(LeastSquares):
         return {"q": q}
 
     def _cost(self, q: Array, measured: Array, own: bool) -> tuple[Array, Array, Array]:
-        """Half the squared residual, its gradient, and the trace of P'P: sums over the tendons from the first on."""
+        """Half the squared residual, its gradient, and the trace of P'P, summed in the order of the tendons."""
         h, P = self.model(q, own)
         residual = h - measured
         total, trace = np.zeros_like(q[:, 0]), np.zeros_like(q[:, 0])

@@ -1,10 +1,9 @@
-"""Tendon forces for a torque and a stiffness: demands whose best answer is known, and that answer at 256 bits."""
+"""Tendon forces for a torque and a stiffness: demands whose optimal forces are known, and these at 256 bits."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -13,48 +12,56 @@ from flint import arb
 from awiwi_gen.ir.algebras import Balls, Floats
 from awiwi_gen.ir.graph import Graph, prune
 from awiwi_gen.ir.interpret import evaluate
-from awiwi_gen.kernel import Solver
+from awiwi_gen.verify.distribution_answer import System
+from awiwi_gen.verify.problem import Problem
 from awiwi_gen.verify.reference import Reference, reference
 
 Array = np.ndarray[Any, Any]
-Ends = tuple[float, float]  # limits of every force [N]
+Limits = tuple[float, float]  # limits of every force [N]
 
 INFEASIBLE = 4  # AWIWI_INFEASIBLE
-HELD = 0.3  # share of the tendons that are at a limit, in the demands that have such
-IN_HAND = 0.05  # least torque of free tendons by unit forces, in parts of the largest
-UNREACHABLE = 0.05  # how far a stiffness is from what the tendons can do, in parts of its largest entry
+SHARE_AT_LIMITS = 0.3  # probability of a tendon to be at a limit, in demands of that kind
+LEAST_AUTHORITY = 0.05  # smallest singular value of the free tendons' coupling, relative to the largest of all
+UNREACHABLE = 0.05  # distance of a stiffness from what the tendons can do, relative to its largest entry
 UNREACHABLE_TORQUE = 0.2  # [N m]
-MILDEST = 12  # halvings of a miss
-RAYS, POINTS = 48, 24  # along which it is looked for forces that are as near, and how many on each
+HALVINGS = 12  # of the distance to an unreachable stiffness, until its answer is unique
+RAYS, POINTS = 48, 24  # of the search for other forces that come as near: rays, and points on each
+DETERMINED = 1e-4  # smallest effect of a pattern of forces, relative to the largest, that still determines forces
 ROUNDS = 8  # of Newton's method with a derivative in floats, at most: each gains ten digits at least
-SETTLED = 1e-40  # largest step [N] after which the next would change nothing that two doubles show
+LAST_STEP = 1e-40  # largest step [N] after which the next would change nothing that two doubles show
 
 
 @dataclass(frozen=True)
 class Answer:
-    """The best forces for one demand: which tendons are at the lower (-1) or upper (1) limit, and which torques fail."""
+    """The optimal forces f (m,) [N] for one demand tau (n,) [N m], K (n, n) [N m/rad].
+
+    `held` (m,) is -1 for a tendon at the lower limit, 1 at the upper one, 0 between them. The torque cannot be reached
+    unless `feasible`; other forces do the same unless `unique`.
+    """
 
     f: Array
     held: Array
     tau: Array
     K: Array
     feasible: bool
+    unique: bool
 
 
 @dataclass(frozen=True)
-class _Wish:
-    """What a demand of some kind is made from: forces as shares of their range, tendons at limits, torque, stiffness."""
+class _Draft:
+    """Random numbers for one demand: its kind, forces as shares of their range, tendons held at limits, a torque and a
+    stiffness that are out of reach."""
 
     kind: int
     share: Array
     held: Array
-    push: Array
+    torque_excess: Array
     miss: Array
 
 
 @dataclass(frozen=True)
-class _Pull:
-    """Forces (m,), the joint stiffness (n, n) that they give, and how it grows with each of them (m, n, n)."""
+class _State:
+    """Forces (m,), their joint stiffness (n, n), and its derivatives by the forces (m, n, n)."""
 
     f: Array
     K: Array
@@ -62,18 +69,18 @@ class _Pull:
 
 
 @dataclass(frozen=True)
-class Distribution:
-    """Demands made from their answers: forces first, then a torque and a stiffness for which nothing is better.
+class Distribution(Problem):
+    """Demands made from their answers: forces first, then a torque and a stiffness for which they are optimal.
 
-    By the sample's number modulo 4: forces inside the limits that give just what is asked for; the same with some at
-    their limits; a stiffness out of reach, in a direction in which no move of the forces helps; a torque out of reach.
-    That no other forces are as near is made sure of by looking, so that the answer is the only one.
+    The sample's number modulo 4 decides the kind: 0: forces inside the limits that give exactly the demand; 1: the same
+    with some forces at limits; 2: a stiffness out of reach, in a direction that no change of the forces reduces; 3: a
+    torque out of reach. A search along rays confirms that no other forces come as near.
+
+    Some fingers have no unique answer: two equal pairs over one joint, or three tendons over one joint, can change
+    their forces without a change of torque or stiffness. There torque and stiffness are compared, not the forces.
     """
 
-    solver: Solver
-    graphs: Mapping[str, Graph]
-    values: Mapping[str, Fraction]
-    _known: dict[bytes, list[Answer]] = field(default_factory=dict, init=False, compare=False)
+    _cached: dict[bytes, list[Answer]] = field(default_factory=dict, init=False, compare=False)
     _curves: dict[tuple[str, ...], Graph] = field(default_factory=dict, init=False, compare=False)
 
     def sample(self, drawn: dict[str, Array]) -> dict[str, Array]:
@@ -83,75 +90,76 @@ class Distribution:
         tau, K = (np.array([getattr(a, name) for a in answers]).astype(dtype) for name in ("tau", "K"))
         return {"q": drawn["q"], "tau": tau, "K": K, "f_min": low, "f_max": high}
 
-    def mirror(self, inputs: Mapping[str, Array], own: bool) -> Mapping[str, Array]:
-        """No bits are known."""
-        return {}
-
     # -- demands ----------------------------------------------------------------------------------------------
 
     def answers(self, q: Array, low: Array, high: Array) -> list[Answer]:
-        """One for every sample; the same for the same arguments, and then looked for once."""
+        """One answer for every sample; cached, since the demand and its solution both need it."""
         given = b"".join(each.tobytes() for each in (q, low, high))
-        if given not in self._known:
+        if given not in self._cached:
             random = np.random.default_rng(len(q))
             P, dP = self.tendons(q)
-            wishes = [_wish(s % 4, P[s], random) for s in range(len(q))]
-            ends = [(float(low[s]), float(high[s])) for s in range(len(q))]
-            first = [_forces(wish.share, wish.held, each) for wish, each in zip(wishes, ends, strict=True)]
+            drafts = [_draft(s % 4, P[s], random) for s in range(len(q))]
+            limits = [(float(low[s]), float(high[s])) for s in range(len(q))]
+            first = [_forces(draft.share, draft.held, each) for draft, each in zip(drafts, limits, strict=True)]
             k, slope = self.curve(np.array(first).T, "k", "slope")
-            pulls = [_pull(first[s], k[:, s], slope[:, s], P[s], dP[s]) for s in range(len(q))]
-            self._known[given] = [self._answer(wishes[s], pulls[s], P[s], dP[s], ends[s]) for s in range(len(q))]
-        return self._known[given]
+            states = [_state(first[s], k[:, s], slope[:, s], P[s], dP[s]) for s in range(len(q))]
+            self._cached[given] = [self._answer(drafts[s], states[s], P[s], dP[s], limits[s]) for s in range(len(q))]
+        return self._cached[given]
 
-    def _answer(self, wish: _Wish, pull: _Pull, P: Array, dP: Array, ends: Ends) -> Answer:
-        """Forces, and the demand that they answer best.
+    def _answer(self, draft: _Draft, state: _State, P: Array, dP: Array, limits: Limits) -> Answer:
+        """Forces, and a demand for which they are optimal.
 
-        The stiffness is moved out of reach as far as nothing else comes as near: the distance is not convex in the
-        forces, so that beyond some miss others are nearer.
+        The distance of the stiffness is not convex in the forces: if the demand is too far out of reach, other forces
+        come nearer. So it is halved until none does; at distance zero none can.
         """
-        pushed = bool(wish.push.any())
-        for milder in 0.5 ** np.arange(MILDEST) * (wish.kind > 1):
-            pulled, at, excess = self._out_of_reach(wish, pull, P, dP, ends, milder)
-            answer = Answer(pulled.f, at, wish.push - P.T @ pulled.f, pulled.K - excess, not pushed)
-            if self._is_nearest(answer, P, dP, ends):
+        infeasible = bool(draft.torque_excess.any())
+        for part in (*0.5 ** np.arange(HALVINGS), 0.0) if draft.kind > 1 else (0.0,):
+            reached, at, excess = self._out_of_reach(draft, state, P, dP, limits, part)
+            tau = draft.torque_excess - P.T @ reached.f
+            answer = Answer(reached.f, at, tau, reached.K - excess, not infeasible, _is_unique(P, reached.growth))
+            if self._is_nearest(answer, P, dP, limits):
                 return answer
-        raise ValueError("no demand is answered best by the forces it was made from")
+        return answer
 
     def _out_of_reach(
-        self, wish: _Wish, pull: _Pull, P: Array, dP: Array, ends: Ends, milder: float
-    ) -> tuple[_Pull, Array, Array]:
-        """Forces, which of them are at a limit, and a miss of the stiffness that no small move makes less."""
-        held, miss = wish.held, wish.miss * milder * np.abs(pull.K).max()
-        for _ in range(2):  # which limit a held tendon is at depends on where the stiffness is out of reach
-            excess = _out_of_reach(P, pull.growth, held, miss)
-            prices = np.where(held != 0, _prices(P, pull.growth, held, excess), 0)
-            if wish.push.any() or not np.any(held * prices > 0):
-                return pull, held, excess
-            held = -np.sign(prices).astype(int)
-            f = _forces(wish.share, held, ends)
+        self, draft: _Draft, state: _State, P: Array, dP: Array, limits: Limits, part: float
+    ) -> tuple[_State, Array, Array]:
+        """Forces, which of them are held at a limit, and a stiffness error that no small change of forces reduces."""
+        held, miss = draft.held, draft.miss * part * np.abs(state.K).max()
+        for _ in range(2):  # the sign of the stiffness error decides which limit holds a tendon
+            excess = _out_of_reach(P, state.growth, held, miss)
+            multipliers = np.where(held != 0, _multipliers(P, state.growth, held, excess), 0)
+            if draft.torque_excess.any() or not np.any(held * multipliers > 0):
+                return state, held, excess
+            held = -np.sign(multipliers).astype(int)
+            f = _forces(draft.share, held, limits)
             k, slope = (each[:, 0] for each in self.curve(f[:, None], "k", "slope"))
-            pull = _pull(f, k, slope, P, dP)
-        return pull, held, excess * 0
+            state = _state(f, k, slope, P, dP)
+        return state, held, excess * 0
 
-    def _is_nearest(self, answer: Answer, P: Array, dP: Array, ends: Ends) -> bool:
-        """Whether no forces along rays from the answer, through all that gives the same torque, are as near.
+    def _is_nearest(self, answer: Answer, P: Array, dP: Array, limits: Limits) -> bool:
+        """Whether no other forces with the same torque come as near, on rays from the answer.
 
-        Of pairs this is known: their stiffness is linear in sums that grow with the forces.
+        Pairs need no search: their stiffness is linear in sums that grow with the forces. Where the answer is not
+        unique, other forces come as near, but none may come nearer.
         """
         group = [int(i) for i in self.solver.strings["searched"].split(",") if i]
         if not group:
             return True
         rays = _rays(P[group])
-        room = np.where(rays > 0, ends[1] - answer.f[group], ends[0] - answer.f[group])
+        room = np.where(rays > 0, limits[1] - answer.f[group], limits[0] - answer.f[group])
         with np.errstate(divide="ignore", invalid="ignore"):
             length = np.where(np.abs(rays) > 1e-12, room / rays, np.inf).min(axis=1)
         away = np.outer(length, np.arange(1, POINTS + 1) / POINTS)[..., None] * rays[:, None]
         f = np.broadcast_to(answer.f, (*away.shape[:2], len(P))).copy()
-        f[..., group] = np.clip(f[..., group] + away, *ends)
+        f[..., group] = np.clip(f[..., group] + away, *limits)
         distance = ((self._stiffness(f, P, dP) - answer.K) ** 2).sum(axis=(-2, -1))
-        moved = np.abs(f - answer.f).max(axis=-1) > 1e-6 * ends[1]
+        moved = np.abs(f - answer.f).max(axis=-1) > 1e-6 * limits[1]
         here = ((self._stiffness(answer.f, P, dP) - answer.K) ** 2).sum()
-        return not np.any(distance[moved] <= here)
+        if answer.unique:
+            return not np.any(distance[moved] <= here)
+        rounding = (1e-12 * np.abs(answer.K).max()) ** 2
+        return not np.any(distance[moved] < here * (1 - 1e-9) - rounding)
 
     def _stiffness(self, f: Array, P: Array, dP: Array) -> Array:
         """Joint stiffness (..., n, n) of forces (..., m)."""
@@ -172,7 +180,7 @@ class Distribution:
         return found[0], found[1]
 
     def curve(self, f: Any, *names: str, algebra: Any = None) -> Any:
-        """Of "k", "slope" and "curvature" (m, samples) of forces f (m, samples) those asked for, in an algebra."""
+        """The requested ones of "k", "slope" and "curvature" (m, samples) at forces f (m, samples), in an algebra."""
         if names not in self._curves:
             whole = self.graphs["tendon_stiffness"]
             outputs = tuple(output for output in whole.outputs if output.name in names)
@@ -184,7 +192,7 @@ class Distribution:
     # -- answers at 256 bits ----------------------------------------------------------------------------------
 
     def solve(self, inputs: Mapping[str, Array]) -> Reference:
-        """Where the free forces leave no slope along the moves that keep the torque; those at limits stay there."""
+        """Forces whose free components are stationary under changes that keep the torque; the others stay at limits."""
         q, samples = inputs["q"], len(inputs["q"])
         answers = self.answers(q, inputs["f_min"], inputs["f_max"])
         balls = Balls(samples)
@@ -201,8 +209,8 @@ class Distribution:
         floats = self.tendons(q)
         curves = self.curve(np.array([a.f for a in answers]).T, "k", "slope", "curvature")
         systems = [
-            _System(answer, inputs["tau"][s], inputs["K"][s], [c[s] for c in P], [c[s] for c in dP],
-                    (floats[0][s], floats[1][s]), [each[:, s] for each in curves])
+            System(answer.f, answer.held, inputs["tau"][s], inputs["K"][s], [c[s] for c in P], [c[s] for c in dP],
+                   (floats[0][s], floats[1][s]), [each[:, s] for each in curves])
             for s, answer in enumerate(answers)
         ]  # fmt: skip
         for _ in range(ROUNDS):
@@ -213,147 +221,115 @@ class Distribution:
                 steps += [float(abs(force - row[s])) for row, force in zip(f, here, strict=True)]
                 for row, force in zip(f, here, strict=True):
                     row[s] = force
-            if max(steps) < SETTLED:
+            if max(steps) < LAST_STEP:
                 break
         status = [[arb(0 if answer.feasible else INFEASIBLE) for answer in answers]]
-        return reference({"f": f, "status": status})
-
-
-class _System:
-    """The equations of one sample: no slope of the free forces beyond what the torques' prices explain, and the torque."""
-
-    def __init__(
-        self, answer: Answer, tau: Array, K: Array, P: list[arb], dP: list[arb], floats: tuple[Array, Array], curve: Any
-    ) -> None:
-        n = len(tau)
-        self.free, self.n = np.flatnonzero(answer.held == 0).tolist(), n
-        self.P = [P[i * n : i * n + n] for i in range(len(answer.f))]
-        self.dP = [dP[i * n * n : (i + 1) * n * n] for i in range(len(answer.f))]
-        self.tau = [arb(float(x)) for x in tau]
-        self.K = [arb(float(x)) for x in (K.astype(np.float64) + K.T.astype(np.float64)).flat]
-        coupling, bend = floats
-        self.rows = _independent(coupling[self.free])
-        k, slope, curvature = curve
-        pp = np.einsum("ia,ib->iab", coupling, coupling)
-        growth = slope[:, None, None] * pp + bend
-        excess = np.tensordot(k, pp, 1) + np.tensordot(answer.f, bend, 1) - (K + K.T) / 2
-        hessian = np.einsum("iab,lab->il", growth, growth)
-        hessian += np.diag(curvature * np.einsum("iab,ab->i", pp, excess))
-        count, rank = len(self.free), len(self.rows)
-        matrix = np.zeros((count + rank, count + rank))
-        matrix[:count, :count] = hessian[np.ix_(self.free, self.free)]
-        matrix[:count, count:] = coupling[np.ix_(self.free, self.rows)]
-        matrix[count:, :count] = matrix[:count, count:].T
-        self.inverse = np.linalg.inv(matrix)
-        self.prices = [arb(0)] * rank
-
-    def improved(self, f: list[arb], k: list[arb], slope: list[arb]) -> list[arb]:
-        """One step with the derivative that is known in floats."""
-        n = range(self.n)
-        excess = [
-            sum((k[i] * self.P[i][a] * self.P[i][b] + f[i] * self.dP[i][a * self.n + b] for i in range(len(f))),
-                -self.K[a * self.n + b] / 2)
-            for a in n for b in n
-        ]  # fmt: skip
-        misses = [
-            sum((excess[a * self.n + b] * (slope[i] * self.P[i][a] * self.P[i][b] + self.dP[i][a * self.n + b])
-                 for a in n for b in n), arb(0))
-            + sum((self.P[i][j] * price for j, price in zip(self.rows, self.prices, strict=True)), arb(0))
-            for i in self.free
-        ]  # fmt: skip
-        misses += [self.tau[j] + sum((self.P[i][j] * f[i] for i in range(len(f))), arb(0)) for j in self.rows]
-        steps = [
-            sum((arb(float(x)) * miss for x, miss in zip(row, misses, strict=True)), arb(0)) for row in self.inverse
+        if all(answer.unique for answer in answers):
+            return reference({"f": f, "status": status})
+        (k,) = self.curve(f, "k", algebra=balls)
+        effects = [
+            [*system.torque(forces), *system.stiffness(forces, [c[s] for c in k])]
+            for s, (system, forces) in enumerate(zip(systems, map(list, zip(*f, strict=True)), strict=True))
         ]
-        self.prices = [(price - step).mid() for price, step in zip(self.prices, steps[len(self.free) :], strict=True)]
-        moved = dict(zip(self.free, steps, strict=False))
-        return [(force - moved[i]).mid() if i in moved else force for i, force in enumerate(f)]
+        columns, n = [list(column) for column in zip(*effects, strict=True)], q.shape[1]
+        outside = [[arb(0)] * samples] * len(f)
+        return reference({"torque": columns[:n], "stiffness": columns[n:], "outside": outside, "status": status})
+
+    def observed(self, inputs: Mapping[str, Array], found: Any) -> Mapping[str, Array]:
+        """The forces found, their torque and stiffness, and how far they lie outside their limits."""
+        P, dP = self.tendons(inputs["q"])
+        f = found.f.astype(np.float64)
+        low, high = (inputs[end][:, None].astype(np.float64) for end in ("f_min", "f_max"))
+        k = self.curve(f.T, "k")[0].T
+        stiffness = np.einsum("si,sia,sib->sab", k, P, P) + np.einsum("si,siab->sab", f, dP)
+        outside = np.maximum(0, np.maximum(low - f, f - high))
+        return {
+            "f": found.f, "torque": -np.einsum("sia,si->sa", P, f), "stiffness": stiffness, "outside": outside,
+        }  # fmt: skip
 
 
-def _wish(kind: int, P: Array, random: Any) -> _Wish:
-    held, push = np.zeros(len(P), int), np.zeros(P.shape[1])
+def _draft(kind: int, P: Array, random: Any) -> _Draft:
+    held, torque_excess = np.zeros(len(P), int), np.zeros(P.shape[1])
     share = random.uniform(size=len(P))
     if kind in (1, 2):
         held = _some_held(P, random)
     elif kind == 3:
-        push = _push(P, random)
-        held = -np.sign(np.where(np.abs(P @ push) > 1e-9, P @ push, 0)).astype(int)
+        torque_excess = _torque_excess(P, random)
+        held = -np.sign(np.where(np.abs(P @ torque_excess) > 1e-9, P @ torque_excess, 0)).astype(int)
     miss = random.normal(size=(P.shape[1], P.shape[1]))
-    return _Wish(kind, share, held, push, (miss + miss.T) * UNREACHABLE)
+    return _Draft(kind, share, held, torque_excess, (miss + miss.T) * UNREACHABLE)
 
 
-def _pull(f: Array, k: Array, slope: Array, P: Array, dP: Array) -> _Pull:
+def _state(f: Array, k: Array, slope: Array, P: Array, dP: Array) -> _State:
     pairs = np.einsum("ia,ib->iab", P, P)
     K = np.tensordot(k, pairs, 1) + np.tensordot(f, dP, 1)
-    return _Pull(f, K, slope[:, None, None] * pairs + dP)
+    return _State(f, K, slope[:, None, None] * pairs + dP)
 
 
-def _forces(share: Array, held: Array, ends: Ends) -> Array:
-    low, high = ends
+def _forces(share: Array, held: Array, limits: Limits) -> Array:
+    low, high = limits
     return np.where(held < 0, low, np.where(held > 0, high, low + share * (high - low)))
 
 
 def _some_held(P: Array, random: Any) -> Array:
-    """Some tendons at a limit; the others must have every torque well in hand."""
+    """Some tendons at a limit; the others must still control every torque."""
     held, sizes = np.zeros(len(P), int), np.linalg.svd(P, compute_uv=False)
-    rank, weak = int(np.sum(sizes > 1e-9 * sizes[0])), IN_HAND * sizes[0]
+    rank, weak = int(np.sum(sizes > 1e-9 * sizes[0])), LEAST_AUTHORITY * sizes[0]
     for i in random.permutation(len(P)):
         rest = [k for k in range(len(P)) if k != i and not held[k]]
-        if random.uniform() < HELD and np.linalg.matrix_rank(P[rest], tol=weak) == rank:
+        if random.uniform() < SHARE_AT_LIMITS and np.linalg.matrix_rank(P[rest], tol=weak) == rank:
             held[i] = random.choice((-1, 1))
     return held
 
 
-def _push(P: Array, random: Any) -> Array:
+def _torque_excess(P: Array, random: Any) -> Array:
     """A torque beyond reach for the joints of one or more groups of tendons."""
-    left, push = set(np.flatnonzero(np.abs(P).any(axis=0))), np.zeros(P.shape[1])
+    left, torque_excess = set(np.flatnonzero(np.abs(P).any(axis=0))), np.zeros(P.shape[1])
     while left:
         joints = {left.pop()}
         while (more := set(np.flatnonzero(np.abs(P[np.abs(P[:, list(joints)]).any(axis=1)]).any(axis=0)))) - joints:
             joints |= more
         left -= joints
-        if (not left and not push.any()) or random.uniform() < 0.5:
-            push[list(joints)] = random.normal(size=len(joints)) * UNREACHABLE_TORQUE
-    return push
+        if (not left and not torque_excess.any()) or random.uniform() < 0.5:
+            torque_excess[list(joints)] = random.normal(size=len(joints)) * UNREACHABLE_TORQUE
+    return torque_excess
 
 
 def _null_space(P: Array) -> Array:
-    """Orthonormal moves (tendons, ...) that give no torque."""
+    """Orthonormal changes of the forces (tendons, ...) that give no torque."""
     u, sizes, _ = np.linalg.svd(P)
     return u[:, int(np.sum(sizes > 1e-9 * sizes[0])) :] if len(P) else np.zeros((0, 0))
 
 
 def _rays(P: Array) -> Array:
-    """Directions (rays, tendons) all around in which forces change and the torque does not."""
+    """Directions (rays, tendons) in which forces change and the torque does not."""
     moves = _null_space(P)
     if moves.shape[1] == 1:
         return np.concatenate([moves.T, -moves.T])
     around = np.random.default_rng(RAYS).normal(size=(RAYS, moves.shape[1]))
     if moves.shape[1] == 2:
-        turn = 2 * np.pi * np.arange(RAYS) / RAYS
-        around = np.stack([np.cos(turn), np.sin(turn)], axis=1)
+        angle = 2 * np.pi * np.arange(RAYS) / RAYS
+        around = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     return np.asarray(around @ moves.T)
 
 
 def _out_of_reach(P: Array, growth: Array, held: Array, miss: Array) -> Array:
-    """What is left of a miss of the stiffness when the free tendons have done what they can without a torque."""
+    """The part of a stiffness error that the free tendons cannot reduce without a torque."""
     free = held == 0
     moves = np.tensordot(_null_space(P[free]).T, growth[free], 1).reshape(-1, miss.size)
     part: Array = moves.T @ np.linalg.lstsq(moves.T, miss.ravel(), rcond=None)[0] if len(moves) else np.zeros(miss.size)
     return miss - part.reshape(miss.shape)
 
 
-def _prices(P: Array, growth: Array, held: Array, excess: Array) -> Array:
-    """Slopes of the cost by each force, less what the torque's prices explain; negative: it would gain by growing."""
+def _multipliers(P: Array, growth: Array, held: Array, excess: Array) -> Array:
+    """Reduced gradient of the cost by each force; negative where a larger force would lower the cost."""
     slopes, free = np.einsum("iab,ab->i", growth, excess), held == 0
-    prices: Array = slopes + P @ np.linalg.lstsq(P[free], -slopes[free], rcond=None)[0]
-    return prices
+    multipliers: Array = slopes + P @ np.linalg.lstsq(P[free], -slopes[free], rcond=None)[0]
+    return multipliers
 
 
-def _independent(P: Array) -> list[int]:
-    """Joints whose torques by these tendons are independent, as many as there are."""
-    found: list[int] = []
-    for j in range(P.shape[1]):
-        if len(P) and np.linalg.matrix_rank(P[:, [*found, j]], tol=1e-9) > len(found):
-            found.append(j)
-    return found
+def _is_unique(P: Array, growth: Array) -> bool:
+    """Whether every pattern of forces changes the torque or the stiffness."""
+    effects = np.concatenate([P / np.abs(P).max(), growth.reshape(len(P), -1) / np.abs(growth).max()], axis=1)
+    sizes = np.linalg.svd(effects, compute_uv=False)
+    return bool(len(sizes) == len(P) and sizes[-1] > DETERMINED * sizes[0])

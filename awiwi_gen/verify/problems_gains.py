@@ -1,37 +1,32 @@
-"""Gains of the impedance law from its feedback gains (eq. 16.4): wanted ones that exist, and the gains at 256 bits."""
+"""Gains of the impedance law from its feedback gains (eq. 16.4): reachable feedback gains, and solutions at 256 bits."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import Any
 
 import numpy as np
 from flint import arb, arb_mat
 
 from awiwi_gen.ir.algebras import Balls, Floats
-from awiwi_gen.ir.graph import Graph, Node
+from awiwi_gen.ir.graph import Node
 from awiwi_gen.ir.interpret import evaluate
-from awiwi_gen.kernel import Solver
+from awiwi_gen.verify.problem import Problem
 from awiwi_gen.verify.reference import Reference, reference
 
 Array = np.ndarray[Any, Any]
 
-ROUNDS = 30  # of Newton's method, which doubles the digits once it is near
-AWAY = 0.05  # how far starts are from the gains, as a share: several gains can have the same feedback
+ROUNDS = 30  # of Newton's method, which converges quadratically
+AWAY = 0.05  # relative distance of starts from the gains: several gains can have the same feedback gains
 
 
 @dataclass(frozen=True)
-class GainMatching:
-    """Joints of all sizes, with gains whose parts of the closed loop are of like size, so that all can be told."""
-
-    solver: Solver
-    graphs: Mapping[str, Graph]
-    values: Mapping[str, Fraction]
+class GainMatching(Problem):
+    """Joints of all sizes, with gains whose terms in the closed loop are of similar size, so that all are observable."""
 
     def sample(self, drawn: dict[str, Array]) -> dict[str, Array]:
-        """Feedback gains of known gains, and starts near these."""
+        """Feedback gains of known gains, and start values near these."""
         plant, samples, dtype = drawn["plant"], len(drawn["plant"]), drawn["plant"].dtype
         random = np.random.default_rng(samples)
         m, _, k = plant.T.astype(np.float64)
@@ -51,8 +46,8 @@ class GainMatching:
             return inputs["start" if node[1] == "gains" else node[1]][:, node[2]].astype(np.float64)
 
         feedback = evaluate(self.graphs["backstepping_state_gains"], Floats(), leaf)["K_cancelled"]
-        begun = inputs["start"] * random.uniform(1 - AWAY, 1 + AWAY, (samples, 4))
-        return {"K_opt": np.stack(feedback, axis=1).astype(dtype), **inputs, "start": begun.astype(dtype)}
+        nearby = inputs["start"] * random.uniform(1 - AWAY, 1 + AWAY, (samples, 4))
+        return {"K_opt": np.stack(feedback, axis=1).astype(dtype), **inputs, "start": nearby.astype(dtype)}
 
     def solve(self, inputs: Mapping[str, Array]) -> Reference:
         """The gains near the starts, by Newton's method."""
@@ -72,7 +67,3 @@ class GainMatching:
                 for j in range(4):
                     gains[j][s] = (gains[j][s] + step[j, 0]).mid()
         return reference({"impedance": gains[:2], "rates": gains[2:]})
-
-    def mirror(self, inputs: Mapping[str, Array], own: bool) -> Mapping[str, Array]:
-        """No bits are known."""
-        return {}

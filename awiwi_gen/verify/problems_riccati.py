@@ -1,39 +1,33 @@
-"""Optimal gains: plants with a stable optimum, and that optimum at 256 bits."""
+"""Optimal gains: plants with a stabilising solution of the Riccati equation, and that solution at 256 bits."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import Any
 
 import numpy as np
 from flint import arb, arb_mat, ctx
 
 from awiwi_gen.ir.algebras import PRECISION_BITS
-from awiwi_gen.ir.graph import Graph
-from awiwi_gen.kernel import Solver
+from awiwi_gen.verify.problem import Problem
 from awiwi_gen.verify.reference import Reference, reference
 
 Array = np.ndarray[Any, Any]
 
 N = 4  # states
-ROUNDS = 12  # of Newton's method: from a solution in floats each doubles the digits
-SETTLED = 1e-60
+ROUNDS = 12  # of Newton's method, which converges quadratically from a solution in floats
+LAST_CHANGE = 1e-60  # of the gains, relative to the largest
 TABLE_WEIGHTS = (10.0, 0.01, 1.0, 0.01)  # table 13.1
 
 
 @dataclass(frozen=True)
-class Riccati:
+class Riccati(Problem):
     """Gains and least cost of a linear plant with one input (eq. 13.5).
 
     The first samples are the plants of tables 13.1, 14.2 and 16.1. Of the others each third is a joint with a spring,
-    an integrator chain as in table 16.1, or a matrix without structure in coordinates of unlike size.
+    an integrator chain as in table 16.1, or a dense matrix in coordinates of different scales.
     """
-
-    solver: Solver
-    graphs: Mapping[str, Graph]
-    values: Mapping[str, Fraction]
 
     def sample(self, drawn: dict[str, Array]) -> dict[str, Array]:
         """Plants for as many samples as were drawn, costs included."""
@@ -50,21 +44,13 @@ class Riccati:
         samples = [optimum(*plant) for plant in zip(*(inputs[name] for name in ("A", "B", "Q", "R")), strict=True)]
         return _reference({"K": [K for K, _ in samples], "S": [S for _, S in samples]})
 
-    def mirror(self, inputs: Mapping[str, Array], own: bool) -> Mapping[str, Array]:
-        """No bits are known."""
-        return {}
-
 
 @dataclass(frozen=True)
-class JointRegulator:
-    """Gains and torque of a joint with a spring that has a secant (eq. 14.10), from any last gains."""
-
-    solver: Solver
-    graphs: Mapping[str, Graph]
-    values: Mapping[str, Fraction]
+class JointRegulator(Problem):
+    """Gains and torque of a joint with a spring in secant form (eq. 14.10), from any previous gains."""
 
     def sample(self, drawn: dict[str, Array]) -> dict[str, Array]:
-        """What was drawn, with springs that always pull back and half a radian of deflexion at most."""
+        """The drawn inputs, with springs of positive stiffness and at most half a radian of deflection."""
         made = dict(drawn)
         s1, s2, s3 = drawn["spring"].T
         made["spring"] = np.stack([s1, s2 / 50 * np.sqrt(s1 * s3), s3], axis=1)
@@ -91,10 +77,6 @@ class JointRegulator:
             torques.append([held - sum((g * (p - d) for g, p, d in zip(K, x, x_des, strict=True)), arb(0))])
         return _reference({"K": gains, "u": torques})
 
-    def mirror(self, inputs: Mapping[str, Array], own: bool) -> Mapping[str, Array]:
-        """No bits are known."""
-        return {}
-
 
 # -- the optimum -------------------------------------------------------------------------------------------
 
@@ -107,7 +89,7 @@ def optimum(A: Array, B: Array, Q: Array, R: Array) -> tuple[list[arb], list[arb
 
 
 def optimum_of(A: arb_mat, b: arb_mat, Q: arb_mat, R: arb) -> tuple[list[arb], list[arb]]:
-    """The same for balls: Newton's method on gains, which Kleinman proved to converge from stabilising ones."""
+    """The same for balls, by Kleinman's iteration: Newton's method on gains converges from stabilising ones."""
     K = arb_mat([_row(_begin(A, b, Q, R))])
     for _ in range(ROUNDS):
         loop = A - b * K
@@ -115,9 +97,9 @@ def optimum_of(A: arb_mat, b: arb_mat, Q: arb_mat, R: arb) -> tuple[list[arb], l
         better = _middle(b.transpose() * S * (1 / R))
         change = max(map(_magnitude, (better - K).entries()))
         K = better
-        if change <= SETTLED * max(map(_magnitude, K.entries())):
+        if change <= LAST_CHANGE * max(map(_magnitude, K.entries())):
             return K.entries(), S.entries()
-    raise ValueError("there is no optimum, or floats do not find it")
+    raise ValueError("the Riccati equation has no stabilising solution, or it is not found in floats")
 
 
 def _begin(A: arb_mat, b: arb_mat, Q: arb_mat, R: arb) -> Array:
@@ -132,7 +114,7 @@ def _begin(A: arb_mat, b: arb_mat, Q: arb_mat, R: arb) -> Array:
 
 
 def _balance(a: Array, G: Array, q: Array) -> Array:
-    """Scales d (n) of coordinates x = diag(d) z that make rows and columns of the Hamiltonian matrix weigh alike."""
+    """Scales d (n) of coordinates x = diag(d) z that balance rows and columns of the Hamiltonian matrix."""
     d = np.ones(len(a))
     for _ in range(8):
         for i, others in enumerate(~np.eye(len(a), dtype=bool)):

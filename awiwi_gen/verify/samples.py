@@ -1,4 +1,4 @@
-"""Where kernels are tried: limits, the straight finger, corners, and the inside of every port's range."""
+"""Sample points for verification: limits, the straight finger, corners, and the inside of every port's range."""
 
 from __future__ import annotations
 

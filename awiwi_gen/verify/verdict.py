@@ -1,4 +1,4 @@
-"""The comparison of one compiled kernel with its reference, and what it says."""
+"""Compares one compiled kernel with its reference and states the verdict."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from awiwi_gen.ir.algebras import Bounded, Floats
+from awiwi_gen.ir.algebras import UNIT_ROUNDOFF, Bounded, Floats
 from awiwi_gen.ir.graph import Graph, Node
 from awiwi_gen.ir.interpret import evaluate
 from awiwi_gen.kernel import GUARDS
@@ -18,19 +18,19 @@ Array = np.ndarray[Any, Any]
 
 
 NEAR_ZERO = 1e-3
-STATUS = "status"  # of a reference: what the kernel must return, if that is not always 0
+STATUS = "status"  # output of a reference: the status that the kernel must return, if not always 0
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What was found for one kernel; ``passed`` only if every level passed.
+    """The result of verification for one kernel; ``passed`` only if every level passed.
 
     ``bit_exact`` (level 1): the C equals the float interpreter in every bit. ``passes`` (level 2) and
     ``agreement`` (level 4): worst relative difference at 256 bits between the graphs before and after a
     pass, and between the routes. Level 3: ``worst_ulp`` in units in the last place, over the values that
     reach a thousandth of the output's largest (nearer to zero an ulp says nothing), ``worst_scaled_error``
-    relative to the largest value of the output, ``bound_use`` the largest share of its rounding error bound
-    that an error reached; above 1 the C computes something else.
+    relative to the largest value of the output, ``bound_use`` the largest error relative to its rounding error
+    bound; above 1 the C computes something else.
     """
 
     name: str
@@ -50,12 +50,12 @@ class Verdict:
         return asdict(self)
 
     def refused(self, reason: str) -> Verdict:
-        """The same with one more reason not to pass."""
+        """The same verdict with one more reason for failure."""
         return replace(self, passed=False, reasons=(*self.reasons, reason))
 
 
 def float_values(graph: Graph, inputs: Mapping[str, Array], params: Mapping[str, Any], algebra: Any) -> dict[str, Any]:
-    """A graph in an algebra on arrays; per output an array (samples, size), or (…) pairs stacked likewise."""
+    """Values of a graph in an algebra on arrays: per output a list of columns (samples,), or of pairs of columns."""
     samples = len(next(iter(inputs.values())))
 
     def leaf(node: Node) -> Any:
@@ -82,28 +82,31 @@ def judge_solver(
     name: str,
     reference: Reference,
     mirror: Mapping[str, Array],
+    observed: Callable[[Any], Mapping[str, Array]],
     inputs: Mapping[str, Array],
     call: Callable[..., Any],
     tolerance: float,
     seed: int,
 ) -> Verdict:
-    """Level 3 for a kernel that iterates: every sample converges, to the exact solution within the tolerance.
+    """Level 3 for a kernel that iterates: every sample converges to the exact solution within the tolerance.
 
-    Level 1 where the bits are known: ``mirror`` has the outputs for which they are.
+    Level 1 for the outputs in ``mirror``, whose bits are known. ``observed`` computes from the result what the
+    reference contains: outputs, or quantities that follow from them.
     """
     raw = call(**inputs)
+    found = observed(raw)
     samples = len(raw.status)
     reasons = []
     wrong = raw.status != reference.high.get(STATUS, np.zeros((samples, 1)))[:, 0]
     if np.any(wrong):
-        reasons.append(f"its status is not as expected at {np.count_nonzero(wrong)} samples")
+        reasons.append(f"it returns a wrong status at {np.count_nonzero(wrong)} samples")
     worst_ulp = worst_scaled = 0.0
     for port, exact in reference.high.items():
         if port == STATUS:
             continue
-        values = getattr(raw, port).reshape(samples, -1)
+        values = found[port].reshape(samples, -1)
         error = reference.error(port, values)
-        scale = float(np.max(np.abs(exact)))
+        scale = float(np.max(np.abs(exact))) or 1.0
         spacing = np.spacing(np.maximum(np.abs(exact), NEAR_ZERO * scale).astype(values.dtype))
         worst_ulp = max(worst_ulp, float(np.max(error / spacing)))
         worst_scaled = max(worst_scaled, float(np.max(error)) / scale)
@@ -132,7 +135,7 @@ def judge(
     dtype: type,
     own: bool,
 ) -> Verdict:
-    """Levels 1 and 3 for one compiled kernel, joined with what is known of its graphs."""
+    """Levels 1 and 3 for one compiled kernel, with the results of levels 2 and 4 for its graphs."""
     samples = len(next(iter(inputs.values())))
     arrays = {port: a.reshape(samples, *shapes[port]) for port, a in inputs.items()}
     raw = call(**arrays)
@@ -153,7 +156,9 @@ def judge(
         if not np.isfinite(values).all():
             reasons.append(f"{port} is not finite inside the documented range")
             error = np.where(np.isfinite(error), error, np.inf)
-        scale = float(np.max(np.abs(reference.high[port]), initial=0.0)) or 1.0
+        scale = float(np.max(np.abs(reference.high[port]), initial=0.0))
+        if scale == 0:  # the output is zero everywhere: the rounding bound gives the size of its terms
+            scale = float(np.max(limit, initial=0.0)) / UNIT_ROUNDOFF[dtype]
         spacing = np.spacing(np.abs(reference.high[port]).astype(dtype)).astype(np.float64)
         sizeable = np.abs(reference.high[port]) >= NEAR_ZERO * scale
         with np.errstate(over="ignore"):  # of errors near zero, which do not count

@@ -205,7 +205,8 @@ def _parts(finger: Finger, q: SX) -> Iterator[_Part]:
             yield _Part(coordinate, turn, ratio * own, None, ratio, SX(0), offset, body, index)
         else:
             crank = own + link.four_bar.reference
-            now, (c, s) = FourBar(link.four_bar, crank), FourBar(link.four_bar, SX(link.four_bar.reference)).coupler
+            start = SX(link.start + link.four_bar.reference)
+            now, (c, s) = FourBar(link.four_bar, crank), FourBar(link.four_bar, start).coupler
             arm = ca.vertcat(link.four_bar.crank, 0, 0)
             yield _Part(coordinate, turn, crank, None, SX(1), SX(0), arm, Moments.none(), index)
             turned = _sum_of_angles(now.coupler, (c, -s))

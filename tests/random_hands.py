@@ -1,0 +1,306 @@
+"""Random legal hand files, by seed: fingers of one to eight links with every kind of part present or absent.
+
+    hand(7)                            # text of a hand file; equal seeds give equal texts
+    hand(7, links=8, features={"wrist"})
+
+A seed chooses the features; `kinds` names those that a file has. What hand files refuse is drawn again.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from awiwi_gen.errors import InputError
+from awiwi_gen.hand import Hand
+
+FEATURES = (
+    "wrist", "motor", "ripple", "spring", "units", "fibre", "gains",  # of the hand
+    "four-bar", "four-bar without zero", "spans", "tensegrity", "couplings", "alike", "fewest", "crossed",  # of a finger
+    "narrow range", "range without zero", "axial mass", "second finger",
+)  # fmt: skip
+TURNS = ("none", "none", "x+90", "x-90", "y+90", "y-90", "z+90", "z-90")
+LINKS = (1, 2, 1, 3, 2, 4, 3, 5, 2, 4, 6, 8)  # most hands are small: eight links take a minute to derive
+QUARTER = np.pi / 2
+
+
+def hand(seed: int, links: int | None = None, features: set[str] | None = None) -> str:
+    """The text of a legal hand file."""
+    for attempt in range(200):
+        random = np.random.default_rng([seed, attempt])
+        chosen = {f for f in FEATURES if random.random() < 0.35} if features is None else features
+        text = _Writer(random, chosen).hand(LINKS[seed % len(LINKS)] if links is None else links)
+        try:
+            Hand.parse(text)
+        except InputError:
+            continue
+        return text
+    raise ValueError(f"no legal hand for seed {seed}")
+
+
+def kinds(text: str) -> set[str]:
+    """The features that a hand file has."""
+    told = text.partition("\n")[0].removeprefix("# ")
+    return set(told.split(", ")) if told else set()
+
+
+class _Writer:
+    """Writes one hand; `used` grows with the features that it got room for."""
+
+    def __init__(self, random: np.random.Generator, features: set[str]) -> None:
+        self.random, self.features = random, features
+        self.used: set[str] = set()
+        self.scale = random.uniform(0.4, 2.5)  # of all lengths: a child's hand to a giant's
+
+    def wants(self, feature: str) -> bool:
+        if feature in self.features:
+            self.used.add(feature)
+        return feature in self.features
+
+    def between(self, low: float, high: float) -> float:
+        return float(self.random.uniform(low, high))
+
+    def mm(self, low: float, high: float) -> str:
+        return f'"{self.scale * self.between(low, high):.4g} mm"'
+
+    def point(self, *ranges: tuple[float, float]) -> str:
+        return f"[{', '.join(self.mm(*each) for each in ranges)}]"
+
+    # -- the hand ---------------------------------------------------------------------------------------------
+
+    def hand(self, links: int) -> str:
+        b = self.between
+        fingers = [self.finger("one", links)]
+        if self.wants("second finger"):
+            fingers.append(self.finger("two", int(self.random.integers(1, 3))))
+        tendons = sum(count for _, count in fingers)
+        low = b(200, 2000)
+        limits = f"""
+[limits]
+joint_velocity = "{b(5, 50):.3g} rad/s"
+joint_acceleration = "{b(200, 5000):.4g} rad/s^2"
+joint_torque = "{b(0.2, 5):.3g} N m"
+tendon_force = "{b(20, 200):.4g} N"
+tendon_stiffness_low = "{low:.4g} N/m"
+tendon_stiffness_high = "{low * b(3, 60):.4g} N/m"
+gravity = "{self.random.choice([9.81, 1.62])} m/s^2"
+source = "assumed"
+"""
+        parts = "".join(text for text, _ in fingers) + self.wrist(tendons) + self.actuators(tendons)
+        head = f'prefix = "{self.random.choice(["claw", "h"])}"\nname = "Random hand"\n'
+        return f"# {', '.join(sorted(self.used))}\n{head}{limits}{parts}"
+
+    def wrist(self, tendons: int) -> str:
+        if not self.wants("wrist"):
+            return ""
+        x, y, z = (self.scale * self.between(0.95, 1.05) * side for side in (50, 42, 36))
+        rows = [
+            f"    {{ forearm = {self.point((2, 6), (5, 36), (6, 30))}, palm = {self.point((-6, -2), (-14, 18), (-12, 12))} }},\n"
+            for _ in range(tendons)
+        ]
+        return f"""
+[wrist]
+a0 = ["0 mm", "{y / 2:.3f} mm", "{z:.3f} mm"]
+a = ["{x:.3f} mm", "{round(y, 2) / 2:.3f} mm", "0 mm"]
+b = ["{x:.3f} mm", "{round(y, 2):.3f} mm", "{z:.3f} mm"]
+palm = ["{x:.3f} mm", "{y / 2:.3f} mm", "{z / 2:.3f} mm"]
+q71 = {{ low = "-{self.between(5, 28):.3g} deg", high = "{self.between(5, 28):.3g} deg" }}
+q73 = {{ low = "-{self.between(5, 18):.3g} deg", high = "{self.between(5, 18):.3g} deg" }}
+source = "assumed"
+tendons = [
+{"".join(rows)}]
+"""
+
+    def actuators(self, tendons: int) -> str:
+        b, text = self.between, ""
+        if self.wants("motor"):
+            text += f"""
+[motor]
+rotor_inertia = "{b(1e-7, 5e-7):.3g} kg m^2"
+gear_inertia = "{b(5e-7, 5e-6):.3g} kg m^2"
+gear_ratio = "{b(10, 100):.4g}"
+pulley = "4 mm"
+friction = {{ steepness = "{b(2, 30):.3g} s/rad", level = "{b(0.1, 1):.3g} N m", viscosity = "{b(0.01, 0.1):.3g} N m s/rad" }}
+compensation = "{b(0.5, 0.95):.3g}"
+travel = "{b(0.5, 3):.3g} rad"
+velocity = "{b(5, 30):.3g} rad/s"
+acceleration = "{b(100, 2000):.4g} rad/s^2"
+torque = "{b(1, 5):.3g} N m"
+source = "assumed"
+"""
+            lines = [(shaft, n) for shaft in ("input", "output") for n in (1, 2, 3)]
+            for shaft, harmonic in lines[:: int(self.random.integers(1, 4))] if self.wants("ripple") else ():
+                text += f"""
+[[motor.ripple]]
+shaft = "{shaft}"
+harmonic = {harmonic}
+amplitude = "{b(0.005, 0.08):.3g} N m"
+phase = "{b(-180, 180):.4g} deg"
+"""
+        if self.wants("spring"):
+            text += f"""
+[spring]
+motor = {{ centre = ["-10 mm", "0 mm"], radius = "4 mm", winding = 1 }}
+roller = {{ radius = "{b(2.9, 3.1):.3f} mm", winding = -1 }}
+fixed = {{ centre = ["10 mm", "0 mm"], radius = "3 mm", winding = 1 }}
+pivot = ["18 mm", "8 mm"]
+arm = "18 mm"
+slack = "3.25 rad"
+taut = "{b(3.55, 3.62):.3f} rad"
+anchor = ["-6 mm", "40 mm"]
+spring_arm = "30 mm"
+spring_angle = "0 deg"
+rate = "{b(2, 12):.3g} N/mm"
+free_length = "{b(34.6, 35.1):.4g} mm"
+sensor = {{ slack = "{int(b(0, 500))}", taut = "{int(b(3000, 4095))}" }}
+source = "assumed"
+"""
+            for tendon in sorted(self.random.choice(tendons, min(2, tendons), False)) if self.wants("units") else ():
+                text += f'\n[[spring.units]]\ntendon = {tendon}\nrate = "{b(2, 12):.3g} N/mm"\nsource = "bench"\n'
+        if self.wants("fibre"):
+            text += f"""
+[tendon]
+modulus = "{b(30, 120):.3g} GPa"
+section = "{b(0.1, 0.5):.2g} mm^2"
+length = "{b(100, 400):.4g} mm"
+guiding = "{b(0.02, 0.2):.2g}"
+bend = "{b(1, 7):.2g} rad"
+source = "assumed"
+"""
+        for tendon in sorted(self.random.choice(tendons, min(2, tendons), False)) if self.wants("gains") else ():
+            text += f"""
+[[gains]]
+tendon = {tendon}
+K_p = "{b(0.1, 0.2):.3g} N m/rad"
+K_d = "{b(5e-5, 1e-4):.3g} N m s/rad"
+K_3 = "{b(50, 200):.4g} 1/s"
+K_4 = "{b(50, 200):.4g} 1/s"
+C_t = "{b(8, 12):.3g} rad/(N m)"
+C_s = "{b(1e-3, 2e-3):.3g} rad s^2/(N m)"
+source = "assumed"
+"""
+        return text
+
+    # -- a finger ---------------------------------------------------------------------------------------------
+
+    def finger(self, name: str, links: int) -> tuple[str, int]:
+        """The text of a finger, and how many tendons it has."""
+        joints = [f"j{i}" for i in range(links)]
+        tensegrity = links >= 3 and self.wants("tensegrity")
+        leaders = self.leaders(joints[2:] if tensegrity else joints)
+        free = [joint for joint in joints if joint not in leaders]
+        bar = self.random.choice(free[2:] if tensegrity else free) if len(free) > 2 * tensegrity else None
+        turns = [str(self.random.choice(TURNS)) for _ in joints]
+        if tensegrity:
+            turns[:2] = ["none", "x+90"]
+        rows = self.tendons(free[2:] if tensegrity else free, leaders)
+        corners = [(y, z) for y in (1, -1) for z in (1, -1)] if tensegrity else []
+        spans = [
+            f'{{ rest = "0 mm", span = {{ from = ["{2 * self.scale:.3g} mm", "{30 * self.scale * y:.4g} mm", '
+            f'"{25 * self.scale * z:.4g} mm"], to = ["2 mm", "{3 * self.scale * y:.3g} mm", '
+            f'"{2.5 * self.scale * z:.3g} mm"], joint = "j2" }}, source = "assumed" }}'
+            for y, z in corners
+        ]
+        if links >= 2 and not tensegrity and self.wants("spans"):
+            for _ in range(int(self.random.integers(1, 3))):
+                joint = self.random.choice(joints[1:])
+                start, end = self.point((-60, -40), (-8, 8), (-8, 8)), self.point((-4, 4), (-6, 6), (-6, 6))
+                over = f', over = ["+{self.random.choice(free)}"]' if self.random.random() < 0.3 else ""
+                spans.append(
+                    f'{{ rest = "0 mm"{over}, span = {{ from = {start}, to = {end}, joint = "{joint}" }}, '
+                    'source = "assumed" }'
+                )
+        pulleys = [f'{{ joint = "{joint}", radius = {self.mm(4, 10)}, source = "drawing" }}' for joint in joints]
+        tendons = spans + [
+            f'{{ rest = {self.mm(0, 50)}, over = [{", ".join(row)}], source = "assumed" }}' for row in rows
+        ]
+        couplings = [f'{{ follower = "{one}", leader = "{other}" }}' for one, other in leaders.items()]
+        text = f"\n[fingers.{name}]\npulleys = [{', '.join(pulleys)}]\ntendons = [\n    "
+        text += ",\n    ".join(tendons) + f"\n]\ncouplings = [{', '.join(couplings)}]\n"
+        for joint, turn in zip(joints, turns, strict=True):
+            text += self.link(name, joint, turn, joint in leaders, joint == bar, tensegrity and joint in joints[:2])
+        return text, len(tendons)
+
+    def leaders(self, joints: list[str]) -> dict[str, str]:
+        """Follower -> leader for some joints."""
+        if len(joints) < 2 or not self.wants("couplings"):
+            return {}
+        first = int(self.random.integers(1, len(joints)))
+        found = {joints[first]: joints[first - 1]}
+        if first + 1 < len(joints) and self.random.random() < 0.3:
+            found[joints[first + 1]] = joints[first - 1]
+        return found
+
+    def tendons(self, joints: list[str], leaders: dict[str, str]) -> list[list[str]]:
+        """What each tendon runs over, so that every torque can be pulled."""
+        followers = {leader: follower for follower, leader in leaders.items()}
+
+        def name(joint: str, sense: int) -> str:
+            pulley = followers.get(joint, joint) if self.random.random() < 0.3 else joint
+            return f'"{"+" if sense > 0 else "-"}{pulley}"'
+
+        if len(joints) > 1 and self.wants("fewest"):  # one tendon more than joints
+            senses = np.tril(np.where(self.random.random((len(joints),) * 2) < 0.5, -1, 1))
+            last = -np.sign(np.sum(senses, axis=0) - 0.5)  # both senses at every joint
+            rows = [list(row) for row in senses.astype(int)] + [list(last.astype(int))]
+        elif len(joints) > 1 and self.wants("crossed"):
+            rows = [[a, b] + [0] * (len(joints) - 2) for a in (1, -1) for b in (1, -1)]
+            rows += [[0] * i + [s] + [0] * (len(joints) - i - 1) for i in range(2, len(joints)) for s in (1, -1)]
+        else:
+            rows = [[0] * i + [s] + [0] * (len(joints) - i - 1) for i in range(len(joints)) for s in (1, -1)]
+        if len(rows) < 12 and self.wants("alike"):
+            rows += [rows[i] for i in self.random.choice(len(rows), int(self.random.integers(1, 3)), False)]
+        return [[name(joint, sense) for joint, sense in zip(joints, row, strict=True) if sense] for row in rows]
+
+    def link(self, finger: str, joint: str, turn: str, follows: bool, bar: bool, base: bool) -> str:
+        low, high, four_bar = self.between(-80, -5), self.between(5, 90), ""
+        if base:
+            low, high = self.between(-35, -10), self.between(10, 35)
+        elif bar and not follows and (found := self.four_bar()):
+            low, high, four_bar = found
+        elif self.random.random() < 0.5 and self.wants("narrow range"):
+            low = self.between(-30, 30)
+            high = low + 10 ** self.between(-1.5, 1)
+        elif self.random.random() < 0.5 and self.wants("range without zero"):
+            low, high = sorted(self.random.choice([-1, 1]) * x for x in (self.between(5, 20), self.between(40, 80)))
+        limits = "" if follows else f'low = "{low:.4f} deg"\nhigh = "{high:.4f} deg"\n'
+        axial = self.random.random() < 0.5 and self.wants("axial mass")
+        com = '["0 mm", "0 mm", "0 mm"]' if axial else self.point((5, 20), (-2, 2), (-2, 2))
+        text = f"""
+[[fingers.{finger}.links]]
+joint = "{joint}"
+turn = "{turn}"
+{limits}offset = {self.point((15, 40), (-4, 4), (-4, 4))}
+mass = "{self.scale**3 * self.between(1, 15):.4g} g"
+com = {com}
+inertia = {self.inertia()}
+source = "assumed"
+"""
+        return text + (f"\n[fingers.{finger}.links.four_bar]\n{four_bar}" if four_bar else "")
+
+    def inertia(self) -> str:
+        """The inertia tensor of some body."""
+        axes = np.linalg.qr(self.random.normal(size=(3, 3)))[0]
+        second = axes @ np.diag(self.scale**5 * self.random.uniform(10, 300, 3)) @ axes.T
+        tensor = np.trace(second) * np.eye(3) - second
+        entries = {f"{'xyz'[i]}{'xyz'[j]}": tensor[i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))}
+        return "{ " + ", ".join(f'{key} = "{value:.6g} g mm^2"' for key, value in entries.items()) + " }"
+
+    def four_bar(self) -> tuple[float, float, str] | None:
+        """A linkage and a range of its joint over which it closes; None if there is none."""
+        without_zero = "four-bar without zero" in self.features
+        if not (without_zero or "four-bar" in self.features):
+            return None
+        ground, crank, coupler, rocker = (self.between(*ends) for ends in ((9, 14), (7, 12), (6, 12), (9, 14)))
+        angles = np.linspace(5, 175, 1701)
+        gap = np.sqrt(ground**2 + crank**2 - 2 * ground * crank * np.cos(np.radians(angles)))
+        closes = angles[(gap > 1.03 * abs(coupler - rocker)) & (gap < 0.97 * (coupler + rocker))]
+        if not len(closes) or closes[-1] - closes[0] < 20:
+            return None
+        self.used.add("four-bar without zero" if without_zero else "four-bar")
+        side = self.random.choice([-1, 1])
+        start = closes[0] - 30 if side > 0 else closes[-1] + 30
+        reference = start if without_zero else closes[0] + (closes[-1] - closes[0]) * self.between(0.2, 0.8)
+        bars = zip(("ground", "crank", "coupler", "rocker"), (ground, crank, coupler, rocker), strict=True)
+        text = "".join(f'{key} = "{length:.6f} mm"\n' for key, length in bars)
+        text += f'reference = "{reference:.4f} deg"\nbranch = {self.random.choice([-1, 1])}\nsource = "assumed"\n'
+        return closes[0] - reference, closes[-1] - reference, text
