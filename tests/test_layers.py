@@ -10,18 +10,19 @@ from pathlib import Path
 import pytest
 
 PACKAGE = Path(__file__).resolve().parent.parent / "awiwi_gen"
-PHYSICS = [["errors", "units", "resources"], ["hand", "kernel"], ["models"], ["control"], ["kernels"]]
+PHYSICS = [["errors", "units", "resources", "exits"], ["hand", "kernel"], ["models"], ["control"], ["kernels"]]
 COMPILER = [
     ["errors", "units", "resources"],
     ["kernel", "cache", "sources"],
     ["ir"],
     ["emit"],
-    ["library"],
+    ["library", "compiler"],
     ["build"],
     ["verify"],
 ]
 TOP = [
     ["derive", "records", "budget"],
+    ["parallel", "tasks"],
     ["pipeline"],
     ["report", "explain", "simulate", "studies"],
     ["__init__"],
