@@ -442,7 +442,7 @@ def test_killed_at_any_moment_the_directory_is_the_old_one_or_the_new_one(tree, 
     install(tree, version("old", MANY))
     once = time.perf_counter() - start
     found, left = set(), 0
-    for moment in np.random.default_rng(7).uniform(0, (4 if swappable else 16) * once, 50):
+    for moment in np.random.default_rng(7).uniform(0, (4 if swappable else 16) * once, 50 if swappable else 25):
         process = looping(tree, swappable)
         time.sleep(moment)
         kill(process)
