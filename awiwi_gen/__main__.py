@@ -17,7 +17,9 @@ from typing import Annotated, Any
 
 import typer
 
+from awiwi_gen import exits
 from awiwi_gen.errors import AwiwiError, InputError, unknown
+from awiwi_gen.exits import system_errors
 
 app = typer.Typer(
     help="From the CAD numbers of a tendon-driven hand to verified real-time C.",
@@ -66,7 +68,8 @@ def command(function: Callable[..., int | None]) -> Callable[..., None]:
     @wraps(function)
     def run(**options: Any) -> None:
         try:
-            code = function(**options)
+            with system_errors():
+                code = function(**options)
         except AwiwiError as error:
             if options.get("as_json"):
                 from awiwi_gen.report import print_json
@@ -110,9 +113,9 @@ def generate(
 
     job = replace(make_job(hand, scalar, params, only, math), accept_cost=accept_cost)
     if verify:
-        from awiwi_gen.build import compiler
+        from awiwi_gen.compiler import compiler
 
-        compiler()  # without one nothing can be verified: better told before anything is replaced
+        compiler()  # without one nothing can be verified: the error comes before anything is replaced
     if job.hand.gains:
         with_studies("the check of its gains").require_running_gains(job.hand, job.store)
     changed = generate(job, output)
@@ -385,7 +388,7 @@ def read_json_inputs() -> dict[str, Any]:
 
 def main() -> None:
     """Entry point of ``awiwi-gen``."""
-    app()
+    exits.run(app)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
-"""Compile generated C and load it: the only file that runs a compiler, and the only one that knows cffi.
+"""Compile generated C and load it: the only file that knows cffi.
 
-Every C file becomes an object kept by the digest of its text, the headers, the flags and the compiler, so a
+Every C file becomes an object, cached by the digest of its text, the headers, the flags and the compiler, so a
 changed number recompiles the kernels it changes. The wrapper cffi makes depends on prototypes only.
 """
 
@@ -11,88 +11,38 @@ import importlib.machinery
 import importlib.util
 import json
 import os
-import platform
 import re
-import shutil
-import subprocess
-import sys
 import sysconfig
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from math import prod
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from awiwi_gen.cache import Cache, key
-from awiwi_gen.errors import BuildError, NoCompilerError
+from awiwi_gen.compiler import bindings, compiler, native
+from awiwi_gen.emit.tree import read_manifest
+from awiwi_gen.errors import BuildError, InputError, OutputError
 from awiwi_gen.resources import CSRC
 
 if TYPE_CHECKING:
     from awiwi_gen.library import Library
 
+T = TypeVar("T")
 WARNINGS = ("-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wdouble-promotion", "-Wshadow", "-Werror")
 FLAGS = ("-std=c99", "-O2", "-fPIC", "-ffp-contract=off", *WARNINGS)
-GLUE_FLAGS = ("-O0", "-fPIC", "-w")  # what cffi writes is long and runs once a call; the loops are optimised
+GLUE_FLAGS = ("-O0", "-fPIC", "-w")  # cffi's wrapper is long and runs once a call; only the loops are optimised
 OPTIMISED = '#pragma GCC push_options\n#pragma GCC optimize ("O1")\n{}\n#pragma GCC pop_options\n'
 BATCH_FLAGS = ("-std=c99", "-O3", "-fPIC", "-w", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math")
 GCC_FLAGS = ("-fschedule-insns", "-fsched-pressure", "-fno-tree-loop-distribute-patterns")  # for long straight loops
-UNFUSED = (("-mno-fma",), ("-mno-fma", "-mno-avx512f"))  # x86 without the instructions, in AVX-512 they are built in
+UNFUSED = (("-mno-fma",), ("-mno-fma", "-mno-avx512f"))  # x86 without fused instructions; AVX-512 has them built in
 FUSED = re.compile(r"\b(v?fn?m(add|sub|la|ls|acc|sac)|xvn?m(add|sub)|vfm[as])\w*")
 
 
-@dataclass(frozen=True)
-class Compiler:
-    """A C compiler: its command and what it says of its version."""
-
-    command: tuple[str, ...]
-    version: str
-
-    def run(self, *arguments: str) -> str:
-        """Run it and return what it prints. Raises BuildError with its messages."""
-        done = subprocess.run([*self.command, *arguments], capture_output=True, text=True, check=False)
-        if done.returncode:
-            raise BuildError(f"{' '.join(self.command)} failed:\n{done.stderr.strip()[:4000]}")
-        return done.stdout
-
-
-@cache
-def compiler() -> Compiler:
-    """``$CC``, or the first of cc, gcc and clang. Raises NoCompilerError when there is none that works."""
-    named = os.environ.get("CC", "").split()
-    for command in [named] if named else [["cc"], ["gcc"], ["clang"]]:
-        if shutil.which(command[0]):
-            return Compiler(tuple(command), _version(command))
-    wanted = f"$CC is {named[0]!r}, which is not there" if named else "there is no cc, gcc or clang on the PATH"
-    raise NoCompilerError(f"no C compiler: {wanted}; {MEND}")
-
-
-@cache
-def native() -> tuple[tuple[str, ...], str]:
-    """Flags for this very machine, and what they make of it: code for one machine must not be run on another."""
-    for flags in ("-march=native",), ("-mcpu=native",):
-        try:
-            return flags, compiler().run(*flags, "-E", "-dM", "-x", "c", os.devnull)
-        except BuildError:
-            continue
-    return (), platform.machine()
-
-
-MEND = "install one (Debian: apt-get install gcc) or set CC"
-
-
-def _version(command: list[str]) -> str:
-    try:
-        done = subprocess.run([*command, "--version"], capture_output=True, text=True, check=True)
-    except (OSError, ValueError, subprocess.SubprocessError) as error:
-        raise NoCompilerError(f"no C compiler: {' '.join(command)} does not work ({error}); {MEND}") from None
-    return (done.stdout.splitlines() or ["of unknown version"])[0]
-
-
 def headers(directory: Path) -> str:
-    """Everything a generated C file may include, as one text; comments, which tell of ranges, decide no object."""
+    """Everything a generated C file may include, as one text, without comments: they decide no object."""
     files = sorted(directory.glob("*.h")) + sorted(CSRC.glob("*.h"))
     texts = (path.read_text(encoding="utf-8") for path in files)
     return "\0".join(re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL) for text in texts)
@@ -103,62 +53,115 @@ def sources(directory: Path) -> list[Path]:
     return [*sorted(directory.glob("*.c")), *sorted(CSRC.glob("*.c"))]
 
 
-def object_name(source: Path, shared: str) -> str:
+def object_key(source: Path, shared: str) -> str:
     """The digest of everything that decides an object."""
-    return key(source.read_text(encoding="utf-8"), shared, FLAGS, compiler().version) + ".o"
+    return key(source.read_text(encoding="utf-8"), shared, FLAGS, compiler().identity)
 
 
-def compile_objects(directory: Path, store: Cache) -> list[Path]:
-    """Objects of all C files of a generated directory and of csrc; only those not in the cache are compiled."""
+def compile_objects(directory: Path, store: Cache, into: Path) -> list[Path]:
+    """Objects of all C files of a generated directory and of csrc, as files in a folder; only new ones are compiled."""
     cc, shared = compiler(), headers(directory)
     includes = (f"-I{directory}", f"-I{CSRC}")
 
     def compile_one(source: Path) -> Path:
-        digest = object_name(source, shared)
-        target = store.directory / "objects" / digest
-        if not target.exists():
-            with tempfile.TemporaryDirectory() as scratch:
-                made = Path(scratch) / "kernel.o"
-                cc.run(*FLAGS, *includes, "-c", str(source), "-o", str(made))
-                target = store.put_bytes("objects", digest, made.read_bytes())
+        digest, target = object_key(source, shared), into / f"{source.stem}.o"
+        found = store.read("objects", digest)
+        if found is None:
+            cc.run(*FLAGS, *includes, "-c", str(source), "-o", str(target))
+            store.write("objects", digest, target.read_bytes())
+        else:
+            target.write_bytes(found)
         return target
 
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         return list(pool.map(compile_one, sources(directory)))
 
 
-def declarations(directory: Path) -> str:
-    """The firmware header, preprocessed: what cffi is told is what C sees."""
-    return compiler().run("-E", "-P", "-std=c99", f"-I{directory}", str(CSRC / "awiwi.h"))
+def declarations(directory: Path, store: Cache, shared: str) -> str:
+    """The firmware header, preprocessed: cffi reads what C sees."""
+
+    def preprocess() -> str:
+        return compiler().run("-E", "-P", "-std=c99", f"-I{directory}", str(CSRC / "awiwi.h"))
+
+    return store.memo("declarations", key(shared, compiler().identity), preprocess)
 
 
 def load(directory: Path, store: Cache | None = None) -> Library:
-    """Compile a generated directory and load it as a Library. Raises BuildError."""
+    """Compile a generated directory and load it as a Library.
+
+    Raises InputError where nothing was generated, BuildError where the compiler refuses the code.
+    """
     from awiwi_gen.library import Library
 
     store = store or Cache()
-    manifest = json.loads((directory / "manifest.json").read_text(encoding="utf-8"))
-    glue = _glue_source(manifest, declarations(directory))
-    python = f"{sys.version} {sysconfig.get_config_var('EXT_SUFFIX')}"
-    name = "_awiwi_" + key(glue, python, GLUE_FLAGS, compiler().version)[:16]
-    with ThreadPoolExecutor(1) as aside:  # the wrapper takes longest: the kernels are compiled meanwhile
-        wrapping = aside.submit(_glue_object, name, glue, directory, store)
-        objects = compile_objects(directory, store)
-        wrapper = wrapping.result()
-    digest = key(name, *(path.name for path in objects)) + ".so"
-    target = store.directory / "libraries" / digest
-    if not target.exists():
+    manifest = read_manifest(directory)
+    if manifest is None:
+        raise InputError(f"{directory}: nothing generated here; run awiwi-gen generate -o {directory}")
+    shared = headers(directory)
+    glue = _glue_source(manifest, declarations(directory, store, shared))
+    python = f"{bindings()} {sysconfig.get_config_var('EXT_SUFFIX')}"
+    name = "_awiwi_" + key(glue, python, GLUE_FLAGS, compiler().identity)[:16]
+    objects = [object_key(source, shared) for source in sources(directory)]
+    digest = key(name, glue, *objects)
+    data = store.read("libraries", digest)
+    if data is None:
         with tempfile.TemporaryDirectory() as scratch:
-            made = Path(scratch) / "library.so"
-            compiler().run("-shared", *(str(o) for o in objects), str(wrapper), "-o", str(made), "-lm")
-            target = store.put_bytes("libraries", digest, made.read_bytes())
-    module = _import(name, target)
-    loaded = frozenset(path.name for path in objects)
+            data = _linked(name, glue, directory, store, Path(scratch))
+        store.write("libraries", digest, data)
+    if digest not in _MODULES:
+        _MODULES[digest] = open_copy(data, store, partial(_import, name))
+    module = _MODULES[digest]
 
     def vectorised(entry: Mapping[str, Any]) -> Any:
-        return batch_function(entry, manifest, directory, store, loaded, module.ffi)
+        return batch_function(entry, manifest, directory, store, frozenset(objects), module.ffi)
 
-    return Library(manifest, module.lib, module.ffi, vectorised)
+    origin = (load_again, (str(directory.resolve()), str(store.directory.resolve()), digest))
+    return Library(manifest, module.lib, module.ffi, vectorised, origin)
+
+
+_MODULES: dict[str, Any] = {}  # by the digest of their library: a process maps each once
+
+
+@cache
+def load_again(directory: str, cached: str, digest: str) -> Library:
+    """The library that was pickled, in this process. Raises BuildError when its directory has changed since."""
+    library = load(Path(directory), Cache(Path(cached)))
+    if library.origin[1] != (directory, cached, digest):
+        raise BuildError(f"{directory} has changed since its library was pickled; build and pickle it again")
+    return library
+
+
+def _linked(name: str, glue: str, directory: Path, store: Cache, scratch: Path) -> bytes:
+    """A library of all objects and the wrapper."""
+    with ThreadPoolExecutor(1) as aside:  # the wrapper takes longest: the kernels are compiled meanwhile
+        wrapping = aside.submit(_glue_object, name, glue, directory, store, scratch)
+        (scratch / "objects").mkdir()
+        objects = compile_objects(directory, store, scratch / "objects")
+        wrapper = wrapping.result()
+    made = scratch / "library.so"
+    compiler().run("-shared", *map(str, objects), str(wrapper), "-o", str(made), "-lm")
+    return made.read_bytes()
+
+
+def open_copy(data: bytes, store: Cache, opened: Callable[[str], T]) -> T:
+    """Load a library from a private copy, so that no change of the cached file reaches a running program.
+
+    The copy is in the folder of temporary files, or in the cache where programs may not be run from there.
+    Raises OutputError when they may not be run from either.
+    """
+    reasons = []
+    for folder in (tempfile.gettempdir(), str(store.directory)):
+        try:
+            with tempfile.TemporaryDirectory(dir=folder) as scratch:
+                path = Path(scratch) / "library.so"
+                path.write_bytes(data)
+                return opened(str(path))
+        except (OSError, ImportError) as error:
+            reasons.append(f"{folder}: {str(error).rpartition(': ')[2].lower()}")
+    raise OutputError(
+        f"the compiled library cannot be loaded ({'; '.join(reasons)}); "
+        "set TMPDIR to a folder that has space and is not mounted noexec"
+    )
 
 
 def batch_function(
@@ -180,25 +183,26 @@ def batch_function(
     if not worthwhile(entry, text):
         return None
     shared = headers(directory)
-    if object_name(source, shared) not in loaded:
+    if object_key(source, shared) not in loaded:
         raise BuildError(f"{directory} has changed since it was loaded; load it again")
     looped = directory / BATCHES / source.name
     texts = (text, shared, looped.read_text(encoding="utf-8"), headers(directory / BATCHES))
-    digest = key(texts, BATCH_FLAGS, GCC_FLAGS, UNFUSED, native(), compiler().version) + ".so"
-    target = store.directory / "batches" / digest
-    if not target.exists():
+    digest = key(texts, BATCH_FLAGS, GCC_FLAGS, UNFUSED, native(), compiler().identity)
+    data = store.read("batches", digest)
+    if data is None:
         with tempfile.TemporaryDirectory() as scratch:
-            target = store.put_bytes("batches", digest, _compile_batch(looped, Path(scratch)).read_bytes())
+            data = _compile_batch(looped, Path(scratch)).read_bytes()
+        store.write("batches", digest, data)
     head = prototype(entry, manifest["prefix"], manifest["c_type"])
     result, name = head.split("(")[0].split()
-    function = getattr(ctypes.CDLL(str(target)), name)
+    function = getattr(open_copy(data, store, ctypes.CDLL), name)
     return ffi.cast(head.replace(f"{result} {name}", f"{result} (*)", 1), ctypes.cast(function, ctypes.c_void_p).value)
 
 
 def _compile_batch(source: Path, scratch: Path) -> Path:
-    """A loop over samples as a library for this machine, of which no instruction multiplies and adds at once.
+    """A loop over samples as a library for this machine, without fused multiply-add instructions.
 
-    gcc 12 makes such where it finds a sum beside a difference, whatever it is told; then it may not know them.
+    gcc 12 fuses where it finds a sum beside a difference, against its flags; then the instruction set is withheld.
     """
     assembly, made = scratch / "batch.s", scratch / "batch.so"
     flags, machine = native()
@@ -212,7 +216,7 @@ def _compile_batch(source: Path, scratch: Path) -> Path:
 
 
 def _glue_source(manifest: dict[str, Any], declared: str) -> str:
-    """JSON of what the wrapper is made from: declarations, loops over batches, and the kernels in a uniform shape."""
+    """JSON of what the wrapper is made from: declarations, loops over samples, and the kernels in a uniform shape."""
     loops, prototypes = [], []
     scalar, prefix = manifest["c_type"], manifest["prefix"]
     if any(entry["params"] for entry in manifest["kernels"]):
@@ -243,7 +247,7 @@ def _glue_source(manifest: dict[str, Any], declared: str) -> str:
 
 
 def _flat_source(entry: dict[str, Any], prefix: str, scalar: str) -> str:
-    """A kernel with all inputs in one array and all outputs in another: what a loop can call without knowing it."""
+    """A kernel with all inputs in one array and all outputs in another, so that C code can call any of them."""
     arguments = [f"&{prefix}_default_params"] if entry["params"] else []
     for side, array in (("inputs", "in"), ("outputs", "out")):
         place = 0
@@ -255,27 +259,29 @@ def _flat_source(entry: dict[str, Any], prefix: str, scalar: str) -> str:
     return f"{head} {{ return {call} }}" if entry["status"] else f"{head} {{ {call} return 0; }}"
 
 
-def _glue_object(name: str, glue: str, directory: Path, store: Cache) -> Path:
-    digest = key(name, glue) + ".o"
-    target = store.directory / "objects" / digest
-    if target.exists():
-        return target
+def _glue_object(name: str, glue: str, directory: Path, store: Cache, scratch: Path) -> Path:
+    """The compiled wrapper, as a file in a folder."""
+    digest, made = key(name, glue), scratch / f"{name}.o"
+    found = store.read("objects", digest)
+    if found is not None:
+        made.write_bytes(found)
+        return made
     import cffi.recompiler
 
     parts = json.loads(glue)
     ffi = cffi.FFI()
     ffi.cdef(re.sub(r"^#.*$", "", parts["declared"], flags=re.M) + "\n".join(parts["prototypes"]))
     preamble = '#include "awiwi.h"\n' + OPTIMISED.format("\n".join(parts["loops"]))
-    with tempfile.TemporaryDirectory() as scratch:
-        source, made = Path(scratch) / f"{name}.c", Path(scratch) / f"{name}.o"
-        cffi.recompiler.make_c_source(ffi, name, preamble, str(source))
-        python = sysconfig.get_paths()["include"]
-        compiler().run(*GLUE_FLAGS, f"-I{python}", f"-I{directory}", f"-I{CSRC}", "-c", str(source), "-o", str(made))
-        return store.put_bytes("objects", digest, made.read_bytes())
+    source = scratch / f"{name}.c"
+    cffi.recompiler.make_c_source(ffi, name, preamble, str(source))
+    python = sysconfig.get_paths()["include"]
+    compiler().run(*GLUE_FLAGS, f"-I{python}", f"-I{directory}", f"-I{CSRC}", "-c", str(source), "-o", str(made))
+    store.write("objects", digest, made.read_bytes())
+    return made
 
 
-def _import(name: str, path: Path) -> Any:
-    loader = importlib.machinery.ExtensionFileLoader(name, str(path))
+def _import(name: str, path: str) -> Any:
+    loader = importlib.machinery.ExtensionFileLoader(name, path)
     spec = importlib.util.spec_from_file_location(name, path, loader=loader)
     if spec is None:
         raise BuildError(f"{path} cannot be loaded")

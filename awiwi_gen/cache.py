@@ -1,28 +1,43 @@
-"""Results kept between runs, by the digest of everything they depend on."""
+"""Results kept between runs, by the digest of everything they depend on.
+
+Every entry begins with a checksum over its kind, its name and its content, and is read through `Cache.read` alone.
+What cannot be read, is too short, was changed or belongs under another name counts as absent and is made again.
+
+Trust: the checksum finds damage, not malice. Entries are unpickled and libraries are run, so whoever may write to the
+folder may run code as you; its permissions decide who that is. New entries take the permissions of the folder: a
+folder with mode 2770 is shared by its group, one with mode 700 is private.
+"""
 
 from __future__ import annotations
 
 import hashlib
 import os
 import pickle
+import stat
+import sys
 import tempfile
 from collections.abc import Callable, Iterable
-from functools import cache
+from contextlib import suppress
+from functools import cache, cached_property
 from importlib.metadata import version
 from pathlib import Path
 from typing import TypeVar
 
+from awiwi_gen.errors import Fault, InputError, OutputError
 from awiwi_gen.resources import SOURCES
 
 T = TypeVar("T")
+VARIABLE = "AWIWI_GEN_CACHE"
 
 
 def cache_directory() -> Path:
-    """``$AWIWI_GEN_CACHE``, or the user's cache directory."""
-    given = os.environ.get("AWIWI_GEN_CACHE")
-    if given:
-        return Path(given)
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "awiwi_gen"
+    """``$AWIWI_GEN_CACHE``, or the user's cache directory. Raises InputError where there is neither."""
+    if os.environ.get(VARIABLE):
+        return Path(os.environ[VARIABLE])
+    try:
+        return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "awiwi_gen"
+    except RuntimeError:  # neither $HOME nor an entry in the password database
+        raise InputError(f"there is no home directory to cache results in; set {VARIABLE} to a folder") from None
 
 
 def key(*parts: object) -> str:
@@ -32,14 +47,17 @@ def key(*parts: object) -> str:
 
 @cache
 def code_digest(*rooms: str) -> str:
-    """Digest of the package's own source text: of some rooms (files or folders), or of all that decides bytes."""
+    """Digest of the package's own source text: of some rooms (files or folders), or of all that decides bytes.
+
+    Line endings do not matter: a checkout may have converted them.
+    """
     wanted = rooms or ("",)
     total = hashlib.sha256()
     for root in SOURCES:
         for path in sorted(root.rglob("*")):
             relative = path.relative_to(root.parent).as_posix()
             if path.suffix in (".py", ".j2", ".c", ".h") and any(_inside(relative, room) for room in wanted):
-                total.update(relative.encode() + b"\0" + path.read_bytes())
+                total.update(relative.encode() + b"\0" + path.read_bytes().replace(b"\r\n", b"\n"))
     return total.hexdigest()
 
 
@@ -49,41 +67,69 @@ def _inside(path: str, room: str) -> bool:
 
 @cache
 def libraries() -> str:
-    """The libraries whose versions decide what is derived."""
-    return ", ".join(f"{name} {version(name)}" for name in ("sympy", "casadi", "python-flint"))
+    """What decides the derived graphs and the text of the C besides our own code: versions, and ``python -OO``.
+
+    ``-OO`` drops the docstrings, from which the comments of the C are made.
+    """
+    names = [f"{name} {version(name)}" for name in ("sympy", "casadi", "python-flint")]
+    return ", ".join(names + ["without docstrings"] * (sys.flags.optimize > 1))
 
 
 class Cache:
-    """A folder of pickled results. Anything unreadable counts as absent."""
+    """A folder of results, each a file named by kind and digest. Anything but a whole entry counts as absent."""
 
     def __init__(self, directory: Path | None = None) -> None:
-        self.directory = directory or cache_directory()
+        self._given = directory
+
+    @cached_property
+    def directory(self) -> Path:
+        """The folder; created when something is written."""
+        return self._given or cache_directory()
+
+    def read(self, kind: str, digest: str) -> bytes | None:
+        """The bytes written under this digest, or None."""
+        try:
+            handle = os.open(self.directory / kind / digest, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
+            with open(handle, "rb") as file:
+                if not stat.S_ISREG(os.fstat(handle).st_mode):
+                    return None
+                found = file.read()
+        except OSError:
+            return None
+        checksum, data = found[:32], found[32:]
+        return data if checksum == _checksum(kind, digest, data) else None
+
+    def write(self, kind: str, digest: str, data: bytes) -> None:
+        """Keep bytes; a reader sees all of them or nothing. Raises OutputError where that is impossible."""
+        try:
+            folder = self._folder(kind)
+            handle, temporary = tempfile.mkstemp(dir=folder)
+            try:
+                with open(handle, "wb") as file:
+                    file.write(_checksum(kind, digest, data) + data)
+                os.chmod(temporary, folder.stat().st_mode & 0o666)
+                os.replace(temporary, folder / digest)
+            except BaseException:
+                with suppress(OSError):
+                    os.unlink(temporary)
+                raise
+        except OSError as error:
+            raise self._unwritable(error) from None
 
     def get(self, kind: str, digest: str) -> object | None:
-        """What was put under this digest, or None."""
+        """The object put under this digest, or None."""
+        data = self.read(kind, digest)
         try:
-            with (self.directory / kind / digest).open("rb") as file:
-                found: object = pickle.load(file)  # noqa: S301 our own files
-                return found
-        except (OSError, pickle.PickleError, EOFError, AttributeError, ImportError, IndexError):
+            return None if data is None else pickle.loads(data)  # noqa: S301 see the trust model above
+        except Exception:  # of a class that is no more: pickle may raise anything
             return None
 
     def put(self, kind: str, digest: str, value: object) -> None:
-        """Keep a result; a reader sees all of it or nothing."""
-        self.put_bytes(kind, digest, pickle.dumps(value, protocol=5))
-
-    def put_bytes(self, kind: str, digest: str, data: bytes) -> Path:
-        """Keep a file; returns its path."""
-        folder = self.directory / kind
-        folder.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(dir=folder)
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
-        Path(temporary).replace(folder / digest)
-        return folder / digest
+        """Keep an object. Raises OutputError where that is impossible."""
+        self.write(kind, digest, pickle.dumps(value, protocol=5))
 
     def memo(self, kind: str, digest: str, compute: Callable[[], T]) -> T:
-        """The kept result, or the computed one, which is then kept."""
+        """The cached object, or the computed one, which is then cached."""
         found = self.get(kind, digest)
         if found is None:
             found = compute()
@@ -91,5 +137,34 @@ class Cache:
         return found  # type: ignore[return-value]
 
     def missing(self, kind: str, digests: Iterable[str]) -> list[str]:
-        """Which of these digests are not there yet."""
-        return [digest for digest in digests if not (self.directory / kind / digest).exists()]
+        """The digests under which there is no whole entry."""
+        return [digest for digest in digests if self.read(kind, digest) is None]
+
+    def require_writable(self) -> None:
+        """Raise OutputError where nothing can be written: before the work, not after it."""
+        try:
+            with tempfile.TemporaryFile(dir=self._folder("records")):
+                pass
+        except OSError as error:
+            raise self._unwritable(error) from None
+
+    def _folder(self, kind: str) -> Path:
+        """The folder of a kind, with the permissions of the whole."""
+        folder = self.directory / kind
+        if not folder.is_dir():
+            self.directory.mkdir(parents=True, exist_ok=True)
+            folder.mkdir(exist_ok=True)
+            with suppress(PermissionError):  # another user was faster, and has done it
+                folder.chmod(stat.S_IMODE(self.directory.stat().st_mode))
+        return folder
+
+    def _unwritable(self, error: OSError) -> OutputError:
+        reason = (error.strerror or str(error)).lower()
+        message = f"cannot be written: {reason}; it is the cache of awiwi_gen: set {VARIABLE} to another folder"
+        return OutputError(Fault(file=str(self.directory), message=message))
+
+
+def _checksum(kind: str, digest: str, data: bytes) -> bytes:
+    total = hashlib.sha256(f"awiwi_gen {kind}/{digest}\0".encode())
+    total.update(data)
+    return total.digest()

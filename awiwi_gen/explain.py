@@ -10,7 +10,7 @@ from awiwi_gen.errors import unknown
 from awiwi_gen.ir.graph import Graph
 from awiwi_gen.ir.passes import optimise
 from awiwi_gen.kernel import Port
-from awiwi_gen.pipeline import Job, derive_missing, make_records
+from awiwi_gen.pipeline import Job
 from awiwi_gen.records import load_graphs
 
 MOST_LINES = 60
@@ -23,8 +23,7 @@ def explanation(job: Job, name: str) -> dict[str, Any]:
         raise unknown("kernel", name, known)
     kernel = known[name]
     alone = Job(job.hand, job.options, name, job.store, job.progress)
-    derive_missing(alone)
-    record = make_records(alone)[name]
+    record = alone.records[name]
     definition = next(iter(load_graphs(kernel, job.store).values()), None)
     return {
         "name": name,

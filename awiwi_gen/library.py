@@ -2,24 +2,32 @@
 
 from __future__ import annotations
 
+import difflib
+import inspect
+import operator
 import os
+import textwrap
 import warnings
 from collections import namedtuple
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
+from decimal import Decimal
 from functools import cache
+from itertools import combinations
 from math import prod
+from numbers import Real
 from typing import Any
 
 import numpy as np
 
-from awiwi_gen.errors import BuildError, InputError
+from awiwi_gen.errors import BuildError, InputError, OutputError
 from awiwi_gen.ir.cost import SINCOS
 
 Array = np.ndarray[Any, Any]
 Samples = tuple[Array, int, int]  # an array to point at, the steps from sample to sample and element to element
-Place = tuple[Any, int, tuple[int, ...]]  # where samples begin, the step from one to the next, what a loop is told
+Place = tuple[Any, int, tuple[int, ...]]  # pointer to the samples, step between them, steps that a loop is given
 
+KINDS = {"c": "complex numbers", "U": "text", "S": "bytes", "M": "dates", "m": "durations", "V": "records"}
 C_TYPES = {"d": "double", "f": "float", "i": "int"}  # by NumPy's characters
 VECTORISE_AFTER = 100_000  # samples of a kernel
 CALL = 20  # operations that a call is worth
@@ -52,12 +60,14 @@ class KernelFunction:
     ``x.T`` of an array (4, n). Large batches run in vector units and on several cores (see `Library`), copy no input
     whose samples are evenly apart, and are fastest by elements. A sample has the same bits however many come with it.
     ``out=M`` writes into what a call with such inputs returned before: fresh memory can cost more than a kernel.
+    Kernels can be pickled and copied; another process loads the library again from the same cache.
 
     ``flat`` is the kernel as a C function of one array with all inputs and one with all outputs.
     """
 
     def __init__(self, entry: Mapping[str, Any], library: Library, loop: Any, flat: Any, params: Any) -> None:
         self.name: str = entry["name"]
+        self.__name__ = self.__qualname__ = self.name
         self.doc: str = entry["doc"]
         self.source: str = entry["source"]
         self.cost: dict[str, int] = dict(entry["cost"])
@@ -67,7 +77,7 @@ class KernelFunction:
         self.dtype = library.dtype
         self.flat = flat
         self._entry, self._library, self._loop = entry, library, loop
-        self._vectorised: Any = None  # not decided yet
+        self._vectorised: Any = None  # undecided
         self._seen = 0
         self._params: tuple[Any, ...] = () if params is None else (params,)
         self._names = [port["name"] for port in self.inputs]
@@ -79,6 +89,9 @@ class KernelFunction:
             self._results.append(((), 1, np.dtype(np.intc)))
             fields.append("status")
         self._result = result_type(self.name, tuple(fields))
+        kinds = inspect.Parameter
+        parameters = [kinds(name, kinds.POSITIONAL_OR_KEYWORD) for name in self._names]
+        self.__signature__ = inspect.Signature([*parameters, kinds("out", kinds.KEYWORD_ONLY, default=None)])
 
     @property
     def signature(self) -> str:
@@ -92,8 +105,11 @@ class KernelFunction:
     def __repr__(self) -> str:
         return f"<kernel {self.name}: {self.signature}>"
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return operator.getitem, (self._library, self.name)
+
     def __call__(self, *args: Any, out: Any = None, **named: Any) -> Any:
-        """Evaluate the kernel at one or many points, where told so into what a call like this one returned before."""
+        """Evaluate the kernel at one or many points; with ``out`` into what a call like this one returned before."""
         given = args if len(args) == len(self._names) and not named else self._bound(args, named)
         arrays = [self._checked(place, value) for place, value in enumerate(given)]
         leads = [a.shape[: a.ndim - len(shape)] for a, shape in zip(arrays, self._shapes, strict=True)]
@@ -115,11 +131,15 @@ class KernelFunction:
         shapes = [shape + lead if by_element else lead + shape for shape, _, _ in self._results]
         if out is None:
             return [np.empty(shape, dtype) for shape, (_, _, dtype) in zip(shapes, self._results, strict=True)]
-        given = [np.asanyarray(one) for one in (out if isinstance(out, tuple) else (out,))]
+        given = list(out) if isinstance(out, tuple) else [out]
+        for one in given:
+            if not isinstance(one, np.ndarray) or isinstance(one, np.ma.MaskedArray):
+                count = "one array" if len(shapes) == 1 else f"a tuple of {len(shapes)} arrays"
+                raise InputError(f"{self.name}: out is or holds a {type(one).__name__}; expected {count} of NumPy")
         found = [(one.shape, one.dtype) for one in given]
         wanted = [(lead + shape, dtype) for shape, _, dtype in self._results]
         if found != wanted:
-            raise InputError(f"{self.name}: out is {_told(found)}; expected {_told(wanted)}")
+            raise InputError(f"{self.name}: out is {_described(found)}; expected {_described(wanted)}")
         targets = [_rolled(one, len(lead)) if by_element else one for one in given]
         if not all(one.flags.carray for one in targets):
             order = "elements" if by_element else "samples"
@@ -128,6 +148,8 @@ class KernelFunction:
             )
         if any(np.may_share_memory(one, array) for one in targets for array in arrays):
             raise InputError(f"{self.name}: out overlaps an input")
+        if any(np.may_share_memory(a, b) for a, b in combinations(targets, 2)):
+            raise InputError(f"{self.name}: arrays of out overlap; expected one array for each output")
         return targets
 
     def _evaluate(self, lead: tuple[int, ...], by_element: bool, samples: list[Samples], results: list[Array]) -> None:
@@ -154,7 +176,7 @@ class KernelFunction:
         """Evaluate n samples, in equal parts on several cores where that pays for the threads."""
 
         def part(first: int, last: int) -> None:
-            moved = [x for pointer, step, told in places for x in (pointer + first * step, *told)]
+            moved = [x for pointer, step, steps in places for x in (pointer + first * step, *steps)]
             loop(last - first, *self._params, *moved)
 
         parts = min(self._library.threads, n * self._work // WORTH_A_THREAD)
@@ -189,22 +211,50 @@ class KernelFunction:
         missing = [n for n in names if n not in given]
         unknown = [n for n in given if n not in names]
         if missing or unknown or len(args) > len(names) or len(given) != len(args) + len(named):
-            raise InputError(f"{self.name} takes {', '.join(names)}; missing {missing}, unknown {unknown}")
+            hint = "; ".join(near for n in unknown if (near := did_you_mean(n, names)))
+            message = f"{self.name} takes {', '.join(names)}; missing {missing}, unknown {unknown}"
+            raise InputError(message + f"; {hint}" * bool(hint))
         return [given[n] for n in names]
 
     def _checked(self, place: int, value: Any) -> Array:
         name, shape = self._names[place], self._shapes[place]
-        try:
-            array: Array = np.asarray(value, self.dtype)
-        except (TypeError, ValueError):
-            raise InputError(f"{self.name}: {name} = {value!r} is not an array of numbers") from None
+        if type(value) is np.ndarray and value.dtype == self.dtype:
+            array: Array = value
+        else:
+            try:
+                array = as_numbers(value).astype(self.dtype, copy=False)
+            except (TypeError, ValueError, OverflowError) as error:
+                shown = textwrap.shorten(repr(value), 60)
+                raise InputError(f"{self.name}: {name} = {shown} is not an array of real numbers: {error}") from None
         if array.shape != shape and array.shape[max(array.ndim - len(shape), 0) :] != shape:
             wanted = ", ".join(["...", *map(str, shape)])
             raise InputError(f"{self.name}: {name} has shape {array.shape}, expected ({wanted})")
         return array
 
 
-def _told(arrays: list[tuple[tuple[int, ...], Any]]) -> str:
+def as_numbers(value: Any) -> Array:
+    """An array of real numbers. Raises TypeError or ValueError for all that NumPy would silently make numbers of."""
+    if isinstance(value, np.ma.MaskedArray):
+        raise TypeError("it is masked; fill it, or choose the samples that are not")
+    array = np.asarray(value)
+    kind = array.dtype.kind
+    if kind == "O":  # numbers of Python and SymPy, but neither None nor dates nor texts
+        for one in array.flat:
+            if not isinstance(one, (Real, Decimal)):
+                raise TypeError(f"it holds a {type(one).__name__}")
+        return array.astype(float)
+    if kind not in "fiub":
+        raise TypeError(f"it holds {KINDS.get(kind, array.dtype.name)}")
+    return array
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """A hint at the names that look like one, or nothing."""
+    near = difflib.get_close_matches(name, list(known), 3)
+    return f"did you mean {', '.join(near)}?" if near else ""
+
+
+def _described(arrays: list[tuple[tuple[int, ...], Any]]) -> str:
     return ", ".join(f"{shape} of {dtype}" for shape, dtype in arrays)
 
 
@@ -252,7 +302,12 @@ class Library(Mapping[str, KernelFunction]):
     """
 
     def __init__(
-        self, manifest: Mapping[str, Any], lib: Any, ffi: Any, vectorised: Callable[[Mapping[str, Any]], Any]
+        self,
+        manifest: Mapping[str, Any],
+        lib: Any,
+        ffi: Any,
+        vectorised: Callable[[Mapping[str, Any]], Any],
+        origin: tuple[Callable[..., Library], tuple[str, ...]],
     ) -> None:
         self.dtype = np.dtype(np.float64 if manifest["c_type"] == "double" else np.float32)
         prefix = manifest["prefix"]
@@ -261,6 +316,7 @@ class Library(Mapping[str, KernelFunction]):
         self.digest: str = ffi.string(getattr(lib, f"{prefix}_model_digest")).decode()
         self.threads: int = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
         self.vectorise_after: float = VECTORISE_AFTER
+        self.origin = origin  # a function and its arguments that load this library in another process
         self._vectorised = vectorised
         self._kernels = {}
         for place, entry in enumerate(manifest["kernels"]):
@@ -276,21 +332,35 @@ class Library(Mapping[str, KernelFunction]):
         return self.ffi.cast(kind + " *", array.__array_interface__["data"][0])
 
     def vectorised(self, entry: Mapping[str, Any]) -> Any:
-        """A kernel's loop for vector units, or None; where it cannot be compiled a warning tells why."""
+        """A kernel's loop for vector units, or None; where it cannot be compiled a warning says why."""
         try:
             return self._vectorised(entry)
-        except (BuildError, OSError) as error:
+        except (BuildError, OutputError, OSError) as error:
             warnings.warn(f"{entry['name']} runs without vector units: {error}", RuntimeWarning, stacklevel=5)
             return None
+
+    def __repr__(self) -> str:
+        hand, scalar = self.manifest["hand"], self.manifest["c_type"]
+        return f"<library {hand}: {len(self)} kernels, {scalar}, model {self.digest[:12]}>"
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _restored, (self.origin, self.threads, self.vectorise_after)
 
     def __getattr__(self, name: str) -> KernelFunction:
         try:
             return self.__dict__["_kernels"][name]  # type: ignore[no-any-return]
         except KeyError:
-            raise AttributeError(f"this hand has no kernel {name!r}") from None
+            raise AttributeError(self._unknown(name)) from None
 
     def __getitem__(self, name: str) -> KernelFunction:
-        return self._kernels[name]
+        try:
+            return self._kernels[name]
+        except KeyError:
+            raise KeyError(self._unknown(name)) from None
+
+    def _unknown(self, name: str) -> str:
+        hint = did_you_mean(name, self.__dict__.get("_kernels", ()))
+        return f"this hand has no kernel {name!r}" + f"; {hint}" * bool(hint)
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._kernels)
@@ -300,3 +370,11 @@ class Library(Mapping[str, KernelFunction]):
 
     def __dir__(self) -> list[str]:
         return [*super().__dir__(), *self._kernels]
+
+
+def _restored(origin: tuple[Callable[..., Library], tuple[str, ...]], threads: int, vectorise_after: float) -> Library:
+    """A pickled library, loaded again, with the same settings."""
+    load, arguments = origin
+    library = load(*arguments)
+    library.threads, library.vectorise_after = threads, vectorise_after
+    return library

@@ -1,30 +1,41 @@
-"""Read me first: the road from a hand file to verified C, one call for each stage.
+"""Read me first: from a hand file to verified C, one call for each stage.
 
-    hand.toml -> Hand -> catalog -> derive -> make_records -> files -> install     (generate)
-    generated/ -> load -> judge -> Verdict                                        (verify)
+    hand.toml -> Hand -> catalog -> derive -> optimise -> emit -> install     (generate)
+    generated/ -> load -> judge -> Verdict                                   (verify)
 
-Data walks this road once, left to right. Everything expensive is kept by the digest of what it depends on.
+Data takes this road once, left to right. Everything expensive is cached by the digest of what it depends on, so each
+stage does what is missing. `parallel` spreads the work over all cores.
 """
 
 from __future__ import annotations
 
 import fnmatch
-import json
-import os
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property, partial
-from math import ceil
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
+from awiwi_gen import parallel, tasks
 from awiwi_gen.cache import Cache, code_digest, key, libraries
+from awiwi_gen.emit.exchange import MANIFEST, clear
 from awiwi_gen.emit.options import Options
-from awiwi_gen.emit.tree import MANIFEST, State, contents, inspect, install, require_place, sha256, sweep
-from awiwi_gen.errors import InputError
+from awiwi_gen.emit.tree import (
+    ELSEWHERE,
+    State,
+    inspect,
+    install,
+    read_manifest,
+    remove,
+    require_place,
+    sealed,
+    sha256,
+)
+from awiwi_gen.errors import Fault, InputError, OutputError
 from awiwi_gen.hand import Hand
+from awiwi_gen.parallel import Progress, silent
 
 if TYPE_CHECKING:
     from awiwi_gen.library import Library
@@ -39,22 +50,16 @@ GENERATOR = (
     *(f"awiwi_gen/{file}.py" for file in ("structure", "kernel", "units", "derive", "records", "budget", "pipeline")),
     "templates",
 )
-Progress = Callable[[str, int, int], None]
-# A kernel, what its record is made from (fingerprints of graphs, keys of other kernels' records), and its key.
-Task = tuple[Any, Mapping[str, Any], str]
-
-
-def silent(stage: str, done: int, total: int) -> None:
-    """No progress shown."""
+ALL = "*"
 
 
 @dataclass(frozen=True)
 class Job:
-    """What is to be generated, and where results are kept."""
+    """What is to be generated, and where results are cached."""
 
     hand: Hand
     options: Options = field(default_factory=Options)
-    only: str = "*"
+    only: str = ALL
     store: Cache = field(default_factory=Cache)
     progress: Progress = silent
     accept_cost: bool = False  # of kernels that cost more than their budget
@@ -86,81 +91,135 @@ class Job:
     @cached_property
     def records(self) -> dict[str, Record]:
         """All that is known of the kernels before they are compiled."""
-        return make_records(self)
-
-    def parallel(
-        self, stage: str, function: Callable[[Any], Any], items: Sequence[Any], after: Sequence[set[int]] = ()
-    ) -> None:
-        """Apply a function to items on all cores, with progress; to each when those `after` has for it are done."""
-        with self.begun(stage, function, items, after) as finish:
-            finish()
-
-    @contextmanager
-    def begun(
-        self, stage: str, function: Callable[[Any], Any], items: Sequence[Any], after: Sequence[set[int]] = ()
-    ) -> Iterator[Callable[[], object]]:
-        """The same while something else is done inside; what it gives waits for the end."""
-        if len(items) <= 1:
-            yield lambda: [function(item) for item in items]
-            return
-        waiting = dict(enumerate(after or [set() for _ in items]))
-        running: dict[Future[Any], int] = {}
-        with ProcessPoolExecutor(min(os.cpu_count() or 1, len(items))) as pool:
-
-            def start() -> None:
-                for place in [place for place, others in waiting.items() if not others]:
-                    del waiting[place]
-                    running[pool.submit(function, items[place])] = place
-
-            def finish() -> None:
-                while running:
-                    for future in sorted(wait(running, return_when=FIRST_COMPLETED).done, key=running.__getitem__):
-                        future.result()
-                        done = running.pop(future)
-                        for others in waiting.values():
-                            others.discard(done)
-                    start()
-                    self.progress(stage, len(items) - len(waiting) - len(running), len(items))
-
-            start()
-            try:
-                yield finish
-            except BaseException:
-                pool.shutdown(wait=False, cancel_futures=True)
-                raise
+        derive(self)
+        return optimise(self)
 
 
-def state(job: Job, directory: Path) -> State:
-    """Whether a generated directory is what this job would generate; imports no physics."""
-    return inspect(directory, job.inputs)
+# -- generate ------------------------------------------------------------------------------------------------
 
 
 def generate(job: Job, directory: Path) -> bool:
     """Bring a generated directory up to date; False if it was already.
 
-    Raises InputError for a bad hand, DimensionError and VerificationError for bad physics, OutputError when
-    the directory cannot be replaced, BudgetError when a kernel costs more than it says; whatever is raised, the
-    directory is as it was.
+    A directory that holds all kernels is never cut down to a part: with a pattern, the part is written again where
+    the rest is fresh, else it is refused. Raises InputError for a bad hand, DimensionError and VerificationError for
+    bad physics, OutputError when the directory cannot be replaced, BudgetError when a kernel costs more than its
+    budget; then the directory is as it was.
     """
-    sweep(directory)
-    if state(job, directory).fresh:
+    clear(directory)
+    found = state(job, directory)
+    if found.fresh:
         return False
+    job = _with_the_rest(job, found, directory)
+    job.store.require_writable()
     require_place(directory)
+    install(directory, emit(job, job.records, directory))
+    return True
+
+
+def state(job: Job, directory: Path) -> State:
+    """Whether a generated directory is what this job would generate, or holds it; imports no physics."""
+    return inspect(directory, _for_all(job, directory).inputs)
+
+
+def _for_all(job: Job, directory: Path) -> Job:
+    """The job for all kernels where the directory holds them all."""
+    return replace(job, only=ALL) if _pattern(directory) == ALL else job
+
+
+def _pattern(directory: Path) -> str | None:
+    """The choice of kernels that a directory was generated for."""
+    manifest = read_manifest(directory)
+    return manifest["inputs"]["options"]["only"] if manifest else None
+
+
+def _with_the_rest(job: Job, found: State, directory: Path) -> Job:
+    """The job that changes no kernel but those asked for. Raises OutputError where others would go or be stale."""
+    pattern = _pattern(directory)
+    if pattern is None or job.only in (ALL, pattern):
+        return job
+    part = {name for kernel in job.kernels for name in (f"{kernel.name}.c", f"batches/{kernel.name}.c")}
+    others = [*found.stale, *sorted({*found.edited, *found.lost} - part)]
+    if pattern == ALL and not others:
+        return _for_all(job, directory)
+    holds = "all kernels" if pattern == ALL else f"the kernels of --only {pattern}"
+    reason = f" and more of it is out of date ({', '.join(others[:5])})" if pattern == ALL else ""
+    message = f"holds {holds}{reason}; leave out --only {job.only}, or {ELSEWHERE}"
+    raise OutputError(Fault(file=str(directory), message=message))
+
+
+# -- derive --------------------------------------------------------------------------------------------------
+
+
+def derive(job: Job) -> None:
+    """Derive every (structure, family, route) that the cache lacks; equal structures are derived once."""
+    from awiwi_gen.records import derivation_key
+
+    keys = [(kernel, route, derivation_key(kernel, route)) for kernel in job.kernels for route in kernel.routes]
+    absent = set(job.store.missing("derived", {digest for _, _, digest in keys}))
+    groups: dict[tuple[str, str], dict[str, Any]] = {}
+    for kernel, route, digest in keys:
+        if digest in absent:
+            groups.setdefault((kernel.structure, route), {}).setdefault(digest, kernel)
+    work = [(route, kernels, job.store) for (_, route), kernels in groups.items()]
+    work.sort(key=lambda piece: piece[0] != "sympy")  # the slow ones first
+    parallel.run("derive", tasks.derive, work, job.progress)
+
+
+# -- optimise ------------------------------------------------------------------------------------------------
+
+
+def optimise(job: Job) -> dict[str, Record]:
+    """Bind, compare, optimise and print every kernel whose record the cache lacks; the records of all."""
+    from awiwi_gen.records import fingerprints, record_key, solver_key
+
+    known: dict[str, tasks.Task] = {}
+    for kernel in sorted(job.kernels, key=lambda kernel: kernel.solver is not None):
+        if kernel.solver is None:
+            graphs = fingerprints(kernel, job.store)
+            known[kernel.name] = kernel, graphs, record_key(kernel, graphs, job.hand.prefix, job.options)
+        else:  # built from the records of the kernels it calls
+            used = {family: known[name][2] for family, name in kernel.needs.items()}
+            known[kernel.name] = kernel, used, solver_key(kernel, used, job.hand.prefix, job.options)
+    absent = set(job.store.missing("records", [digest for _, _, digest in known.values()]))
+    work, after = tasks.ordered([task for task in known.values() if task[2] in absent])
+    with _precision_restored():
+        items = [(members, job.hand.prefix, job.options, job.store) for members in work]
+        parallel.run("emit", tasks.make_records, items, job.progress, after)
+    return {kernel.name: tasks.cached(job.store, "records", known[kernel.name][2]) for kernel in job.kernels}
+
+
+@contextmanager
+def _precision_restored() -> Iterator[None]:
+    """Set python-flint's precision, which is global, back to what the caller had."""
+    from flint import ctx
+
+    precision = ctx.prec
+    try:
+        yield
+    finally:
+        ctx.prec = precision
+
+
+# -- emit ----------------------------------------------------------------------------------------------------
+
+
+def emit(job: Job, records: Mapping[str, Record], directory: Path) -> dict[str, str]:
+    """All files of the generated directory, by name. Raises BudgetError against the budget that is there."""
     from awiwi_gen.budget import BUDGET, budget_text, require_budget
     from awiwi_gen.emit.batch import batch_files
     from awiwi_gen.emit.files import shared_files
     from awiwi_gen.records import manifest_entry
 
-    records = job.records
-    functions = [record.function for record in records.values()]
     files = {f"{name}.c": record.file for name, record in records.items()}
+    files[BUDGET] = budget_text(job.kernels, records, job.options)
+    if not job.accept_cost:
+        require_budget(directory, files[BUDGET])
     graphs = [(kernel.path, records[kernel.name].graph) for kernel in job.kernels]
     read = {f"{path}.{param}".lstrip(".") for path, graph in graphs if graph for param in graph.params}
     everything = job.hand.quantities().items()
     quantities = {path: q for path, q in everything if not path.startswith("limits.") or path in read}
-    files[BUDGET] = budget_text(job.kernels, records, job.options)
-    if not job.accept_cost:
-        require_budget(directory, files[BUDGET])
+    functions = [record.function for record in records.values()]
     files |= shared_files(job.hand.prefix, functions, job.hand.digest(), quantities, job.options)
     entries = [manifest_entry(kernel, records[kernel.name]) for kernel in job.kernels]
     files |= batch_files(entries, job.hand.prefix, job.options)
@@ -173,109 +232,10 @@ def generate(job: Job, directory: Path) -> bool:
         "files": {name: sha256(text) for name, text in sorted(files.items())},
         "kernels": entries,
     }
-    install(directory, {**files, MANIFEST: json.dumps(manifest, indent=1, ensure_ascii=False) + "\n"})
-    return True
+    return {**files, MANIFEST: sealed(manifest)}
 
 
-def make_records(job: Job) -> dict[str, Record]:
-    """Derive what is not derived yet, then bind, compare, optimise and print every kernel."""
-    from awiwi_gen.records import fingerprints, record_key, solver_key
-
-    derive_missing(job)
-    tasks: dict[str, Task] = {}
-    for kernel in sorted(job.kernels, key=lambda kernel: kernel.solver is not None):
-        if kernel.solver is None:
-            given = fingerprints(kernel, job.store)
-            tasks[kernel.name] = kernel, given, record_key(kernel, given, job.hand.prefix, job.options)
-        else:  # built from the records of the kernels it calls
-            used = {family: tasks[name][2] for family, name in kernel.needs.items()}
-            tasks[kernel.name] = kernel, used, solver_key(kernel, used, job.hand.prefix, job.options)
-    _make_absent(job, tasks.values())
-    return {kernel.name: _kept(job.store, tasks[kernel.name][2]) for kernel in job.kernels}
-
-
-def _kept(store: Cache, digest: str) -> Record:
-    return store.get("records", digest)  # type: ignore[return-value]
-
-
-def _make_absent(job: Job, tasks: Collection[Task]) -> None:
-    """Make the records that are not kept yet on all cores, part by part, those that others wait for first."""
-    absent = set(job.store.missing("records", [digest for _, _, digest in tasks]))
-    parts: dict[str, list[Task]] = {}
-    for kernel, given, digest in tasks:
-        if digest in absent:
-            group = kernel.path if kernel.solver is None else kernel.name
-            parts.setdefault(group, []).append((kernel, given, digest))
-    work = _shares(list(parts.values()))
-    awaited = {digest for members in work for task in members for digest in _needs(task)}
-    work.sort(key=lambda members: (awaited.isdisjoint(task[2] for task in members), -sum(map(_size, members))))
-    place = {digest: number for number, members in enumerate(work) for _, _, digest in members}
-    after = [{place[one] for task in members for one in _needs(task) if one in place} for members in work]
-    job.parallel("emit", _record_task, [(members, job.hand.prefix, job.options, job.store) for members in work], after)
-
-
-def _needs(task: Task) -> Collection[str]:
-    """Keys of the records that a record is made from."""
-    return task[1].values() if task[0].solver is not None else ()
-
-
-def _shares(parts: Sequence[list[Task]]) -> list[list[Task]]:
-    """The same tasks with parts that would keep one core busy while others wait cut into pieces."""
-    sizes = [sum(map(_size, members)) for members in parts]
-    fair = max(1.0, sum(sizes) / (os.cpu_count() or 1))
-    return [
-        members[first::pieces]
-        for members, size in zip(parts, sizes, strict=True)
-        for pieces in [min(len(members), ceil(size / fair) or 1)]
-        for first in range(pieces)
-    ]
-
-
-def _size(task: Task) -> int:
-    """Number of nodes of the graphs a record is made from."""
-    return sum(getattr(graph, "size", 0) for graph in task[1].values())
-
-
-def _record_task(task: tuple[list[Task], str, Options, Cache]) -> None:
-    from awiwi_gen.records import load_graphs, make_records, make_solver_record
-
-    members, prefix, options, store = task
-    if members[0][0].solver is None:
-        loaded = [(kernel, load_graphs(kernel, store), digest) for kernel, _, digest in members]
-        made = make_records(loaded, prefix, options)
-    else:
-        made = []
-        for kernel, needs, digest in members:
-            used = {family: _kept(store, one) for family, one in needs.items()}
-            made.append(make_solver_record(kernel, used, digest, prefix, options))
-    for record in made:
-        store.put("records", record.digest, record)
-
-
-def derive_missing(job: Job) -> None:
-    """Derive every (structure, family, route) that the cache lacks; equal structures are derived once."""
-    from awiwi_gen.records import derivation_key
-
-    groups: dict[tuple[str, str], dict[str, Any]] = {}
-    for kernel in job.kernels:
-        for route in kernel.routes:
-            digest = derivation_key(kernel, route)
-            if job.store.missing("derived", [digest]):
-                groups.setdefault((kernel.structure, route), {}).setdefault(digest, kernel)
-    tasks = [(route, kernels, job.store) for (_, route), kernels in groups.items()]
-    tasks.sort(key=lambda task: task[0] != "sympy")  # the slow ones first
-    job.parallel("derive", _derive_task, tasks)
-
-
-def _derive_task(task: tuple[str, dict[str, Any], Cache]) -> None:
-    from awiwi_gen.derive import Deriver, check_dimensions
-
-    route, kernels, store = task
-    deriver = Deriver(next(iter(kernels.values())).part)
-    for digest, kernel in kernels.items():
-        graph = deriver.derive(kernel, route)
-        check_dimensions(kernel, graph)
-        store.put("derived", digest, graph)
+# -- verify --------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -298,10 +258,12 @@ def verify(job: Job, directory: Path) -> Proof:
 
     An unchanged directory is not examined twice.
     """
-    from awiwi_gen.build import compiler
+    from awiwi_gen.compiler import compiler, machine
 
-    texts = {name: sha256((directory / name).read_bytes()) for name in contents(directory)}
-    digest = key(texts, job.inputs, code_digest(), compiler())
+    identity = compiler().identity  # without a compiler this raises before anything is derived
+    names = sorted(path.relative_to(directory).as_posix() for path in directory.rglob("*.[ch]"))
+    texts = {name: sha256((directory / name).read_bytes()) for name in names}
+    digest = key(texts, read_manifest(directory), job.inputs, code_digest(), identity, machine())
     return job.store.memo("proofs", digest, lambda: _examine(job, directory))
 
 
@@ -309,7 +271,8 @@ def _examine(job: Job, directory: Path) -> Proof:
     from awiwi_gen.build import load
 
     records = job.records
-    with _laws_begun(job, records) as laws:  # they need no compiler, which has work for less than all cores in the end
+    # The laws need no compiler, which cannot use all cores in the end.
+    with _precision_restored(), _laws_running(job, records) as laws:
         verdicts = _judged(job, directory, load(directory, job.store), records)
         seal = _seal(job, directory)
         found = seal.found if seal else {}
@@ -321,7 +284,8 @@ def _examine(job: Job, directory: Path) -> Proof:
 
 
 def _judged(job: Job, directory: Path, library: Library, records: Mapping[str, Record]) -> list[Verdict]:
-    from awiwi_gen.build import compiler, headers
+    from awiwi_gen.build import headers
+    from awiwi_gen.compiler import compiler, machine
     from awiwi_gen.judge import judge_record, verdict_key
 
     shared = headers(directory)
@@ -329,7 +293,7 @@ def _judged(job: Job, directory: Path, library: Library, records: Mapping[str, R
     for kernel in job.kernels:
         record, used = records[kernel.name], {family: records[name] for family, name in kernel.needs.items()}
         text = (directory / f"{kernel.name}.c").read_text(encoding="utf-8")
-        digest = verdict_key(record, key(text, shared, compiler()))
+        digest = verdict_key(record, key(text, shared, compiler().identity, machine()))
         examine = partial(judge_record, kernel, record, used, library[kernel.name], job.options)
         verdicts.append(job.store.memo("verdicts", digest, examine))
         job.progress("verify", len(verdicts), len(job.kernels))
@@ -344,12 +308,13 @@ def _seal(job: Job, directory: Path) -> Seal | None:
     if job.options.scalar == "f64":
         return None
     names = [path.name for path in sources(directory)]
-    return examine(dict(zip(names, compile_objects(directory, job.store), strict=True)))
+    with TemporaryDirectory() as scratch:
+        return examine(dict(zip(names, compile_objects(directory, job.store, Path(scratch)), strict=True)))
 
 
 @contextmanager
-def _laws_begun(job: Job, records: Mapping[str, Record]) -> Iterator[Callable[[], list[Law]]]:
-    """The laws of physics on all parts, looked at on other cores while something else is done inside."""
+def _laws_running(job: Job, records: Mapping[str, Record]) -> Iterator[Callable[[], list[Law]]]:
+    """Check the laws of physics on all parts on other cores while the body of the `with` statement runs."""
     from awiwi_gen.judge import laws_key
 
     parts: dict[str, list[tuple[Any, Record]]] = {}
@@ -360,30 +325,35 @@ def _laws_begun(job: Job, records: Mapping[str, Record]) -> Iterator[Callable[[]
     ports: dict[str, dict[str, Any]] = {}
     for kernel in job.catalog:  # a law may need a velocity that none of the kernels asked for takes
         ports.setdefault(kernel.path, {}).update(kernel.inputs)
-    tasks = [
+    work = [
         (members, ports[path], digest, job.options, job.store)
         for (path, members), digest in zip(parts.items(), keys, strict=True)
         if digest in absent
     ]
-    with job.begun("physics", _physics_task, tasks) as made:
+    with parallel.running("physics", tasks.check_laws, work, job.progress) as finish:
 
         def laws() -> list[Law]:
-            made()
-            return [law for digest in keys for law in job.store.get("laws", digest)]  # type: ignore[attr-defined]
+            finish()
+            return [law for digest in keys for law in tasks.cached(job.store, "laws", digest)]
 
         yield laws
 
 
-def _physics_task(task: tuple[Any, ...]) -> None:
-    from awiwi_gen.judge import physics
-
-    members, ports, digest, options, store = task
-    store.put("laws", digest, physics(members, ports, options))
+# -- for Python ----------------------------------------------------------------------------------------------
 
 
 def cached_tree(job: Job) -> Path:
-    """A generated directory in the cache that is up to date for this job: what Python users run."""
+    """A generated directory in the cache that is up to date for this job, to be compiled and loaded.
+
+    Raises NoCompilerError before anything is derived. A damaged directory is made again.
+    """
+    from awiwi_gen.compiler import compiler
+
+    compiler()
     directory = job.store.directory / "trees" / key(job.inputs)
-    directory.parent.mkdir(parents=True, exist_ok=True)
-    generate(job, directory)
+    try:
+        generate(job, directory)
+    except OutputError:
+        remove(directory)
+        generate(job, directory)
     return directory

@@ -56,12 +56,11 @@ job.catalog
 spent.append(["start, read the hand, make the catalogue", *(a - b for a, b in zip(now(), (start, 0.0)))])
 from awiwi_gen import build
 import awiwi_gen.records
-timed(pipeline, "derive_missing", "derive, check units")
-timed(pipeline, "_make_absent", "bind, compare, optimise, print")
+timed(pipeline, "derive", "derive, check units")
 timed(sys.modules["awiwi_gen.build"], "load", "compile, link, load")
 timed(pipeline, "_judged", "compare the compiled kernels")
 timed(pipeline, "_examine", "laws of physics, beyond what compiling hides")
-timed(pipeline, "make_records", "keys, read what is kept")
+timed(pipeline, "optimise", "bind, compare, optimise, print")
 timed(pipeline, "generate", "write")
 timed(pipeline, "verify", "digests of what is there")
 pipeline.generate(job, Path(sys.argv[2]))

@@ -173,7 +173,7 @@ def test_c_programs_run_batches_as_their_header_tells(tmp_path):
 
     (tmp_path / "main.c").write_text(PROGRAM)
     batch, program = compiled("jaw_inverse_dynamics", tree(), tmp_path, *flags, "-c"), str(tmp_path / "main")
-    others = map(str, compile_objects(tree(), Cache()))
+    others = map(str, compile_objects(tree(), Cache(), tmp_path))
     compiler().run("-std=c99", f"-I{tree()}", str(tmp_path / "main.c"), str(batch), *others, "-o", program, "-lm")
     subprocess.run([program], check=True)
 
@@ -184,7 +184,7 @@ def test_the_c_of_a_batch_is_clean_and_links_with_everything_else(options, tmp_p
     kernels = [entry for entry in load(directory).manifest["kernels"] if has_batch(entry)]
     flags = ("-std=c99", "-O1", "-fPIC", *WARNINGS, "-c")
     batches = [compiled(entry["name"], directory, tmp_path, *flags) for entry in kernels]
-    others = compile_objects(directory, Cache())
+    others = compile_objects(directory, Cache(), tmp_path)
     compiler().run("-shared", *map(str, batches + others), "-o", str(tmp_path / "all.so"), "-lm")
 
     assert len(batches) > 10

@@ -97,11 +97,11 @@ def called_by(objects: list[Path]) -> set[str]:
 
 
 @pytest.fixture(scope="module")
-def objects(tree) -> list[Path]:
+def objects(tree, tmp_path_factory) -> list[Path]:
     from awiwi_gen.cache import Cache
 
     need("nm")
-    return compile_objects(tree, Cache())
+    return compile_objects(tree, Cache(), tmp_path_factory.mktemp("objects"))
 
 
 def test_nothing_is_called_but_mathematics(objects):
@@ -132,7 +132,7 @@ def single(request, hand, tmp_path_factory) -> tuple[Path, list[Path]]:
     directory = tmp_path_factory.mktemp("single") / "generated"
     pattern = {"libm": "thumb_*", "own": "[msw][opr]*"}[request.param]
     generate(Job(hand, Options("f32", math=request.param), only=pattern), directory)
-    return directory, compile_objects(directory, Cache())
+    return directory, compile_objects(directory, Cache(), tmp_path_factory.mktemp("objects"))
 
 
 def test_float_code_is_written_without_double(single):

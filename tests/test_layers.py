@@ -15,7 +15,7 @@ from awiwi_gen.kernels import catalog
 
 PACKAGE = Path(__file__).resolve().parent.parent / "awiwi_gen"
 PHYSICS = [
-    ["errors", "units", "resources"],
+    ["errors", "units", "resources", "exits"],
     ["hand", "kernel", "structure"],
     ["definitions", "witnesses"],
     ["kernels"],
@@ -25,13 +25,14 @@ COMPILER = [
     ["kernel", "cache", "sources"],
     ["ir"],
     ["emit"],
-    ["library"],
+    ["library", "compiler"],
     ["build"],
     ["verify"],
 ]
 TOP = [
     ["derive", "records", "budget"],
     ["judge"],
+    ["parallel", "tasks"],
     ["pipeline"],
     ["report", "explain", "simulate", "studies"],
     ["__init__"],

@@ -3,7 +3,12 @@
 from __future__ import annotations
 
 import copy
+import inspect
+import multiprocessing
 import pickle
+from datetime import date
+from decimal import Decimal
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -106,6 +111,13 @@ def test_lists_integers_and_other_byte_orders_are_numbers_too(lib):
     assert np.array_equal(lib.index_mass_matrix(np.array([0, 1, 1, 0], dtype=bool)), expected)
 
 
+def test_numbers_of_python_are_numbers(lib):
+    expected = lib.index_mass_matrix([0.5, 0.25, 0.0, 1.0])
+
+    assert np.array_equal(lib.index_mass_matrix([Fraction(1, 2), Decimal("0.25"), False, 1]), expected)
+    assert np.array_equal(lib.index_mass_matrix(np.array([0.5, 0.25, 0, 1], np.float16)), expected)
+
+
 def test_inputs_are_left_as_they_are(lib):
     given = points(lib.index_forward_dynamics, 5)
     before = copy.deepcopy(given)
@@ -186,16 +198,30 @@ def test_a_solver_says_when_its_input_is_not_a_number(lib):
         ({"q": [0.1, 0.2, 0.3]}, r"index_mass_matrix: q has shape \(3,\), expected \(..., 4\)"),
         ({"q": 0.1}, r"index_mass_matrix: q has shape \(\), expected \(..., 4\)"),
         ({"q": np.zeros((4, 5))}, r"q has shape \(4, 5\), expected \(..., 4\)"),
-        ({"q": "straight"}, "index_mass_matrix: q = 'straight' is not an array of numbers"),
-        ({"q": [[1, 2], [3]]}, "is not an array of numbers"),
-        ({"q": [1j, 0, 0, 0]}, "is not an array of numbers"),
-        ({"q": None}, r"expected \(..., 4\)"),
+        ({"q": "straight"}, "index_mass_matrix: q = 'straight' is not an array of real numbers: it holds text"),
+        ({"q": [[1, 2], [3]]}, "is not an array of real numbers"),
+        ({"q": [1j, 0, 0, 0]}, "it holds complex numbers"),
+        ({"q": np.array([1e-30j, 0, 0, 0])}, "it holds complex numbers"),
+        ({"q": None}, "it holds a NoneType"),
+        ({"q": [0.1, None, 0.3, 0.4]}, "it holds a NoneType"),
+        ({"q": ["0.1", "0.2", "0.3", "0.4"]}, "it holds text"),
+        ({"q": [b"0.1", b"0.2", b"0.3", b"0.4"]}, "it holds bytes"),
+        ({"q": b"1234"}, "it holds bytes"),
+        ({"q": np.ma.array(np.zeros(4), mask=[0, 1, 0, 0])}, "it is masked"),
+        ({"q": np.ma.zeros(4)}, "it is masked"),
+        ({"q": np.zeros(4, "datetime64[s]")}, "it holds dates"),
+        ({"q": np.zeros(4, "timedelta64[s]")}, "it holds durations"),
+        ({"q": [date(2026, 1, 1)] * 4}, "it holds a date"),
+        ({"q": np.zeros(4, [("x", float)])}, "it holds records"),
+        ({"q": [10**400, 0, 0, 0]}, "is not an array of real numbers"),
+        ({"q": {"q": 1}}, "it holds a dict"),
         ({}, r"index_mass_matrix takes q; missing \['q'\], unknown \[\]"),
         ({"Q": np.zeros(4)}, r"index_mass_matrix takes q; missing \['q'\], unknown \['Q'\]"),
+        ({"q_": np.zeros(4)}, r"unknown \['q_'\]; did you mean q\?"),
         ({"q": np.zeros(4), "qd": np.zeros(4)}, r"missing \[\], unknown \['qd'\]"),
     ],
 )
-def test_inputs_that_do_not_fit_are_told(lib, given, message):
+def test_inputs_that_do_not_fit_are_refused_in_words(lib, given, message):
     with pytest.raises(InputError, match=message):
         lib.index_mass_matrix(**given)
 
@@ -213,6 +239,35 @@ def test_leading_dimensions_that_do_not_broadcast_are_told_with_all_shapes(lib):
 
     assert str(caught.value) == "index_gravity: leading dimensions do not broadcast: q (2, 4), g (3, 3)"
     assert isinstance(caught.value, ValueError)
+
+
+# ------------------------------------------------------------------------------------------------- out
+
+
+@pytest.mark.parametrize(
+    ("out", "message"),
+    [
+        ([[0.0] * 4] * 4, "out is or holds a list; expected one array of NumPy"),
+        ([np.zeros((4, 4))], "out is or holds a list"),
+        (np.ma.zeros((4, 4)), "out is or holds a MaskedArray"),
+        (0.0, "out is or holds a float"),
+        ((None,), "out is or holds a NoneType"),
+        (np.zeros((4, 4), np.float32), r"out is \(4, 4\) of float32; expected \(4, 4\) of float64"),
+    ],
+)
+def test_an_out_that_would_hold_no_result_is_refused(lib, out, message):
+    with pytest.raises(InputError, match=message):
+        lib.index_mass_matrix(np.zeros(4), out=out)
+
+
+def test_one_array_for_two_outputs_is_refused(lib):
+    q, g = np.zeros(4), np.zeros(3)
+    M, gravity = np.zeros((4, 4)), np.zeros(4)
+    for C in (M, M.reshape(4, 4), np.lib.stride_tricks.as_strided(M, (4, 4), M.strides)):
+        with pytest.raises(InputError, match="arrays of out overlap; expected one array for each output"):
+            lib.index_dynamics(q, q, g, out=(M, C, gravity))
+    result = lib.index_dynamics(q, q, g, out=(M, np.zeros((4, 4)), gravity))
+    assert np.array_equal(result[0], lib.index_dynamics(q, q, g).M)
 
 
 # ------------------------------------------------------------------------------------------------- results
@@ -243,6 +298,81 @@ def test_results_survive_pickling_and_copying(lib, duplicate):
 
     assert type(again) is type(result)
     assert all(np.array_equal(a, b) for a, b in zip(again, result, strict=True))
+
+
+# ------------------------------------------------------------------------------------------------- copies
+
+
+@pytest.mark.parametrize("duplicate", [lambda x: pickle.loads(pickle.dumps(x)), copy.copy, copy.deepcopy])
+def test_kernels_and_libraries_survive_pickling_and_copying(single, duplicate):
+    single.threads = 3
+    q = np.array([0.1, 0.2])
+    again, kernel = duplicate(single), duplicate(single.jaw_mass_matrix)
+
+    assert again.threads == 3
+    assert again.digest == single.digest
+    assert list(again) == list(single)
+    assert np.array_equal(again.jaw_mass_matrix(q), single.jaw_mass_matrix(q))
+    assert np.array_equal(kernel(q), single.jaw_mass_matrix(q))
+
+
+def test_a_kernel_runs_in_a_process_pool(single):
+    points = RANDOM.uniform(0, 0.2, (6, 2))
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        found = pool.map(single.jaw_mass_matrix, points)
+
+    assert np.array_equal(found, single.jaw_mass_matrix(points))
+
+
+# ------------------------------------------------------------------------------------------------- building
+
+
+def test_a_part_is_built_and_what_it_does_is_reported(tmp_path, monkeypatch):
+    monkeypatch.setenv("AWIWI_GEN_CACHE", str(tmp_path / "cache"))
+    seen = []
+    part = awiwi_gen.build(
+        awiwi_gen.Hand.load(ONE_FINGER), only="jaw_tendon_*hs", progress=lambda *words: seen.append(words)
+    )
+
+    assert list(part) == ["jaw_tendon_lengths"]
+    assert seen[0][0] == "derive"
+    assert seen[-1] == ("compile", 1, 1)
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ({"scalar": "f16"}, "build: scalar = 'f16'; expected one of 'f64', 'f32'"),
+        ({"params": "free"}, "build: params = 'free'; expected one of 'baked', 'runtime'"),
+        ({"only": "elbow_*"}, r"--only elbow_\*: no kernel has such a name"),
+    ],
+)
+def test_wrong_arguments_of_build_are_refused(hand, words, message):
+    with pytest.raises(InputError, match=message):
+        awiwi_gen.build(hand, **words)
+    with pytest.raises(InputError, match=r"build: 'hand.toml' is not a hand; expected one from Hand.load"):
+        awiwi_gen.build("hand.toml")
+
+
+def test_the_package_is_typed():
+    assert Path(awiwi_gen.__file__).with_name("py.typed").exists()
+
+
+def test_the_precision_of_other_libraries_is_left_as_it_was(tmp_path):
+    from flint import ctx
+
+    from awiwi_gen.cache import Cache
+    from awiwi_gen.pipeline import Job, generate, verify
+
+    before = ctx.prec
+    try:
+        ctx.prec = 77
+        job = Job(awiwi_gen.Hand.load(ONE_FINGER), only="jaw_tendon_lengths", store=Cache(tmp_path / "cache"))
+        generate(job, tmp_path / "c")
+        assert verify(job, tmp_path / "c").passed
+        assert ctx.prec == 77
+    finally:
+        ctx.prec = before
 
 
 # ------------------------------------------------------------------------------------------------- single precision
@@ -280,6 +410,9 @@ def test_a_kernel_explains_itself(lib):
         "Source: eq. 2.17, 5.4.",
     ]  # fmt: skip
     assert repr(function) == "<kernel index_mass_matrix: q(4) [rad] -> M(4, 4) [kg m^2]>"
+    assert str(inspect.signature(function)) == "(q, *, out=None)"
+    assert str(inspect.signature(lib.index_gravity)) == "(q, g, *, out=None)"
+    assert function.__name__ == "index_mass_matrix"
     assert function.cost["mul"] > 0
     assert function.inputs[0]["low"] == pytest.approx(np.deg2rad([-20, -10, -5, -5]))
 
@@ -288,7 +421,11 @@ def test_a_library_is_a_mapping_of_its_kernels(lib):
     assert lib["index_mass_matrix"] is lib.index_mass_matrix
     assert "index_mass_matrix" in dir(lib)
     assert len(lib) == len(list(lib)) == len(lib.manifest["kernels"])
-    with pytest.raises(AttributeError, match="this hand has no kernel 'index_mass'"):
+    assert repr(lib) == f"<library {lib.manifest['hand']}: {len(lib)} kernels, double, model {lib.digest[:12]}>"
+    with pytest.raises(KeyError, match="did you mean index_mass_matrix"):
+        _ = lib["index_mas_matrix"]
+    assert "index_mass" not in lib
+    with pytest.raises(AttributeError, match="this hand has no kernel 'index_mass'; did you mean .*index_mass_matrix"):
         _ = lib.index_mass
 
 

@@ -1,9 +1,12 @@
-"""The generated directory: what is the matter with it is told, nothing of others is touched, no kill leaves a mix."""
+"""The generated directory: its state is described, files of others are never touched, no kill leaves a mix."""
 
 from __future__ import annotations
 
+import ctypes
+import errno
 import json
 import multiprocessing
+import os
 import time
 from multiprocessing.process import BaseProcess
 from multiprocessing.synchronize import Event
@@ -12,7 +15,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from awiwi_gen.emit.tree import MANIFEST, State, inspect, install, require_place, sha256, sweep
+from awiwi_gen.emit import exchange
+from awiwi_gen.emit.exchange import MANIFEST, clear
+from awiwi_gen.emit.tree import State, inspect, install, read_manifest, require_place, sealed, sha256
 from awiwi_gen.errors import OutputError
 from awiwi_gen.report import state_lines
 
@@ -25,7 +30,7 @@ def version(name: str, count: int = 3, inputs: dict[str, str] = INPUTS) -> dict[
     """A whole generated directory as texts; every file says which version it is of."""
     files = {f"kernel{i}.c": f"/* {name} */\n" + "x" * 1000 for i in range(count)}
     manifest = {"inputs": inputs, "files": {file: sha256(text) for file, text in files.items()}}
-    return {**files, MANIFEST: json.dumps(manifest)}
+    return {**files, MANIFEST: sealed(manifest)}
 
 
 def contents(directory: Path) -> dict[str, str]:
@@ -89,7 +94,7 @@ def test_files_below_a_directory_are_known_by_their_places(tmp_path):
     tree = tmp_path / "generated"
     texts = {"a.c": "a", "batches/a.c": "aa", "batches/b.c": "bb", "batches/c.c": "cc"}
     manifest = {"inputs": INPUTS, "files": {name: sha256(text) for name, text in texts.items()}}
-    install(tree, {**texts, MANIFEST: json.dumps(manifest)})
+    install(tree, {**texts, MANIFEST: sealed(manifest)})
     assert inspect(tree, INPUTS) == State()
 
     (tree / "batches" / "a.c").write_text("faster")
@@ -127,13 +132,55 @@ def test_all_that_is_wrong_is_told_at_once(tree):
     )
 
 
-@pytest.mark.parametrize("text", ["", "not json", "[]", '{"files": 3}', "\x00"])
-def test_a_directory_with_an_unreadable_manifest_counts_as_not_generated(tree, text):
-    (tree / MANIFEST).write_text(text)
+@pytest.mark.parametrize(
+    "text", ["", "not json", "[]", '{"files": 3}', "\x00", "[" * 100_000, '{"files": {"thesis.tex": "00"}}', "\ud800"]
+)
+def test_a_manifest_that_is_damaged_or_not_ours_is_refused_and_named(tree, text):
+    (tree / MANIFEST).write_text(text, errors="surrogatepass")
 
-    assert inspect(tree, INPUTS).missing
-    with pytest.raises(OutputError, match="holds files that were not generated"):
-        install(tree, version("new"))
+    for attempt in (lambda: inspect(tree, INPUTS), lambda: install(tree, version("new")), lambda: require_place(tree)):
+        with pytest.raises(OutputError, match=r"manifest.json is damaged or not a manifest of awiwi-gen \("):
+            attempt()
+    assert (tree / "kernel0.c").exists()
+
+
+def test_a_manifest_with_one_changed_character_is_refused(tree):
+    path = tree / MANIFEST
+    path.write_text(path.read_text().replace('"h1"', '"h2"'))
+
+    with pytest.raises(OutputError, match="its own digest does not match"):
+        inspect(tree, INPUTS)
+
+
+@pytest.mark.parametrize("make", [Path.mkdir, os.mkfifo, lambda path: path.symlink_to(path.name)])
+def test_what_is_no_file_is_no_manifest_and_is_not_waited_for(tree, make):
+    (tree / MANIFEST).unlink()
+    make(tree / MANIFEST)
+
+    with pytest.raises(OutputError, match=r"damaged or not a manifest of awiwi-gen \(not a regular file\)"):
+        inspect(tree, INPUTS)
+
+
+def test_a_manifest_of_somebody_else_gives_no_right_to_the_files_it_lists(tmp_path):
+    place = tmp_path / "work"
+    place.mkdir()
+    (place / "thesis.tex").write_text("years of work")
+    listed = {"files": {"thesis.tex": sha256("years of work")}, "inputs": {}, "kernels": []}
+    (place / MANIFEST).write_text(json.dumps(listed))
+    before = contents(place)
+
+    with pytest.raises(OutputError, match="is damaged or not a manifest of awiwi-gen"):
+        install(place, version("new"))
+    assert contents(place) == before
+
+
+def test_a_checkout_with_other_line_ends_is_fresh(tree):
+    for path in tree.iterdir():
+        path.write_bytes(path.read_bytes().replace(b"\n", b"\r\n"))
+
+    assert inspect(tree, INPUTS) == State()
+    (tree / "kernel1.c").write_text("/* faster! */\r\n")
+    assert inspect(tree, INPUTS) == State(edited=("kernel1.c",))
 
 
 # ------------------------------------------------------------------------------------------------- what is refused
@@ -178,8 +225,55 @@ def test_a_place_that_cannot_be_written_is_named(tmp_path, monkeypatch, place):
     for attempt in (lambda: install(Path(place), version("new")), lambda: require_place(Path(place))):
         with pytest.raises(OutputError, match=r"generated cannot be written: .*; choose another place with -o"):
             attempt()
-    sweep(Path(place))
+    clear(Path(place))
     assert contents(tmp_path) == {"file": "a file"}
+
+
+def loop_of_links(place: Path) -> Path:
+    (place / "a").symlink_to("b")
+    (place / "b").symlink_to("a")
+    return place / "a" / "generated"
+
+
+@pytest.mark.parametrize(
+    ("place", "words"),
+    [
+        (lambda _: Path("/"), "is the root of the file system"),
+        (lambda tmp: tmp / ("n" * 300), "cannot be written: file name too long"),
+        (lambda tmp: tmp / ("n" * 300) / "generated", "cannot be written: file name too long"),
+        (loop_of_links, "cannot be written: symlink loop|cannot be written: too many levels of symbolic links"),
+        (lambda _: Path("/dev/null"), "is a file; expected a directory"),
+    ],
+)
+def test_a_place_that_cannot_be_is_refused_in_one_sentence(tmp_path, place, words):
+    directory = place(tmp_path)
+
+    for attempt in (lambda: install(directory, version("new")), lambda: require_place(directory)):
+        with pytest.raises(OutputError, match=words) as caught:
+            attempt()
+        assert len(str(caught.value).splitlines()) == 1
+
+
+def test_the_whole_file_system_is_not_searched_for_foreign_files(tmp_path):
+    for number in range(50):
+        (tmp_path / f"folder{number}" / "below").mkdir(parents=True)
+
+    assert inspect(tmp_path, INPUTS).foreign == tuple(sorted(f"folder{number}" for number in range(50)))
+
+
+def test_what_is_written_into_the_old_directory_during_the_exchange_is_not_lost(tree, monkeypatch):
+    swap = exchange.exchange
+
+    def slow(a, b):
+        (b / "notes.txt").write_text("mine")
+        monkeypatch.setattr(exchange, "exchange", swap)
+        return swap(a, b)
+
+    monkeypatch.setattr(exchange, "exchange", slow)
+    with pytest.raises(OutputError, match=r"holds files that were not generated \(notes.txt\)"):
+        install(tree, version("new"))
+    assert contents(tree) == version("old") | {"notes.txt": "mine"}
+    assert litter(tree) == []
 
 
 def test_a_disk_that_fills_up_changes_nothing(tree, monkeypatch):
@@ -220,16 +314,94 @@ def test_a_link_to_a_directory_stays_a_link(tree, tmp_path):
     assert contents(tree) == version("new")
 
 
-def test_where_directories_cannot_be_swapped_in_one_step_two_renames_do(tree, monkeypatch):
-    monkeypatch.setattr("ctypes.CDLL", lambda *_, **__: object())
+NOT_SWAPPED = [errno.EXDEV, errno.EBUSY, errno.EINVAL, errno.ENOSYS]
+
+
+@pytest.fixture(params=NOT_SWAPPED, ids=errno.errorcode.get)
+def unswappable(request, monkeypatch):
+    """A place where the kernel refuses to rename and to swap directories that are there already."""
+    refuse_swaps(request.param, monkeypatch.setattr)
+
+
+def refuse_swaps(code: int, setattr_=setattr) -> None:
+    rename = Path.rename
+
+    class Refusing:
+        @staticmethod
+        def renameat2(*_):
+            ctypes.set_errno(code)
+            return -1
+
+    def renamed(path, target):
+        if Path(target).name == "generated":
+            raise OSError(code, "refused")
+        return rename(path, target)
+
+    setattr_(ctypes, "CDLL", lambda *_, **__: Refusing)
+    setattr_(Path, "rename", renamed)
+
+
+@pytest.mark.usefixtures("unswappable")
+def test_where_directories_cannot_be_swapped_files_are_moved_one_by_one(tree):
+    install(tree, version("new", count=2))
+
+    assert contents(tree) == version("new", count=2)
+    assert litter(tree) == []
+
+
+@pytest.mark.usefixtures("unswappable")
+def test_a_mount_point_takes_files_of_another_file_system(tree, monkeypatch):
+    move = os.replace
+
+    def across(source, target):
+        if Path(source).parent != Path(target).parent:
+            raise OSError(errno.EXDEV, "Invalid cross-device link")
+        move(source, target)
+
+    monkeypatch.setattr(os, "replace", across)
     install(tree, version("new"))
 
     assert contents(tree) == version("new")
     assert litter(tree) == []
 
 
+@pytest.mark.usefixtures("unswappable")
+@pytest.mark.parametrize("moved", range(MANY + 3))
+def test_the_next_reader_finishes_an_interrupted_move(tree, monkeypatch, moved):
+    move, count = exchange._move_file, iter(range(1000))
+
+    def interrupted(source, target):
+        if next(count) == moved:
+            raise KeyboardInterrupt
+        move(source, target)
+
+    monkeypatch.setattr(exchange, "_move_file", interrupted)
+    new = version("new", MANY)
+    if moved <= MANY:
+        with pytest.raises(KeyboardInterrupt):
+            install(tree, new)
+    else:
+        install(tree, new)
+    monkeypatch.setattr(exchange, "_move_file", move)
+
+    assert read_manifest(tree) == json.loads(new[MANIFEST])
+    assert contents(tree) == new
+    assert litter(tree) == []
+
+
+def test_a_foreign_directory_with_the_name_of_ours_is_left_alone(tree):
+    foreign = tree.parent / ".generated-complete"
+    foreign.mkdir()
+    (foreign / "thesis.tex").write_text("years of work")
+    (foreign / MANIFEST).write_text('{"files": {}}')
+
+    with pytest.raises(OutputError, match=r"\.generated-complete/manifest\.json is damaged or not a manifest"):
+        read_manifest(tree)
+    assert (foreign / "thesis.tex").read_text() == "years of work"
+
+
 def test_line_ends_are_the_same_on_every_system(tree):
-    install(tree, {"a.c": "one\ntwo\n"} | {MANIFEST: '{"files": {"a.c": ""}}'})
+    install(tree, {"a.c": "one\ntwo\n", MANIFEST: sealed({"files": {"a.c": ""}})})
 
     assert (tree / "a.c").read_bytes() == b"one\ntwo\n"
 
@@ -240,8 +412,10 @@ FORKING = multiprocessing.get_context("forkserver")  # processes that need not i
 FORKING.set_forkserver_preload(["pytest", "awiwi_gen.emit.tree", "awiwi_gen.report"])
 
 
-def loop(tree: Path, ready: Event) -> None:
+def loop(tree: Path, ready: Event, swappable: bool) -> None:
     """Replace a directory again and again, until killed."""
+    if not swappable:
+        refuse_swaps(errno.EXDEV)
     old, new = version("old", MANY), version("new", MANY)
     ready.set()
     while True:
@@ -249,9 +423,9 @@ def loop(tree: Path, ready: Event) -> None:
         install(tree, old)
 
 
-def looping(tree: Path) -> BaseProcess:
+def looping(tree: Path, swappable: bool = True) -> BaseProcess:
     ready = FORKING.Event()
-    process = FORKING.Process(target=loop, args=(tree, ready), daemon=True)
+    process = FORKING.Process(target=loop, args=(tree, ready, swappable), daemon=True)
     process.start()
     assert ready.wait(30)
     return process
@@ -262,20 +436,22 @@ def kill(process: BaseProcess) -> None:
     process.join()
 
 
-def test_killed_at_any_moment_the_directory_is_the_old_one_or_the_new_one(tree):
+@pytest.mark.parametrize("swappable", [True, False])
+def test_killed_at_any_moment_the_directory_is_the_old_one_or_the_new_one(tree, swappable):
     start = time.perf_counter()
     install(tree, version("old", MANY))
     once = time.perf_counter() - start
     found, left = set(), 0
-    for moment in np.random.default_rng(7).uniform(0, 4 * once, 50):
-        process = looping(tree)
+    for moment in np.random.default_rng(7).uniform(0, (4 if swappable else 16) * once, 50 if swappable else 25):
+        process = looping(tree, swappable)
         time.sleep(moment)
         kill(process)
+        read_manifest(tree)  # as every reader does first
         now = contents(tree)
         assert now in (version("old", MANY), version("new", MANY))
         found.add(now["kernel0.c"][3:6])
         left += len(litter(tree))
-    sweep(tree)
+    clear(tree)
 
     assert found == {"old", "new"}
     assert left > 0, "no kill was ever in the middle of a run: the test tests nothing"
@@ -283,7 +459,7 @@ def test_killed_at_any_moment_the_directory_is_the_old_one_or_the_new_one(tree):
 
 
 def test_the_next_run_clears_what_a_killed_one_left(tree):
-    for name in (".generated-unfinished-abc12_xy", ".generated-unfinished-abcdefgh-old"):
+    for name in (".generated-unfinished-abc12_xy", ".generated-unfinished-0123abcd"):
         (tree.parent / name).mkdir()
         (tree.parent / name / "kernel0.c").write_text("half a ker")
     install(tree, version("new"))
@@ -296,12 +472,12 @@ def test_a_living_run_is_not_disturbed(tree):
     try:
         end = time.monotonic() + 2
         while time.monotonic() < end:
-            sweep(tree)
+            clear(tree)
         assert [process.is_alive() for process in processes] == [True, True]
     finally:
         for process in processes:
             kill(process)
-    sweep(tree)
+    clear(tree)
 
     assert contents(tree) in (version("old", MANY), version("new", MANY))
     assert litter(tree) == []
@@ -312,6 +488,6 @@ def test_a_living_run_is_not_disturbed(tree):
 )
 def test_directories_that_only_look_like_litter_stay(tree, name):
     (tree.parent / name).mkdir()
-    sweep(tree)
+    clear(tree)
 
     assert litter(tree) == [name]

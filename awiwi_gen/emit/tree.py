@@ -1,46 +1,77 @@
-"""The generated directory as a whole: is it ours, is it fresh, and how it is replaced in one step."""
+"""The generated directory as a whole: is it ours, is it fresh, and how it is replaced in one step.
+
+A directory is ours if its manifest carries a digest over itself; the files it lists are ours, everything else in the
+directory belongs to somebody else and is never touched.
+"""
 
 from __future__ import annotations
 
-import ctypes
-import errno
-import fcntl
 import hashlib
 import json
 import os
-import re
 import shutil
-import tempfile
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from awiwi_gen.emit.exchange import MANIFEST, clear, finish_replacement, replace, staging
 from awiwi_gen.errors import Fault, OutputError
 
-MANIFEST = "manifest.json"
-UNFINISHED = "-unfinished-"  # what a killed run leaves beside `generated` is called .generated-unfinished-...
+OWN_DIGEST = "manifest_digest"
+SHOWN = 5  # names of foreign files in a message
+ELSEWHERE = "choose another place with -o"
 
 
 def sha256(text: str | bytes) -> str:
-    """Hexadecimal SHA-256 of a text."""
-    return hashlib.sha256(text.encode() if isinstance(text, str) else text).hexdigest()
+    """Hexadecimal SHA-256 of a text; CRLF counts as LF, for a checkout may have converted it."""
+    data = text.encode() if isinstance(text, str) else text
+    return hashlib.sha256(data.replace(b"\r\n", b"\n")).hexdigest()
+
+
+def sealed(manifest: Mapping[str, Any]) -> str:
+    """The text of a manifest with a digest over itself, which proves that it is ours."""
+    return json.dumps({**manifest, OWN_DIGEST: _own_digest(manifest)}, indent=1, ensure_ascii=False) + "\n"
+
+
+def _own_digest(manifest: Mapping[str, Any]) -> str:
+    others = {name: value for name, value in manifest.items() if name != OWN_DIGEST}
+    return sha256("awiwi_gen " + json.dumps(others, sort_keys=True))
 
 
 def read_manifest(directory: Path) -> dict[str, Any] | None:
-    """The manifest of a generated directory; None if there is none that can be read."""
-    try:
-        manifest = json.loads((directory / MANIFEST).read_text(encoding="utf-8"))
-        return manifest if isinstance(manifest, dict) and isinstance(manifest.get("files"), dict) else None
-    except (OSError, ValueError):
+    """The manifest of a generated directory; None if there is none.
+
+    Completes a replacement that was interrupted. Raises OutputError if the manifest is damaged or not ours.
+    """
+    with _worded(directory):
+        finish_replacement(directory, _listed)
+        return _manifest(directory)
+
+
+def _manifest(directory: Path) -> dict[str, Any] | None:
+    path = directory / MANIFEST
+    if not os.path.lexists(path):
         return None
+    try:
+        if not path.is_file():
+            raise ValueError("not a regular file")
+        manifest = json.loads(path.read_text(encoding="utf-8"))
+        if not isinstance(manifest, dict) or manifest.get(OWN_DIGEST) != _own_digest(manifest):
+            raise ValueError("its own digest does not match")
+    except (ValueError, RecursionError) as error:
+        message = (
+            f"is damaged or not a manifest of awiwi-gen ({str(error) or 'too deeply nested'}); "
+            f"if everything in {directory} is generated, delete it and generate again, else {ELSEWHERE}"
+        )
+        raise OutputError(Fault(file=str(path), message=message)) from None
+    return manifest
 
 
-def contents(directory: Path) -> list[str]:
-    """What a directory holds: files in it and below it, and empty directories, by their places."""
-    found = [path for path in directory.rglob("*") if not path.is_dir() or path.is_symlink() or not any(path.iterdir())]
-    return sorted(path.relative_to(directory).as_posix() for path in found)
+def _listed(directory: Path) -> Mapping[str, Any]:
+    """The files that the manifest of a directory lists."""
+    return (_manifest(directory) or {"files": {}})["files"]  # type: ignore[no-any-return]
 
 
 @dataclass(frozen=True)
@@ -61,21 +92,26 @@ class State:
 
 def inspect(directory: Path, inputs: Mapping[str, Any]) -> State:
     """Compare a directory with its manifest, and the manifest's inputs with the present ones."""
-    if not directory.is_dir():
-        return State(missing=True)
-    manifest = read_manifest(directory)
-    present = {*contents(directory)} - {MANIFEST}
-    if manifest is None:
-        return State(missing=True, foreign=tuple(sorted(present)))
-    files = manifest["files"]
-    edited = tuple(sorted(n for n in present & files.keys() if sha256((directory / n).read_bytes()) != files[n]))
-    recorded = manifest.get("inputs", {})
-    return State(
-        edited=edited,
-        lost=tuple(sorted(files.keys() - present)),
-        foreign=tuple(sorted(present - files.keys())),
-        stale=tuple(sorted(key for key in inputs if recorded.get(key) != inputs[key])),
-    )
+    with _worded(directory):
+        if not directory.is_dir():
+            return State(missing=True)
+        manifest = read_manifest(directory)
+        if manifest is None:
+            return State(missing=True, foreign=tuple(_foreign(directory, ())))
+        files = manifest["files"]
+        lost = [name for name in files if not os.path.lexists(directory / name)]
+        edited = [name for name in files if name not in lost and _digest(directory / name) != files[name]]
+        recorded = manifest.get("inputs", {})
+        return State(
+            edited=tuple(sorted(edited)),
+            lost=tuple(sorted(lost)),
+            foreign=tuple(_foreign(directory, files)),
+            stale=tuple(sorted(key for key in inputs if recorded.get(key) != inputs[key])),
+        )
+
+
+def _digest(path: Path) -> str:
+    return sha256(path.read_bytes()) if path.is_file() else ""
 
 
 def install(directory: Path, files: Mapping[str, str]) -> None:
@@ -84,102 +120,77 @@ def install(directory: Path, files: Mapping[str, str]) -> None:
     Killed at any moment, the directory is the old one or the new one. Raises OutputError when it cannot be
     written, or when it holds files that are not ours.
     """
-    directory = directory.resolve()
-    _require_ours(directory)
-    sweep(directory)
-    with _staging(directory) as staging:
-        for name, text in files.items():
-            (staging / name).parent.mkdir(exist_ok=True)
-            (staging / name).write_text(text, encoding="utf-8", newline="\n")
-        staging.chmod(0o755)
-        try:
-            staging.rename(directory)
-        except OSError:  # there is one already
-            exchange(staging, directory)
+    with _worded(directory):
+        directory = directory.resolve()
+        _require_ours(directory)
+        clear(directory)
+        with staging(directory) as new:
+            for name, text in files.items():
+                (new / name).parent.mkdir(exist_ok=True)
+                (new / name).write_text(text, encoding="utf-8", newline="\n")
+            new.chmod(0o755)
+            replace(new, directory, _listed, _require_ours)
 
 
 def require_place(directory: Path) -> None:
     """Raise OutputError where `install` would: before the work, not after it."""
-    _require_ours(directory.resolve())
-    with _staging(directory.resolve()):
-        pass
+    with _worded(directory):
+        directory = directory.resolve()
+        _require_ours(directory)
+        with staging(directory):
+            pass
+
+
+def remove(directory: Path) -> None:
+    """Remove a directory of the cache with all that is in it."""
+    with _worded(directory):
+        if directory.is_dir() and not directory.is_symlink():
+            shutil.rmtree(directory)
+        else:
+            directory.unlink(missing_ok=True)
 
 
 def _require_ours(directory: Path) -> None:
+    """Raise OutputError if a directory holds something that this program did not write."""
+    if directory == Path(directory.anchor):
+        raise OutputError(Fault(file=str(directory), message=f"is the root of the file system; {ELSEWHERE}"))
     if directory.exists() and not directory.is_dir():
         raise OutputError(Fault(file=str(directory), message="is a file; expected a directory"))
-    ours = (read_manifest(directory) or {"files": {}})["files"].keys() | {MANIFEST}
-    foreign = [name for name in contents(directory) if name not in ours]
+    if not directory.exists():
+        return
+    manifest = read_manifest(directory)
+    foreign = _foreign(directory, manifest["files"] if manifest else ())
     if foreign:
-        names = ", ".join(sorted(foreign)[:5])
-        mend = "move them away, or choose another place with -o"
-        raise OutputError(Fault(file=str(directory), message=f"holds files that were not generated ({names}); {mend}"))
+        names = ", ".join(foreign[:SHOWN]) + ", ..." * (len(foreign) > SHOWN)
+        message = f"holds files that were not generated ({names}); move them away, or {ELSEWHERE}"
+        raise OutputError(Fault(file=str(directory), message=message))
+
+
+def _foreign(directory: Path, ours: Collection[str]) -> list[str]:
+    """Files that are not ours, and folders in which nothing is ours, by their paths in the directory."""
+    known = {*ours, MANIFEST} if ours else set()
+    folders = {parent.as_posix() for name in known for parent in Path(name).parents}
+
+    def walk(folder: Path, prefix: str) -> Iterator[str]:
+        with os.scandir(folder) as entries:
+            for entry in entries:
+                name = prefix + entry.name
+                if name in folders and entry.is_dir(follow_symlinks=False):
+                    yield from walk(Path(entry.path), f"{name}/")
+                elif name not in known or entry.is_dir(follow_symlinks=False):
+                    yield name
+
+    return sorted(walk(directory, ""))
 
 
 @contextmanager
-def _staging(directory: Path) -> Iterator[Path]:
-    """A new directory beside the given one, locked as long as this process lives, and removed in the end."""
-    handle: int | None = None
+def _worded(directory: Path) -> Iterator[None]:
+    """Errors of the operating system as one sentence."""
     try:
-        directory.parent.mkdir(parents=True, exist_ok=True)
-        while handle is None:  # until it is locked before another run sweeps it
-            staging = Path(tempfile.mkdtemp(prefix=f".{directory.name}{UNFINISHED}", dir=directory.parent))
-            handle = _locked(staging, or_unlockable=True)
-        try:
-            yield staging
-        finally:
-            shutil.rmtree(staging, ignore_errors=True)
-            os.close(handle)
-    except OSError as error:
-        message = f"cannot be written: {(error.strerror or str(error)).lower()}; choose another place with -o"
+        yield
+    except (OSError, RuntimeError) as error:  # Path.resolve raises RuntimeError for a loop of links
+        if isinstance(error, OutputError):
+            raise
+        reason = (getattr(error, "strerror", None) or str(error).partition(" from ")[0]).lower()
+        message = f"cannot be written: {reason}; {ELSEWHERE}"
         raise OutputError(Fault(file=str(directory), message=message)) from error
-
-
-def sweep(directory: Path) -> None:
-    """Remove what killed runs left beside a directory; what a living run works on is locked, and stays."""
-    directory = directory.resolve()
-    ours = re.compile(re.escape(f".{directory.name}{UNFINISHED}") + r"\w{8}(-old)?")
-    with suppress(OSError):
-        for path in [path for path in directory.parent.iterdir() if ours.fullmatch(path.name)]:
-            handle = _locked(path)
-            if handle is not None:
-                shutil.rmtree(path, ignore_errors=True)
-                os.close(handle)
-
-
-def _locked(path: Path, or_unlockable: bool = False) -> int | None:
-    """An open handle that holds the lock of a directory and loses it with its process; None if it is not to be had.
-
-    Where the file system has no locks nothing is ever swept, and ``or_unlockable`` gives a handle without one.
-    """
-    try:
-        handle = os.open(path, os.O_RDONLY | os.O_DIRECTORY)
-    except OSError:
-        return None
-    try:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        if path.exists():
-            return handle
-    except BlockingIOError:
-        pass
-    except OSError:
-        if or_unlockable:
-            return handle
-    os.close(handle)
-    return None
-
-
-def exchange(a: Path, b: Path) -> None:
-    """Swap two directories atomically (Linux); elsewhere by two renames, the nearest there is."""
-    renameat2 = getattr(ctypes.CDLL(None, use_errno=True), "renameat2", None)
-    at_fdcwd, rename_exchange = -100, 2
-    if renameat2 is not None:
-        if renameat2(at_fdcwd, os.fsencode(a), at_fdcwd, os.fsencode(b), rename_exchange) == 0:
-            return
-        code = ctypes.get_errno()
-        if code not in (errno.ENOSYS, errno.EINVAL):
-            raise OSError(code, os.strerror(code), str(b))
-    spare = a.with_name(a.name + "-old")
-    b.rename(spare)
-    a.rename(b)
-    spare.rename(a)
