@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from awiwi_gen.cache import Cache, code_digest, key, libraries
+from awiwi_gen.emit.names import require_names
 from awiwi_gen.emit.options import Options
 from awiwi_gen.emit.tree import MANIFEST, State, contents, inspect, install, require_place, sha256, sweep
 from awiwi_gen.errors import InputError
@@ -146,6 +147,7 @@ def generate(job: Job, directory: Path) -> bool:
     if state(job, directory).fresh:
         return False
     require_place(directory)
+    require_names(job.hand.prefix, job.catalog)
     from awiwi_gen.budget import BUDGET, budget_text, require_budget
     from awiwi_gen.emit.batch import batch_files
     from awiwi_gen.emit.files import shared_files
