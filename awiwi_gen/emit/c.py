@@ -17,7 +17,7 @@ from awiwi_gen.emit.options import Options
 from awiwi_gen.ir.cost import Cost, cost
 from awiwi_gen.ir.elementary import OWN
 from awiwi_gen.ir.graph import LEAVES, Graph, Node, Ref, node_of, operands
-from awiwi_gen.ir.passes.rounds import angle_groups
+from awiwi_gen.ir.passes.sincos_groups import angle_groups
 from awiwi_gen.kernel import GUARDS
 
 SPARSE = 64  # an output with at least so many zeros is cleared by memset

@@ -110,16 +110,7 @@ def shared_files(
         f".{identifier(path)} = {options.literal(quantity.value)}, /* {quantity.text} */"
         for path, quantity in quantities.items()
     ]
-    return {
-        "math_constants.h": math_constants(options),
-        "real.h": render(
-            "real.h.j2",
-            banner=banner(),
-            c_type=options.c_type,
-            bits=options.bits,
-            largest=options.literal(Fraction(float(np.finfo(options.dtype).max))),
-            epsilon=options.literal(Fraction(float(np.finfo(options.dtype).eps))),
-        ),
+    return scalar_files(options) | {
         "kernels.h": render(
             "kernels.h.j2",
             banner=banner(),
@@ -131,6 +122,22 @@ def shared_files(
         ),
         "model.c": render(
             "model.c.j2", banner=banner(), prefix=prefix, digest=digest, values=values if runtime else []
+        ),
+    }
+
+
+def scalar_files(options: Options) -> dict[str, str]:
+    """The headers that depend on the scalar type only; csrc needs no others."""
+    limits = np.finfo(options.dtype)
+    return {
+        "math_constants.h": math_constants(options),
+        "real.h": render(
+            "real.h.j2",
+            banner=banner(),
+            c_type=options.c_type,
+            bits=options.bits,
+            largest=options.literal(Fraction(float(limits.max))),
+            epsilon=options.literal(Fraction(float(limits.eps))),
         ),
     }
 
