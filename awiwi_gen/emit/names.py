@@ -21,7 +21,7 @@ SIGNIFICANT = 63  # characters of an external name that today's toolchains tell 
 C99_SIGNIFICANT = 31  # and those that C99 guarantees
 LONGEST_PORT = 48  # leaves room for the suffixes of batch loops within 63 characters
 PORT = re.compile(r"[A-Za-z](_?[A-Za-z0-9])*")
-KERNEL = re.compile(r"[a-z](_?[A-Za-z0-9])*")
+KERNEL = PORT
 
 # Keywords and standard names of C and C++ with an underscore inside: a prefix and a kernel's name could spell one.
 STANDARD = """
@@ -97,7 +97,7 @@ def require_names(prefix: str, kernels: Iterable[Kernel]) -> None:
         who = f"kernel {kernel.name!r}"
         name = function_name(prefix, kernel.name)
         if not KERNEL.fullmatch(kernel.name):
-            faults.append(f"{who}: not a usable name; expected a-z, then letters, digits and single underscores")
+            faults.append(f"{who}: not a usable name; expected a letter, then letters, digits and single underscores")
             continue
         if owner := taken.get(name):
             faults.append(f"{who}: its C name {name} is taken by {owner}; choose another kernel name or prefix")
