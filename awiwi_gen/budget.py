@@ -1,6 +1,6 @@
-"""What kernels may cost: counts of operations after every pass, committed beside the generated code.
+"""Cost budgets: operation counts after every pass, committed beside the generated code.
 
-Counts do not drift as clocks do, so a run that makes a kernel dearer is refused until somebody accepts it.
+Counts do not drift as clocks do, so a run that makes a kernel more expensive is refused until somebody accepts it.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ Steps = Sequence[Sequence[Any]]  # a pass, operations and weight of the graph af
 
 
 def budget_text(kernels: Iterable[Kernel], records: Mapping[str, Record], options: Any) -> str:
-    """The budget file: for each kernel what its part is like, and its operations and weight after each pass."""
+    """The budget file: for each kernel the digest of its structure, and its operations and weight after each pass."""
     rows = []
     for kernel in kernels:
         kind = key(kernel.structure, options)[:16]
@@ -34,7 +34,7 @@ def budget_text(kernels: Iterable[Kernel], records: Mapping[str, Record], option
 
 
 def require_budget(directory: Path, text: str) -> None:
-    """Hold new costs against the budget in a directory, if there is one.
+    """Compare new costs with the budget in a directory, if there is one.
 
     Kernels are compared where the structure of their part and the options are the same. Raises BudgetError with all
     kernels that cost more.
@@ -50,8 +50,10 @@ def require_budget(directory: Path, text: str) -> None:
         for sentence in excess(old[name]["steps"], row["steps"])
     ]
     if excesses:
-        mend = f"mend what made them dearer, or accept it with --accept-cost ({directory / BUDGET} is the budget)"
-        raise BudgetError("\n".join([*excesses, mend]))
+        fix = (
+            f"undo what made them more expensive, or accept it with --accept-cost (the budget is {directory / BUDGET})"
+        )
+        raise BudgetError("\n".join([*excesses, fix]))
 
 
 def excess(old: Steps, new: Steps) -> list[str]:
@@ -69,9 +71,9 @@ def excess(old: Steps, new: Steps) -> list[str]:
 
 
 def removals(steps: Steps, measure: int) -> dict[str, int]:
-    """What each pass takes away, all its turns together: of operations (1) or of weight (-1).
+    """What each pass removes in all its runs: operations (1) or weight (-1).
 
-    The first step is where the passes start from; it takes away less than nothing.
+    The first step is the derivation itself; its entry is negative.
     """
     result = {steps[0][0]: -steps[0][measure]}
     for last, step in pairwise(steps):

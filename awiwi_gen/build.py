@@ -23,6 +23,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from awiwi_gen.cache import Cache, key
 from awiwi_gen.compiler import bindings, compiler, native
+from awiwi_gen.emit.names import input_name, output_name
+from awiwi_gen.emit.options import GCC_FLAGS, VECTOR_FLAGS
 from awiwi_gen.emit.tree import read_manifest
 from awiwi_gen.errors import BuildError, InputError, OutputError
 from awiwi_gen.resources import CSRC
@@ -35,9 +37,8 @@ WARNINGS = ("-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wdouble-promotio
 FLAGS = ("-std=c99", "-O2", "-fPIC", "-ffp-contract=off", *WARNINGS)
 GLUE_FLAGS = ("-O0", "-fPIC", "-w")  # cffi's wrapper is long and runs once a call; only the loops are optimised
 OPTIMISED = '#pragma GCC push_options\n#pragma GCC optimize ("O1")\n{}\n#pragma GCC pop_options\n'
-BATCH_FLAGS = ("-std=c99", "-O3", "-fPIC", "-w", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math")
-GCC_FLAGS = ("-fschedule-insns", "-fsched-pressure", "-fno-tree-loop-distribute-patterns")  # for long straight loops
-UNFUSED = (("-mno-fma",), ("-mno-fma", "-mno-avx512f"))  # x86 without fused instructions; AVX-512 has them built in
+BATCH_FLAGS = (*VECTOR_FLAGS, "-fPIC", "-w")
+UNFUSED = (("-mno-fma",), ("-mno-fma", "-mno-avx512f"))  # x86 without the instructions, in AVX-512 they are built in
 FUSED = re.compile(r"\b(v?fn?m(add|sub|la|ls|acc|sac)|xvn?m(add|sub)|vfm[as])\w*")
 
 
@@ -220,29 +221,30 @@ def _glue_source(manifest: dict[str, Any], declared: str) -> str:
     loops, prototypes = [], []
     scalar, prefix = manifest["c_type"], manifest["prefix"]
     if any(entry["params"] for entry in manifest["kernels"]):
-        head = f"const {prefix}_params *default_params(void)"
+        head = f"const {prefix}_params *DefaultParams(void)"
         prototypes.append(f"{head};")
         loops.append(f"static {head} {{ return &{prefix}_default_params; }}")
     for entry in manifest["kernels"]:
-        sizes = {p["name"]: prod(p["shape"]) for p in entry["inputs"] + entry["outputs"]}
-        inputs, outputs = ([p["name"] for p in entry[side]] for side in ("inputs", "outputs"))
-        signature = [f"const {scalar} *{n}, ptrdiff_t step_{n}" for n in inputs]
+        inputs = [input_name(p["name"]) for p in entry["inputs"]]
+        sizes = {output_name(p["name"]): prod(p["shape"]) for p in entry["outputs"]}
+        outputs = list(sizes)
+        signature = [f"const {scalar} *{n}, ptrdiff_t {n}_step" for n in inputs]
         signature += [f"{scalar} *{n}" for n in outputs]
-        call = [f"{n} + i*step_{n}" for n in inputs] + [f"{n} + i*{sizes[n]}" for n in outputs]
+        call = [f"{n} + i*{n}_step" for n in inputs] + [f"{n} + i*{sizes[n]}" for n in outputs]
         if entry["status"]:
             signature.append("int *status")
         if entry["params"]:
             signature.insert(0, f"const {prefix}_params *p")
             call.insert(0, "p")
-        head = f"void batch_{entry['name']}(ptrdiff_t n, {', '.join(signature)})"
+        head = f"void Batch_{entry['name']}(ptrdiff_t n, {', '.join(signature)})"
         prototypes.append(f"{head};")
         keep = "status[i] = " if entry["status"] else ""
         body = f"for (ptrdiff_t i = 0; i < n; i++) {keep}{prefix}_{entry['name']}({', '.join(call)});"
         loops.append(f"static {head} {{ {body} }}")
         loops.append(_flat_source(entry, prefix, scalar))
-    table = ", ".join(f"flat_{entry['name']}" for entry in manifest["kernels"])
-    prototypes.append("extern awiwi_flat flat_kernels[];")
-    loops.append(f"static awiwi_flat flat_kernels[] = {{ {table} }};")
+    table = ", ".join(f"Flat_{entry['name']}" for entry in manifest["kernels"])
+    prototypes.append("extern awiwi_flat FlatKernels[];")
+    loops.append(f"static awiwi_flat FlatKernels[] = {{ {table} }};")
     return json.dumps({"declared": declared, "prototypes": prototypes, "loops": loops})
 
 
@@ -255,7 +257,7 @@ def _flat_source(entry: dict[str, Any], prefix: str, scalar: str) -> str:
             arguments.append(f"{array} + {place}")
             place += prod(port["shape"])
     call = f"{prefix}_{entry['name']}({', '.join(arguments)});"
-    head = f"static int flat_{entry['name']}(const {scalar} *in, {scalar} *out)"
+    head = f"static int Flat_{entry['name']}(const {scalar} *in, {scalar} *out)"
     return f"{head} {{ return {call} }}" if entry["status"] else f"{head} {{ {call} return 0; }}"
 
 

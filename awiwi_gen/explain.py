@@ -44,14 +44,19 @@ def mathematics(definition: Graph) -> list[str]:
     """The definition with the hand's numbers by name, as assignments; long ones end in an ellipsis."""
     graph = optimise(definition)[-1][1]
     lines = [
-        line.removeprefix("const double ").rstrip(";")
-        for line in Names(graph, Options(math="libm"), "", "").statements()
+        line.removeprefix("const double ").rstrip(";") for line in Names(graph, Options(math="libm"), "").statements()
     ]
     return lines if len(lines) <= MOST_LINES else [*lines[:MOST_LINES], f"... and {len(lines) - MOST_LINES} more lines"]
 
 
 class Names(Printer):
-    """Prints numbers of the hand by their path in the hand file."""
+    """Prints numbers of the hand by their path in the hand file, and ports by their own names."""
+
+    def input_element(self, port: str, element: int) -> str:
+        """``q[2]``."""
+        return f"{port}[{element}]"
+
+    output_element = input_element
 
     def parameter(self, path: str) -> str:
         """``links[1].mass`` as it stands in the file."""

@@ -320,9 +320,9 @@ class Library(Mapping[str, KernelFunction]):
         self._vectorised = vectorised
         self._kernels = {}
         for place, entry in enumerate(manifest["kernels"]):
-            params = lib.default_params() if entry["params"] else None
-            loop = getattr(lib, f"batch_{entry['name']}")
-            self._kernels[entry["name"]] = KernelFunction(entry, self, loop, lib.flat_kernels[place], params)
+            params = lib.DefaultParams() if entry["params"] else None
+            loop = getattr(lib, f"Batch_{entry['name']}")
+            self._kernels[entry["name"]] = KernelFunction(entry, self, loop, lib.FlatKernels[place], params)
 
     def pointer(self, array: Array) -> Any:
         """Where an array's first element is; the array must outlive the pointer."""

@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any
 from awiwi_gen import parallel, tasks
 from awiwi_gen.cache import Cache, code_digest, key, libraries
 from awiwi_gen.emit.exchange import MANIFEST, clear
+from awiwi_gen.emit.names import require_names
 from awiwi_gen.emit.options import Options
 from awiwi_gen.emit.tree import (
     ELSEWHERE,
@@ -113,6 +114,7 @@ def generate(job: Job, directory: Path) -> bool:
     job = _with_the_rest(job, found, directory)
     job.store.require_writable()
     require_place(directory)
+    require_names(job.hand.prefix, job.catalog)
     install(directory, emit(job, job.records, directory))
     return True
 

@@ -1,4 +1,5 @@
 /* Small dense linear algebra: products, elimination with row exchanges. */
+#include "numerics.h"
 #include "dense.h"
 
 awiwi_real awiwi_dot(const awiwi_real *a, const awiwi_real *b, int n)

@@ -8,6 +8,8 @@
    F(c2) = c2^2 + 2 - g2 - 2 c1 c3 = 0. F is convex; its largest zero is the stable factor; and since c1 c3 is at most
    (t c3^2 + c1^2/t)/2, a zero of a parabola bounds it from above for any t > 0, closely if t is near c1/c3. From there
    Newton's method comes down without fail. A last gain only says where to start. */
+#include "numerics.h"
+
 #include <tgmath.h>
 
 #include "awiwi_regulators.h"

@@ -1,4 +1,5 @@
 /* Bounded least squares: joint angles from measured tendon lengths, eq. 5.14 and 5.24. */
+#include "numerics.h"
 #include "awiwi_solvers.h"
 #include "dense.h"
 

@@ -1,4 +1,6 @@
 /* What can be said of the poles of up to four states without finding them. */
+#include "numerics.h"
+
 #include <tgmath.h>
 
 #include "dense.h"

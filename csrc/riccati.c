@@ -1,6 +1,8 @@
 /* The algebraic Riccati equation S A + A'S - S b b'S/R + Q = 0 of one input (eq. 13.5), by structure-preserving
    doubling: a Cayley transform makes it a discrete one, whose closed loop is squared until it vanishes. Then Newton's
    method, after Kleinman, from residuals with twice the digits: so gains are right to the last one. */
+#include "numerics.h"
+
 #include <tgmath.h>
 
 #include "awiwi_regulators.h"

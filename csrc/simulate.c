@@ -1,4 +1,5 @@
 /* Sampled loops of kernels: what a law does on a real clock. */
+#include "numerics.h"
 #include "awiwi_simulate.h"
 
 #include <stdint.h>

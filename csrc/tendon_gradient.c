@@ -2,6 +2,7 @@
 
    Printed, the gradient is that of the last trial, taken or not, while the search stands elsewhere. Here both move
    together. A step along the projected gradient is one of alpha in an orthonormal null space of P'. */
+#include "numerics.h"
 #include "awiwi_distribution.h"
 #include "dense.h"
 

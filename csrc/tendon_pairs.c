@@ -3,6 +3,7 @@
    A pair of opposite couplings p, -p gives the torque -p (f1 - f2) and the stiffness (k1 + k2) p p'. So the torque
    tells all differences of forces; what is left is one number for each pair, on which k1 + k2 grows. The stiffness is
    linear in these sums and the limits are a box for them: a convex problem of two sums, for pairs that share joints. */
+#include "numerics.h"
 #include "awiwi_distribution.h"
 #include "dense.h"
 

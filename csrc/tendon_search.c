@@ -3,6 +3,7 @@
    First the torque: forces within the limits with the least |tau + P' f|. Then the stiffness, in the moves that keep
    the torque. Tendons at a limit are held there until the slope of the cost says that they should leave; all others
    share a Newton step that is cut where the first of them reaches a limit. So every iterate keeps both. */
+#include "numerics.h"
 #include "awiwi_distribution.h"
 #include "dense.h"
 

@@ -12,16 +12,17 @@
  * Cost: 20 add, 12 mul.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-void awiwi_antagonistic_feedback(const double x[restrict 6], const double x_des[restrict 6], const double u_des[restrict 2], const double feedback[restrict 12], const double resistance[restrict 2], double tau_m[restrict 2])
+void awiwi_antagonistic_feedback(const double x_in[restrict 6], const double x_des_in[restrict 6], const double u_des_in[restrict 2], const double feedback_in[restrict 12], const double resistance_in[restrict 2], double tau_m_out[restrict 2])
 {
-    const double t0 = x[0] - x_des[0];
-    const double t1 = x[1] - x_des[1];
-    const double t2 = x[2] - x_des[2];
-    const double t3 = x[3] - x_des[3];
-    const double t4 = x[4] - x_des[4];
-    const double t5 = x[5] - x_des[5];
-    tau_m[0] = resistance[0] + u_des[0] - feedback[0]*t0 - feedback[1]*t1 - feedback[2]*t2 - feedback[3]*t3 - feedback[4]*t4 - feedback[5]*t5;
-    tau_m[1] = resistance[1] + u_des[1] - feedback[6]*t0 - feedback[7]*t1 - feedback[8]*t2 - feedback[9]*t3 - feedback[10]*t4 - feedback[11]*t5;
+    const double t0 = x_in[0] - x_des_in[0];
+    const double t1 = x_in[1] - x_des_in[1];
+    const double t2 = x_in[2] - x_des_in[2];
+    const double t3 = x_in[3] - x_des_in[3];
+    const double t4 = x_in[4] - x_des_in[4];
+    const double t5 = x_in[5] - x_des_in[5];
+    tau_m_out[0] = resistance_in[0] + u_des_in[0] - feedback_in[0]*t0 - feedback_in[1]*t1 - feedback_in[2]*t2 - feedback_in[3]*t3 - feedback_in[4]*t4 - feedback_in[5]*t5;
+    tau_m_out[1] = resistance_in[1] + u_des_in[1] - feedback_in[6]*t0 - feedback_in[7]*t1 - feedback_in[8]*t2 - feedback_in[9]*t3 - feedback_in[10]*t4 - feedback_in[11]*t5;
 }

@@ -9,16 +9,17 @@
  * Cost: 4 add, 4 mul.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-void awiwi_antagonistic_modes(const double motors[restrict 4], double against[restrict 2], double together[restrict 2])
+void awiwi_antagonistic_modes(const double motors_in[restrict 4], double against_out[restrict 2], double together_out[restrict 2])
 {
-    const double t0 = 0.5*motors[0];
-    const double t1 = 0.5*motors[2];
-    against[0] = t0 - t1;
-    together[0] = t0 + t1;
-    const double t2 = 0.5*motors[1];
-    const double t3 = 0.5*motors[3];
-    against[1] = t2 - t3;
-    together[1] = t2 + t3;
+    const double t0 = 0.5*motors_in[0];
+    const double t1 = 0.5*motors_in[2];
+    against_out[0] = t0 - t1;
+    together_out[0] = t0 + t1;
+    const double t2 = 0.5*motors_in[1];
+    const double t3 = 0.5*motors_in[3];
+    against_out[1] = t2 - t3;
+    together_out[1] = t2 + t3;
 }

@@ -15,29 +15,30 @@
  * Cost: 15 add, 15 mul, 2 div.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-int awiwi_antagonistic_setpoint(const double desired[restrict 5], const double pretension[restrict 3], const double elongations[restrict 2], const double slopes[restrict 2], const double inertias[restrict 3], const double damping[restrict 1], double x_des[restrict 6], double u_des[restrict 2])
+int awiwi_antagonistic_setpoint(const double desired_in[restrict 5], const double pretension_in[restrict 3], const double elongations_in[restrict 2], const double slopes_in[restrict 2], const double inertias_in[restrict 3], const double damping_in[restrict 1], double x_des_out[restrict 6], double u_des_out[restrict 2])
 {
-    x_des[0] = desired[0];
-    x_des[1] = desired[1];
-    const double t0 = 0.5/slopes[0];
-    double s1 = elongations[0] + desired[0];
-    double s2 = elongations[1] - desired[0];
-    const double t3 = -0.5/slopes[1];
-    const double t4 = damping[0]*desired[1] + desired[2]*inertias[0];
+    x_des_out[0] = desired_in[0];
+    x_des_out[1] = desired_in[1];
+    const double t0 = 0.5/slopes_in[0];
+    double s1 = elongations_in[0] + desired_in[0];
+    double s2 = elongations_in[1] - desired_in[0];
+    const double t3 = -0.5/slopes_in[1];
+    const double t4 = damping_in[0]*desired_in[1] + desired_in[2]*inertias_in[0];
     s1 += t4*t0;
-    x_des[2] = s1;
+    x_des_out[2] = s1;
     s2 += t4*t3;
-    x_des[4] = s2;
+    x_des_out[4] = s2;
     const double t5 = 0.5*t4;
-    const double t6 = damping[0]*desired[2] + desired[3]*inertias[0];
-    x_des[3] = desired[1] + t6*t0;
-    x_des[5] = t6*t3 - desired[1];
-    const double t7 = damping[0]*desired[3] + desired[4]*inertias[0];
-    double s8 = inertias[1]*(t7*t0 + desired[2]) + t5;
-    s8 += pretension[0];
-    u_des[0] = s8;
-    u_des[1] = pretension[0] - t5 - inertias[2]*(desired[2] - t7*t3);
-    return slopes[0] > 0.0 && slopes[1] > 0.0 ? 0 : 1;
+    const double t6 = damping_in[0]*desired_in[2] + desired_in[3]*inertias_in[0];
+    x_des_out[3] = desired_in[1] + t6*t0;
+    x_des_out[5] = t6*t3 - desired_in[1];
+    const double t7 = damping_in[0]*desired_in[3] + desired_in[4]*inertias_in[0];
+    double s8 = inertias_in[1]*(t7*t0 + desired_in[2]) + t5;
+    s8 += pretension_in[0];
+    u_des_out[0] = s8;
+    u_des_out[1] = pretension_in[0] - t5 - inertias_in[2]*(desired_in[2] - t7*t3);
+    return slopes_in[0] > 0.0 && slopes_in[1] > 0.0 ? 0 : 1;
 }

@@ -8,11 +8,12 @@
  * Cost: 2 add, 1 mul.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-void awiwi_antagonistic_sharing(const double torque[restrict 1], const double pretension[restrict 3], double shares[restrict 2])
+void awiwi_antagonistic_sharing(const double torque_in[restrict 1], const double pretension_in[restrict 3], double shares_out[restrict 2])
 {
-    const double t0 = 0.5*torque[0];
-    shares[0] = t0 + pretension[0];
-    shares[1] = pretension[0] - t0;
+    const double t0 = 0.5*torque_in[0];
+    shares_out[0] = t0 + pretension_in[0];
+    shares_out[1] = pretension_in[0] - t0;
 }

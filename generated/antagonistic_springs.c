@@ -11,25 +11,26 @@
  * Cost: 12 add, 18 mul, 2 calls.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
+#include "numerics.h"
 #include <math.h>
 #include "kernels.h"
 
-void awiwi_antagonistic_springs(const double stretches[restrict 2], const double speeds[restrict 2], const double tendons[restrict 6], double torques[restrict 4], double springs[restrict 4])
+void awiwi_antagonistic_springs(const double stretches_in[restrict 2], const double speeds_in[restrict 2], const double tendons_in[restrict 6], double torques_out[restrict 4], double springs_out[restrict 4])
 {
-    const double t0 = 0.5*(stretches[0] + fabs(stretches[0]));
-    const double t1 = tendons[2]*t0;
-    const double t2 = 2.0*tendons[1];
-    torques[0] = t0*(t0*(t1 + tendons[1]) + tendons[0]);
-    const double t3 = tendons[0] + t0*(t2 + 3.0*t1);
-    springs[0] = t3;
-    torques[1] = speeds[0]*t3;
-    springs[1] = t2 + 6.0*t1;
-    const double t4 = 0.5*(stretches[1] + fabs(stretches[1]));
-    const double t5 = tendons[5]*t4;
-    const double t6 = 2.0*tendons[4];
-    torques[2] = t4*(t4*(t5 + tendons[4]) + tendons[3]);
-    const double t7 = tendons[3] + t4*(t6 + 3.0*t5);
-    springs[2] = t7;
-    torques[3] = speeds[1]*t7;
-    springs[3] = t6 + 6.0*t5;
+    const double t0 = 0.5*(stretches_in[0] + fabs(stretches_in[0]));
+    const double t1 = tendons_in[2]*t0;
+    const double t2 = 2.0*tendons_in[1];
+    torques_out[0] = t0*(t0*(t1 + tendons_in[1]) + tendons_in[0]);
+    const double t3 = tendons_in[0] + t0*(t2 + 3.0*t1);
+    springs_out[0] = t3;
+    torques_out[1] = speeds_in[0]*t3;
+    springs_out[1] = t2 + 6.0*t1;
+    const double t4 = 0.5*(stretches_in[1] + fabs(stretches_in[1]));
+    const double t5 = tendons_in[5]*t4;
+    const double t6 = 2.0*tendons_in[4];
+    torques_out[2] = t4*(t4*(t5 + tendons_in[4]) + tendons_in[3]);
+    const double t7 = tendons_in[3] + t4*(t6 + 3.0*t5);
+    springs_out[2] = t7;
+    torques_out[3] = speeds_in[1]*t7;
+    springs_out[3] = t6 + 6.0*t5;
 }

@@ -9,13 +9,14 @@
  * Cost: 6 add, 7 mul.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-int awiwi_backstepping_academic(const double x[restrict 2], const double k[restrict 2], double u[restrict 1])
+int awiwi_backstepping_academic(const double x_in[restrict 2], const double k_in[restrict 2], double u_out[restrict 1])
 {
-    const double t0 = x[0]*x[0];
-    const double t1 = x[1] + t0;
-    const double t2 = t1 - x[0]*t0;
-    u[0] = x[0]*(-2.0*t2 - 1.0) - k[0]*t2 - k[1]*(t1 + k[0]*x[0]);
-    return k[0] > 0.0 && k[1] > 0.0 ? 0 : 1;
+    const double t0 = x_in[0]*x_in[0];
+    const double t1 = x_in[1] + t0;
+    const double t2 = t1 - x_in[0]*t0;
+    u_out[0] = x_in[0]*(-2.0*t2 - 1.0) - k_in[0]*t2 - k_in[1]*(t1 + k_in[0]*x_in[0]);
+    return k_in[0] > 0.0 && k_in[1] > 0.0 ? 0 : 1;
 }

@@ -10,15 +10,16 @@
  * Cost: 5 add, 6 mul, 2 neg.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-void awiwi_backstepping_academic_lyapunov(const double x[restrict 2], const double k[restrict 2], double V[restrict 1], double Vdot[restrict 1], double controls[restrict 1])
+void awiwi_backstepping_academic_lyapunov(const double x_in[restrict 2], const double k_in[restrict 2], double V_out[restrict 1], double Vdot_out[restrict 1], double controls_out[restrict 1])
 {
-    const double t0 = x[0]*x[0];
-    const double t1 = k[0]*x[0] + t0;
-    controls[0] = -t1;
-    const double t2 = x[1] + t1;
+    const double t0 = x_in[0]*x_in[0];
+    const double t1 = k_in[0]*x_in[0] + t0;
+    controls_out[0] = -t1;
+    const double t2 = x_in[1] + t1;
     const double t3 = t2*t2;
-    V[0] = 0.5*(t0 + t3);
-    Vdot[0] = -(t0*(k[0] + t0)) - k[1]*t3;
+    V_out[0] = 0.5*(t0 + t3);
+    Vdot_out[0] = -(t0*(k_in[0] + t0)) - k_in[1]*t3;
 }

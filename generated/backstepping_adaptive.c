@@ -24,42 +24,43 @@
  * Cost: 49 add, 37 mul, 7 div.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-int awiwi_backstepping_adaptive(const double joint[restrict 2], const double torques[restrict 4], const double desired[restrict 5], const double pretension[restrict 3], const double external[restrict 2], const double inertias[restrict 3], const double springs[restrict 4], const double damping[restrict 1], const double impedance[restrict 2], const double tunings[restrict 8], const double resistance[restrict 2], double tau_m[restrict 2])
+int awiwi_backstepping_adaptive(const double joint_in[restrict 2], const double torques_in[restrict 4], const double desired_in[restrict 5], const double pretension_in[restrict 3], const double external_in[restrict 2], const double inertias_in[restrict 3], const double springs_in[restrict 4], const double damping_in[restrict 1], const double impedance_in[restrict 2], const double tunings_in[restrict 8], const double resistance_in[restrict 2], double tau_m_out[restrict 2])
 {
-    double s0 = torques[2] - external[0] - torques[0];
-    const double t1 = 1.0/springs[0];
-    double s2 = torques[0] + resistance[0];
-    double s3 = torques[0] - pretension[0];
-    double s4 = torques[2] - pretension[0];
-    double s5 = torques[2] + resistance[1];
-    double s6 = external[1] + torques[1];
-    const double t7 = torques[1]*t1;
-    double s8 = torques[1] - pretension[1];
-    s6 -= torques[3];
-    double s9 = torques[3] - pretension[1];
-    double s10 = springs[1]*(t7*t7) - pretension[2];
-    const double t11 = 1.0/springs[2];
-    const double t12 = torques[3]*t11;
-    double s13 = springs[3]*(t12*t12) - pretension[2];
-    const double t14 = 1.0/inertias[0];
-    double s15 = impedance[0]*(desired[0] - joint[0]) + desired[2]*inertias[0];
-    s0 += damping[0]*joint[1];
+    double s0 = torques_in[2] - external_in[0] - torques_in[0];
+    const double t1 = 1.0/springs_in[0];
+    double s2 = torques_in[0] + resistance_in[0];
+    double s3 = torques_in[0] - pretension_in[0];
+    double s4 = torques_in[2] - pretension_in[0];
+    double s5 = torques_in[2] + resistance_in[1];
+    double s6 = external_in[1] + torques_in[1];
+    const double t7 = torques_in[1]*t1;
+    double s8 = torques_in[1] - pretension_in[1];
+    s6 -= torques_in[3];
+    double s9 = torques_in[3] - pretension_in[1];
+    double s10 = springs_in[1]*(t7*t7) - pretension_in[2];
+    const double t11 = 1.0/springs_in[2];
+    const double t12 = torques_in[3]*t11;
+    double s13 = springs_in[3]*(t12*t12) - pretension_in[2];
+    const double t14 = 1.0/inertias_in[0];
+    double s15 = impedance_in[0]*(desired_in[0] - joint_in[0]) + desired_in[2]*inertias_in[0];
+    s0 += damping_in[0]*joint_in[1];
     const double t16 = t14*s0;
-    const double t17 = desired[2] + t16;
-    s6 += damping[0]*t16;
-    const double t18 = desired[1] - joint[1];
-    s15 += damping[0]*desired[1];
-    double s19 = damping[0]*desired[2] + impedance[0]*t18;
-    double s20 = impedance[0]*t17 + damping[0]*desired[3];
-    s19 += desired[3]*inertias[0];
-    s20 += desired[4]*inertias[0];
-    s20 += impedance[1]*(desired[3] - t14*s6);
-    s15 += impedance[1]*t18;
+    const double t17 = desired_in[2] + t16;
+    s6 += damping_in[0]*t16;
+    const double t18 = desired_in[1] - joint_in[1];
+    s15 += damping_in[0]*desired_in[1];
+    double s19 = damping_in[0]*desired_in[2] + impedance_in[0]*t18;
+    double s20 = impedance_in[0]*t17 + damping_in[0]*desired_in[3];
+    s19 += desired_in[3]*inertias_in[0];
+    s20 += desired_in[4]*inertias_in[0];
+    s20 += impedance_in[1]*(desired_in[3] - t14*s6);
+    s15 += impedance_in[1]*t18;
     const double t21 = 0.5*s15;
     s3 -= t21;
-    s19 += impedance[1]*t17;
+    s19 += impedance_in[1]*t17;
     const double t22 = 0.5*s19;
     s8 -= t22;
     const double t23 = 0.5*s20;
@@ -67,15 +68,15 @@ int awiwi_backstepping_adaptive(const double joint[restrict 2], const double tor
     s4 += t21;
     s9 += t22;
     s13 += t23;
-    s10 -= (t17 + tunings[1]*t18)/tunings[2];
-    s13 += (t17 + tunings[5]*t18)/tunings[6];
-    s10 += (tunings[2]/tunings[3] + tunings[0]*tunings[1])*s3;
-    s10 += (tunings[0] + tunings[1])*s8;
-    s2 -= inertias[1]*(t1*s10 + t16);
-    tau_m[0] = s2;
-    s13 += (tunings[6]/tunings[7] + tunings[4]*tunings[5])*s4;
-    s13 += (tunings[4] + tunings[5])*s9;
-    s5 += inertias[2]*(t16 - t11*s13);
-    tau_m[1] = s5;
-    return inertias[0] > 0.0 && inertias[1] > 0.0 && inertias[2] > 0.0 && springs[0] > 0.0 && springs[2] > 0.0 && impedance[0] > 0.0 && impedance[1] > 0.0 && tunings[0] > 0.0 && tunings[1] > 0.0 && tunings[2] > 0.0 && tunings[3] > 0.0 && tunings[4] > 0.0 && tunings[5] > 0.0 && tunings[6] > 0.0 && tunings[7] > 0.0 ? 0 : 1;
+    s10 -= (t17 + tunings_in[1]*t18)/tunings_in[2];
+    s13 += (t17 + tunings_in[5]*t18)/tunings_in[6];
+    s10 += (tunings_in[2]/tunings_in[3] + tunings_in[0]*tunings_in[1])*s3;
+    s10 += (tunings_in[0] + tunings_in[1])*s8;
+    s2 -= inertias_in[1]*(t1*s10 + t16);
+    tau_m_out[0] = s2;
+    s13 += (tunings_in[6]/tunings_in[7] + tunings_in[4]*tunings_in[5])*s4;
+    s13 += (tunings_in[4] + tunings_in[5])*s9;
+    s5 += inertias_in[2]*(t16 - t11*s13);
+    tau_m_out[1] = s5;
+    return inertias_in[0] > 0.0 && inertias_in[1] > 0.0 && inertias_in[2] > 0.0 && springs_in[0] > 0.0 && springs_in[2] > 0.0 && impedance_in[0] > 0.0 && impedance_in[1] > 0.0 && tunings_in[0] > 0.0 && tunings_in[1] > 0.0 && tunings_in[2] > 0.0 && tunings_in[3] > 0.0 && tunings_in[4] > 0.0 && tunings_in[5] > 0.0 && tunings_in[6] > 0.0 && tunings_in[7] > 0.0 ? 0 : 1;
 }

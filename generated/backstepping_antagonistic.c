@@ -24,46 +24,47 @@
  * Cost: 42 add, 32 mul, 7 div.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-int awiwi_backstepping_antagonistic(const double joint[restrict 2], const double torques[restrict 4], const double desired[restrict 5], const double pretension[restrict 3], const double external[restrict 2], const double inertias[restrict 3], const double springs[restrict 4], const double impedance[restrict 2], const double tunings[restrict 8], double tau_m[restrict 2])
+int awiwi_backstepping_antagonistic(const double joint_in[restrict 2], const double torques_in[restrict 4], const double desired_in[restrict 5], const double pretension_in[restrict 3], const double external_in[restrict 2], const double inertias_in[restrict 3], const double springs_in[restrict 4], const double impedance_in[restrict 2], const double tunings_in[restrict 8], double tau_m_out[restrict 2])
 {
-    const double t0 = 1.0/springs[0];
-    const double t1 = desired[1] - joint[1];
-    double s2 = impedance[0]*(desired[0] - joint[0]) + impedance[1]*t1;
-    double s3 = torques[0] - pretension[0];
-    double s4 = torques[2] - pretension[0];
-    const double t5 = torques[1]*t0;
-    double s6 = torques[1] - pretension[1];
-    double s7 = torques[3] - pretension[1];
-    double s8 = springs[1]*(t5*t5) - pretension[2];
-    const double t9 = 1.0/springs[2];
-    const double t10 = torques[3]*t9;
-    double s11 = springs[3]*(t10*t10) - pretension[2];
-    const double t12 = 1.0/inertias[0];
-    const double t13 = t12*(torques[2] - external[0] - torques[0]);
-    s2 += desired[2]*inertias[0];
+    const double t0 = 1.0/springs_in[0];
+    const double t1 = desired_in[1] - joint_in[1];
+    double s2 = impedance_in[0]*(desired_in[0] - joint_in[0]) + impedance_in[1]*t1;
+    double s3 = torques_in[0] - pretension_in[0];
+    double s4 = torques_in[2] - pretension_in[0];
+    const double t5 = torques_in[1]*t0;
+    double s6 = torques_in[1] - pretension_in[1];
+    double s7 = torques_in[3] - pretension_in[1];
+    double s8 = springs_in[1]*(t5*t5) - pretension_in[2];
+    const double t9 = 1.0/springs_in[2];
+    const double t10 = torques_in[3]*t9;
+    double s11 = springs_in[3]*(t10*t10) - pretension_in[2];
+    const double t12 = 1.0/inertias_in[0];
+    const double t13 = t12*(torques_in[2] - external_in[0] - torques_in[0]);
+    s2 += desired_in[2]*inertias_in[0];
     const double t14 = 0.5*s2;
     s3 -= t14;
-    const double t15 = desired[2] + t13;
-    double s16 = impedance[0]*t1 + impedance[1]*t15;
-    double s17 = impedance[0]*t15 + desired[4]*inertias[0];
-    s16 += desired[3]*inertias[0];
+    const double t15 = desired_in[2] + t13;
+    double s16 = impedance_in[0]*t1 + impedance_in[1]*t15;
+    double s17 = impedance_in[0]*t15 + desired_in[4]*inertias_in[0];
+    s16 += desired_in[3]*inertias_in[0];
     const double t18 = 0.5*s16;
     s6 -= t18;
-    s17 += impedance[1]*(t12*(torques[3] - external[1] - torques[1]) + desired[3]);
+    s17 += impedance_in[1]*(t12*(torques_in[3] - external_in[1] - torques_in[1]) + desired_in[3]);
     const double t19 = 0.5*s17;
     s8 -= t19;
     s4 += t14;
     s7 += t18;
     s11 += t19;
-    s8 -= (t15 + tunings[1]*t1)/tunings[2];
-    s11 += (t15 + tunings[5]*t1)/tunings[6];
-    s8 += (tunings[2]/tunings[3] + tunings[0]*tunings[1])*s3;
-    s8 += (tunings[0] + tunings[1])*s6;
-    tau_m[0] = torques[0] - inertias[1]*(t0*s8 + t13);
-    s11 += (tunings[6]/tunings[7] + tunings[4]*tunings[5])*s4;
-    s11 += (tunings[4] + tunings[5])*s7;
-    tau_m[1] = torques[2] + inertias[2]*(t13 - t9*s11);
-    return inertias[0] > 0.0 && inertias[1] > 0.0 && inertias[2] > 0.0 && springs[0] > 0.0 && springs[2] > 0.0 && impedance[0] > 0.0 && impedance[1] > 0.0 && tunings[0] > 0.0 && tunings[1] > 0.0 && tunings[2] > 0.0 && tunings[3] > 0.0 && tunings[4] > 0.0 && tunings[5] > 0.0 && tunings[6] > 0.0 && tunings[7] > 0.0 ? 0 : 1;
+    s8 -= (t15 + tunings_in[1]*t1)/tunings_in[2];
+    s11 += (t15 + tunings_in[5]*t1)/tunings_in[6];
+    s8 += (tunings_in[2]/tunings_in[3] + tunings_in[0]*tunings_in[1])*s3;
+    s8 += (tunings_in[0] + tunings_in[1])*s6;
+    tau_m_out[0] = torques_in[0] - inertias_in[1]*(t0*s8 + t13);
+    s11 += (tunings_in[6]/tunings_in[7] + tunings_in[4]*tunings_in[5])*s4;
+    s11 += (tunings_in[4] + tunings_in[5])*s7;
+    tau_m_out[1] = torques_in[2] + inertias_in[2]*(t13 - t9*s11);
+    return inertias_in[0] > 0.0 && inertias_in[1] > 0.0 && inertias_in[2] > 0.0 && springs_in[0] > 0.0 && springs_in[2] > 0.0 && impedance_in[0] > 0.0 && impedance_in[1] > 0.0 && tunings_in[0] > 0.0 && tunings_in[1] > 0.0 && tunings_in[2] > 0.0 && tunings_in[3] > 0.0 && tunings_in[4] > 0.0 && tunings_in[5] > 0.0 && tunings_in[6] > 0.0 && tunings_in[7] > 0.0 ? 0 : 1;
 }

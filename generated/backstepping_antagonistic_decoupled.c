@@ -22,46 +22,48 @@
  * Cost: 48 add, 40 mul, 7 div.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-int awiwi_backstepping_antagonistic_decoupled(const double joint[restrict 2], const double torques[restrict 4], const double desired[restrict 5], const double pretension[restrict 3], const double external[restrict 2], const double inertias[restrict 3], const double springs[restrict 4], const double impedance[restrict 2], const double tunings[restrict 8], double tau_m[restrict 2])
+int awiwi_backstepping_antagonistic_decoupled(const double joint_in[restrict 2], const double torques_in[restrict 4], const double desired_in[restrict 5], const double pretension_in[restrict 3], const double external_in[restrict 2], const double inertias_in[restrict 3], const double springs_in[restrict 4], const double impedance_in[restrict 2], const double tunings_in[restrict 8], double tau_m_out[restrict 2])
 {
-    const double t0 = 1.0/springs[0];
-    const double t1 = desired[1] - joint[1];
-    double s2 = impedance[0]*(desired[0] - joint[0]) + impedance[1]*t1;
-    const double t3 = 1.0/springs[2];
-    const double t4 = 1.0/inertias[0];
-    s2 += desired[2]*inertias[0];
+    const double t0 = 1.0/springs_in[0];
+    const double t1 = desired_in[1] - joint_in[1];
+    double s2 = impedance_in[0]*(desired_in[0] - joint_in[0]) + impedance_in[1]*t1;
+    const double t3 = 1.0/springs_in[2];
+    const double t4 = 1.0/inertias_in[0];
+    s2 += desired_in[2]*inertias_in[0];
     const double t5 = 0.5*s2;
-    double s6 = torques[0] - t5;
-    const double t7 = torques[0] + external[0];
-    const double t8 = desired[2] - t7*t4;
-    const double t9 = t4*(torques[2] - t7);
-    const double t10 = desired[2] - (external[0] - torques[2])*t4;
-    double s11 = t5 + torques[2];
-    s6 -= pretension[0];
-    s11 -= pretension[0];
-    const double t12 = impedance[0]*t1 + desired[3]*inertias[0];
-    const double t13 = desired[4]*inertias[0];
-    double s14 = torques[1] - 0.5*(t12 + impedance[1]*t8);
-    const double t15 = torques[1]*t0;
-    s14 -= pretension[1];
-    double s16 = 0.5*(t12 + impedance[1]*t10) - pretension[1];
-    double s17 = springs[1]*(t15*t15) - 0.5*(impedance[1]*(desired[3] - (torques[1] + external[1])*t4) + t13 + impedance[0]*t8);
-    double s18 = t13 + impedance[0]*t10;
-    s17 -= (t8 + tunings[1]*t1)/tunings[2];
-    s17 += (tunings[2]/tunings[3] + tunings[0]*tunings[1])*s6;
-    s17 += (tunings[0] + tunings[1])*s14;
-    s17 -= pretension[2];
-    tau_m[0] = torques[0] - inertias[1]*(t0*s17 + t9);
-    double s19 = (t10 + tunings[5]*t1)/tunings[6] - pretension[2];
-    s18 += impedance[1]*(desired[3] - (external[1] - torques[3])*t4);
-    s16 += torques[3];
-    const double t20 = torques[3]*t3;
-    s19 += springs[3]*(t20*t20);
-    s19 += 0.5*s18;
-    s19 += (tunings[6]/tunings[7] + tunings[4]*tunings[5])*s11;
-    s19 += (tunings[4] + tunings[5])*s16;
-    tau_m[1] = torques[2] + inertias[2]*(t9 - t3*s19);
-    return inertias[0] > 0.0 && inertias[1] > 0.0 && inertias[2] > 0.0 && springs[0] > 0.0 && springs[2] > 0.0 && impedance[0] > 0.0 && impedance[1] > 0.0 && tunings[0] > 0.0 && tunings[1] > 0.0 && tunings[2] > 0.0 && tunings[3] > 0.0 && tunings[4] > 0.0 && tunings[5] > 0.0 && tunings[6] > 0.0 && tunings[7] > 0.0 ? 0 : 1;
+    double s6 = torques_in[0] - t5;
+    const double t7 = torques_in[0] + external_in[0];
+    const double t8 = desired_in[2] - t7*t4;
+    const double t9 = t4*(torques_in[2] - t7);
+    const double t10 = desired_in[2] - (external_in[0] - torques_in[2])*t4;
+    double s11 = t5 + torques_in[2];
+    s6 -= pretension_in[0];
+    s11 -= pretension_in[0];
+    const double t12 = impedance_in[0]*t1 + desired_in[3]*inertias_in[0];
+    const double t13 = desired_in[4]*inertias_in[0];
+    double s14 = torques_in[1] - 0.5*(t12 + impedance_in[1]*t8);
+    const double t15 = torques_in[1]*t0;
+    s14 -= pretension_in[1];
+    double s16 = 0.5*(t12 + impedance_in[1]*t10) - pretension_in[1];
+    const double t17 = 0.5*(impedance_in[1]*(desired_in[3] - (torques_in[1] + external_in[1])*t4) + t13 + impedance_in[0]*t8);
+    double s18 = springs_in[1]*(t15*t15) - t17;
+    double s19 = t13 + impedance_in[0]*t10;
+    s18 -= (t8 + tunings_in[1]*t1)/tunings_in[2];
+    s18 += (tunings_in[2]/tunings_in[3] + tunings_in[0]*tunings_in[1])*s6;
+    s18 += (tunings_in[0] + tunings_in[1])*s14;
+    s18 -= pretension_in[2];
+    tau_m_out[0] = torques_in[0] - inertias_in[1]*(t0*s18 + t9);
+    double s20 = (t10 + tunings_in[5]*t1)/tunings_in[6] - pretension_in[2];
+    s19 += impedance_in[1]*(desired_in[3] - (external_in[1] - torques_in[3])*t4);
+    s16 += torques_in[3];
+    const double t21 = torques_in[3]*t3;
+    s20 += springs_in[3]*(t21*t21);
+    s20 += 0.5*s19;
+    s20 += (tunings_in[6]/tunings_in[7] + tunings_in[4]*tunings_in[5])*s11;
+    s20 += (tunings_in[4] + tunings_in[5])*s16;
+    tau_m_out[1] = torques_in[2] + inertias_in[2]*(t9 - t3*s20);
+    return inertias_in[0] > 0.0 && inertias_in[1] > 0.0 && inertias_in[2] > 0.0 && springs_in[0] > 0.0 && springs_in[2] > 0.0 && impedance_in[0] > 0.0 && impedance_in[1] > 0.0 && tunings_in[0] > 0.0 && tunings_in[1] > 0.0 && tunings_in[2] > 0.0 && tunings_in[3] > 0.0 && tunings_in[4] > 0.0 && tunings_in[5] > 0.0 && tunings_in[6] > 0.0 && tunings_in[7] > 0.0 ? 0 : 1;
 }

@@ -18,49 +18,50 @@
  * Cost: 31 add, 29 mul, 3 div, 1 neg.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-void awiwi_backstepping_antagonistic_lyapunov(const double joint[restrict 2], const double torques[restrict 4], const double desired[restrict 5], const double pretension[restrict 3], const double external[restrict 2], const double inertias[restrict 3], const double springs[restrict 4], const double impedance[restrict 2], const double tunings[restrict 8], double V[restrict 1], double Vdot[restrict 1], double controls[restrict 4])
+void awiwi_backstepping_antagonistic_lyapunov(const double joint_in[restrict 2], const double torques_in[restrict 4], const double desired_in[restrict 5], const double pretension_in[restrict 3], const double external_in[restrict 2], const double inertias_in[restrict 3], const double springs_in[restrict 4], const double impedance_in[restrict 2], const double tunings_in[restrict 8], double V_out[restrict 1], double Vdot_out[restrict 1], double controls_out[restrict 4])
 {
-    (void)springs;
-    const double t0 = desired[0] - joint[0];
-    const double t1 = 0.5*impedance[0];
+    (void)springs_in;
+    const double t0 = desired_in[0] - joint_in[0];
+    const double t1 = 0.5*impedance_in[0];
     const double t2 = t0*t1;
-    const double t3 = desired[1] - joint[1];
+    const double t3 = desired_in[1] - joint_in[1];
     const double t4 = t3*t3;
-    const double t5 = 0.5*inertias[0];
-    double s6 = t3*t1 + desired[3]*t5;
+    const double t5 = 0.5*inertias_in[0];
+    double s6 = t3*t1 + desired_in[3]*t5;
     double s7 = t0*t2 + t5*t4;
-    double s8 = t2 + desired[2]*t5;
-    const double t9 = 0.5*impedance[1];
+    double s8 = t2 + desired_in[2]*t5;
+    const double t9 = 0.5*impedance_in[1];
     s8 += t3*t9;
-    const double t10 = s8 + pretension[0];
-    controls[0] = t10;
-    const double t11 = pretension[0] - s8;
-    controls[2] = t11;
-    const double t12 = torques[0] - t10;
-    const double t13 = torques[2] - t11;
-    s6 += t9*(desired[2] - (torques[0] - torques[2] + external[0])/inertias[0]);
-    const double t14 = tunings[0]*t12;
+    const double t10 = s8 + pretension_in[0];
+    controls_out[0] = t10;
+    const double t11 = pretension_in[0] - s8;
+    controls_out[2] = t11;
+    const double t12 = torques_in[0] - t10;
+    const double t13 = torques_in[2] - t11;
+    s6 += t9*(desired_in[2] - (torques_in[0] - torques_in[2] + external_in[0])/inertias_in[0]);
+    const double t14 = tunings_in[0]*t12;
     double s15 = s6 - t14;
-    s15 += pretension[1];
-    double s16 = pretension[1] - s6;
-    s15 += t3/tunings[2];
-    controls[1] = s15;
-    const double t17 = tunings[2]*t12;
-    const double t18 = torques[1] - s15;
-    const double t19 = t18*(tunings[3]*t18);
-    s16 -= t3/tunings[6];
-    const double t20 = tunings[6]*t13;
+    s15 += pretension_in[1];
+    double s16 = pretension_in[1] - s6;
+    s15 += t3/tunings_in[2];
+    controls_out[1] = s15;
+    const double t17 = tunings_in[2]*t12;
+    const double t18 = torques_in[1] - s15;
+    const double t19 = t18*(tunings_in[3]*t18);
+    s16 -= t3/tunings_in[6];
+    const double t20 = tunings_in[6]*t13;
     double s21 = t12*t17 + t13*t20;
-    const double t22 = tunings[4]*t13;
+    const double t22 = tunings_in[4]*t13;
     s16 -= t22;
-    controls[3] = s16;
-    const double t23 = torques[3] - s16;
-    const double t24 = t23*(tunings[7]*t23);
+    controls_out[3] = s16;
+    const double t23 = torques_in[3] - s16;
+    const double t24 = t23*(tunings_in[7]*t23);
     s21 += t19;
     s21 += t24;
     s7 += 0.5*s21;
-    V[0] = s7;
-    Vdot[0] = -(impedance[1]*t4) - external[0]*t3 - t14*t17 - t22*t20 - tunings[1]*t19 - tunings[5]*t24;
+    V_out[0] = s7;
+    Vdot_out[0] = -(impedance_in[1]*t4) - external_in[0]*t3 - t14*t17 - t22*t20 - tunings_in[1]*t19 - tunings_in[5]*t24;
 }

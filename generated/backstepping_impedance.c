@@ -18,25 +18,26 @@
  * Cost: 22 add, 16 mul, 4 div.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-int awiwi_backstepping_impedance(const double state[restrict 4], const double desired[restrict 5], const double external[restrict 2], const double plant[restrict 3], const double gains[restrict 4], const double weights[restrict 2], double tau_m[restrict 1])
+int awiwi_backstepping_impedance(const double state_in[restrict 4], const double desired_in[restrict 5], const double external_in[restrict 2], const double plant_in[restrict 3], const double gains_in[restrict 4], const double weights_in[restrict 2], double tau_m_out[restrict 1])
 {
-    const double t0 = state[1] - desired[1];
-    double s1 = state[2] + gains[0]*(state[0] - desired[0]);
-    double s2 = state[3] + gains[0]*t0;
-    s1 += gains[1]*t0;
-    const double t3 = 1.0/plant[0];
-    const double t4 = (external[0] + state[2])*t3;
-    const double t5 = desired[2] - t4;
-    s1 -= desired[2]*plant[0];
-    s2 -= gains[1]*t5;
-    double s6 = (t5 - gains[3]*t0)/weights[0] + desired[4]*plant[0];
-    s2 -= desired[3]*plant[0];
-    s6 += gains[1]*(desired[3] - (external[1] + state[3])*t3);
-    s6 += gains[0]*t5;
-    s6 -= (gains[2]*gains[3] + weights[0]/weights[1])*s1;
-    s6 -= (gains[3] + gains[2])*s2;
-    tau_m[0] = state[2] + plant[1]*(t4 + s6/plant[2]);
-    return plant[0] > 0.0 && plant[1] > 0.0 && plant[2] > 0.0 && gains[0] > 0.0 && gains[1] > 0.0 && gains[2] > 0.0 && gains[3] > 0.0 && weights[0] > 0.0 && weights[1] > 0.0 ? 0 : 1;
+    const double t0 = state_in[1] - desired_in[1];
+    double s1 = state_in[2] + gains_in[0]*(state_in[0] - desired_in[0]);
+    double s2 = state_in[3] + gains_in[0]*t0;
+    s1 += gains_in[1]*t0;
+    const double t3 = 1.0/plant_in[0];
+    const double t4 = (external_in[0] + state_in[2])*t3;
+    const double t5 = desired_in[2] - t4;
+    s1 -= desired_in[2]*plant_in[0];
+    s2 -= gains_in[1]*t5;
+    double s6 = (t5 - gains_in[3]*t0)/weights_in[0] + desired_in[4]*plant_in[0];
+    s2 -= desired_in[3]*plant_in[0];
+    s6 += gains_in[1]*(desired_in[3] - (external_in[1] + state_in[3])*t3);
+    s6 += gains_in[0]*t5;
+    s6 -= (gains_in[2]*gains_in[3] + weights_in[0]/weights_in[1])*s1;
+    s6 -= (gains_in[3] + gains_in[2])*s2;
+    tau_m_out[0] = state_in[2] + plant_in[1]*(t4 + s6/plant_in[2]);
+    return plant_in[0] > 0.0 && plant_in[1] > 0.0 && plant_in[2] > 0.0 && gains_in[0] > 0.0 && gains_in[1] > 0.0 && gains_in[2] > 0.0 && gains_in[3] > 0.0 && weights_in[0] > 0.0 && weights_in[1] > 0.0 ? 0 : 1;
 }

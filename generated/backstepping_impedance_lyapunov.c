@@ -15,29 +15,30 @@
  * Cost: 18 add, 18 mul, 2 div, 1 neg.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-void awiwi_backstepping_impedance_lyapunov(const double state[restrict 4], const double desired[restrict 5], const double external[restrict 2], const double plant[restrict 3], const double gains[restrict 4], const double weights[restrict 2], double V[restrict 1], double Vdot[restrict 1], double controls[restrict 2])
+void awiwi_backstepping_impedance_lyapunov(const double state_in[restrict 4], const double desired_in[restrict 5], const double external_in[restrict 2], const double plant_in[restrict 3], const double gains_in[restrict 4], const double weights_in[restrict 2], double V_out[restrict 1], double Vdot_out[restrict 1], double controls_out[restrict 2])
 {
-    const double t0 = desired[1] - state[1];
-    const double t1 = desired[0] - state[0];
-    const double t2 = gains[0]*t1;
-    double s3 = t0*(gains[0] + 1.0/weights[0]) + desired[3]*plant[0];
-    double s4 = t1*t2 + plant[0]*t0*t0;
-    double s5 = t2 + desired[2]*plant[0];
-    const double t6 = gains[1]*t0;
+    const double t0 = desired_in[1] - state_in[1];
+    const double t1 = desired_in[0] - state_in[0];
+    const double t2 = gains_in[0]*t1;
+    double s3 = t0*(gains_in[0] + 1.0/weights_in[0]) + desired_in[3]*plant_in[0];
+    double s4 = t1*t2 + plant_in[0]*t0*t0;
+    double s5 = t2 + desired_in[2]*plant_in[0];
+    const double t6 = gains_in[1]*t0;
     s5 += t6;
-    controls[0] = s5;
-    const double t7 = state[2] - s5;
-    const double t8 = weights[0]*t7;
+    controls_out[0] = s5;
+    const double t7 = state_in[2] - s5;
+    const double t8 = weights_in[0]*t7;
     s4 += t7*t8;
-    const double t9 = gains[2]*t7;
+    const double t9 = gains_in[2]*t7;
     s3 -= t9;
-    s3 += gains[1]*(desired[2] - (state[2] + external[0])/plant[0]);
-    controls[1] = s3;
-    const double t10 = state[3] - s3;
-    const double t11 = t10*(weights[1]*t10);
+    s3 += gains_in[1]*(desired_in[2] - (state_in[2] + external_in[0])/plant_in[0]);
+    controls_out[1] = s3;
+    const double t10 = state_in[3] - s3;
+    const double t11 = t10*(weights_in[1]*t10);
     s4 += t11;
-    V[0] = 0.5*s4;
-    Vdot[0] = -(t9*t8) - t0*(t6 + external[0]) - gains[3]*t11;
+    V_out[0] = 0.5*s4;
+    Vdot_out[0] = -(t9*t8) - t0*(t6 + external_in[0]) - gains_in[3]*t11;
 }

@@ -17,28 +17,29 @@
  * Cost: 23 add, 20 mul, 4 div.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-int awiwi_backstepping_nonlinear(const double state[restrict 4], const double desired[restrict 5], const double external[restrict 2], const double bodies[restrict 2], const double spring[restrict 2], const double gains[restrict 4], const double weights[restrict 2], double tau_m[restrict 1])
+int awiwi_backstepping_nonlinear(const double state_in[restrict 4], const double desired_in[restrict 5], const double external_in[restrict 2], const double bodies_in[restrict 2], const double spring_in[restrict 2], const double gains_in[restrict 4], const double weights_in[restrict 2], double tau_m_out[restrict 1])
 {
-    const double t0 = 1.0/spring[0];
-    const double t1 = state[3]*t0;
-    const double t2 = desired[1] - state[1];
-    double s3 = state[2] + gains[0]*(state[0] - desired[0]);
-    double s4 = state[3] - gains[0]*t2;
-    s3 -= gains[1]*t2;
-    double s5 = spring[1]*(t1*t1) - bodies[0]*desired[4];
-    const double t6 = 1.0/bodies[0];
-    const double t7 = (external[0] + state[2])*t6;
-    const double t8 = t7 - desired[2];
-    s3 -= bodies[0]*desired[2];
-    s4 += gains[1]*t8;
-    s4 -= bodies[0]*desired[3];
-    s5 += gains[0]*t8;
-    s5 -= gains[1]*(desired[3] - (external[1] + state[3])*t6);
-    s5 += (gains[2]*gains[3] + weights[0]/weights[1])*s3;
-    s5 += (gains[3] + gains[2])*s4;
-    s5 -= (gains[3]*t2 - t8)/weights[0];
-    tau_m[0] = state[2] + bodies[1]*(t7 - t0*s5);
-    return bodies[0] > 0.0 && bodies[1] > 0.0 && spring[0] > 0.0 && gains[0] > 0.0 && gains[1] > 0.0 && gains[2] > 0.0 && gains[3] > 0.0 && weights[0] > 0.0 && weights[1] > 0.0 ? 0 : 1;
+    const double t0 = 1.0/spring_in[0];
+    const double t1 = state_in[3]*t0;
+    const double t2 = desired_in[1] - state_in[1];
+    double s3 = state_in[2] + gains_in[0]*(state_in[0] - desired_in[0]);
+    double s4 = state_in[3] - gains_in[0]*t2;
+    s3 -= gains_in[1]*t2;
+    double s5 = spring_in[1]*(t1*t1) - bodies_in[0]*desired_in[4];
+    const double t6 = 1.0/bodies_in[0];
+    const double t7 = (external_in[0] + state_in[2])*t6;
+    const double t8 = t7 - desired_in[2];
+    s3 -= bodies_in[0]*desired_in[2];
+    s4 += gains_in[1]*t8;
+    s4 -= bodies_in[0]*desired_in[3];
+    s5 += gains_in[0]*t8;
+    s5 -= gains_in[1]*(desired_in[3] - (external_in[1] + state_in[3])*t6);
+    s5 += (gains_in[2]*gains_in[3] + weights_in[0]/weights_in[1])*s3;
+    s5 += (gains_in[3] + gains_in[2])*s4;
+    s5 -= (gains_in[3]*t2 - t8)/weights_in[0];
+    tau_m_out[0] = state_in[2] + bodies_in[1]*(t7 - t0*s5);
+    return bodies_in[0] > 0.0 && bodies_in[1] > 0.0 && spring_in[0] > 0.0 && gains_in[0] > 0.0 && gains_in[1] > 0.0 && gains_in[2] > 0.0 && gains_in[3] > 0.0 && weights_in[0] > 0.0 && weights_in[1] > 0.0 ? 0 : 1;
 }

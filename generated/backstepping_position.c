@@ -15,23 +15,24 @@
  * Cost: 22 add, 16 mul, 4 div.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-int awiwi_backstepping_position(const double motion[restrict 4], const double desired[restrict 5], const double plant[restrict 3], const double rates[restrict 4], const double scales[restrict 3], double tau_m[restrict 1])
+int awiwi_backstepping_position(const double motion_in[restrict 4], const double desired_in[restrict 5], const double plant_in[restrict 3], const double rates_in[restrict 4], const double scales_in[restrict 3], double tau_m_out[restrict 1])
 {
-    const double t0 = rates[0] + rates[1];
-    const double t1 = t0 + rates[2];
-    double s2 = desired[4] + (desired[3] - motion[3])*(t1 + rates[3]);
-    const double t3 = rates[0]*rates[1] + 1.0/scales[0];
-    const double t4 = scales[0]/scales[1];
-    const double t5 = scales[1]/scales[2];
-    double s6 = rates[3]*t1 + t5;
-    const double t7 = t4 + t3 + rates[2]*t0;
+    const double t0 = rates_in[0] + rates_in[1];
+    const double t1 = t0 + rates_in[2];
+    double s2 = desired_in[4] + (desired_in[3] - motion_in[3])*(t1 + rates_in[3]);
+    const double t3 = rates_in[0]*rates_in[1] + 1.0/scales_in[0];
+    const double t4 = scales_in[0]/scales_in[1];
+    const double t5 = scales_in[1]/scales_in[2];
+    double s6 = rates_in[3]*t1 + t5;
+    const double t7 = t4 + t3 + rates_in[2]*t0;
     s6 += t7;
-    const double t8 = rates[0]*t4 + rates[2]*t3;
-    s2 += (desired[2] - motion[2])*s6;
-    s2 += (desired[0] - motion[0])*(t3*t5 + rates[3]*t8);
-    s2 += (desired[1] - motion[1])*(t0*t5 + t8 + rates[3]*t7);
-    tau_m[0] = motion[2]*(plant[0] + plant[1]) + plant[0]*plant[1]/plant[2]*s2;
-    return plant[0] > 0.0 && plant[1] > 0.0 && plant[2] > 0.0 && rates[0] > 0.0 && rates[1] > 0.0 && rates[2] > 0.0 && rates[3] > 0.0 && scales[0] > 0.0 && scales[1] > 0.0 && scales[2] > 0.0 ? 0 : 1;
+    const double t8 = rates_in[0]*t4 + rates_in[2]*t3;
+    s2 += (desired_in[2] - motion_in[2])*s6;
+    s2 += (desired_in[0] - motion_in[0])*(t3*t5 + rates_in[3]*t8);
+    s2 += (desired_in[1] - motion_in[1])*(t0*t5 + t8 + rates_in[3]*t7);
+    tau_m_out[0] = motion_in[2]*(plant_in[0] + plant_in[1]) + plant_in[0]*plant_in[1]/plant_in[2]*s2;
+    return plant_in[0] > 0.0 && plant_in[1] > 0.0 && plant_in[2] > 0.0 && rates_in[0] > 0.0 && rates_in[1] > 0.0 && rates_in[2] > 0.0 && rates_in[3] > 0.0 && scales_in[0] > 0.0 && scales_in[1] > 0.0 && scales_in[2] > 0.0 ? 0 : 1;
 }

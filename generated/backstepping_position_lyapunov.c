@@ -14,37 +14,38 @@
  * Cost: 22 add, 20 mul, 2 div, 1 neg.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-void awiwi_backstepping_position_lyapunov(const double motion[restrict 4], const double desired[restrict 5], const double plant[restrict 3], const double rates[restrict 4], const double scales[restrict 3], double V[restrict 1], double Vdot[restrict 1], double controls[restrict 3])
+void awiwi_backstepping_position_lyapunov(const double motion_in[restrict 4], const double desired_in[restrict 5], const double plant_in[restrict 3], const double rates_in[restrict 4], const double scales_in[restrict 3], double V_out[restrict 1], double Vdot_out[restrict 1], double controls_out[restrict 3])
 {
-    (void)plant;
-    const double t0 = desired[0] - motion[0];
-    const double t1 = rates[0]*t0;
-    const double t2 = t1 + desired[1];
-    controls[0] = t2;
-    const double t3 = motion[1] - t2;
-    const double t4 = desired[1] - motion[1];
-    const double t5 = rates[0]*t4 + desired[2];
-    double s6 = desired[3] + rates[0]*(desired[2] - motion[2]) - rates[1]*(motion[2] - t5);
-    const double t7 = rates[1]*t3;
+    (void)plant_in;
+    const double t0 = desired_in[0] - motion_in[0];
+    const double t1 = rates_in[0]*t0;
+    const double t2 = t1 + desired_in[1];
+    controls_out[0] = t2;
+    const double t3 = motion_in[1] - t2;
+    const double t4 = desired_in[1] - motion_in[1];
+    const double t5 = rates_in[0]*t4 + desired_in[2];
+    double s6 = desired_in[3] + rates_in[0]*(desired_in[2] - motion_in[2]) - rates_in[1]*(motion_in[2] - t5);
+    const double t7 = rates_in[1]*t3;
     double s8 = t5 - t7;
-    const double t9 = scales[0]*t3;
-    const double t10 = 1.0/scales[0];
+    const double t9 = scales_in[0]*t3;
+    const double t10 = 1.0/scales_in[0];
     s8 += t0*t10;
-    controls[1] = s8;
-    const double t11 = motion[2] - s8;
+    controls_out[1] = s8;
+    const double t11 = motion_in[2] - s8;
     s6 += t4*t10;
     double s12 = t0*t0 + t3*t9;
-    s6 -= t9/scales[1];
-    const double t13 = scales[1]*t11;
+    s6 -= t9/scales_in[1];
+    const double t13 = scales_in[1]*t11;
     s12 += t11*t13;
-    const double t14 = rates[2]*t11;
+    const double t14 = rates_in[2]*t11;
     s6 -= t14;
-    controls[2] = s6;
-    const double t15 = motion[3] - s6;
-    const double t16 = t15*(scales[2]*t15);
+    controls_out[2] = s6;
+    const double t15 = motion_in[3] - s6;
+    const double t16 = t15*(scales_in[2]*t15);
     s12 += t16;
-    V[0] = 0.5*s12;
-    Vdot[0] = -(t0*t1) - t7*t9 - t14*t13 - rates[3]*t16;
+    V_out[0] = 0.5*s12;
+    Vdot_out[0] = -(t0*t1) - t7*t9 - t14*t13 - rates_in[3]*t16;
 }

@@ -13,36 +13,37 @@
  * Cost: 11 add, 15 mul, 4 div, 1 neg.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-void awiwi_backstepping_state_gains(const double plant[restrict 3], const double gains[restrict 4], const double weights[restrict 2], double K[restrict 4], double K_cancelled[restrict 4], double h[restrict 2])
+void awiwi_backstepping_state_gains(const double plant_in[restrict 3], const double gains_in[restrict 4], const double weights_in[restrict 2], double K_out[restrict 4], double K_cancelled_out[restrict 4], double h_out[restrict 2])
 {
-    const double t0 = 1.0/plant[2];
-    const double t1 = 1.0/plant[0];
-    const double t2 = plant[1]*t0;
-    const double t3 = plant[1]*t1;
-    const double t4 = gains[1]*t1*t2;
-    h[1] = -t4;
-    const double t5 = 1.0/weights[0];
-    const double t6 = weights[0]/weights[1] + gains[2]*gains[3];
-    const double t7 = gains[2] + gains[3];
-    double s8 = gains[3]*t5 + gains[1]*t6;
+    const double t0 = 1.0/plant_in[2];
+    const double t1 = 1.0/plant_in[0];
+    const double t2 = plant_in[1]*t0;
+    const double t3 = plant_in[1]*t1;
+    const double t4 = gains_in[1]*t1*t2;
+    h_out[1] = -t4;
+    const double t5 = 1.0/weights_in[0];
+    const double t6 = weights_in[0]/weights_in[1] + gains_in[2]*gains_in[3];
+    const double t7 = gains_in[2] + gains_in[3];
+    double s8 = gains_in[3]*t5 + gains_in[1]*t6;
     const double t9 = t2*t6;
-    double s10 = t5 + gains[1]*t7;
+    double s10 = t5 + gains_in[1]*t7;
     const double t11 = t4 + t7*t2;
-    K[3] = t11;
-    K_cancelled[3] = t11;
-    s8 += gains[0]*t7;
+    K_out[3] = t11;
+    K_cancelled_out[3] = t11;
+    s8 += gains_in[0]*t7;
     const double t12 = t2*s8;
-    K[1] = t12;
-    K_cancelled[1] = t12;
-    s10 += gains[0];
-    const double t13 = gains[0]*t9;
-    K[0] = t13;
-    K_cancelled[0] = t13;
+    K_out[1] = t12;
+    K_cancelled_out[1] = t12;
+    s10 += gains_in[0];
+    const double t13 = gains_in[0]*t9;
+    K_out[0] = t13;
+    K_cancelled_out[0] = t13;
     const double t14 = t3*(1.0 - t0*s10);
-    h[0] = t14;
+    h_out[0] = t14;
     const double t15 = t9 - t14;
-    K[2] = t15 - 1.0;
-    K_cancelled[2] = t3 + t15;
+    K_out[2] = t15 - 1.0;
+    K_cancelled_out[2] = t3 + t15;
 }

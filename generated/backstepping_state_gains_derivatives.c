@@ -9,35 +9,36 @@
  * Cost: 7 add, 14 mul, 4 div.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-void awiwi_backstepping_state_gains_derivatives(const double plant[restrict 3], const double gains[restrict 4], const double weights[restrict 2], double dK[restrict 16])
+void awiwi_backstepping_state_gains_derivatives(const double plant_in[restrict 3], const double gains_in[restrict 4], const double weights_in[restrict 2], double dK_out[restrict 16])
 {
-    dK[1] = 0.0;
-    dK[12] = 0.0;
-    const double t0 = plant[1]/plant[2];
-    dK[14] = t0;
-    dK[15] = t0;
-    const double t1 = 1.0/plant[0];
+    dK_out[1] = 0.0;
+    dK_out[12] = 0.0;
+    const double t0 = plant_in[1]/plant_in[2];
+    dK_out[14] = t0;
+    dK_out[15] = t0;
+    const double t1 = 1.0/plant_in[0];
     const double t2 = t1*t0;
-    dK[8] = t2;
-    dK[13] = t2;
-    const double t3 = t0*(weights[0]/weights[1] + gains[2]*gains[3]);
-    dK[0] = t3;
-    dK[5] = t3;
-    const double t4 = gains[3]*t0;
-    const double t5 = gains[2]*t0;
-    const double t6 = (gains[3] + gains[2])*t0;
-    dK[4] = t6;
-    dK[9] = t1*t6;
-    double s7 = t0/weights[0] + gains[1]*t5;
-    const double t8 = t1*(gains[1]*t0);
-    const double t9 = gains[0]*t0;
-    dK[6] = gains[1]*t4 + t9;
+    dK_out[8] = t2;
+    dK_out[13] = t2;
+    const double t3 = t0*(weights_in[0]/weights_in[1] + gains_in[2]*gains_in[3]);
+    dK_out[0] = t3;
+    dK_out[5] = t3;
+    const double t4 = gains_in[3]*t0;
+    const double t5 = gains_in[2]*t0;
+    const double t6 = (gains_in[3] + gains_in[2])*t0;
+    dK_out[4] = t6;
+    dK_out[9] = t1*t6;
+    double s7 = t0/weights_in[0] + gains_in[1]*t5;
+    const double t8 = t1*(gains_in[1]*t0);
+    const double t9 = gains_in[0]*t0;
+    dK_out[6] = gains_in[1]*t4 + t9;
     s7 += t9;
-    dK[7] = s7;
-    dK[2] = gains[0]*t4;
-    dK[3] = gains[0]*t5;
-    dK[10] = t4 + t8;
-    dK[11] = t5 + t8;
+    dK_out[7] = s7;
+    dK_out[2] = gains_in[0]*t4;
+    dK_out[3] = gains_in[0]*t5;
+    dK_out[10] = t4 + t8;
+    dK_out[11] = t5 + t8;
 }

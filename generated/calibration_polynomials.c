@@ -17,18 +17,19 @@
  * Cost: 23 add, 19 mul, 1 div.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-int awiwi_calibration_polynomials(const double counts[restrict 1], const double ends[restrict 2], const double length_powers[restrict 7], const double force_powers[restrict 7], const double stiffness_powers[restrict 7], double dL[restrict 1], double force[restrict 1], double stiffness[restrict 1])
+int awiwi_calibration_polynomials(const double counts_in[restrict 1], const double ends_in[restrict 2], const double length_powers_in[restrict 7], const double force_powers_in[restrict 7], const double stiffness_powers_in[restrict 7], double dL_out[restrict 1], double force_out[restrict 1], double stiffness_out[restrict 1])
 {
-    double s0 = counts[0] + counts[0] - ends[0];
-    s0 -= ends[1];
-    const double t1 = s0/(ends[0] - ends[1]);
-    const double t2 = length_powers[2] - t1*(length_powers[3] - t1*(length_powers[4] - t1*(length_powers[5] - length_powers[6]*t1)));
-    dL[0] = length_powers[0] - t1*(length_powers[1] - t1*t2);
-    const double t3 = force_powers[2] - t1*(force_powers[3] - t1*(force_powers[4] - t1*(force_powers[5] - force_powers[6]*t1)));
-    force[0] = force_powers[0] - t1*(force_powers[1] - t1*t3);
-    const double t4 = t1*(stiffness_powers[3] - t1*(stiffness_powers[4] - t1*(stiffness_powers[5] - stiffness_powers[6]*t1)));
-    stiffness[0] = stiffness_powers[0] - t1*(stiffness_powers[1] - t1*(stiffness_powers[2] - t4));
+    double s0 = counts_in[0] + counts_in[0] - ends_in[0];
+    s0 -= ends_in[1];
+    const double t1 = s0/(ends_in[0] - ends_in[1]);
+    const double t2 = t1*(length_powers_in[3] - t1*(length_powers_in[4] - t1*(length_powers_in[5] - length_powers_in[6]*t1)));
+    dL_out[0] = length_powers_in[0] - t1*(length_powers_in[1] - t1*(length_powers_in[2] - t2));
+    const double t3 = force_powers_in[2] - t1*(force_powers_in[3] - t1*(force_powers_in[4] - t1*(force_powers_in[5] - force_powers_in[6]*t1)));
+    force_out[0] = force_powers_in[0] - t1*(force_powers_in[1] - t1*t3);
+    const double t4 = stiffness_powers_in[3] - t1*(stiffness_powers_in[4] - t1*(stiffness_powers_in[5] - stiffness_powers_in[6]*t1));
+    stiffness_out[0] = stiffness_powers_in[0] - t1*(stiffness_powers_in[1] - t1*(stiffness_powers_in[2] - t1*t4));
     return 1.015625 - t1*t1 > 0.0 ? 0 : 1;
 }

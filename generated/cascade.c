@@ -24,14 +24,15 @@
  * Cost: 8 add, 8 mul, 2 div.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-int awiwi_cascade(const double f[restrict 1], const double xd[restrict 1], const double stiffness[restrict 1], const double slope[restrict 1], const double hdd[restrict 1], const double f_des[restrict 1], const double fd_des[restrict 1], const double fdd_des[restrict 1], const double friction[restrict 1], const double r[restrict 1], const double B[restrict 1], const double force_kp[restrict 1], const double force_kd[restrict 1], double tau[restrict 1])
+int awiwi_cascade(const double f_in[restrict 1], const double xd_in[restrict 1], const double stiffness_in[restrict 1], const double slope_in[restrict 1], const double hdd_in[restrict 1], const double f_des_in[restrict 1], const double fd_des_in[restrict 1], const double fdd_des_in[restrict 1], const double friction_in[restrict 1], const double r_in[restrict 1], const double B_in[restrict 1], const double force_kp_in[restrict 1], const double force_kd_in[restrict 1], double tau_out[restrict 1])
 {
-    double s0 = fdd_des[0] - force_kp[0]*(f[0] - f_des[0]);
-    double s1 = hdd[0] + slope[0]*(xd[0]*xd[0]);
-    s0 += force_kd[0]*(fd_des[0] - stiffness[0]*xd[0]);
-    s1 -= s0/stiffness[0];
-    tau[0] = friction[0] + f[0]*r[0] - B[0]*(1.0/r[0])*s1;
-    return stiffness[0] > 0.0 && r[0] > 0.0 && B[0] > 0.0 && force_kp[0] > 0.0 && force_kd[0] > 0.0 ? 0 : 1;
+    double s0 = fdd_des_in[0] - force_kp_in[0]*(f_in[0] - f_des_in[0]);
+    double s1 = hdd_in[0] + slope_in[0]*(xd_in[0]*xd_in[0]);
+    s0 += force_kd_in[0]*(fd_des_in[0] - stiffness_in[0]*xd_in[0]);
+    s1 -= s0/stiffness_in[0];
+    tau_out[0] = friction_in[0] + f_in[0]*r_in[0] - B_in[0]*(1.0/r_in[0])*s1;
+    return stiffness_in[0] > 0.0 && r_in[0] > 0.0 && B_in[0] > 0.0 && force_kp_in[0] > 0.0 && force_kd_in[0] > 0.0 ? 0 : 1;
 }

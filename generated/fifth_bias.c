@@ -9,17 +9,18 @@
  * Cost: 223 add, 250 mul, 2 div, 1 sqrt, 5 sincos.
  * Inputs: sha256 d0df8ff241cc1ae7f3754b69e6914d3fe8fd8fd3f3a8cea2e9a7fef674657d8d.
  */
+#include "numerics.h"
 #include <math.h>
-#include "trig.h"
+#include "sincos.h"
 #include "kernels.h"
 
-void awiwi_fifth_bias(const double q[restrict 4], const double qd[restrict 4], const double g[restrict 3], double bias[restrict 4])
+void awiwi_fifth_bias(const double q_in[restrict 4], const double qd_in[restrict 4], const double g_in[restrict 3], double bias_out[restrict 4])
 {
-    const double t0 = q[0] + 1.0471975511965979;
-    double s1 = 0.7692307692307693*q[3] - 1.5372089625888168;
-    const double t2 = q[3] + q[2];
+    const double t0 = q_in[0] + 1.0471975511965979;
+    double s1 = 0.7692307692307693*q_in[3] - 1.5372089625888168;
+    const double t2 = q_in[3] + q_in[2];
     s1 += t2;
-    const awiwi_turn4 a0 = awiwi_sincos4(t0, q[2], t2, s1);
+    const awiwi_sincos4_result a0 = awiwi_sincos4(t0, q_in[2], t2, s1);
     const double t3 = 0.01*a0.cos[0];
     const double t4 = 0.00024*a0.cos[0] - 0.000244;
     const double t5 = 1.0/t4;
@@ -44,38 +45,38 @@ void awiwi_fifth_bias(const double q[restrict 4], const double qd[restrict 4], c
     const double t23 = 0.0001092*a0.cos[2] - 8e-07*a0.sin[2];
     const double t24 = 2.0628358988550422e-07*a0.cos[3] - 2.4006612569884656e-05*a0.sin[3];
     const double t25 = 2.4006612569884656e-05*a0.cos[3] + 2.0628358988550422e-07*a0.sin[3];
-    const double t26 = qd[0]*t17;
-    const double t27 = qd[0]*qd[0];
+    const double t26 = qd_in[0]*t17;
+    const double t27 = qd_in[0]*qd_in[0];
     const double t28 = t27*(t13*s18);
-    const double t29 = g[0] + t27*t3;
-    const double t30 = g[2] + t27*t11;
+    const double t29 = g_in[0] + t27*t3;
+    const double t30 = g_in[2] + t27*t11;
     const double t31 = t26*t26;
     double s32 = 0.0001068*t31 - 7.12e-05*t28;
-    const awiwi_turn a1 = awiwi_sincos(q[1]);
+    const awiwi_sincos_result a1 = awiwi_sincos(q_in[1]);
     const double t33 = a1.cos*t26;
     const double t34 = a1.sin*t26;
     const double t35 = t33*t33;
     const double t36 = t34*t34;
     const double t37 = t35 + t36;
     const double t38 = 2.0*t33;
-    const double t39 = qd[2]*(t38 + qd[2]);
+    const double t39 = qd_in[2]*(t38 + qd_in[2]);
     const double t40 = t37 + t39;
-    const double t41 = qd[2] + qd[3];
-    const double t42 = 0.7692307692307693*qd[3] + t41;
+    const double t41 = qd_in[2] + qd_in[3];
+    const double t42 = 0.7692307692307693*qd_in[3] + t41;
     const double t43 = t41*(t41 + t38);
     const double t44 = t42*(t38 + t42);
     const double t45 = t37 + t43;
     const double t46 = t33*t34;
     const double t47 = 2.0*t34;
-    const double t48 = t46 + qd[2]*t47;
+    const double t48 = t46 + qd_in[2]*t47;
     const double t49 = t46 + t41*t47;
     const double t50 = t42*t47 + t46;
     double s51 = 7.12e-05*t31 + 0.0001068*t28;
-    const double t52 = qd[1]*t33;
+    const double t52 = qd_in[1]*t33;
     const double t53 = t52 - a1.sin*t28;
     const double t54 = t52 + t53;
     const double t55 = t52 - t53;
-    const double t56 = qd[1]*t34;
+    const double t56 = qd_in[1]*t34;
     const double t57 = a1.cos*t28 + t56;
     const double t58 = t56 + t57;
     const double t59 = t25*(t37 + t44) + t24*t58;
@@ -85,8 +86,8 @@ void awiwi_fifth_bias(const double q[restrict 4], const double qd[restrict 4], c
     double s63 = 1.0626e-06*t56 + 8.73e-08*t54 - 8.78e-08*t46 - 5.313e-07*t62;
     const double t64 = 1.46e-05*t54 + 8.79e-05*t58 + t61;
     s32 -= t64;
-    const double t65 = 2.0*qd[1];
-    const double t66 = qd[1]*qd[1];
+    const double t65 = 2.0*qd_in[1];
+    const double t66 = qd_in[1]*qd_in[1];
     double s67 = 8.79e-05*t46 - 1.46e-05*(t36 + t66);
     const double t68 = t35 + t66;
     const double t69 = t39 + t68;
@@ -104,11 +105,11 @@ void awiwi_fifth_bias(const double q[restrict 4], const double qd[restrict 4], c
     double s80 = t21*t48 + s76;
     const double t81 = t41 + t33;
     const double t82 = t81*t81;
-    const double t83 = qd[2]*t65 + t55;
+    const double t83 = qd_in[2]*t65 + t55;
     s80 -= t20*t83;
     s67 += s80;
     s51 += a1.sin*s67;
-    const double t84 = qd[2] + t33;
+    const double t84 = qd_in[2] + t33;
     const double t85 = t84*t84;
     const double t86 = 0.006*s80;
     s73 += t86;
@@ -120,7 +121,7 @@ void awiwi_fifth_bias(const double q[restrict 4], const double qd[restrict 4], c
     s72 -= t90;
     s51 -= a1.cos*s72;
     s63 += 0.006*(t61 + t90);
-    double s91 = 0.000203*(g[0]*a0.sin[0] - g[2]*a0.cos[0]) + t3*(t14*s32 - t19*s51) + t11*(t19*s32 + t14*s51);
+    double s91 = 0.000203*(g_in[0]*a0.sin[0] - g_in[2]*a0.cos[0]) + t3*(t14*s32 - t19*s51) + t11*(t19*s32 + t14*s51);
     const double t92 = t29*t19 - t30*t14;
     const double t93 = t29*t14 + t30*t19;
     const double t94 = t92 - 0.004*t28;
@@ -156,10 +157,10 @@ void awiwi_fifth_bias(const double q[restrict 4], const double qd[restrict 4], c
     const double t111 = t103 - 2.729474562350089e-07;
     s106 -= t111*t87;
     s88 -= t111*t50;
-    const double t112 = g[1]*a1.cos - a1.sin*t95;
+    const double t112 = g_in[1]*a1.cos - a1.sin*t95;
     const double t113 = t112 - 0.006*(t55 + t46);
     s73 += t20*t113;
-    const double t114 = a1.cos*t95 + g[1]*a1.sin;
+    const double t114 = a1.cos*t95 + g_in[1]*a1.sin;
     const double t115 = 0.006*(t68 - t62) + t114;
     s110 += t20*t115;
     s88 += 1.46e-05*t114;
@@ -219,13 +220,13 @@ void awiwi_fifth_bias(const double q[restrict 4], const double qd[restrict 4], c
     const double t133 = t121 + 2.041e-08;
     s109 += t133*t87;
     s110 -= s109;
-    bias[2] = s110;
+    bias_out[2] = s110;
     s63 -= s110;
     s97 -= a1.sin*s73;
     s97 -= a1.cos*s63;
     s91 += t17*s97;
-    bias[0] = s91;
+    bias_out[0] = s91;
     s88 += t133*t49;
-    bias[1] = s88;
-    bias[3] = -0.7692307692307693*s106 - s109;
+    bias_out[1] = s88;
+    bias_out[3] = -0.7692307692307693*s106 - s109;
 }

@@ -7,41 +7,42 @@
  * Cost: nothing but moves.
  * Inputs: sha256 fc64e49011f94c883d0dff8d313f87b0ec40722e48a38df7128230bbe8804bb6.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-void awiwi_fifth_coupling(const double q[restrict 4], double P[restrict 32])
+void awiwi_fifth_coupling(const double q_in[restrict 4], double P_out[restrict 32])
 {
-    (void)q;
-    P[0] = 0.008;
-    P[4] = -0.008;
-    P[9] = 0.008;
-    P[13] = 0.008;
-    P[17] = -0.008;
-    P[21] = -0.008;
-    P[1] = 0.0;
-    P[2] = 0.0;
-    P[3] = 0.0;
-    P[5] = 0.0;
-    P[6] = 0.0;
-    P[7] = 0.0;
-    P[8] = 0.0;
-    P[11] = 0.0;
-    P[12] = 0.0;
-    P[15] = 0.0;
-    P[16] = 0.0;
-    P[19] = 0.0;
-    P[20] = 0.0;
-    P[23] = 0.0;
-    P[24] = 0.0;
-    P[25] = 0.0;
-    P[26] = 0.0;
-    P[28] = 0.0;
-    P[29] = 0.0;
-    P[30] = 0.0;
-    P[10] = 0.006;
-    P[14] = -0.006;
-    P[18] = 0.006;
-    P[22] = -0.006;
-    P[27] = 0.005;
-    P[31] = -0.005;
+    (void)q_in;
+    P_out[0] = 0.008;
+    P_out[4] = -0.008;
+    P_out[9] = 0.008;
+    P_out[13] = 0.008;
+    P_out[17] = -0.008;
+    P_out[21] = -0.008;
+    P_out[1] = 0.0;
+    P_out[2] = 0.0;
+    P_out[3] = 0.0;
+    P_out[5] = 0.0;
+    P_out[6] = 0.0;
+    P_out[7] = 0.0;
+    P_out[8] = 0.0;
+    P_out[11] = 0.0;
+    P_out[12] = 0.0;
+    P_out[15] = 0.0;
+    P_out[16] = 0.0;
+    P_out[19] = 0.0;
+    P_out[20] = 0.0;
+    P_out[23] = 0.0;
+    P_out[24] = 0.0;
+    P_out[25] = 0.0;
+    P_out[26] = 0.0;
+    P_out[28] = 0.0;
+    P_out[29] = 0.0;
+    P_out[30] = 0.0;
+    P_out[10] = 0.006;
+    P_out[14] = -0.006;
+    P_out[18] = 0.006;
+    P_out[22] = -0.006;
+    P_out[27] = 0.005;
+    P_out[31] = -0.005;
 }

@@ -10,17 +10,18 @@
  * Cost: 133 add, 166 mul, 2 div, 1 sqrt, 5 sincos.
  * Inputs: sha256 82c94b8f69f95d4e333edef1e77b9be9e828f140a78270df43f42bcfcd69897c.
  */
+#include "numerics.h"
 #include <math.h>
-#include "trig.h"
+#include "sincos.h"
 #include "kernels.h"
 
-void awiwi_fifth_energy(const double q[restrict 4], const double qd[restrict 4], const double g[restrict 3], double kinetic[restrict 1], double potential[restrict 1])
+void awiwi_fifth_energy(const double q_in[restrict 4], const double qd_in[restrict 4], const double g_in[restrict 3], double kinetic_out[restrict 1], double potential_out[restrict 1])
 {
-    double s0 = 0.7692307692307693*q[3] - 1.5372089625888168;
-    const double t1 = q[3] + q[2];
+    double s0 = 0.7692307692307693*q_in[3] - 1.5372089625888168;
+    const double t1 = q_in[3] + q_in[2];
     s0 += t1;
-    const double t2 = q[0] + 1.0471975511965979;
-    const awiwi_turn4 a0 = awiwi_sincos4(t1, s0, q[2], t2);
+    const double t2 = q_in[0] + 1.0471975511965979;
+    const awiwi_sincos4_result a0 = awiwi_sincos4(t1, s0, q_in[2], t2);
     const double t3 = 2.0628358988550422e-07*a0.cos[1] - 2.4006612569884656e-05*a0.sin[1];
     const double t4 = 0.044*a0.cos[0]*t3;
     const double t5 = 2.4006612569884656e-05*a0.cos[1] + 2.0628358988550422e-07*a0.sin[1];
@@ -59,8 +60,8 @@ void awiwi_fifth_energy(const double q[restrict 4], const double qd[restrict 4],
     const double t28 = 0.006*t26;
     s21 += t28;
     double s29 = t27 - 1.0652e-06;
-    double s30 = qd[3]*(t24 + 5.772486465986733e-08*a0.cos[1]) + qd[2]*t25;
-    double s31 = 0.5*qd[3]*qd[3]*(t7 + 2.0*t10 + 1.6871005917159763e-07) + qd[2]*(0.5*qd[2]*s12 + qd[3]*s11);
+    double s30 = qd_in[3]*(t24 + 5.772486465986733e-08*a0.cos[1]) + qd_in[2]*t25;
+    double s31 = 0.5*qd_in[3]*qd_in[3]*(t7 + 2.0*t10 + 1.6871005917159763e-07) + qd_in[2]*(0.5*qd_in[2]*s12 + qd_in[3]*s11);
     const double t32 = 1.011997e-05*a0.cos[2] - 2.62e-08*a0.sin[2];
     s21 += a0.sin[2]*t32;
     double s33 = 4.517e-07*a0.cos[2] - 4.28e-09*a0.sin[2];
@@ -72,11 +73,11 @@ void awiwi_fifth_energy(const double q[restrict 4], const double qd[restrict 4],
     const double t37 = 2.6077491247001784e-07*a0.cos[1] + 1.03276050589926e-08*a0.sin[1];
     s35 -= a0.cos[1]*t37;
     s8 -= s35;
-    s30 -= 0.5*qd[1]*s8;
+    s30 -= 0.5*qd_in[1]*s8;
     s21 -= a0.sin[1]*t37;
     s9 += s35;
     s29 += s9;
-    s31 += qd[1]*s30;
+    s31 += qd_in[1]*s30;
     const double t38 = t23 + 8.79e-05;
     const double t39 = 0.01*a0.cos[3];
     const double t40 = 0.00024*a0.cos[3] - 0.000244;
@@ -92,25 +93,25 @@ void awiwi_fifth_energy(const double q[restrict 4], const double qd[restrict 4],
     const double t50 = (t46*t47 + 0.00012*a0.sin[3] - t39*t45)/t43 - 1.0;
     const double t51 = t50 + 1.0;
     const double t52 = t20 - 0.0001068;
-    const awiwi_turn a1 = awiwi_sincos(q[1]);
+    const awiwi_sincos_result a1 = awiwi_sincos(q_in[1]);
     s29 += a1.cos*(2.0*a1.sin*(s33 + 8.73e-08) - a1.cos*(s9 - 1.1684e-07));
     const double t53 = a1.cos*t20;
     const double t54 = t39*(t23*t49 - t53*t48) + t46*(t23*t48 + t53*t49) - (a1.sin*s33 - 0.004*t23 - a1.cos*(s12 - t28))*t51;
     const double t55 = a1.cos*t19;
     const double t56 = t39*(t18*t49 - t55*t48) + t46*(t18*t48 + t55*t49) + (0.004*t18 + a1.sin*(5.772486465986733e-08*a0.sin[1] - t36) - a1.cos*(0.006*(t19 - t18) - s11))*t51;
-    const double t57 = qd[1]*((1.46e-05*a1.cos + a1.sin*t38)*(t39*t48 - t46*t49) - (a1.cos*(t25 - 8.78e-08) + a1.sin*s21)*t51);
-    double s58 = t57 - qd[2]*t54 - qd[3]*t56;
+    const double t57 = qd_in[1]*((1.46e-05*a1.cos + a1.sin*t38)*(t39*t48 - t46*t49) - (a1.cos*(t25 - 8.78e-08) + a1.sin*s21)*t51);
+    double s58 = t57 - qd_in[2]*t54 - qd_in[3]*t56;
     const double t59 = 1.46e-05*a1.sin - a1.cos*t38;
     s29 += 0.008*t59;
     const double t60 = t59 - 7.12e-05;
     const double t61 = 0.02*(a0.cos[3]*(t52*t48 + t60*t49) - a0.sin[3]*(t52*t49 - t60*t48));
-    s58 += 0.5*qd[0]*(s29 + t61 + t50*(s29*(t50 + 2.0) + t61) - 2.03e-06);
-    s31 -= qd[0]*s58;
-    kinetic[0] = s31;
-    const double t62 = g[0]*t49 + g[2]*t48;
-    double s63 = t52*(g[0]*t48 - g[2]*t49) - 0.000203*(g[0]*a0.cos[3] + g[2]*a0.sin[3]) - 7.12e-05*t62;
-    s63 += 2.5e-06*g[1];
-    s63 -= 1.46e-05*(g[1]*a1.cos - a1.sin*t62);
-    s63 -= t38*(a1.cos*t62 + g[1]*a1.sin);
-    potential[0] = s63;
+    s58 += 0.5*qd_in[0]*(s29 + t61 + t50*(s29*(t50 + 2.0) + t61) - 2.03e-06);
+    s31 -= qd_in[0]*s58;
+    kinetic_out[0] = s31;
+    const double t62 = g_in[0]*t49 + g_in[2]*t48;
+    double s63 = t52*(g_in[0]*t48 - g_in[2]*t49) - 0.000203*(g_in[0]*a0.cos[3] + g_in[2]*a0.sin[3]) - 7.12e-05*t62;
+    s63 += 2.5e-06*g_in[1];
+    s63 -= 1.46e-05*(g_in[1]*a1.cos - a1.sin*t62);
+    s63 -= t38*(a1.cos*t62 + g_in[1]*a1.sin);
+    potential_out[0] = s63;
 }

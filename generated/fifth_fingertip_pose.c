@@ -7,20 +7,21 @@
  * Cost: 28 add, 44 mul, 1 div, 3 neg, 1 sqrt, 5 sincos.
  * Inputs: sha256 28edf41a51f84ef24222facbdc6e1021f809ccdd8b122d41df2ba55b8d1b95d9.
  */
+#include "numerics.h"
 #include <math.h>
-#include "trig.h"
+#include "sincos.h"
 #include "kernels.h"
 
-void awiwi_fifth_fingertip_pose(const double q[restrict 4], double T[restrict 16])
+void awiwi_fifth_fingertip_pose(const double q_in[restrict 4], double T_out[restrict 16])
 {
-    T[12] = 0.0;
-    T[13] = 0.0;
-    T[14] = 0.0;
-    T[15] = 1.0;
-    const double t0 = q[0] + 1.0471975511965979;
-    const double t1 = q[2] + q[3];
-    const double t2 = 0.7692307692307693*q[3] + t1;
-    const awiwi_turn4 a0 = awiwi_sincos4(t2, t0, q[2], t1);
+    T_out[12] = 0.0;
+    T_out[13] = 0.0;
+    T_out[14] = 0.0;
+    T_out[15] = 1.0;
+    const double t0 = q_in[0] + 1.0471975511965979;
+    const double t1 = q_in[2] + q_in[3];
+    const double t2 = 0.7692307692307693*q_in[3] + t1;
+    const awiwi_sincos4_result a0 = awiwi_sincos4(t2, t0, q_in[2], t1);
     const double t3 = 0.01*a0.sin[1];
     const double t4 = 0.00012*a0.cos[1] - 0.000122;
     const double t5 = 0.01*a0.cos[1];
@@ -40,22 +41,22 @@ void awiwi_fifth_fingertip_pose(const double q[restrict 4], double T[restrict 16
     s17 += 0.022*a0.cos[3];
     double s18 = t5 - s16*t15;
     double s19 = t3 + s16*t14;
-    const awiwi_turn a1 = awiwi_sincos(q[1]);
-    T[6] = -a1.cos;
+    const awiwi_sincos_result a1 = awiwi_sincos(q_in[1]);
+    T_out[6] = -a1.cos;
     const double t20 = 0.0036*a1.sin - 0.004 - a1.cos*s17;
     s18 -= t20*t14;
-    T[3] = s18;
-    T[7] = a1.sin*s17 + 0.0036*a1.cos;
+    T_out[3] = s18;
+    T_out[7] = a1.sin*s17 + 0.0036*a1.cos;
     s19 -= t20*t15;
-    T[11] = s19;
+    T_out[11] = s19;
     const double t21 = a1.cos*a0.cos[0];
-    T[0] = t21*t14 - a0.sin[0]*t15;
+    T_out[0] = t21*t14 - a0.sin[0]*t15;
     const double t22 = a1.cos*a0.sin[0];
-    T[1] = -(a0.cos[0]*t15) - t22*t14;
-    T[2] = a1.sin*t14;
-    T[4] = a1.sin*a0.cos[0];
-    T[5] = -(a1.sin*a0.sin[0]);
-    T[8] = a0.sin[0]*t14 + t21*t15;
-    T[9] = a0.cos[0]*t14 - t22*t15;
-    T[10] = a1.sin*t15;
+    T_out[1] = -(a0.cos[0]*t15) - t22*t14;
+    T_out[2] = a1.sin*t14;
+    T_out[4] = a1.sin*a0.cos[0];
+    T_out[5] = -(a1.sin*a0.sin[0]);
+    T_out[8] = a0.sin[0]*t14 + t21*t15;
+    T_out[9] = a0.cos[0]*t14 - t22*t15;
+    T_out[10] = a1.sin*t15;
 }

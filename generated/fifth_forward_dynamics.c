@@ -10,17 +10,18 @@
  * Cost: 329 add, 352 mul, 6 div, 1 neg, 1 sqrt, 5 sincos.
  * Inputs: sha256 1718087ca49bffea2cbf8b94cea197715d11a5dc4952832196147295c859c88c.
  */
+#include "numerics.h"
 #include <math.h>
-#include "trig.h"
+#include "sincos.h"
 #include "kernels.h"
 
-void awiwi_fifth_forward_dynamics(const double q[restrict 4], const double qd[restrict 4], const double tau[restrict 4], const double g[restrict 3], double qdd[restrict 4])
+void awiwi_fifth_forward_dynamics(const double q_in[restrict 4], const double qd_in[restrict 4], const double tau_in[restrict 4], const double g_in[restrict 3], double qdd_out[restrict 4])
 {
-    double s0 = 0.7692307692307693*q[3] - 1.5372089625888168;
-    const double t1 = q[3] + q[2];
+    double s0 = 0.7692307692307693*q_in[3] - 1.5372089625888168;
+    const double t1 = q_in[3] + q_in[2];
     s0 += t1;
-    const double t2 = q[0] + 1.0471975511965979;
-    const awiwi_turn4 a0 = awiwi_sincos4(q[2], t1, s0, t2);
+    const double t2 = q_in[0] + 1.0471975511965979;
+    const awiwi_sincos4_result a0 = awiwi_sincos4(q_in[2], t1, s0, t2);
     const double t3 = 0.6931486301369864*a0.cos[0] - 0.0017945205479452055*a0.sin[0];
     const double t4 = a0.cos[0]*t3;
     const double t5 = a0.sin[0]*t3 + 0.0008972602739726027;
@@ -122,7 +123,7 @@ void awiwi_fifth_forward_dynamics(const double q[restrict 4], const double qd[re
     const double t85 = t73*t84 - 1.0;
     s77 -= t73*t73*(0.000121*t76*t76 - (t70 + 5.625e-05)*t84*t84);
     const double t86 = t85 + 1.0;
-    const awiwi_turn a1 = awiwi_sincos(q[1]);
+    const awiwi_sincos_result a1 = awiwi_sincos(q_in[1]);
     const double t87 = a1.cos*t55;
     const double t88 = t63*(t53*t75 - t87*t74) + t71*(t53*t74 + t87*t75) + (0.004*t53 + a1.sin*(0.0039537578534155704*a0.sin[2] - t82) - a1.cos*(0.006*(t55 - t53) - s46))*t86;
     double s89 = t47*t88 - (a1.sin*s54 + a1.cos*t57)*t86;
@@ -138,20 +139,20 @@ void awiwi_fifth_forward_dynamics(const double q[restrict 4], const double qd[re
     const double t95 = t17 - 7.315068493150685;
     const double t96 = t61*s89;
     double s97 = s89*t96 + s38 - 0.13904109589041097;
-    const double t98 = qd[0]*t86;
-    const double t99 = qd[0]*qd[0];
+    const double t98 = qd_in[0]*t86;
+    const double t99 = qd_in[0]*qd_in[0];
     const double t100 = t99*(t73*s77);
     const double t101 = a1.sin*t98;
     const double t102 = a1.sin*t101;
     const double t103 = t98*t102;
     const double t104 = a1.cos*t98;
     const double t105 = t98*t98;
-    double s106 = 68493.1506849315*tau[1] - 0.00597945205479452*t98*(a1.cos*t104 - t102);
-    const double t107 = t104 + qd[2];
+    double s106 = 68493.1506849315*tau_in[1] - 0.00597945205479452*t98*(a1.cos*t104 - t102);
+    const double t107 = t104 + qd_in[2];
     const double t108 = t107*t107;
     s106 += t51*(t103 - t108);
-    const double t109 = qd[2] + qd[3];
-    const double t110 = 0.7692307692307693*qd[3] + t109;
+    const double t109 = qd_in[2] + qd_in[3];
+    const double t110 = 0.7692307692307693*qd_in[3] + t109;
     const double t111 = t109 + t104;
     const double t112 = t111*t111;
     s106 += t78*(t103 - t112);
@@ -160,23 +161,23 @@ void awiwi_fifth_forward_dynamics(const double q[restrict 4], const double qd[re
     const double t114 = 2.0*t101;
     const double t115 = t113 + t110*t114;
     s106 += t37*t115;
-    const double t116 = t99*t63 + g[0];
-    const double t117 = t99*t71 + g[2];
-    double s118 = 68493.1506849315*tau[0] - 13.904109589041095*(g[0]*a0.sin[3] - g[2]*a0.cos[3]);
+    const double t116 = t99*t63 + g_in[0];
+    const double t117 = t99*t71 + g_in[2];
+    double s118 = 68493.1506849315*tau_in[0] - 13.904109589041095*(g_in[0]*a0.sin[3] - g_in[2]*a0.cos[3]);
     const double t119 = t116*t75 + t117*t74;
     const double t120 = t116*t74 - t117*t75;
     const double t121 = t119 + 0.004*t105;
     double s122 = 4.876712328767123*t120 - 7.315068493150685*t119;
     const double t123 = t120 - 0.004*t100;
     s122 -= 0.07295890410958904*t100;
-    const double t124 = g[1]*a1.cos - a1.sin*t121;
-    const double t125 = a1.cos*t121 + g[1]*a1.sin;
+    const double t124 = g_in[1]*a1.cos - a1.sin*t121;
+    const double t125 = a1.cos*t121 + g_in[1]*a1.sin;
     s106 += 6.02054794520548*t124;
     s106 -= t125;
     const double t126 = t110 + t104;
     const double t127 = t126*t126;
     s106 -= t81*(t103 - t127);
-    const double t128 = t113 + qd[2]*t114;
+    const double t128 = t113 + qd_in[2]*t114;
     const double t129 = t109*t114 + t113;
     s106 -= t7*t128;
     s106 -= t12*t129;
@@ -184,9 +185,9 @@ void awiwi_fifth_forward_dynamics(const double q[restrict 4], const double qd[re
     const double t131 = t104*t104;
     const double t132 = t131 + t103;
     const double t133 = 2.0*t104;
-    const double t134 = qd[1]*t104;
+    const double t134 = qd_in[1]*t104;
     const double t135 = t134 - a1.sin*t100;
-    const double t136 = 2.0*qd[1];
+    const double t136 = 2.0*qd_in[1];
     const double t137 = t134 - t135;
     const double t138 = t124 - 0.006*(t113 + t137);
     double s139 = t50*t128 - t138;
@@ -198,7 +199,7 @@ void awiwi_fifth_forward_dynamics(const double q[restrict 4], const double qd[re
     s106 -= 0.03610958904109589*t137;
     s130 += t13*t138;
     s130 -= 0.008002739726027398*t140;
-    const double t144 = qd[2]*t136 + t137;
+    const double t144 = qd_in[2]*t136 + t137;
     s139 -= t52*t144;
     double s145 = t28*t128 - t13*t144;
     double s146 = t79*t129 + s139;
@@ -213,9 +214,9 @@ void awiwi_fifth_forward_dynamics(const double q[restrict 4], const double qd[re
     s145 += t150;
     s146 -= t80*t147;
     const double t151 = t136*t101;
-    const double t152 = qd[1]*t101;
+    const double t152 = qd_in[1]*t101;
     const double t153 = a1.cos*t100 + t152;
-    const double t154 = qd[1]*qd[1];
+    const double t154 = qd_in[1]*qd_in[1];
     s141 -= t37*t151;
     s142 += t12*t151;
     s143 += t7*t151;
@@ -261,7 +262,7 @@ void awiwi_fifth_forward_dynamics(const double q[restrict 4], const double qd[re
     const double t165 = t15*(t132 + t164) + t18*t156;
     s142 += t79*t165;
     double s166 = t165 + t22*t156;
-    const double t167 = qd[2]*(qd[2] + t133);
+    const double t167 = qd_in[2]*(qd_in[2] + t133);
     const double t168 = t109*(t133 + t109);
     const double t169 = t132 + t167;
     const double t170 = t123 + 0.006*(t132 - t156);
@@ -294,7 +295,7 @@ void awiwi_fifth_forward_dynamics(const double q[restrict 4], const double qd[re
     s141 -= t15*s179;
     s142 += s141;
     s142 -= t14*s178;
-    const double t184 = 0.7692307692307693*s141 + 68493.1506849315*tau[3] + s142;
+    const double t184 = 0.7692307692307693*s141 + 68493.1506849315*tau_in[3] + s142;
     s143 += s142;
     s143 -= t13*t183;
     s106 -= t47*t184;
@@ -303,7 +304,7 @@ void awiwi_fifth_forward_dynamics(const double q[restrict 4], const double qd[re
     s130 -= 0.0060136986301369865*(t154 - t131);
     s157 += 0.006*(t174 + s182);
     s157 += s143;
-    const double t185 = s143 + 68493.1506849315*tau[2] - t58*t184;
+    const double t185 = s143 + 68493.1506849315*tau_in[2] - t58*t184;
     s106 -= t60*t185;
     s122 -= a1.sin*s130;
     s122 -= a1.cos*s157;
@@ -321,10 +322,10 @@ void awiwi_fifth_forward_dynamics(const double q[restrict 4], const double qd[re
     s97 += t188;
     s97 += t85*(t188 + s38*(t85 + 2.0));
     const double t189 = s118/s97;
-    qdd[0] = -t189;
+    qdd_out[0] = -t189;
     const double t190 = t61*s106 - t96*t189;
-    qdd[1] = t190;
+    qdd_out[1] = t190;
     const double t191 = t59*t185 + t187*t189 - t60*t190;
-    qdd[2] = t191;
-    qdd[3] = t45*t184 + t186*t189 - t47*t190 - t58*t191;
+    qdd_out[2] = t191;
+    qdd_out[3] = t45*t184 + t186*t189 - t47*t190 - t58*t191;
 }

@@ -8,19 +8,20 @@
  * Cost: 41 add, 55 mul, 2 div, 1 sqrt, 5 sincos.
  * Inputs: sha256 510cc29c516f948798433eb3b40aa4ff4fd7af8989efae96a8696b05c3c6c657.
  */
+#include "numerics.h"
 #include <math.h>
-#include "trig.h"
+#include "sincos.h"
 #include "kernels.h"
 
-void awiwi_fifth_gravity(const double q[restrict 4], const double g[restrict 3], double gravity[restrict 4])
+void awiwi_fifth_gravity(const double q_in[restrict 4], const double g_in[restrict 3], double gravity_out[restrict 4])
 {
-    const double t0 = q[0] + 1.0471975511965979;
-    const double t1 = q[2] - 1.5667559447406272;
-    const double t2 = q[2] + q[3];
-    double s3 = 0.7692307692307693*q[3] + t2;
+    const double t0 = q_in[0] + 1.0471975511965979;
+    const double t1 = q_in[2] - 1.5667559447406272;
+    const double t2 = q_in[2] + q_in[3];
+    double s3 = 0.7692307692307693*q_in[3] + t2;
     const double t4 = t2 - 1.563470450527876;
     s3 -= 1.5458015331759765;
-    const awiwi_turn4 a0 = awiwi_sincos4(t0, t1, t4, s3);
+    const awiwi_sincos4_result a0 = awiwi_sincos4(t0, t1, t4, s3);
     const double t5 = 2.400749882849107e-05*a0.cos[3];
     const double t6 = 0.0001092029303636125*a0.cos[2] + t5;
     const double t7 = 0.00034650282827128554*a0.cos[1] + t6;
@@ -40,17 +41,17 @@ void awiwi_fifth_gravity(const double q[restrict 4], const double g[restrict 3],
     const double t21 = t13*(0.33610469291294465*t17 - 0.575741330674062*t18);
     double s22 = 0.000203*a0.sin[0] + t11*t19;
     double s23 = 0.000203*a0.cos[0] - t11*t21;
-    const awiwi_turn a1 = awiwi_sincos(q[1]);
+    const awiwi_sincos_result a1 = awiwi_sincos(q_in[1]);
     const double t24 = 1.46e-05*a1.sin + a1.cos*t20 - 7.12e-05;
     s22 -= t24*t21;
     s23 -= t24*t19;
-    double s25 = g[0]*s22 - g[2]*s23;
-    const double t26 = g[0]*t19 + g[2]*t21;
-    const double t27 = g[0]*t21 - g[2]*t19;
+    double s25 = g_in[0]*s22 - g_in[2]*s23;
+    const double t26 = g_in[0]*t19 + g_in[2]*t21;
+    const double t27 = g_in[0]*t21 - g_in[2]*t19;
     s25 += ((0.00012*a0.sin[0] - 5e-05*(t13*(a0.cos[0]*t17 - a0.sin[0]*t18)))/t15 - 1.0)*(t11*t26 - t24*t27);
-    gravity[0] = s25;
-    const double t28 = a1.cos*t26 + g[1]*a1.sin;
-    gravity[1] = t20*(g[1]*a1.cos - a1.sin*t26) + 1.46e-05*t28;
-    gravity[2] = t7*t28 - t10*t27;
-    gravity[3] = t6*t28 - t9*t27 - 0.7692307692307693*(t8*t27 - t5*t28);
+    gravity_out[0] = s25;
+    const double t28 = a1.cos*t26 + g_in[1]*a1.sin;
+    gravity_out[1] = t20*(g_in[1]*a1.cos - a1.sin*t26) + 1.46e-05*t28;
+    gravity_out[2] = t7*t28 - t10*t27;
+    gravity_out[3] = t6*t28 - t9*t27 - 0.7692307692307693*(t8*t27 - t5*t28);
 }

@@ -14,15 +14,16 @@
  * Cost: 15 add, 25 mul, 2 div, 1 sqrt, 1 sincos, 2 calls.
  * Inputs: sha256 d021538d8900d42317b84036df325beebaa6feecad7df8e1e869f0ec5a1f0d9f.
  */
+#include "numerics.h"
 #include <math.h>
 #include "elementary.h"
-#include "trig.h"
+#include "sincos.h"
 #include "kernels.h"
 
-int awiwi_fifth_hmc_four_bar(const double q[restrict 1], double coupler[restrict 1], double rocker[restrict 1], double coupler_ratio[restrict 1], double rocker_ratio[restrict 1], double transmission[restrict 1])
+int awiwi_fifth_hmc_four_bar(const double q_in[restrict 1], double coupler_out[restrict 1], double rocker_out[restrict 1], double coupler_ratio_out[restrict 1], double rocker_ratio_out[restrict 1], double transmission_out[restrict 1])
 {
-    const double t0 = q[0] + 1.0471975511965979;
-    const awiwi_turn a0 = awiwi_sincos(t0);
+    const double t0 = q_in[0] + 1.0471975511965979;
+    const awiwi_sincos_result a0 = awiwi_sincos(t0);
     const double t1 = 0.00024*a0.cos - 0.000244;
     const double t2 = 0.01*a0.cos;
     const double t3 = 1.0/t1;
@@ -38,10 +39,10 @@ int awiwi_fifth_hmc_four_bar(const double q[restrict 1], double coupler[restrict
     const double t13 = -133.33333333333334*t9;
     const double t14 = -133.33333333333334*t8;
     const double t15 = 90.9090909090909*(t4 - t8);
-    coupler_ratio[0] = t11*(0.00012*a0.sin + t12);
-    rocker_ratio[0] = t11*t12;
-    coupler[0] = awiwi_atan2(t14, t13);
-    rocker[0] = awiwi_atan2(t15, t10);
-    transmission[0] = t14*t10 - t13*t15;
+    coupler_ratio_out[0] = t11*(0.00012*a0.sin + t12);
+    rocker_ratio_out[0] = t11*t12;
+    coupler_out[0] = awiwi_atan2(t14, t13);
+    rocker_out[0] = awiwi_atan2(t15, t10);
+    transmission_out[0] = t14*t10 - t13*t15;
     return -36730945.82185491*((t1 + 1.225e-05)*(t1 + 0.00034225)) > 0.0 ? 0 : 1;
 }

@@ -10,17 +10,18 @@
  * Cost: 238 add, 262 mul, 2 div, 1 sqrt, 5 sincos.
  * Inputs: sha256 d0df8ff241cc1ae7f3754b69e6914d3fe8fd8fd3f3a8cea2e9a7fef674657d8d.
  */
+#include "numerics.h"
 #include <math.h>
-#include "trig.h"
+#include "sincos.h"
 #include "kernels.h"
 
-void awiwi_fifth_inverse_dynamics(const double q[restrict 4], const double qd[restrict 4], const double qdd[restrict 4], const double g[restrict 3], double tau[restrict 4])
+void awiwi_fifth_inverse_dynamics(const double q_in[restrict 4], const double qd_in[restrict 4], const double qdd_in[restrict 4], const double g_in[restrict 3], double tau_out[restrict 4])
 {
-    const double t0 = q[0] + 1.0471975511965979;
-    double s1 = 0.7692307692307693*q[3] - 1.5372089625888168;
-    const double t2 = q[3] + q[2];
+    const double t0 = q_in[0] + 1.0471975511965979;
+    double s1 = 0.7692307692307693*q_in[3] - 1.5372089625888168;
+    const double t2 = q_in[3] + q_in[2];
     s1 += t2;
-    const awiwi_turn4 a0 = awiwi_sincos4(t0, q[2], t2, s1);
+    const awiwi_sincos4_result a0 = awiwi_sincos4(t0, q_in[2], t2, s1);
     const double t3 = 0.01*a0.cos[0];
     const double t4 = 0.00024*a0.cos[0] - 0.000244;
     const double t5 = 1.0/t4;
@@ -45,51 +46,51 @@ void awiwi_fifth_inverse_dynamics(const double q[restrict 4], const double qd[re
     const double t23 = 2.0628358988550422e-07*a0.cos[3] - 2.4006612569884656e-05*a0.sin[3];
     const double t24 = 0.0001092*a0.cos[2] - 8e-07*a0.sin[2];
     const double t25 = 0.0003465*a0.cos[1] - 1.4e-06*a0.sin[1];
-    const double t26 = qd[0]*t17;
-    const double t27 = qd[0]*qd[0];
-    double s28 = g[0] + t27*t3;
-    double s29 = g[2] + t27*t11;
+    const double t26 = qd_in[0]*t17;
+    const double t27 = qd_in[0]*qd_in[0];
+    double s28 = g_in[0] + t27*t3;
+    double s29 = g_in[2] + t27*t11;
     const double t30 = t26*t26;
-    const double t31 = qdd[0]*t17 - t27*t13*s18;
-    s28 += qdd[0]*t11;
-    s29 -= qdd[0]*t3;
-    double s32 = 0.000203*(g[0]*a0.sin[0] - g[2]*a0.cos[0]) + 2.03e-06*qdd[0];
+    const double t31 = qdd_in[0]*t17 - t27*t13*s18;
+    s28 += qdd_in[0]*t11;
+    s29 -= qdd_in[0]*t3;
+    double s32 = 0.000203*(g_in[0]*a0.sin[0] - g_in[2]*a0.cos[0]) + 2.03e-06*qdd_in[0];
     double s33 = 0.0001068*t30 + 7.12e-05*t31;
-    const awiwi_turn a1 = awiwi_sincos(q[1]);
+    const awiwi_sincos_result a1 = awiwi_sincos(q_in[1]);
     const double t34 = a1.cos*t26;
     const double t35 = a1.sin*t26;
     const double t36 = t34*t34;
     const double t37 = t35*t35;
     const double t38 = t36 + t37;
     const double t39 = 2.0*t34;
-    const double t40 = qd[2]*(t39 + qd[2]);
+    const double t40 = qd_in[2]*(t39 + qd_in[2]);
     const double t41 = t38 + t40;
-    const double t42 = qd[2] + qd[3];
-    const double t43 = 0.7692307692307693*qd[3] + t42;
+    const double t42 = qd_in[2] + qd_in[3];
+    const double t43 = 0.7692307692307693*qd_in[3] + t42;
     const double t44 = t42*(t42 + t39);
     const double t45 = t43*(t39 + t43);
     const double t46 = t38 + t44;
     const double t47 = t34*t35;
-    const double t48 = qdd[1] - t47;
-    const double t49 = t47 + qdd[1];
+    const double t48 = qdd_in[1] - t47;
+    const double t49 = t47 + qdd_in[1];
     const double t50 = 2.0*t35;
-    const double t51 = t49 + qd[2]*t50;
+    const double t51 = t49 + qd_in[2]*t50;
     const double t52 = t49 + t42*t50;
     const double t53 = t43*t50 + t49;
-    const double t54 = qd[1]*t34;
+    const double t54 = qd_in[1]*t34;
     const double t55 = a1.sin*t31 + t54;
     const double t56 = t54 + t55;
     const double t57 = t54 - t55;
-    const double t58 = qd[1]*t35;
+    const double t58 = qd_in[1]*t35;
     const double t59 = t58 - a1.cos*t31;
     const double t60 = t58 + t59;
     const double t61 = t58 - t59;
     double s62 = 1.0626e-06*t58 + 8.78e-08*t48 + 8.73e-08*t56 - 5.313e-07*t61;
-    const double t63 = qdd[2] - t60;
+    const double t63 = qdd_in[2] - t60;
     double s64 = t20*t41 - t25*t63;
-    const double t65 = qdd[2] + t61;
-    const double t66 = qdd[2] + qdd[3];
-    const double t67 = 0.7692307692307693*qdd[3] + t66;
+    const double t65 = qdd_in[2] + t61;
+    const double t66 = qdd_in[2] + qdd_in[3];
+    const double t67 = 0.7692307692307693*qdd_in[3] + t66;
     const double t68 = t67 - t60;
     const double t69 = t22*(t38 + t45) - t23*t68;
     const double t70 = t66 - t60;
@@ -101,13 +102,13 @@ void awiwi_fifth_inverse_dynamics(const double q[restrict 4], const double qd[re
     s33 -= t74;
     double s75 = 5.272e-07*t49 - 8.73e-08*t60 - 1.1684e-07*t56;
     double s76 = 1.0652e-06*t31 - 0.004*t74;
-    const double t77 = qd[1]*qd[1];
+    const double t77 = qd_in[1]*qd_in[1];
     const double t78 = t36 + t77;
     const double t79 = t40 + t78;
     const double t80 = t44 + t78;
     const double t81 = t23*(t45 + t78) + t22*t73;
     double s82 = 1.46e-05*t48 + 8.79e-05*t78;
-    const double t83 = 2.0*qd[1];
+    const double t83 = 2.0*qd_in[1];
     s75 -= 8.78e-08*(t77 - t36);
     double s84 = 1.1684e-07*t48 + 5.313e-07*t49 + 5.272e-07*t57 - 8.78e-08*t61;
     const double t85 = t24*t80 + t21*t72 + t81;
@@ -123,8 +124,8 @@ void awiwi_fifth_inverse_dynamics(const double q[restrict 4], const double qd[re
     const double t93 = t42 + t34;
     const double t94 = t93*t93;
     const double t95 = t24*t52 + t91 - t21*t92;
-    const double t96 = qd[2]*t83 + t57;
-    const double t97 = qd[2] + t34;
+    const double t96 = qd_in[2]*t83 + t57;
+    const double t97 = qd_in[2] + t34;
     const double t98 = t97*t97;
     const double t99 = t83*t35;
     s84 += 8.73e-08*(t26*(a1.cos*t34 - a1.sin*t35));
@@ -181,10 +182,10 @@ void awiwi_fifth_inverse_dynamics(const double q[restrict 4], const double qd[re
     const double t121 = t115 - 2.729474562350089e-07;
     s112 += t121*t99;
     s84 -= t121*t53;
-    const double t122 = g[1]*a1.cos - a1.sin*t106;
+    const double t122 = g_in[1]*a1.cos - a1.sin*t106;
     const double t123 = t122 - 0.006*(t57 + t49);
     s75 += t20*t123;
-    const double t124 = a1.cos*t106 + g[1]*a1.sin;
+    const double t124 = a1.cos*t106 + g_in[1]*a1.sin;
     const double t125 = 0.006*(t78 - t61) + t124;
     s109 += t20*t125;
     s84 += 1.46e-05*t124;
@@ -235,13 +236,13 @@ void awiwi_fifth_inverse_dynamics(const double q[restrict 4], const double qd[re
     const double t141 = t136 + 2.041e-08;
     s120 += t141*t99;
     s109 -= s120;
-    tau[2] = s109;
+    tau_out[2] = s109;
     s62 -= s109;
     s76 -= a1.sin*s75;
     s76 -= a1.cos*s62;
     s32 += t17*s76;
-    tau[0] = s32;
+    tau_out[0] = s32;
     s84 += t141*t52;
-    tau[1] = s84;
-    tau[3] = 0.7692307692307693*s112 - s120;
+    tau_out[1] = s84;
+    tau_out[3] = 0.7692307692307693*s112 - s120;
 }

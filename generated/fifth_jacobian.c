@@ -7,20 +7,21 @@
  * Cost: 33 add, 59 mul, 2 div, 4 neg, 1 sqrt, 5 sincos.
  * Inputs: sha256 41e0b066350c1515c23653124cb3764011a2af2cb74c560413362bf44f18b5d9.
  */
+#include "numerics.h"
 #include <math.h>
-#include "trig.h"
+#include "sincos.h"
 #include "kernels.h"
 
-void awiwi_fifth_jacobian(const double q[restrict 4], double J[restrict 24])
+void awiwi_fifth_jacobian(const double q_in[restrict 4], double J_out[restrict 24])
 {
-    J[4] = 0.0;
-    J[12] = 0.0;
-    J[17] = 0.0;
-    J[20] = 0.0;
-    const double t0 = q[0] + 1.0471975511965979;
-    const double t1 = q[2] + q[3];
-    const double t2 = 0.7692307692307693*q[3] + t1;
-    const awiwi_turn4 a0 = awiwi_sincos4(t0, q[2], t1, t2);
+    J_out[4] = 0.0;
+    J_out[12] = 0.0;
+    J_out[17] = 0.0;
+    J_out[20] = 0.0;
+    const double t0 = q_in[0] + 1.0471975511965979;
+    const double t1 = q_in[2] + q_in[3];
+    const double t2 = 0.7692307692307693*q_in[3] + t1;
+    const awiwi_sincos4_result a0 = awiwi_sincos4(t0, q_in[2], t1, t2);
     const double t3 = 0.01*a0.sin[0];
     const double t4 = 0.00024*a0.cos[0] - 0.000244;
     const double t5 = 0.01*a0.cos[0];
@@ -31,7 +32,7 @@ void awiwi_fifth_jacobian(const double q[restrict 4], double J[restrict 24])
     const double t10 = t6*(0.5*t7*t8 - t3*t9);
     const double t11 = t6*(0.005*a0.sin[0]*t8 + t7*t9);
     const double t12 = (0.00012*a0.sin[0] + t3*t10 - t5*t11)/t9;
-    J[16] = -t12;
+    J_out[16] = -t12;
     const double t13 = -0.022*a0.sin[2] + -0.018*a0.sin[3];
     const double t14 = -0.033*a0.sin[1] + t13;
     const double t15 = 0.022*a0.cos[2] + 0.018*a0.cos[3];
@@ -40,32 +41,32 @@ void awiwi_fifth_jacobian(const double q[restrict 4], double J[restrict 24])
     const double t18 = 0.013846153846153847*a0.cos[3] + t15;
     const double t19 = t14 + 0.006;
     const double t20 = 115.1482661348124*t11 + 67.22093858258893*t10;
-    J[21] = t20;
+    J_out[21] = t20;
     const double t21 = 67.22093858258893*t11 - 115.1482661348124*t10;
-    J[13] = -t21;
+    J_out[13] = -t21;
     const double t22 = t16 + 0.006;
-    const awiwi_turn a1 = awiwi_sincos(q[1]);
-    J[18] = -a1.cos;
+    const awiwi_sincos_result a1 = awiwi_sincos(q_in[1]);
+    J_out[18] = -a1.cos;
     const double t23 = 0.0036*a1.sin - a1.cos*t22;
-    J[5] = -t23;
+    J_out[5] = -t23;
     const double t24 = t23 - 0.004;
-    J[0] = t12*(t19*t20 + t24*t21) - t3;
-    J[8] = t5 - t12*(t24*t20 - t19*t21);
+    J_out[0] = t12*(t19*t20 + t24*t21) - t3;
+    J_out[8] = t5 - t12*(t24*t20 - t19*t21);
     const double t25 = a1.cos*t20;
     const double t26 = a1.sin*t20;
-    J[14] = t26;
-    J[2] = t14*t25 - t16*t21;
-    J[3] = t17*t25 - t18*t21;
-    J[1] = -0.0036*t25 - t22*t26;
-    J[15] = 1.7692307692307692*t26;
-    J[6] = a1.sin*t14;
-    J[7] = a1.sin*t17;
+    J_out[14] = t26;
+    J_out[2] = t14*t25 - t16*t21;
+    J_out[3] = t17*t25 - t18*t21;
+    J_out[1] = -0.0036*t25 - t22*t26;
+    J_out[15] = 1.7692307692307692*t26;
+    J_out[6] = a1.sin*t14;
+    J_out[7] = a1.sin*t17;
     const double t27 = a1.sin*t21;
-    J[22] = t27;
+    J_out[22] = t27;
     const double t28 = a1.cos*t21;
-    J[9] = -0.0036*t28 - t22*t27;
-    J[10] = t16*t20 + t14*t28;
-    J[11] = t18*t20 + t17*t28;
-    J[19] = -1.7692307692307692*a1.cos;
-    J[23] = 1.7692307692307692*t27;
+    J_out[9] = -0.0036*t28 - t22*t27;
+    J_out[10] = t16*t20 + t14*t28;
+    J_out[11] = t18*t20 + t17*t28;
+    J_out[19] = -1.7692307692307692*a1.cos;
+    J_out[23] = 1.7692307692307692*t27;
 }

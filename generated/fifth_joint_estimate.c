@@ -8,15 +8,16 @@
  * Cost: 6 add, 4 mul.
  * Inputs: sha256 00fec029411b512bfbf8b6822baf232d76be140a5bbc5c338c3d82c1669b86a3.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-void awiwi_fifth_joint_estimate(const double h[restrict 8], const double start[restrict 4], double q[restrict 4])
+void awiwi_fifth_joint_estimate(const double h_in[restrict 8], const double start_in[restrict 4], double q_out[restrict 4])
 {
-    (void)start;
-    q[0] = 62.5*(h[0] - h[1]);
-    const double t0 = h[2] - h[5];
-    const double t1 = h[3] - h[4];
-    q[1] = 31.25*(t0 + t1);
-    q[2] = 41.666666666666664*(t0 - t1);
-    q[3] = 100.0*(h[6] - h[7]);
+    (void)start_in;
+    q_out[0] = 62.5*(h_in[0] - h_in[1]);
+    const double t0 = h_in[2] - h_in[5];
+    const double t1 = h_in[3] - h_in[4];
+    q_out[1] = 31.25*(t0 + t1);
+    q_out[2] = 41.666666666666664*(t0 - t1);
+    q_out[3] = 100.0*(h_in[6] - h_in[7]);
 }

@@ -10,31 +10,32 @@
  * Cost: 8 mul.
  * Inputs: sha256 fc64e49011f94c883d0dff8d313f87b0ec40722e48a38df7128230bbe8804bb6.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-void awiwi_fifth_joint_estimate_error(const double q[restrict 4], const double noise[restrict 1], double covariance[restrict 16], double worst[restrict 4])
+void awiwi_fifth_joint_estimate_error(const double q_in[restrict 4], const double noise_in[restrict 1], double covariance_out[restrict 16], double worst_out[restrict 4])
 {
-    (void)q;
-    covariance[1] = 0.0;
-    covariance[2] = 0.0;
-    covariance[3] = 0.0;
-    covariance[4] = 0.0;
-    covariance[6] = 0.0;
-    covariance[7] = 0.0;
-    covariance[8] = 0.0;
-    covariance[9] = 0.0;
-    covariance[11] = 0.0;
-    covariance[12] = 0.0;
-    covariance[13] = 0.0;
-    covariance[14] = 0.0;
-    const double t0 = noise[0]*noise[0];
-    covariance[0] = 7812.5*t0;
-    covariance[5] = 3906.25*t0;
-    covariance[10] = 6944.444444444444*t0;
-    covariance[15] = 20000.0*t0;
-    const double t1 = 125.0*noise[0];
-    worst[0] = t1;
-    worst[1] = t1;
-    worst[2] = 166.66666666666666*noise[0];
-    worst[3] = 200.0*noise[0];
+    (void)q_in;
+    covariance_out[1] = 0.0;
+    covariance_out[2] = 0.0;
+    covariance_out[3] = 0.0;
+    covariance_out[4] = 0.0;
+    covariance_out[6] = 0.0;
+    covariance_out[7] = 0.0;
+    covariance_out[8] = 0.0;
+    covariance_out[9] = 0.0;
+    covariance_out[11] = 0.0;
+    covariance_out[12] = 0.0;
+    covariance_out[13] = 0.0;
+    covariance_out[14] = 0.0;
+    const double t0 = noise_in[0]*noise_in[0];
+    covariance_out[0] = 7812.5*t0;
+    covariance_out[5] = 3906.25*t0;
+    covariance_out[10] = 6944.444444444444*t0;
+    covariance_out[15] = 20000.0*t0;
+    const double t1 = 125.0*noise_in[0];
+    worst_out[0] = t1;
+    worst_out[1] = t1;
+    worst_out[2] = 166.66666666666666*noise_in[0];
+    worst_out[3] = 200.0*noise_in[0];
 }

@@ -8,15 +8,16 @@
  * Cost: 6 add, 4 mul.
  * Inputs: sha256 fc64e49011f94c883d0dff8d313f87b0ec40722e48a38df7128230bbe8804bb6.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-void awiwi_fifth_joint_torque(const double q[restrict 4], const double f[restrict 8], double tau[restrict 4])
+void awiwi_fifth_joint_torque(const double q_in[restrict 4], const double f_in[restrict 8], double tau_out[restrict 4])
 {
-    (void)q;
-    tau[0] = -0.008*(f[0] - f[1]);
-    const double t0 = f[2] - f[5];
-    const double t1 = f[3] - f[4];
-    tau[1] = -0.008*(t0 + t1);
-    tau[2] = -0.006*(t0 - t1);
-    tau[3] = -0.005*(f[6] - f[7]);
+    (void)q_in;
+    tau_out[0] = -0.008*(f_in[0] - f_in[1]);
+    const double t0 = f_in[2] - f_in[5];
+    const double t1 = f_in[3] - f_in[4];
+    tau_out[1] = -0.008*(t0 + t1);
+    tau_out[2] = -0.006*(t0 - t1);
+    tau_out[3] = -0.005*(f_in[6] - f_in[7]);
 }

@@ -10,35 +10,36 @@
  * Cost: 12 add, 9 mul.
  * Inputs: sha256 fc64e49011f94c883d0dff8d313f87b0ec40722e48a38df7128230bbe8804bb6.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-void awiwi_fifth_joint_torque_and_stiffness(const double q[restrict 4], const double f[restrict 8], const double k[restrict 8], double tau[restrict 4], double K[restrict 16])
+void awiwi_fifth_joint_torque_and_stiffness(const double q_in[restrict 4], const double f_in[restrict 8], const double k_in[restrict 8], double tau_out[restrict 4], double K_out[restrict 16])
 {
-    (void)q;
-    K[1] = 0.0;
-    K[2] = 0.0;
-    K[3] = 0.0;
-    K[4] = 0.0;
-    K[7] = 0.0;
-    K[8] = 0.0;
-    K[11] = 0.0;
-    K[12] = 0.0;
-    K[13] = 0.0;
-    K[14] = 0.0;
-    tau[0] = -0.008*(f[0] - f[1]);
-    const double t0 = f[2] - f[5];
-    const double t1 = f[3] - f[4];
-    tau[1] = -0.008*(t0 + t1);
-    tau[2] = -0.006*(t0 - t1);
-    tau[3] = -0.005*(f[6] - f[7]);
-    K[0] = 6.4e-05*(k[0] + k[1]);
-    const double t2 = k[2] + k[5];
-    const double t3 = k[3] + k[4];
+    (void)q_in;
+    K_out[1] = 0.0;
+    K_out[2] = 0.0;
+    K_out[3] = 0.0;
+    K_out[4] = 0.0;
+    K_out[7] = 0.0;
+    K_out[8] = 0.0;
+    K_out[11] = 0.0;
+    K_out[12] = 0.0;
+    K_out[13] = 0.0;
+    K_out[14] = 0.0;
+    tau_out[0] = -0.008*(f_in[0] - f_in[1]);
+    const double t0 = f_in[2] - f_in[5];
+    const double t1 = f_in[3] - f_in[4];
+    tau_out[1] = -0.008*(t0 + t1);
+    tau_out[2] = -0.006*(t0 - t1);
+    tau_out[3] = -0.005*(f_in[6] - f_in[7]);
+    K_out[0] = 6.4e-05*(k_in[0] + k_in[1]);
+    const double t2 = k_in[2] + k_in[5];
+    const double t3 = k_in[3] + k_in[4];
     const double t4 = t2 + t3;
     const double t5 = 4.8e-05*(t2 - t3);
-    K[6] = t5;
-    K[9] = t5;
-    K[5] = 6.4e-05*t4;
-    K[10] = 3.6e-05*t4;
-    K[15] = 2.5e-05*(k[6] + k[7]);
+    K_out[6] = t5;
+    K_out[9] = t5;
+    K_out[5] = 6.4e-05*t4;
+    K_out[10] = 3.6e-05*t4;
+    K_out[15] = 2.5e-05*(k_in[6] + k_in[7]);
 }

@@ -7,17 +7,18 @@
  * Cost: 113 add, 126 mul, 2 div, 1 sqrt, 5 sincos.
  * Inputs: sha256 1718087ca49bffea2cbf8b94cea197715d11a5dc4952832196147295c859c88c.
  */
+#include "numerics.h"
 #include <math.h>
-#include "trig.h"
+#include "sincos.h"
 #include "kernels.h"
 
-void awiwi_fifth_mass_matrix(const double q[restrict 4], double M[restrict 16])
+void awiwi_fifth_mass_matrix(const double q_in[restrict 4], double M_out[restrict 16])
 {
-    const double t0 = q[0] + 1.0471975511965979;
-    double s1 = 0.7692307692307693*q[3] - 1.5372089625888168;
-    const double t2 = q[3] + q[2];
+    const double t0 = q_in[0] + 1.0471975511965979;
+    double s1 = 0.7692307692307693*q_in[3] - 1.5372089625888168;
+    const double t2 = q_in[3] + q_in[2];
     s1 += t2;
-    const awiwi_turn4 a0 = awiwi_sincos4(t0, q[2], t2, s1);
+    const awiwi_sincos4_result a0 = awiwi_sincos4(t0, q_in[2], t2, s1);
     const double t3 = 2.4*a0.cos[0] - 2.44;
     const double t4 = 1.0/t3;
     const double t5 = t3 + 0.6475;
@@ -56,24 +57,24 @@ void awiwi_fifth_mass_matrix(const double q[restrict 4], double M[restrict 16])
     s33 -= t35;
     const double t36 = 5.5*a0.sin[1]*t14;
     s32 += t36;
-    M[10] = s32;
+    M_out[10] = s32;
     s33 -= t36;
     const double t37 = t34 - s32 - 6.4814e-07;
     const double t38 = 0.5*t34;
     s28 += t38;
     s33 -= t37;
-    M[5] = s33;
+    M_out[5] = s33;
     double s39 = t37 + t30;
     s39 -= 1.0652e-06;
     const double t40 = 2.4608e-07*a0.cos[2] - 2.22e-09*a0.sin[2] - 7.504232405782752e-08*a0.sin[3];
     const double t41 = t40 + 4.517e-07*a0.cos[1] - 4.28e-09*a0.sin[1];
     const double t42 = 2.22e-09*a0.cos[2] + 2.4608e-07*a0.sin[2] + 7.504232405782752e-08*a0.cos[3];
     const double t43 = 5.772486465986733e-08*a0.cos[3] + t42;
-    M[7] = t43;
-    M[13] = t43;
+    M_out[7] = t43;
+    M_out[13] = t43;
     const double t44 = t42 + 4.28e-09*a0.cos[1] + 4.517e-07*a0.sin[1];
-    M[6] = t44;
-    M[9] = t44;
+    M_out[6] = t44;
+    M_out[9] = t44;
     const double t45 = 2.75*a0.cos[1];
     const double t46 = 2.75*a0.sin[1];
     s28 += t45*t14;
@@ -85,27 +86,27 @@ void awiwi_fifth_mass_matrix(const double q[restrict 4], double M[restrict 16])
     s28 += 1.8333333333333333*(a0.cos[2]*t13 + a0.sin[2]*t19);
     const double t51 = 1.4102564102564104*(a0.cos[2]*t19 + a0.sin[2]*t13) + 2.1932307692307691e-07;
     s49 += t51;
-    M[11] = s49;
-    M[14] = s49;
+    M_out[11] = s49;
+    M_out[14] = s49;
     s50 += 2.0*t51;
-    M[15] = s50;
-    const awiwi_turn a1 = awiwi_sincos(q[1]);
+    M_out[15] = s50;
+    const awiwi_sincos_result a1 = awiwi_sincos(q_in[1]);
     s39 += a1.cos*(2.0*a1.sin*(t41 + 8.73e-08) - a1.cos*(t30 - 1.1684e-07));
     const double t52 = a1.cos*t15;
     const double t53 = a0.cos[0]*(t21*t18 - t52*t17) + a0.sin[0]*(t21*t17 + t52*t18) - (a1.sin*t41 - 0.3333333333333333*t21 - a1.cos*(s32 - t38))*t12;
-    M[2] = t53;
-    M[8] = t53;
+    M_out[2] = t53;
+    M_out[8] = t53;
     double s54 = a1.sin*(5.772486465986733e-08*a0.sin[3] - t40) + 0.3333333333333333*t47;
     const double t55 = a1.cos*t48;
     s54 -= a1.cos*(0.5*(t48 - t47) - s49);
     const double t56 = a0.cos[0]*(t47*t18 - t55*t17) + a0.sin[0]*(t47*t17 + t55*t18) + s54*t12;
-    M[3] = t56;
-    M[12] = t56;
+    M_out[3] = t56;
+    M_out[12] = t56;
     const double t57 = 1.752e-07*a1.sin - a1.cos*t22;
     const double t58 = t57 - 8.544e-07;
     s39 += 0.6666666666666666*t57;
-    M[0] = 2.03e-06 - t12*(2.0*(a0.cos[0]*(t16*t17 + t58*t18) - a0.sin[0]*(t16*t18 - t58*t17))) - s39*(t11*(t11 - 2.0) + 1.0);
+    M_out[0] = 2.03e-06 - t12*(2.0*(a0.cos[0]*(t16*t17 + t58*t18) - a0.sin[0]*(t16*t18 - t58*t17))) - s39*(t11*(t11 - 2.0) + 1.0);
     const double t59 = (a1.cos*(t44 - 8.78e-08) + a1.sin*s28)*t12 - (1.752e-07*a1.cos + a1.sin*t22)*(a0.cos[0]*t17 - a0.sin[0]*t18);
-    M[1] = t59;
-    M[4] = t59;
+    M_out[1] = t59;
+    M_out[4] = t59;
 }

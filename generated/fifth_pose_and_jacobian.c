@@ -8,24 +8,25 @@
  * Cost: 41 add, 70 mul, 2 div, 8 neg, 1 sqrt, 5 sincos.
  * Inputs: sha256 28edf41a51f84ef24222facbdc6e1021f809ccdd8b122d41df2ba55b8d1b95d9.
  */
+#include "numerics.h"
 #include <math.h>
-#include "trig.h"
+#include "sincos.h"
 #include "kernels.h"
 
-void awiwi_fifth_pose_and_jacobian(const double q[restrict 4], double T[restrict 16], double J[restrict 24])
+void awiwi_fifth_pose_and_jacobian(const double q_in[restrict 4], double T_out[restrict 16], double J_out[restrict 24])
 {
-    T[12] = 0.0;
-    T[13] = 0.0;
-    T[14] = 0.0;
-    J[4] = 0.0;
-    J[12] = 0.0;
-    J[17] = 0.0;
-    J[20] = 0.0;
-    T[15] = 1.0;
-    const double t0 = q[0] + 1.0471975511965979;
-    const double t1 = q[2] + q[3];
-    const double t2 = 0.7692307692307693*q[3] + t1;
-    const awiwi_turn4 a0 = awiwi_sincos4(t2, t0, q[2], t1);
+    T_out[12] = 0.0;
+    T_out[13] = 0.0;
+    T_out[14] = 0.0;
+    J_out[4] = 0.0;
+    J_out[12] = 0.0;
+    J_out[17] = 0.0;
+    J_out[20] = 0.0;
+    T_out[15] = 1.0;
+    const double t0 = q_in[0] + 1.0471975511965979;
+    const double t1 = q_in[2] + q_in[3];
+    const double t2 = 0.7692307692307693*q_in[3] + t1;
+    const awiwi_sincos4_result a0 = awiwi_sincos4(t2, t0, q_in[2], t1);
     const double t3 = 0.00012*a0.cos[1] - 0.000122;
     const double t4 = 1.0/t3;
     const double t5 = 0.01*a0.sin[1];
@@ -37,58 +38,58 @@ void awiwi_fifth_pose_and_jacobian(const double q[restrict 4], double T[restrict
     const double t11 = t9*t6 - t5*t7;
     const double t12 = 1.0 - (0.00012*a0.sin[1] - 0.005*(t4*(a0.cos[1]*t10 - a0.sin[1]*t11)))/t7;
     const double t13 = t4*(57.5741330674062*t10 + 33.610469291294464*t11);
-    J[21] = t13;
+    J_out[21] = t13;
     const double t14 = t4*(33.610469291294464*t10 - 57.5741330674062*t11);
-    J[13] = -t14;
+    J_out[13] = -t14;
     const double t15 = -0.022*a0.sin[3] + -0.018*a0.sin[0];
     const double t16 = -0.033*a0.sin[2] + t15;
     const double t17 = 0.022*a0.cos[3] + 0.018*a0.cos[0];
     const double t18 = 0.033*a0.cos[2] + t17;
     const double t19 = -t16 - 0.006;
     const double t20 = t18 + 0.006;
-    J[16] = t12 - 1.0;
-    const awiwi_turn a1 = awiwi_sincos(q[1]);
-    T[6] = -a1.cos;
-    J[18] = -a1.cos;
-    J[7] = a1.sin*(t15 - 0.013846153846153847*a0.sin[0]);
+    J_out[16] = t12 - 1.0;
+    const awiwi_sincos_result a1 = awiwi_sincos(q_in[1]);
+    T_out[6] = -a1.cos;
+    J_out[18] = -a1.cos;
+    J_out[7] = a1.sin*(t15 - 0.013846153846153847*a0.sin[0]);
     const double t21 = a1.cos*t13;
-    T[0] = a0.cos[0]*t21 - a0.sin[0]*t14;
+    T_out[0] = a0.cos[0]*t21 - a0.sin[0]*t14;
     const double t22 = a0.cos[0]*t14 + a0.sin[0]*t21;
-    T[1] = -t22;
-    J[2] = t16*t21 - t18*t14;
-    J[3] = t15*t21 + -0.013846153846153847*t22 - t17*t14;
+    T_out[1] = -t22;
+    J_out[2] = t16*t21 - t18*t14;
+    J_out[3] = t15*t21 + -0.013846153846153847*t22 - t17*t14;
     const double t23 = a1.sin*t13;
-    T[2] = t23;
-    J[14] = t23;
+    T_out[2] = t23;
+    J_out[14] = t23;
     const double t24 = 0.0036*a1.sin - a1.cos*t20;
-    J[5] = -t24;
+    J_out[5] = -t24;
     const double t25 = t24 - 0.004;
     const double t26 = t19*t14 + t25*t13;
     const double t27 = t8 - t26;
-    T[3] = t27;
+    T_out[3] = t27;
     const double t28 = -0.0036*a1.cos - a1.sin*t20;
-    T[7] = -t28;
+    T_out[7] = -t28;
     const double t29 = t19*t13 - t25*t14;
     const double t30 = t5 + t29;
-    T[11] = t30;
-    J[0] = t29*t12 - t30;
-    J[8] = t27 + t26*t12;
-    T[4] = a1.sin*a0.cos[0];
-    T[5] = -(a1.sin*a0.sin[0]);
+    T_out[11] = t30;
+    J_out[0] = t29*t12 - t30;
+    J_out[8] = t27 + t26*t12;
+    T_out[4] = a1.sin*a0.cos[0];
+    T_out[5] = -(a1.sin*a0.sin[0]);
     const double t31 = a1.cos*t14;
-    T[8] = a0.sin[0]*t13 + a0.cos[0]*t31;
+    T_out[8] = a0.sin[0]*t13 + a0.cos[0]*t31;
     const double t32 = a0.cos[0]*t13 - a0.sin[0]*t31;
-    T[9] = t32;
-    J[10] = t18*t13 + t16*t31;
-    J[6] = a1.sin*t16;
-    J[11] = t17*t13 + 0.013846153846153847*t32 + t15*t31;
-    J[19] = -1.7692307692307692*a1.cos;
+    T_out[9] = t32;
+    J_out[10] = t18*t13 + t16*t31;
+    J_out[6] = a1.sin*t16;
+    J_out[11] = t17*t13 + 0.013846153846153847*t32 + t15*t31;
+    J_out[19] = -1.7692307692307692*a1.cos;
     const double t33 = a1.sin*t14;
-    T[10] = t33;
-    J[22] = t33;
+    T_out[10] = t33;
+    J_out[22] = t33;
     const double t34 = 1.7692307692307692*a1.sin;
-    J[1] = t28*t13;
-    J[9] = t28*t14;
-    J[15] = t34*t13;
-    J[23] = t34*t14;
+    J_out[1] = t28*t13;
+    J_out[9] = t28*t14;
+    J_out[15] = t34*t13;
+    J_out[23] = t34*t14;
 }

@@ -7,22 +7,23 @@
  * Cost: 2 add, 4 mul, 4 neg.
  * Inputs: sha256 00fec029411b512bfbf8b6822baf232d76be140a5bbc5c338c3d82c1669b86a3.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-void awiwi_fifth_tendon_lengths(const double q[restrict 4], double h[restrict 8])
+void awiwi_fifth_tendon_lengths(const double q_in[restrict 4], double h_out[restrict 8])
 {
-    const double t0 = 0.008*q[0];
-    h[0] = t0;
-    h[1] = -t0;
-    const double t1 = 0.008*q[1];
-    const double t2 = 0.006*q[2];
+    const double t0 = 0.008*q_in[0];
+    h_out[0] = t0;
+    h_out[1] = -t0;
+    const double t1 = 0.008*q_in[1];
+    const double t2 = 0.006*q_in[2];
     const double t3 = t1 + t2;
-    h[2] = t3;
-    h[5] = -t3;
+    h_out[2] = t3;
+    h_out[5] = -t3;
     const double t4 = t1 - t2;
-    h[3] = t4;
-    h[4] = -t4;
-    const double t5 = 0.005*q[3];
-    h[6] = t5;
-    h[7] = -t5;
+    h_out[3] = t4;
+    h_out[4] = -t4;
+    const double t5 = 0.005*q_in[3];
+    h_out[6] = t5;
+    h_out[7] = -t5;
 }

@@ -19,14 +19,15 @@
  * Cost: 5 add, 5 mul, 1 div, 1 neg.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-int awiwi_friction_observer(const double momentum[restrict 1], const double u[restrict 1], const double tau[restrict 1], const double thd[restrict 1], const double B[restrict 1], const double gain[restrict 1], const double period[restrict 1], double momentum_next[restrict 1], double friction[restrict 1])
+int awiwi_friction_observer(const double momentum_in[restrict 1], const double u_in[restrict 1], const double tau_in[restrict 1], const double thd_in[restrict 1], const double B_in[restrict 1], const double gain_in[restrict 1], const double period_in[restrict 1], double momentum_next_out[restrict 1], double friction_out[restrict 1])
 {
-    const double t0 = momentum[0] - period[0]*(tau[0] - u[0]);
-    const double t1 = gain[0]*period[0];
-    const double t2 = (B[0]*thd[0] - t0)/(t1 + 1.0);
-    momentum_next[0] = t0 + t1*t2;
-    friction[0] = -(gain[0]*t2);
-    return B[0] > 0.0 && gain[0] > 0.0 && period[0] > 0.0 ? 0 : 1;
+    const double t0 = momentum_in[0] - period_in[0]*(tau_in[0] - u_in[0]);
+    const double t1 = gain_in[0]*period_in[0];
+    const double t2 = (B_in[0]*thd_in[0] - t0)/(t1 + 1.0);
+    momentum_next_out[0] = t0 + t1*t2;
+    friction_out[0] = -(gain_in[0]*t2);
+    return B_in[0] > 0.0 && gain_in[0] > 0.0 && period_in[0] > 0.0 ? 0 : 1;
 }

@@ -9,10 +9,11 @@
  * Cost: 1 add, 2 mul, 1 calls.
  * Inputs: sha256 b1787cd3c6b4fc2e2d84ef503d433af6c421429c73d51fbd22d68259107b8428.
  */
+#include "numerics.h"
 #include "elementary.h"
 #include "kernels.h"
 
-void awiwi_guiding_friction(const double f[restrict 1], const double bend[restrict 1], double loss[restrict 1])
+void awiwi_guiding_friction(const double f_in[restrict 1], const double bend_in[restrict 1], double loss_out[restrict 1])
 {
-    loss[0] = f[0]*(1.0 - awiwi_exp(-0.05*bend[0]));
+    loss_out[0] = f_in[0]*(1.0 - awiwi_exp(-0.05*bend_in[0]));
 }

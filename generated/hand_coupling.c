@@ -7,71 +7,72 @@
  * Cost: 44 add, 50 mul, 4 div, 4 sqrt, 2 sincos.
  * Inputs: sha256 9b14a568be888c30da7a1d93aeeb047b23eb439117ee5d381d329e389e84ed49.
  */
+#include "numerics.h"
 #include <math.h>
 #include <string.h>
-#include "trig.h"
+#include "sincos.h"
 #include "kernels.h"
 
-void awiwi_hand_coupling(const double q[restrict 19], double P[restrict 722])
+void awiwi_hand_coupling(const double q_in[restrict 19], double P_out[restrict 722])
 {
-    memset(P, 0, 722 * sizeof P[0]);
-    P[117] = 0.006;
-    P[136] = -0.006;
-    P[234] = 0.006;
-    P[253] = -0.006;
-    P[272] = 0.006;
-    P[291] = -0.006;
-    P[390] = 0.006;
-    P[409] = -0.006;
-    P[428] = 0.006;
-    P[447] = -0.006;
-    P[625] = 0.006;
-    P[644] = -0.006;
-    P[663] = 0.006;
-    P[682] = -0.006;
-    P[78] = 0.008;
-    P[97] = -0.008;
-    P[116] = -0.008;
-    P[135] = 0.008;
-    P[585] = 0.008;
-    P[604] = -0.008;
-    P[624] = 0.008;
-    P[643] = 0.008;
-    P[662] = -0.008;
-    P[681] = -0.008;
-    P[156] = 0.009;
-    P[175] = 0.009;
-    P[194] = -0.009;
-    P[213] = -0.009;
-    P[312] = 0.009;
-    P[331] = 0.009;
-    P[350] = -0.009;
-    P[369] = -0.009;
-    P[468] = 0.009;
-    P[487] = 0.009;
-    P[506] = -0.009;
-    P[525] = -0.009;
-    P[157] = 0.0065;
-    P[176] = -0.0065;
-    P[195] = 0.0065;
-    P[214] = -0.0065;
-    P[313] = 0.0065;
-    P[332] = -0.0065;
-    P[351] = 0.0065;
-    P[370] = -0.0065;
-    P[469] = 0.0065;
-    P[488] = -0.0065;
-    P[507] = 0.0065;
-    P[526] = -0.0065;
-    P[273] = -0.0045;
-    P[292] = 0.0045;
-    P[429] = -0.0045;
-    P[448] = 0.0045;
-    P[546] = 0.0055;
-    P[565] = -0.0055;
-    P[702] = 0.005;
-    P[721] = -0.005;
-    const awiwi_turn2 a0 = awiwi_sincos2(q[0], q[1]);
+    memset(P_out, 0, 722 * sizeof P_out[0]);
+    P_out[117] = 0.006;
+    P_out[136] = -0.006;
+    P_out[234] = 0.006;
+    P_out[253] = -0.006;
+    P_out[272] = 0.006;
+    P_out[291] = -0.006;
+    P_out[390] = 0.006;
+    P_out[409] = -0.006;
+    P_out[428] = 0.006;
+    P_out[447] = -0.006;
+    P_out[625] = 0.006;
+    P_out[644] = -0.006;
+    P_out[663] = 0.006;
+    P_out[682] = -0.006;
+    P_out[78] = 0.008;
+    P_out[97] = -0.008;
+    P_out[116] = -0.008;
+    P_out[135] = 0.008;
+    P_out[585] = 0.008;
+    P_out[604] = -0.008;
+    P_out[624] = 0.008;
+    P_out[643] = 0.008;
+    P_out[662] = -0.008;
+    P_out[681] = -0.008;
+    P_out[156] = 0.009;
+    P_out[175] = 0.009;
+    P_out[194] = -0.009;
+    P_out[213] = -0.009;
+    P_out[312] = 0.009;
+    P_out[331] = 0.009;
+    P_out[350] = -0.009;
+    P_out[369] = -0.009;
+    P_out[468] = 0.009;
+    P_out[487] = 0.009;
+    P_out[506] = -0.009;
+    P_out[525] = -0.009;
+    P_out[157] = 0.0065;
+    P_out[176] = -0.0065;
+    P_out[195] = 0.0065;
+    P_out[214] = -0.0065;
+    P_out[313] = 0.0065;
+    P_out[332] = -0.0065;
+    P_out[351] = 0.0065;
+    P_out[370] = -0.0065;
+    P_out[469] = 0.0065;
+    P_out[488] = -0.0065;
+    P_out[507] = 0.0065;
+    P_out[526] = -0.0065;
+    P_out[273] = -0.0045;
+    P_out[292] = 0.0045;
+    P_out[429] = -0.0045;
+    P_out[448] = 0.0045;
+    P_out[546] = 0.0055;
+    P_out[565] = -0.0055;
+    P_out[702] = 0.005;
+    P_out[721] = -0.005;
+    const awiwi_sincos2_result a0 = awiwi_sincos2(q_in[0], q_in[1]);
     const double t0 = 0.003*a0.cos[0];
     const double t1 = 0.003*a0.sin[0];
     const double t2 = 0.047*a0.cos[1];
@@ -101,13 +102,13 @@ void awiwi_hand_coupling(const double q[restrict 19], double P[restrict 722])
     const double t26 = t8*t25;
     const double t27 = t25*t25;
     const double t28 = 1.0/sqrt(t23 + t15*t15 + t14*t14);
-    P[0] = (t11*t14 - t13*t15)*t28;
+    P_out[0] = (t11*t14 - t13*t15)*t28;
     const double t29 = 1.0/sqrt(t23 + t19*t19 + t18*t18);
-    P[38] = (t16*t18 - t17*t19)*t29;
+    P_out[38] = (t16*t18 - t17*t19)*t29;
     const double t30 = a0.sin[0]*t20;
     const double t31 = a0.cos[0]*t20;
-    P[1] = (t30*t15 - t22 - t31*t14)*t28;
-    P[39] = (t31*t18 - t22 - t30*t19)*t29;
+    P_out[1] = (t30*t15 - t22 - t31*t14)*t28;
+    P_out[39] = (t31*t18 - t22 - t30*t19)*t29;
     const double t32 = a0.sin[0]*t9;
     const double t33 = t0 + t32;
     const double t34 = a0.cos[0]*t9;
@@ -121,9 +122,9 @@ void awiwi_hand_coupling(const double q[restrict 19], double P[restrict 722])
     const double t42 = t41 - 0.002;
     const double t43 = t40 - 0.03;
     const double t44 = 1.0/sqrt(t27 + t37*t37 + t36*t36);
-    P[19] = (t33*t36 - t35*t37)*t44;
-    P[20] = (t38*t36 + t26 - t39*t37)*t44;
+    P_out[19] = (t33*t36 - t35*t37)*t44;
+    P_out[20] = (t38*t36 + t26 - t39*t37)*t44;
     const double t45 = 1.0/sqrt(t27 + t43*t43 + t42*t42);
-    P[57] = (t40*t42 - t41*t43)*t45;
-    P[58] = (t26 + t39*t43 - t38*t42)*t45;
+    P_out[57] = (t40*t42 - t41*t43)*t45;
+    P_out[58] = (t26 + t39*t43 - t38*t42)*t45;
 }

@@ -8,17 +8,18 @@
  * Cost: 86 add, 67 mul, 4 div, 4 sqrt, 2 sincos.
  * Inputs: sha256 9b14a568be888c30da7a1d93aeeb047b23eb439117ee5d381d329e389e84ed49.
  */
+#include "numerics.h"
 #include <math.h>
-#include "trig.h"
+#include "sincos.h"
 #include "kernels.h"
 
-void awiwi_hand_joint_torque(const double q[restrict 19], const double f[restrict 38], double tau[restrict 19])
+void awiwi_hand_joint_torque(const double q_in[restrict 19], const double f_in[restrict 38], double tau_out[restrict 19])
 {
-    const awiwi_turn2 a0 = awiwi_sincos2(q[0], q[1]);
+    const awiwi_sincos2_result a0 = awiwi_sincos2(q_in[0], q_in[1]);
     const double t0 = 0.003*a0.sin[0];
     const double t1 = 0.003*a0.cos[0];
     const double t2 = t1 - 0.03;
-    const double t3 = f[6] - f[7];
+    const double t3 = f_in[6] - f_in[7];
     const double t4 = 0.0025*a0.sin[1];
     const double t5 = 0.047*a0.sin[1];
     const double t6 = a0.cos[0]*t4;
@@ -42,22 +43,22 @@ void awiwi_hand_joint_torque(const double q[restrict 19], const double f[restric
     const double t24 = t5 - t12;
     const double t25 = t12 + t5;
     const double t26 = t24*t24;
-    const double t27 = f[0]/sqrt(t26 + t18*t18 + t23*t23);
+    const double t27 = f_in[0]/sqrt(t26 + t18*t18 + t23*t23);
     double s28 = t26 + t22*t22;
     const double t29 = t7 + t15;
     const double t30 = t25*t25;
-    const double t31 = f[3]/sqrt(t30 + t20*t20 + t29*t29);
+    const double t31 = f_in[3]/sqrt(t30 + t20*t20 + t29*t29);
     double s32 = t30 + t21*t21;
     double s33 = ((t7 - t13)*t18 - (t1 + t17)*t23)*t27 + ((t7 + t13)*t20 - (t1 + t19)*t29)*t31;
     const double t34 = t8 - t15;
     s32 += t34*t34;
-    const double t35 = f[1]/sqrt(s32);
+    const double t35 = f_in[1]/sqrt(s32);
     const double t36 = t8 + t15;
     s28 += t36*t36;
-    const double t37 = f[2]/sqrt(s28);
+    const double t37 = f_in[2]/sqrt(s28);
     s33 += ((t8 - t13)*t21 - (t1 - t19)*t34)*t35;
     s33 += ((t13 + t8)*t22 - (t1 - t17)*t36)*t37;
-    tau[0] = s33;
+    tau_out[0] = s33;
     const double t38 = a0.sin[0]*t11;
     const double t39 = a0.sin[0]*t5;
     const double t40 = a0.cos[0]*t11;
@@ -76,32 +77,32 @@ void awiwi_hand_joint_torque(const double q[restrict 19], const double f[restric
     s47 -= t51*t29;
     s48 += t51*t34;
     s49 -= t50*t23;
-    tau[1] = s45*t37 - s47*t31 - s48*t35 - s49*t27;
-    tau[2] = -0.008*(f[4] - f[5] - t3);
-    tau[3] = -0.006*t3;
-    const double t52 = f[8] - f[11];
-    const double t53 = f[9] - f[10];
-    tau[4] = -0.009*(t52 + t53);
-    tau[5] = -0.0065*(t52 - t53);
-    const double t54 = f[14] - f[15];
-    tau[6] = -0.006*(f[12] + t54 - f[13]);
-    tau[7] = 0.0045*t54;
-    const double t55 = f[16] - f[19];
-    const double t56 = f[17] - f[18];
-    tau[8] = -0.009*(t55 + t56);
-    tau[9] = -0.0065*(t55 - t56);
-    const double t57 = f[22] - f[23];
-    tau[10] = -0.006*(f[20] + t57 - f[21]);
-    tau[11] = 0.0045*t57;
-    const double t58 = f[24] - f[27];
-    const double t59 = f[25] - f[26];
-    tau[12] = -0.009*(t58 + t59);
-    tau[13] = -0.0065*(t58 - t59);
-    tau[14] = -0.0055*(f[28] - f[29]);
-    tau[15] = -0.008*(f[30] - f[31]);
-    const double t60 = f[32] - f[35];
-    const double t61 = f[33] - f[34];
-    tau[16] = -0.008*(t60 + t61);
-    tau[17] = -0.006*(t60 - t61);
-    tau[18] = -0.005*(f[36] - f[37]);
+    tau_out[1] = s45*t37 - s47*t31 - s48*t35 - s49*t27;
+    tau_out[2] = -0.008*(f_in[4] - f_in[5] - t3);
+    tau_out[3] = -0.006*t3;
+    const double t52 = f_in[8] - f_in[11];
+    const double t53 = f_in[9] - f_in[10];
+    tau_out[4] = -0.009*(t52 + t53);
+    tau_out[5] = -0.0065*(t52 - t53);
+    const double t54 = f_in[14] - f_in[15];
+    tau_out[6] = -0.006*(f_in[12] + t54 - f_in[13]);
+    tau_out[7] = 0.0045*t54;
+    const double t55 = f_in[16] - f_in[19];
+    const double t56 = f_in[17] - f_in[18];
+    tau_out[8] = -0.009*(t55 + t56);
+    tau_out[9] = -0.0065*(t55 - t56);
+    const double t57 = f_in[22] - f_in[23];
+    tau_out[10] = -0.006*(f_in[20] + t57 - f_in[21]);
+    tau_out[11] = 0.0045*t57;
+    const double t58 = f_in[24] - f_in[27];
+    const double t59 = f_in[25] - f_in[26];
+    tau_out[12] = -0.009*(t58 + t59);
+    tau_out[13] = -0.0065*(t58 - t59);
+    tau_out[14] = -0.0055*(f_in[28] - f_in[29]);
+    tau_out[15] = -0.008*(f_in[30] - f_in[31]);
+    const double t60 = f_in[32] - f_in[35];
+    const double t61 = f_in[33] - f_in[34];
+    tau_out[16] = -0.008*(t60 + t61);
+    tau_out[17] = -0.006*(t60 - t61);
+    tau_out[18] = -0.005*(f_in[36] - f_in[37]);
 }

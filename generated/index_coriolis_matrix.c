@@ -8,15 +8,16 @@
  * Cost: 46 add, 47 mul, 2 neg, 3 sincos.
  * Inputs: sha256 282282bd680841d03234ba2709f06e709554a528cf56b8719c5e0b6114109589.
  */
-#include "trig.h"
+#include "numerics.h"
+#include "sincos.h"
 #include "kernels.h"
 
-void awiwi_index_coriolis_matrix(const double q[restrict 4], const double qd[restrict 4], double C[restrict 16])
+void awiwi_index_coriolis_matrix(const double q_in[restrict 4], const double qd_in[restrict 4], double C_out[restrict 16])
 {
-    C[15] = 0.0;
-    const double t0 = q[2] + q[1];
-    const double t1 = q[3] - 1.5458015331759765 + t0;
-    const awiwi_turn3 a0 = awiwi_sincos3(q[1], t0, t1);
+    C_out[15] = 0.0;
+    const double t0 = q_in[2] + q_in[1];
+    const double t1 = q_in[3] - 1.5458015331759765 + t0;
+    const awiwi_sincos3_result a0 = awiwi_sincos3(q_in[1], t0, t1);
     const double t2 = a0.cos[0] + 0.1485884101040119;
     const double t3 = 0.7379891035165924*a0.cos[1];
     const double t4 = 1.2925637369259591e-06*a0.cos[2];
@@ -32,37 +33,37 @@ void awiwi_index_coriolis_matrix(const double q[restrict 4], const double qd[res
     const double t12 = 8.326356e-06*a0.cos[1] - t9 - 4.8456e-08*a0.sin[1];
     const double t13 = a0.cos[0]*(t6 + t4) - a0.sin[0]*t12;
     const double t14 = a0.sin[0]*(t12 + 2.1654944e-05*a0.cos[0] - 7.72e-08*a0.sin[0] + 3.6348e-06) + 1.8e-08*a0.cos[0] + s7 + 3.86e-08;
-    double s15 = qd[3]*s5 - qd[1]*t14;
-    s15 -= qd[2]*s7;
-    C[0] = s15;
-    const double t16 = qd[2] + qd[1];
-    const double t17 = qd[3] + t16;
+    double s15 = qd_in[3]*s5 - qd_in[1]*t14;
+    s15 -= qd_in[2]*s7;
+    C_out[0] = s15;
+    const double t16 = qd_in[2] + qd_in[1];
+    const double t17 = qd_in[3] + t16;
     const double t18 = t17*(1.0746642198887319e-09*a0.cos[2] + 1.666789209732727e-07*a0.sin[2]);
     const double t19 = t16*(7.5326e-07*a0.cos[1] - 5.8e-09*a0.sin[1]) - t18;
-    double s20 = qd[1]*(1.244876e-06*a0.cos[0] - 9.6e-09*a0.sin[0]) + t19;
-    const double t21 = qd[0]*t14;
-    C[4] = t21;
+    double s20 = qd_in[1]*(1.244876e-06*a0.cos[0] - 9.6e-09*a0.sin[0]) + t19;
+    const double t21 = qd_in[0]*t14;
+    C_out[4] = t21;
     s20 -= t21;
-    C[1] = s20;
-    const double t22 = qd[0]*s7;
-    C[8] = t22;
-    C[2] = t19 - t22;
-    const double t23 = qd[0]*s5;
-    C[12] = -t23;
-    C[3] = t23 - t18;
-    const double t24 = qd[1]*t13;
+    C_out[1] = s20;
+    const double t22 = qd_in[0]*s7;
+    C_out[8] = t22;
+    C_out[2] = t19 - t22;
+    const double t23 = qd_in[0]*s5;
+    C_out[12] = -t23;
+    C_out[3] = t23 - t18;
+    const double t24 = qd_in[1]*t13;
     const double t25 = t16*t10;
-    C[14] = t25;
+    C_out[14] = t25;
     const double t26 = -t17*t10;
-    C[11] = t26;
+    C_out[11] = t26;
     const double t27 = t17*t11;
     double s28 = t16*(t11 - t13) - t27;
-    C[7] = t26 - t27;
+    C_out[7] = t26 - t27;
     const double t29 = t26 + t25;
-    C[10] = t29;
+    C_out[10] = t29;
     s28 += t29;
-    C[6] = s28;
-    C[5] = s28 + t24;
-    C[9] = t29 + t24;
-    C[13] = qd[1]*t11 + t25;
+    C_out[6] = s28;
+    C_out[5] = s28 + t24;
+    C_out[9] = t29 + t24;
+    C_out[13] = qd_in[1]*t11 + t25;
 }

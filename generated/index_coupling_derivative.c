@@ -7,11 +7,12 @@
  * Cost: nothing but moves.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
+#include "numerics.h"
 #include <string.h>
 #include "kernels.h"
 
-void awiwi_index_coupling_derivative(const double q[restrict 4], double dP[restrict 128])
+void awiwi_index_coupling_derivative(const double q_in[restrict 4], double dP_out[restrict 128])
 {
-    (void)q;
-    memset(dP, 0, 128 * sizeof dP[0]);
+    (void)q_in;
+    memset(dP_out, 0, 128 * sizeof dP_out[0]);
 }

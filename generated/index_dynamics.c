@@ -11,16 +11,17 @@
  * Cost: 77 add, 83 mul, 2 neg, 4 sincos.
  * Inputs: sha256 3111373cde589691558afe839d151a7b960ef034f13613b5010ff777ad2e903d.
  */
-#include "trig.h"
+#include "numerics.h"
+#include "sincos.h"
 #include "kernels.h"
 
-void awiwi_index_dynamics(const double q[restrict 4], const double qd[restrict 4], const double g[restrict 3], double M[restrict 16], double C[restrict 16], double gravity[restrict 4])
+void awiwi_index_dynamics(const double q_in[restrict 4], const double qd_in[restrict 4], const double g_in[restrict 3], double M_out[restrict 16], double C_out[restrict 16], double gravity_out[restrict 4])
 {
-    M[15] = 4.1116e-07;
-    C[15] = 0.0;
-    const double t0 = q[2] + q[1];
-    const double t1 = q[3] - 1.539354111254972 + t0;
-    const awiwi_turn4 a0 = awiwi_sincos4(q[1], t0, t1, q[0]);
+    M_out[15] = 4.1116e-07;
+    C_out[15] = 0.0;
+    const double t0 = q_in[2] + q_in[1];
+    const double t1 = q_in[3] - 1.539354111254972 + t0;
+    const awiwi_sincos4_result a0 = awiwi_sincos4(q_in[1], t0, t1, q_in[0]);
     const double t2 = 2.063805357661431e-07*a0.cos[2] - 3.200933312448819e-05*a0.sin[2];
     const double t3 = 0.0002062*a0.cos[1] + t2 - 1.2e-06*a0.sin[1];
     const double t4 = 0.0006058*a0.cos[0] + t3 - 3e-06*a0.sin[0];
@@ -34,17 +35,17 @@ void awiwi_index_dynamics(const double q[restrict 4], const double qd[restrict 4
     double s11 = a0.sin[0]*t10 + 3.86e-08;
     const double t12 = 3.701610137991634e-07*a0.cos[2] + 1.4490668141102139e-08*a0.sin[2];
     s7 -= a0.cos[2]*t12;
-    M[0] = s7;
+    M_out[0] = s7;
     double s13 = a0.sin[2]*t12 - 7.245334070551069e-09;
     const double t14 = 1.6668238539209836e-07*a0.cos[2];
-    M[3] = t14;
-    M[12] = t14;
+    M_out[3] = t14;
+    M_out[12] = t14;
     const double t15 = t14 + 5.8e-09*a0.cos[1] + 7.5326e-07*a0.sin[1];
-    M[2] = t15;
-    M[8] = t15;
+    M_out[2] = t15;
+    M_out[8] = t15;
     const double t16 = t15 + 9.6e-09*a0.cos[0] + 1.244876e-06*a0.sin[0];
-    M[1] = t16;
-    M[4] = t16;
+    M_out[1] = t16;
+    M_out[4] = t16;
     const double t17 = 3.200933312448819e-05*a0.cos[2] + 2.063805357661431e-07*a0.sin[2];
     const double t18 = 0.04038*a0.cos[0];
     const double t19 = 0.04038*a0.sin[0];
@@ -56,17 +57,17 @@ void awiwi_index_dynamics(const double q[restrict 4], const double qd[restrict 4
     const double t25 = t23*t2 + t24*t17;
     const double t26 = t23*t17 - t24*t2;
     const double t27 = t25 + 4.1116e-07;
-    M[11] = t27;
-    M[14] = t27;
+    M_out[11] = t27;
+    M_out[14] = t27;
     const double t28 = t25 + t27 + 5.2959e-06;
-    M[10] = t28;
+    M_out[10] = t28;
     const double t29 = t28 + t22;
-    M[6] = t29;
-    M[9] = t29;
-    M[5] = t22 + t29 + 2.1836744e-05;
+    M_out[6] = t29;
+    M_out[9] = t29;
+    M_out[5] = t22 + t29 + 2.1836744e-05;
     const double t30 = t27 + t18*t2 + t19*t17;
-    M[7] = t30;
-    M[13] = t30;
+    M_out[7] = t30;
+    M_out[13] = t30;
     const double t31 = t18 + 0.006;
     s13 -= (t23 + t31)*t17;
     s8 += t31*t20;
@@ -74,44 +75,44 @@ void awiwi_index_dynamics(const double q[restrict 4], const double qd[restrict 4
     s11 += s8;
     const double t32 = 3e-06*a0.cos[0] + 0.0006058*a0.sin[0];
     s11 += 0.006*t32;
-    double s33 = qd[3]*s13 - qd[1]*s11;
-    s33 -= qd[2]*s8;
-    C[0] = s33;
-    const double t34 = qd[2] + qd[1];
-    const double t35 = qd[3] + t34;
+    double s33 = qd_in[3]*s13 - qd_in[1]*s11;
+    s33 -= qd_in[2]*s8;
+    C_out[0] = s33;
+    const double t34 = qd_in[2] + qd_in[1];
+    const double t35 = qd_in[3] + t34;
     const double t36 = 1.6668238539209836e-07*t35*a0.sin[2];
     const double t37 = t34*(7.5326e-07*a0.cos[1] - 5.8e-09*a0.sin[1]) - t36;
-    double s38 = qd[1]*(1.244876e-06*a0.cos[0] - 9.6e-09*a0.sin[0]) + t37;
-    const double t39 = qd[0]*s11;
-    C[4] = t39;
+    double s38 = qd_in[1]*(1.244876e-06*a0.cos[0] - 9.6e-09*a0.sin[0]) + t37;
+    const double t39 = qd_in[0]*s11;
+    C_out[4] = t39;
     s38 -= t39;
-    C[1] = s38;
-    const double t40 = qd[0]*s8;
-    C[8] = t40;
-    C[2] = t37 - t40;
-    const double t41 = qd[0]*s13;
-    C[12] = -t41;
-    C[3] = t41 - t36;
+    C_out[1] = s38;
+    const double t40 = qd_in[0]*s8;
+    C_out[8] = t40;
+    C_out[2] = t37 - t40;
+    const double t41 = qd_in[0]*s13;
+    C_out[12] = -t41;
+    C_out[3] = t41 - t36;
     const double t42 = t18*t21 - t19*t3;
     const double t43 = t18*t17 - t19*t2;
-    const double t44 = qd[1]*t42;
+    const double t44 = qd_in[1]*t42;
     const double t45 = t34*t26;
-    C[14] = t45;
+    C_out[14] = t45;
     const double t46 = -t35*t26;
-    C[11] = t46;
+    C_out[11] = t46;
     const double t47 = t35*t43;
     double s48 = t34*(t43 - t42) - t47;
-    C[7] = t46 - t47;
+    C_out[7] = t46 - t47;
     const double t49 = t46 + t45;
-    C[10] = t49;
+    C_out[10] = t49;
     s48 += t49;
-    C[6] = s48;
-    C[5] = s48 + t44;
-    C[9] = t49 + t44;
-    C[13] = qd[1]*t43 + t45;
-    const double t50 = g[0]*a0.cos[3] + g[1]*a0.sin[3];
-    gravity[0] = (g[0]*a0.sin[3] - g[1]*a0.cos[3])*(t4 + 0.0001245) + 3.22e-05*t50;
-    gravity[1] = t50*(t32 + t21) - g[2]*t4;
-    gravity[2] = t50*t21 - g[2]*t3;
-    gravity[3] = t50*t17 - g[2]*t2;
+    C_out[6] = s48;
+    C_out[5] = s48 + t44;
+    C_out[9] = t49 + t44;
+    C_out[13] = qd_in[1]*t43 + t45;
+    const double t50 = g_in[0]*a0.cos[3] + g_in[1]*a0.sin[3];
+    gravity_out[0] = (g_in[0]*a0.sin[3] - g_in[1]*a0.cos[3])*(t4 + 0.0001245) + 3.22e-05*t50;
+    gravity_out[1] = t50*(t32 + t21) - g_in[2]*t4;
+    gravity_out[2] = t50*t21 - g_in[2]*t3;
+    gravity_out[3] = t50*t17 - g_in[2]*t2;
 }

@@ -10,23 +10,24 @@
  * Cost: 43 add, 56 mul, 4 sincos.
  * Inputs: sha256 c0e346d673217a3c0fa9e70826de7816197e0e1f7eac085721ef7fbf00222255.
  */
-#include "trig.h"
+#include "numerics.h"
+#include "sincos.h"
 #include "kernels.h"
 
-void awiwi_index_energy(const double q[restrict 4], const double qd[restrict 4], const double g[restrict 3], double kinetic[restrict 1], double potential[restrict 1])
+void awiwi_index_energy(const double q_in[restrict 4], const double qd_in[restrict 4], const double g_in[restrict 3], double kinetic_out[restrict 1], double potential_out[restrict 1])
 {
-    const double t0 = q[2] + q[1];
-    const double t1 = q[3] - 1.5458015331759765 + t0;
-    const double t2 = qd[2] + qd[1];
-    const awiwi_turn4 a0 = awiwi_sincos4(q[1], t0, t1, q[0]);
-    const double t3 = 0.04038*qd[1];
+    const double t0 = q_in[2] + q_in[1];
+    const double t1 = q_in[3] - 1.5458015331759765 + t0;
+    const double t2 = qd_in[2] + qd_in[1];
+    const awiwi_sincos4_result a0 = awiwi_sincos4(q_in[1], t0, t1, q_in[0]);
+    const double t3 = 0.04038*qd_in[1];
     const double t4 = a0.cos[0]*t3;
     const double t5 = t3*a0.sin[0];
     const double t6 = 0.0002062*a0.cos[1] - 1.2e-06*a0.sin[1];
     const double t7 = 1.2e-06*a0.cos[1] + 0.0002062*a0.sin[1];
-    double s8 = t2*(2.64795e-06*t2 + t4*t6 + t5*t7) + 1.0918372e-05*qd[1]*qd[1];
+    double s8 = t2*(2.64795e-06*t2 + t4*t6 + t5*t7) + 1.0918372e-05*qd_in[1]*qd_in[1];
     double s9 = t7 + 3e-06*a0.cos[0] + 0.0006058*a0.sin[0];
-    const double t10 = qd[3] + t2;
+    const double t10 = qd_in[3] + t2;
     const double t11 = 0.0298*t2;
     const double t12 = 3.2009998437988094e-05*a0.cos[2];
     double s13 = (t5 + t11*a0.sin[1])*t12 + 2.0558e-07*t10;
@@ -37,14 +38,14 @@ void awiwi_index_energy(const double q[restrict 4], const double qd[restrict 4],
     s8 += t10*s13;
     const double t16 = a0.cos[1]*(0.2410728931000699*a0.cos[1] - 0.0010528773475470543*a0.sin[1] - 0.08809978482992568*a0.sin[2]);
     double s17 = t16 + 0.07177522807999816;
-    double s18 = qd[1]*(9.6e-09*a0.cos[0] + 1.244876e-06*a0.sin[0]) + t2*(5.8e-09*a0.cos[1] + 7.5326e-07*a0.sin[1]);
+    double s18 = qd_in[1]*(9.6e-09*a0.cos[0] + 1.244876e-06*a0.sin[0]) + t2*(5.8e-09*a0.cos[1] + 7.5326e-07*a0.sin[1]);
     s17 -= a0.cos[2]*(0.00044869325143391677*a0.sin[2] + 0.01710081029621575*a0.cos[2]);
     s18 += t10*(1.666789209732727e-07*a0.cos[2] - 1.0746642198887319e-09*a0.sin[2]);
     const double t19 = 0.0006058*a0.cos[0] - 3e-06*a0.sin[0];
     s17 += a0.cos[0]*(a0.cos[0] + 3729.4023942061453*t15 - 0.0035650057557295*a0.sin[0]);
     s17 += 554.1459723931865*(t19 + t15);
-    s18 += 1.0827472e-05*qd[0]*s17;
-    s8 += qd[0]*s18;
-    kinetic[0] = s8;
-    potential[0] = 3.22e-05*(g[0]*a0.sin[3] - g[1]*a0.cos[3]) - g[2]*s9 - (g[0]*a0.cos[3] + g[1]*a0.sin[3])*(t19 + t15 + 0.0001245);
+    s18 += 1.0827472e-05*qd_in[0]*s17;
+    s8 += qd_in[0]*s18;
+    kinetic_out[0] = s8;
+    potential_out[0] = 3.22e-05*(g_in[0]*a0.sin[3] - g_in[1]*a0.cos[3]) - g_in[2]*s9 - (g_in[0]*a0.cos[3] + g_in[1]*a0.sin[3])*(t19 + t15 + 0.0001245);
 }

@@ -8,24 +8,25 @@
  * Cost: 16 add, 18 mul, 4 sincos.
  * Inputs: sha256 3a88ddfd19000c9698bd5bc8df95fb76af1c699ee8ce4306835172f592b612fc.
  */
-#include "trig.h"
+#include "numerics.h"
+#include "sincos.h"
 #include "kernels.h"
 
-void awiwi_index_gravity(const double q[restrict 4], const double g[restrict 3], double gravity[restrict 4])
+void awiwi_index_gravity(const double q_in[restrict 4], const double g_in[restrict 3], double gravity_out[restrict 4])
 {
-    const double t0 = q[1] - 1.5658442378599757;
-    const double t1 = q[1] + q[2];
+    const double t0 = q_in[1] - 1.5658442378599757;
+    const double t1 = q_in[1] + q_in[2];
     const double t2 = t1 - 1.5649767998637039;
-    const double t3 = t1 + q[3] - 1.5458015331759765;
-    const awiwi_turn4 a0 = awiwi_sincos4(t0, t2, t3, q[0]);
+    const double t3 = t1 + q_in[3] - 1.5458015331759765;
+    const awiwi_sincos4_result a0 = awiwi_sincos4(t0, t2, t3, q_in[0]);
     const double t4 = 3.2009998437988094e-05*a0.sin[2];
     const double t5 = 0.00020620349172601322*a0.sin[1] + t4;
     const double t6 = 0.0006058074281485825*a0.sin[0] + t5;
     const double t7 = 3.2009998437988094e-05*a0.cos[2];
     const double t8 = 0.00020620349172601322*a0.cos[1] + t7;
-    const double t9 = g[0]*a0.cos[3] + g[1]*a0.sin[3];
-    gravity[0] = 3.22e-05*t9 - (g[0]*a0.sin[3] - g[1]*a0.cos[3])*(t6 - 0.0001245);
-    gravity[1] = g[2]*t6 + t9*(0.0006058074281485825*a0.cos[0] + t8);
-    gravity[2] = g[2]*t5 + t9*t8;
-    gravity[3] = g[2]*t4 + t9*t7;
+    const double t9 = g_in[0]*a0.cos[3] + g_in[1]*a0.sin[3];
+    gravity_out[0] = 3.22e-05*t9 - (g_in[0]*a0.sin[3] - g_in[1]*a0.cos[3])*(t6 - 0.0001245);
+    gravity_out[1] = g_in[2]*t6 + t9*(0.0006058074281485825*a0.cos[0] + t8);
+    gravity_out[2] = g_in[2]*t5 + t9*t8;
+    gravity_out[3] = g_in[2]*t4 + t9*t7;
 }

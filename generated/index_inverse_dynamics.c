@@ -10,26 +10,27 @@
  * Cost: 81 add, 98 mul, 4 sincos.
  * Inputs: sha256 3111373cde589691558afe839d151a7b960ef034f13613b5010ff777ad2e903d.
  */
-#include "trig.h"
+#include "numerics.h"
+#include "sincos.h"
 #include "kernels.h"
 
-void awiwi_index_inverse_dynamics(const double q[restrict 4], const double qd[restrict 4], const double qdd[restrict 4], const double g[restrict 3], double tau[restrict 4])
+void awiwi_index_inverse_dynamics(const double q_in[restrict 4], const double qd_in[restrict 4], const double qdd_in[restrict 4], const double g_in[restrict 3], double tau_out[restrict 4])
 {
-    const double t0 = q[2] + q[1];
-    const double t1 = q[3] - 1.5458015331759765 + t0;
-    const awiwi_turn4 a0 = awiwi_sincos4(q[1], t0, t1, q[0]);
-    const double t2 = 24.764735017335315*g[0];
-    const double t3 = 24.764735017335315*g[1];
-    const double t4 = qdd[2] + qdd[1];
-    const double t5 = qd[2] + qd[1];
-    const double t6 = qd[1]*qd[1];
-    const double t7 = qdd[1]*a0.cos[0] - t6*a0.sin[0];
-    const double t8 = qdd[1]*a0.sin[0] + a0.cos[0]*t6;
+    const double t0 = q_in[2] + q_in[1];
+    const double t1 = q_in[3] - 1.5458015331759765 + t0;
+    const awiwi_sincos4_result a0 = awiwi_sincos4(q_in[1], t0, t1, q_in[0]);
+    const double t2 = 24.764735017335315*g_in[0];
+    const double t3 = 24.764735017335315*g_in[1];
+    const double t4 = qdd_in[2] + qdd_in[1];
+    const double t5 = qd_in[2] + qd_in[1];
+    const double t6 = qd_in[1]*qd_in[1];
+    const double t7 = qdd_in[1]*a0.cos[0] - t6*a0.sin[0];
+    const double t8 = qdd_in[1]*a0.sin[0] + a0.cos[0]*t6;
     const double t9 = t5*t5;
     const double t10 = t4*a0.cos[1] - t9*a0.sin[1];
     const double t11 = a0.cos[1]*t9 + t4*a0.sin[1];
-    const double t12 = qdd[3] + t4;
-    const double t13 = qd[3] + t5;
+    const double t12 = qdd_in[3] + t4;
+    const double t13 = qd_in[3] + t5;
     const double t14 = t13*t13;
     const double t15 = t12*a0.cos[2] - t14*a0.sin[2];
     const double t16 = a0.cos[2]*t14 + t12*a0.sin[2];
@@ -43,14 +44,14 @@ void awiwi_index_inverse_dynamics(const double q[restrict 4], const double qd[re
     double s24 = 4.858213616489694e-09 - a0.sin[2]*t22;
     const double t25 = 9.538979534520451e-07*a0.sin[2];
     const double t26 = 1.2925637369259591e-06*a0.cos[2];
-    double s27 = 4.1116e-07*t12 + qdd[0]*(1.666789209732727e-07*a0.cos[2] - 1.0746642198887319e-09*a0.sin[2]);
+    double s27 = 4.1116e-07*t12 + qdd_in[0]*(1.666789209732727e-07*a0.cos[2] - 1.0746642198887319e-09*a0.sin[2]);
     const double t28 = 5.22042e-06*a0.cos[1] - 2.28e-08*a0.sin[1] - t25;
     s23 += a0.cos[1]*(t25 - t28);
     double s29 = a0.sin[1]*t28 + 1.14e-08;
     const double t30 = 2.1654944e-05*a0.cos[0] + t20 - 7.72e-08*a0.sin[0];
     s23 -= a0.cos[0]*(t20 + t30);
     double s31 = a0.sin[0]*t30 + 3.86e-08;
-    double s32 = 9.6e-09*t7 + 1.244876e-06*t8 + 5.8e-09*t10 + 7.5326e-07*t11 + 1.666789209732727e-07*t15 - qdd[0]*s23 - 1.0746642198887319e-09*t16;
+    double s32 = 9.6e-09*t7 + 1.244876e-06*t8 + 5.8e-09*t10 + 7.5326e-07*t11 + 1.666789209732727e-07*t15 - qdd_in[0]*s23 - 1.0746642198887319e-09*t16;
     const double t33 = a0.cos[0] + 0.1485884101040119;
     const double t34 = 4.8456e-08*a0.cos[1] + 8.326356e-06*a0.sin[1];
     s29 += t33*t34;
@@ -58,19 +59,19 @@ void awiwi_index_inverse_dynamics(const double q[restrict 4], const double qd[re
     double s35 = t5*s29 + t13*s24;
     const double t36 = 1.2114e-07*a0.cos[0] + 2.4462204e-05*a0.sin[0];
     s31 += 0.1485884101040119*t36;
-    s35 += qd[1]*s31;
-    s32 -= 2.0*qd[0]*s35;
-    const double t37 = qd[0]*qd[0];
+    s35 += qd_in[1]*s31;
+    s32 -= 2.0*qd_in[0]*s35;
+    const double t37 = qd_in[0]*qd_in[0];
     s27 += t37*s24;
     double s38 = 5.2959e-06*t4 + t37*s29;
-    double s39 = 2.1836744e-05*qdd[1] + t37*s31;
-    s39 += qdd[0]*(9.6e-09*a0.cos[0] + 1.244876e-06*a0.sin[0]);
-    s38 += qdd[0]*(5.8e-09*a0.cos[1] + 7.5326e-07*a0.sin[1]);
+    double s39 = 2.1836744e-05*qdd_in[1] + t37*s31;
+    s39 += qdd_in[0]*(9.6e-09*a0.cos[0] + 1.244876e-06*a0.sin[0]);
+    s38 += qdd_in[0]*(5.8e-09*a0.cos[1] + 7.5326e-07*a0.sin[1]);
     s38 -= 9.538979534520451e-07*(a0.cos[1]*t16 - a0.sin[1]*t15);
     double s40 = 26.67499869832341*t15 + t10;
     s40 += 171.83333333333334*t11;
     s39 -= 4.8456e-08*(a0.cos[0]*(26.67499869832341*t16 + t11 - 171.83333333333334*t10) - a0.sin[0]*s40);
-    const double t41 = 24.764735017335315*g[2];
+    const double t41 = 24.764735017335315*g_in[2];
     const double t42 = t41 - t7;
     s27 += t19*(t42 - 0.7379891035165924*t10);
     s38 -= t42*t18;
@@ -78,14 +79,14 @@ void awiwi_index_inverse_dynamics(const double q[restrict 4], const double qd[re
     const double t43 = a0.cos[3]*t2 + t3*a0.sin[3];
     s32 += 1.300236e-06*t43;
     s32 -= (a0.cos[3]*t3 - t2*a0.sin[3])*(t21 + 5.02731e-06);
-    tau[0] = s32;
+    tau_out[0] = s32;
     const double t44 = t8 + t43;
     s27 += t26*(0.7379891035165924*t11 + t44);
-    tau[3] = s27;
+    tau_out[3] = s27;
     s38 += t44*t34;
     s38 += s27;
-    tau[2] = s38;
+    tau_out[2] = s38;
     s39 += t36*t43;
     s39 += s38;
-    tau[1] = s39;
+    tau_out[1] = s39;
 }

@@ -7,15 +7,16 @@
  * Cost: 33 add, 30 mul, 3 sincos.
  * Inputs: sha256 3111373cde589691558afe839d151a7b960ef034f13613b5010ff777ad2e903d.
  */
-#include "trig.h"
+#include "numerics.h"
+#include "sincos.h"
 #include "kernels.h"
 
-void awiwi_index_mass_matrix(const double q[restrict 4], double M[restrict 16])
+void awiwi_index_mass_matrix(const double q_in[restrict 4], double M_out[restrict 16])
 {
-    M[15] = 4.1116e-07;
-    const double t0 = q[2] + q[1];
-    const double t1 = q[3] - 1.5458015331759765 + t0;
-    const awiwi_turn3 a0 = awiwi_sincos3(t0, t1, q[1]);
+    M_out[15] = 4.1116e-07;
+    const double t0 = q_in[2] + q_in[1];
+    const double t1 = q_in[3] - 1.5458015331759765 + t0;
+    const awiwi_sincos3_result a0 = awiwi_sincos3(t0, t1, q_in[1]);
     const double t2 = a0.sin[0] - 171.83333333333334*a0.cos[0];
     const double t3 = t2 + 26.67499869832341*a0.sin[1];
     double s4 = a0.cos[0]*(5.22042e-06*a0.cos[0] - 2.28e-08*a0.sin[0] - 1.9077959069040903e-06*a0.sin[1]) + 3.079212435233161e-08*t3;
@@ -23,29 +24,29 @@ void awiwi_index_mass_matrix(const double q[restrict 4], double M[restrict 16])
     const double t5 = (a0.cos[2] + 0.46632124352331605)*(2.1654944e-05*a0.cos[2] - 9.6912e-08*t3 - 2.828560414507772e-06 - 7.72e-08*a0.sin[2]);
     s4 += t5;
     s4 -= a0.cos[1]*(3.7031708931917554e-07*a0.cos[1] + 9.716427232979388e-09*a0.sin[1]);
-    M[0] = s4;
+    M_out[0] = s4;
     const double t6 = 1.666789209732727e-07*a0.cos[1] - 1.0746642198887319e-09*a0.sin[1];
-    M[3] = t6;
-    M[12] = t6;
+    M_out[3] = t6;
+    M_out[12] = t6;
     const double t7 = t6 + 5.8e-09*a0.cos[0] + 7.5326e-07*a0.sin[0];
-    M[2] = t7;
-    M[8] = t7;
+    M_out[2] = t7;
+    M_out[8] = t7;
     const double t8 = t7 + 9.6e-09*a0.cos[2] + 1.244876e-06*a0.sin[2];
-    M[1] = t8;
-    M[4] = t8;
+    M_out[1] = t8;
+    M_out[4] = t8;
     const double t9 = 9.538979534520451e-07*(a0.cos[0]*a0.sin[1] - a0.sin[0]*a0.cos[1]);
     const double t10 = 1.2925637369259591e-06*(a0.cos[2]*a0.sin[1] - a0.sin[2]*a0.cos[1]);
     const double t11 = 4.8456e-08*(a0.cos[2]*t2 - a0.sin[2]*(a0.cos[0] + 171.83333333333334*a0.sin[0])) + t10;
     const double t12 = 4.1116e-07 - t9;
-    M[11] = t12;
-    M[14] = t12;
+    M_out[11] = t12;
+    M_out[14] = t12;
     const double t13 = t12 + 5.2959e-06 - t9;
-    M[10] = t13;
+    M_out[10] = t13;
     const double t14 = t13 - t11;
-    M[6] = t14;
-    M[9] = t14;
-    M[5] = t14 + 2.1836744e-05 - t11;
+    M_out[6] = t14;
+    M_out[9] = t14;
+    M_out[5] = t14 + 2.1836744e-05 - t11;
     const double t15 = t12 - t10;
-    M[7] = t15;
-    M[13] = t15;
+    M_out[7] = t15;
+    M_out[13] = t15;
 }

@@ -8,61 +8,62 @@
  * Cost: 9 add, 20 mul, 8 neg, 4 sincos.
  * Inputs: sha256 74fba3f0be68f5fb3d765efd077c013f6464ac472d1e0a918550978e139a5fa9.
  */
-#include "trig.h"
+#include "numerics.h"
+#include "sincos.h"
 #include "kernels.h"
 
-void awiwi_index_pose_and_jacobian(const double q[restrict 4], double T[restrict 16], double J[restrict 24])
+void awiwi_index_pose_and_jacobian(const double q_in[restrict 4], double T_out[restrict 16], double J_out[restrict 24])
 {
-    T[10] = 0.0;
-    T[12] = 0.0;
-    T[13] = 0.0;
-    T[14] = 0.0;
-    J[8] = 0.0;
-    J[12] = 0.0;
-    J[16] = 0.0;
-    J[21] = 0.0;
-    J[22] = 0.0;
-    J[23] = 0.0;
-    T[15] = 1.0;
-    J[20] = 1.0;
-    const double t0 = q[2] + q[1];
-    const double t1 = q[3] + t0;
-    const awiwi_turn4 a0 = awiwi_sincos4(t1, q[1], t0, q[0]);
-    T[9] = a0.cos[0];
-    T[8] = a0.sin[0];
+    T_out[10] = 0.0;
+    T_out[12] = 0.0;
+    T_out[13] = 0.0;
+    T_out[14] = 0.0;
+    J_out[8] = 0.0;
+    J_out[12] = 0.0;
+    J_out[16] = 0.0;
+    J_out[21] = 0.0;
+    J_out[22] = 0.0;
+    J_out[23] = 0.0;
+    T_out[15] = 1.0;
+    J_out[20] = 1.0;
+    const double t0 = q_in[2] + q_in[1];
+    const double t1 = q_in[3] + t0;
+    const awiwi_sincos4_result a0 = awiwi_sincos4(t1, q_in[1], t0, q_in[0]);
+    T_out[9] = a0.cos[0];
+    T_out[8] = a0.sin[0];
     const double t2 = 0.00201*a0.cos[0];
-    J[11] = t2;
+    J_out[11] = t2;
     const double t3 = 0.0298*a0.cos[2] + t2;
-    J[10] = t3;
+    J_out[10] = t3;
     const double t4 = 0.04038*a0.cos[1] + t3;
-    J[9] = t4;
+    J_out[9] = t4;
     const double t5 = t4 + 0.006;
     const double t6 = -0.00201*a0.sin[0];
     const double t7 = t6 - 0.0298*a0.sin[2];
     const double t8 = -0.04038*a0.sin[1] + t7;
-    T[11] = -t8;
-    T[6] = -a0.cos[3];
-    J[17] = -a0.cos[3];
-    J[18] = -a0.cos[3];
-    J[19] = -a0.cos[3];
-    T[2] = a0.sin[3];
-    J[13] = a0.sin[3];
-    J[14] = a0.sin[3];
-    J[15] = a0.sin[3];
-    T[0] = a0.cos[3]*a0.cos[0];
-    T[4] = a0.sin[3]*a0.cos[0];
-    T[1] = -(a0.cos[3]*a0.sin[0]);
-    T[5] = -(a0.sin[3]*a0.sin[0]);
+    T_out[11] = -t8;
+    T_out[6] = -a0.cos[3];
+    J_out[17] = -a0.cos[3];
+    J_out[18] = -a0.cos[3];
+    J_out[19] = -a0.cos[3];
+    T_out[2] = a0.sin[3];
+    J_out[13] = a0.sin[3];
+    J_out[14] = a0.sin[3];
+    J_out[15] = a0.sin[3];
+    T_out[0] = a0.cos[3]*a0.cos[0];
+    T_out[4] = a0.sin[3]*a0.cos[0];
+    T_out[1] = -(a0.cos[3]*a0.sin[0]);
+    T_out[5] = -(a0.sin[3]*a0.sin[0]);
     const double t9 = a0.cos[3]*t5 - 0.0057*a0.sin[3];
-    T[3] = t9;
-    J[4] = t9;
+    T_out[3] = t9;
+    J_out[4] = t9;
     const double t10 = a0.sin[3]*t5 + 0.0057*a0.cos[3];
-    T[7] = t10;
-    J[0] = -t10;
-    J[1] = a0.cos[3]*t8;
-    J[5] = a0.sin[3]*t8;
-    J[2] = a0.cos[3]*t7;
-    J[3] = a0.cos[3]*t6;
-    J[6] = a0.sin[3]*t7;
-    J[7] = a0.sin[3]*t6;
+    T_out[7] = t10;
+    J_out[0] = -t10;
+    J_out[1] = a0.cos[3]*t8;
+    J_out[5] = a0.sin[3]*t8;
+    J_out[2] = a0.cos[3]*t7;
+    J_out[3] = a0.cos[3]*t6;
+    J_out[6] = a0.sin[3]*t7;
+    J_out[7] = a0.sin[3]*t6;
 }

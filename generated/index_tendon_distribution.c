@@ -14,6 +14,7 @@
  * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
  * Cost: at most 66 times that of index_coupling and index_tendon_stiffness, and the solver's own.
  */
+#include "numerics.h"
 #include "awiwi_distribution.h"
 #include "kernels.h"
 
@@ -23,17 +24,17 @@ static int curve(const void *context, const awiwi_real *f, awiwi_real *k, awiwi_
     return awiwi_index_tendon_stiffness(f, k, slope, curvature);
 }
 
-int awiwi_index_tendon_distribution(const double q[restrict 4], const double tau[restrict 4], const double K[restrict 16], const double f_min[restrict 1], const double f_max[restrict 1], double f[restrict 8])
+int awiwi_index_tendon_distribution(const double q_in[restrict 4], const double tau_in[restrict 4], const double K_in[restrict 16], const double f_min_in[restrict 1], const double f_max_in[restrict 1], double f_out[restrict 8])
 {
     static const awiwi_pair pairs[] = {{0, 3, 1}, {1, 2, 0}, {4, 5, 3}, {6, 7, 2}};
     const awiwi_real tolerance = 1e-11;
     const void *const context = 0;
     awiwi_real P[8 * 4];
     const awiwi_tendons tendons = {
-        4, 8, P, 0, curve, context, f_min[0], f_max[0],
+        4, 8, P, 0, curve, context, f_min_in[0], f_max_in[0],
         4, pairs, 0, 0,
     };
 
-    awiwi_index_coupling(q, P);
-    return awiwi_distribute(&tendons, tau, K, tolerance, f);
+    awiwi_index_coupling(q_in, P);
+    return awiwi_distribute(&tendons, tau_in, K_in, tolerance, f_out);
 }

@@ -18,20 +18,21 @@
  * Cost: 72 add, 64 mul.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-void awiwi_joint_impedance(const double M[restrict 16], const double C[restrict 16], const double gravity[restrict 4], const double q[restrict 4], const double qd[restrict 4], const double q_des[restrict 4], const double qd_des[restrict 4], const double qdd_des[restrict 4], const double K[restrict 16], const double D[restrict 16], double tau[restrict 4])
+void awiwi_joint_impedance(const double M_in[restrict 16], const double C_in[restrict 16], const double gravity_in[restrict 4], const double q_in[restrict 4], const double qd_in[restrict 4], const double q_des_in[restrict 4], const double qd_des_in[restrict 4], const double qdd_des_in[restrict 4], const double K_in[restrict 16], const double D_in[restrict 16], double tau_out[restrict 4])
 {
-    const double t0 = qd[0] - qd_des[0];
-    const double t1 = qd[1] - qd_des[1];
-    const double t2 = qd[2] - qd_des[2];
-    const double t3 = qd[3] - qd_des[3];
-    const double t4 = q[0] - q_des[0];
-    const double t5 = q[1] - q_des[1];
-    const double t6 = q[2] - q_des[2];
-    const double t7 = q[3] - q_des[3];
-    tau[0] = gravity[0] + C[0]*qd_des[0] + C[1]*qd_des[1] + C[2]*qd_des[2] + C[3]*qd_des[3] - D[0]*t0 - D[1]*t1 - D[2]*t2 - D[3]*t3 - K[0]*t4 - K[1]*t5 - K[2]*t6 - K[3]*t7 + M[0]*qdd_des[0] + M[1]*qdd_des[1] + M[2]*qdd_des[2] + M[3]*qdd_des[3];
-    tau[1] = gravity[1] + C[4]*qd_des[0] + C[5]*qd_des[1] + C[6]*qd_des[2] + C[7]*qd_des[3] + M[4]*qdd_des[0] + M[5]*qdd_des[1] + M[6]*qdd_des[2] + M[7]*qdd_des[3] - D[4]*t0 - D[5]*t1 - D[6]*t2 - D[7]*t3 - K[4]*t4 - K[5]*t5 - K[6]*t6 - K[7]*t7;
-    tau[2] = gravity[2] + C[8]*qd_des[0] + C[9]*qd_des[1] + C[10]*qd_des[2] + C[11]*qd_des[3] + M[8]*qdd_des[0] + M[9]*qdd_des[1] + M[10]*qdd_des[2] + M[11]*qdd_des[3] - D[8]*t0 - D[9]*t1 - D[10]*t2 - D[11]*t3 - K[8]*t4 - K[9]*t5 - K[10]*t6 - K[11]*t7;
-    tau[3] = C[12]*qd_des[0] + gravity[3] + C[13]*qd_des[1] + C[14]*qd_des[2] + C[15]*qd_des[3] + M[12]*qdd_des[0] + M[13]*qdd_des[1] + M[14]*qdd_des[2] + M[15]*qdd_des[3] - D[12]*t0 - D[13]*t1 - D[14]*t2 - D[15]*t3 - K[12]*t4 - K[13]*t5 - K[14]*t6 - K[15]*t7;
+    const double t0 = qd_in[0] - qd_des_in[0];
+    const double t1 = qd_in[1] - qd_des_in[1];
+    const double t2 = qd_in[2] - qd_des_in[2];
+    const double t3 = qd_in[3] - qd_des_in[3];
+    const double t4 = q_in[0] - q_des_in[0];
+    const double t5 = q_in[1] - q_des_in[1];
+    const double t6 = q_in[2] - q_des_in[2];
+    const double t7 = q_in[3] - q_des_in[3];
+    tau_out[0] = gravity_in[0] + C_in[0]*qd_des_in[0] + C_in[1]*qd_des_in[1] + C_in[2]*qd_des_in[2] + C_in[3]*qd_des_in[3] - D_in[0]*t0 - D_in[1]*t1 - D_in[2]*t2 - D_in[3]*t3 - K_in[0]*t4 - K_in[1]*t5 - K_in[2]*t6 - K_in[3]*t7 + M_in[0]*qdd_des_in[0] + M_in[1]*qdd_des_in[1] + M_in[2]*qdd_des_in[2] + M_in[3]*qdd_des_in[3];
+    tau_out[1] = gravity_in[1] + C_in[4]*qd_des_in[0] + C_in[5]*qd_des_in[1] + C_in[6]*qd_des_in[2] + C_in[7]*qd_des_in[3] + M_in[4]*qdd_des_in[0] + M_in[5]*qdd_des_in[1] + M_in[6]*qdd_des_in[2] + M_in[7]*qdd_des_in[3] - D_in[4]*t0 - D_in[5]*t1 - D_in[6]*t2 - D_in[7]*t3 - K_in[4]*t4 - K_in[5]*t5 - K_in[6]*t6 - K_in[7]*t7;
+    tau_out[2] = gravity_in[2] + C_in[8]*qd_des_in[0] + C_in[9]*qd_des_in[1] + C_in[10]*qd_des_in[2] + C_in[11]*qd_des_in[3] + M_in[8]*qdd_des_in[0] + M_in[9]*qdd_des_in[1] + M_in[10]*qdd_des_in[2] + M_in[11]*qdd_des_in[3] - D_in[8]*t0 - D_in[9]*t1 - D_in[10]*t2 - D_in[11]*t3 - K_in[8]*t4 - K_in[9]*t5 - K_in[10]*t6 - K_in[11]*t7;
+    tau_out[3] = C_in[12]*qd_des_in[0] + gravity_in[3] + C_in[13]*qd_des_in[1] + C_in[14]*qd_des_in[2] + C_in[15]*qd_des_in[3] + M_in[12]*qdd_des_in[0] + M_in[13]*qdd_des_in[1] + M_in[14]*qdd_des_in[2] + M_in[15]*qdd_des_in[3] - D_in[12]*t0 - D_in[13]*t1 - D_in[14]*t2 - D_in[15]*t3 - K_in[12]*t4 - K_in[13]*t5 - K_in[14]*t6 - K_in[15]*t7;
 }

@@ -3,6 +3,39 @@
 #ifndef AWIWI_KERNELS_H
 #define AWIWI_KERNELS_H
 
+/* Port x of a kernel is the parameter x_in or x_out, an array of numbers row by row. The caller owns all arrays;
+ * outputs overlap neither inputs nor each other (definitions are `restrict`). */
+
+/* For toolchains that tell names apart by 31 characters only: define AWIWI_SHORT_NAMES in every file. */
+#ifdef AWIWI_SHORT_NAMES
+#define awiwi_thumb_inverse_dynamics_derivatives awiwi_thumb_inverse_dy_c9173c4f
+#define awiwi_thumb_joint_torque_and_stiffness awiwi_thumb_joint_torq_9ffb34a1
+#define awiwi_thumb_joint_estimate_error awiwi_thumb_joint_esti_4bc2145a
+#define awiwi_thumb_base_estimate_by_gradient awiwi_thumb_base_estim_11900aea
+#define awiwi_index_inverse_dynamics_derivatives awiwi_index_inverse_dy_1f4e9d81
+#define awiwi_index_joint_torque_and_stiffness awiwi_index_joint_torq_beede771
+#define awiwi_index_joint_estimate_error awiwi_index_joint_esti_88f81b41
+#define awiwi_middle_inverse_dynamics_derivatives awiwi_middle_inverse_d_3adeb0a5
+#define awiwi_middle_coupling_derivative awiwi_middle_coupling__daa40f96
+#define awiwi_middle_joint_torque_and_stiffness awiwi_middle_joint_tor_eb229b87
+#define awiwi_middle_joint_estimate_error awiwi_middle_joint_est_541f7671
+#define awiwi_middle_tendon_distribution awiwi_middle_tendon_di_c247956a
+#define awiwi_ring_inverse_dynamics_derivatives awiwi_ring_inverse_dyn_fbec11bf
+#define awiwi_ring_joint_torque_and_stiffness awiwi_ring_joint_torqu_66459bc7
+#define awiwi_fifth_inverse_dynamics_derivatives awiwi_fifth_inverse_dy_08c1eecd
+#define awiwi_fifth_joint_torque_and_stiffness awiwi_fifth_joint_torq_be7a89a3
+#define awiwi_fifth_joint_estimate_error awiwi_fifth_joint_esti_900d754e
+#define awiwi_stiffness_correction_scalar awiwi_stiffness_correc_6833c40c
+#define awiwi_backstepping_academic_lyapunov awiwi_backstepping_aca_9cc919b7
+#define awiwi_backstepping_position_lyapunov awiwi_backstepping_pos_66fb16c2
+#define awiwi_backstepping_impedance_lyapunov awiwi_backstepping_imp_a2c64abd
+#define awiwi_backstepping_antagonistic_lyapunov awiwi_backstepping_ant_e2658562
+#define awiwi_backstepping_antagonistic_decoupled awiwi_backstepping_ant_d3c64f33
+#define awiwi_backstepping_state_gains_derivatives awiwi_backstepping_sta_ac74b978
+#define awiwi_optimal_backstepping_rates awiwi_optimal_backstep_76f87589
+#define awiwi_optimal_backstepping_weights awiwi_optimal_backstep_7cbdc680
+#endif
+
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -22,7 +55,7 @@ extern const char awiwi_model_digest[65];
  * what is not defined is NaN.
  * Cost: 198 add, 198 mul, 7 calls.
  */
-int awiwi_thumb_tendon_stiffness(const double tension[8], double k[8], double slope[8], double curvature[8]);
+int awiwi_thumb_tendon_stiffness(const double tension_in[8], double k_out[8], double slope_out[8], double curvature_out[8]);
 
 /*
  * Pose of the fingertip: maps fingertip coordinates into the finger's base frame.
@@ -31,7 +64,7 @@ int awiwi_thumb_tendon_stiffness(const double tension[8], double k[8], double sl
  *   out  T[4][4] in 1, m
  * Cost: 11 add, 24 mul, 4 neg, 4 sincos.
  */
-void awiwi_thumb_fingertip_pose(const double q[4], double T[16]);
+void awiwi_thumb_fingertip_pose(const double q_in[4], double T_out[16]);
 
 /*
  * Pose of every link frame (at its joint, turning with the link) in the finger's base frame.
@@ -40,7 +73,7 @@ void awiwi_thumb_fingertip_pose(const double q[4], double T[16]);
  *   out  T[4][4][4] in 1, m
  * Cost: 14 add, 32 mul, 8 neg, 4 sincos.
  */
-void awiwi_thumb_link_poses(const double q[4], double T[64]);
+void awiwi_thumb_link_poses(const double q_in[4], double T_out[64]);
 
 /*
  * Fingertip Jacobian in base axes: velocity of the tip (rows 0-2) and angular velocity (rows 3-5).
@@ -49,7 +82,7 @@ void awiwi_thumb_link_poses(const double q[4], double T[64]);
  *   out  J[6][4] in m/rad, 1
  * Cost: 11 add, 25 mul, 3 neg, 4 sincos.
  */
-void awiwi_thumb_jacobian(const double q[4], double J[24]);
+void awiwi_thumb_jacobian(const double q_in[4], double J_out[24]);
 
 /*
  * Pose of the fingertip and its Jacobian, both in base axes, in one call that shares their work.
@@ -59,7 +92,7 @@ void awiwi_thumb_jacobian(const double q[4], double J[24]);
  *   out  J[6][4] in m/rad, 1
  * Cost: 13 add, 34 mul, 8 neg, 4 sincos.
  */
-void awiwi_thumb_pose_and_jacobian(const double q[4], double T[16], double J[24]);
+void awiwi_thumb_pose_and_jacobian(const double q_in[4], double T_out[16], double J_out[24]);
 
 /*
  * Mass matrix: the kinetic energy is half qd' M qd.
@@ -68,7 +101,7 @@ void awiwi_thumb_pose_and_jacobian(const double q[4], double T[16], double J[24]
  *   out  M[4][4] in kg m^2
  * Cost: 48 add, 46 mul, 3 sincos.
  */
-void awiwi_thumb_mass_matrix(const double q[4], double M[16]);
+void awiwi_thumb_mass_matrix(const double q_in[4], double M_out[16]);
 
 /*
  * Coriolis matrix of Christoffel symbols, so that dM/dt - 2 C is skew-symmetric.
@@ -78,7 +111,7 @@ void awiwi_thumb_mass_matrix(const double q[4], double M[16]);
  *   out  C[4][4] in N m s/rad
  * Cost: 128 add, 129 mul, 1 neg, 3 sincos.
  */
-void awiwi_thumb_coriolis_matrix(const double q[4], const double qd[4], double C[16]);
+void awiwi_thumb_coriolis_matrix(const double q_in[4], const double qd_in[4], double C_out[16]);
 
 /*
  * Joint torques that hold the finger still against gravity g (in base axes).
@@ -88,7 +121,7 @@ void awiwi_thumb_coriolis_matrix(const double q[4], const double qd[4], double C
  *   out  gravity[4] in N m
  * Cost: 17 add, 22 mul, 4 sincos.
  */
-void awiwi_thumb_gravity(const double q[4], const double g[3], double gravity[4]);
+void awiwi_thumb_gravity(const double q_in[4], const double g_in[3], double gravity_out[4]);
 
 /*
  * Coriolis, centrifugal and gravity torques together: C qd + gravity.
@@ -99,7 +132,7 @@ void awiwi_thumb_gravity(const double q[4], const double g[3], double gravity[4]
  *   out  bias[4] in N m
  * Cost: 108 add, 131 mul, 4 sincos.
  */
-void awiwi_thumb_bias(const double q[4], const double qd[4], const double g[3], double bias[4]);
+void awiwi_thumb_bias(const double q_in[4], const double qd_in[4], const double g_in[3], double bias_out[4]);
 
 /*
  * Joint torques that produce the accelerations qdd: M qdd + C qd + gravity.
@@ -111,7 +144,7 @@ void awiwi_thumb_bias(const double q[4], const double qd[4], const double g[3], 
  *   out  tau[4] in N m
  * Cost: 135 add, 141 mul, 4 sincos.
  */
-void awiwi_thumb_inverse_dynamics(const double q[4], const double qd[4], const double qdd[4], const double g[3], double tau[4]);
+void awiwi_thumb_inverse_dynamics(const double q_in[4], const double qd_in[4], const double qdd_in[4], const double g_in[3], double tau_out[4]);
 
 /*
  * Partial derivatives of the inverse dynamics with respect to the positions and the velocities.
@@ -124,7 +157,7 @@ void awiwi_thumb_inverse_dynamics(const double q[4], const double qd[4], const d
  *   out  dtau_dqd[4][4] in N m s/rad
  * Cost: 372 add, 393 mul, 1 neg, 4 sincos.
  */
-void awiwi_thumb_inverse_dynamics_derivatives(const double q[4], const double qd[4], const double qdd[4], const double g[3], double dtau_dq[16], double dtau_dqd[16]);
+void awiwi_thumb_inverse_dynamics_derivatives(const double q_in[4], const double qd_in[4], const double qdd_in[4], const double g_in[3], double dtau_dq_out[16], double dtau_dqd_out[16]);
 
 /*
  * Joint accelerations under the joint torques tau.
@@ -136,7 +169,7 @@ void awiwi_thumb_inverse_dynamics_derivatives(const double q[4], const double qd
  *   out  qdd[4] in rad/s^2
  * Cost: 170 add, 184 mul, 3 div, 1 neg, 4 sincos.
  */
-void awiwi_thumb_forward_dynamics(const double q[4], const double qd[4], const double tau[4], const double g[3], double qdd[4]);
+void awiwi_thumb_forward_dynamics(const double q_in[4], const double qd_in[4], const double tau_in[4], const double g_in[3], double qdd_out[4]);
 
 /*
  * Mass matrix, Coriolis matrix and gravity torques in one call that shares their work.
@@ -149,7 +182,7 @@ void awiwi_thumb_forward_dynamics(const double q[4], const double qd[4], const d
  *   out  gravity[4] in N m
  * Cost: 152 add, 161 mul, 1 neg, 4 sincos.
  */
-void awiwi_thumb_dynamics(const double q[4], const double qd[4], const double g[3], double M[16], double C[16], double gravity[4]);
+void awiwi_thumb_dynamics(const double q_in[4], const double qd_in[4], const double g_in[3], double M_out[16], double C_out[16], double gravity_out[4]);
 
 /*
  * Kinetic energy and potential energy in the gravity field g (zero at the base frame's origin).
@@ -161,7 +194,7 @@ void awiwi_thumb_dynamics(const double q[4], const double qd[4], const double g[
  *   out  potential[1] in J
  * Cost: 65 add, 80 mul, 4 sincos.
  */
-void awiwi_thumb_energy(const double q[4], const double qd[4], const double g[3], double kinetic[1], double potential[1]);
+void awiwi_thumb_energy(const double q_in[4], const double qd_in[4], const double g_in[3], double kinetic_out[1], double potential_out[1]);
 
 /*
  * Length of every tendon's path in the finger, from its routing.
@@ -170,7 +203,7 @@ void awiwi_thumb_energy(const double q[4], const double qd[4], const double g[3]
  *   out  h[8] in m
  * Cost: 26 add, 22 mul, 2 neg, 4 sqrt, 2 sincos.
  */
-void awiwi_thumb_tendon_lengths(const double q[4], double h[8]);
+void awiwi_thumb_tendon_lengths(const double q_in[4], double h_out[8]);
 
 /*
  * Coupling matrix P = dh/dq: tendon velocities are P qd.
@@ -179,7 +212,7 @@ void awiwi_thumb_tendon_lengths(const double q[4], double h[8]);
  *   out  P[8][4] in m/rad
  * Cost: 44 add, 50 mul, 4 div, 4 sqrt, 2 sincos.
  */
-void awiwi_thumb_coupling(const double q[4], double P[32]);
+void awiwi_thumb_coupling(const double q_in[4], double P_out[32]);
 
 /*
  * Second derivatives of the tendon lengths: dP[i, j, k] = d2 h_i / dq_j dq_k.
@@ -188,7 +221,7 @@ void awiwi_thumb_coupling(const double q[4], double P[32]);
  *   out  dP[8][4][4] in m/rad^2
  * Cost: 101 add, 112 mul, 4 div, 4 sqrt, 2 sincos.
  */
-void awiwi_thumb_coupling_derivative(const double q[4], double dP[128]);
+void awiwi_thumb_coupling_derivative(const double q_in[4], double dP_out[128]);
 
 /*
  * Joint torques -P' f of the tendon forces f.
@@ -198,7 +231,7 @@ void awiwi_thumb_coupling_derivative(const double q[4], double dP[128]);
  *   out  tau[4] in N m
  * Cost: 61 add, 52 mul, 4 div, 4 sqrt, 2 sincos.
  */
-void awiwi_thumb_joint_torque(const double q[4], const double f[8], double tau[4]);
+void awiwi_thumb_joint_torque(const double q_in[4], const double f_in[8], double tau_out[4]);
 
 /*
  * Joint stiffness -d tau/dq felt through tendons of stiffness k that pull with forces f.
@@ -209,7 +242,7 @@ void awiwi_thumb_joint_torque(const double q[4], const double f[8], double tau[4
  *   out  K[4][4] in N m/rad
  * Cost: 125 add, 135 mul, 4 div, 4 sqrt, 2 sincos.
  */
-void awiwi_thumb_joint_stiffness(const double q[4], const double f[8], const double k[8], double K[16]);
+void awiwi_thumb_joint_stiffness(const double q_in[4], const double f_in[8], const double k_in[8], double K_out[16]);
 
 /*
  * Joint torques and joint stiffness of the tendons in one call that shares their work.
@@ -221,7 +254,7 @@ void awiwi_thumb_joint_stiffness(const double q[4], const double f[8], const dou
  *   out  K[4][4] in N m/rad
  * Cost: 134 add, 145 mul, 4 div, 1 neg, 4 sqrt, 2 sincos.
  */
-void awiwi_thumb_joint_torque_and_stiffness(const double q[4], const double f[8], const double k[8], double tau[4], double K[16]);
+void awiwi_thumb_joint_torque_and_stiffness(const double q_in[4], const double f_in[8], const double k_in[8], double tau_out[4], double K_out[16]);
 
 /*
  * Joint angles whose tendon lengths are nearest to the measured h; start is the last estimate.
@@ -232,7 +265,7 @@ void awiwi_thumb_joint_torque_and_stiffness(const double q[4], const double f[8]
  * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
  * Cost: at most 24 times that of thumb_tendon_lengths and thumb_coupling, and the solver's own.
  */
-int awiwi_thumb_joint_estimate(const double h[8], const double start[4], double q[4]);
+int awiwi_thumb_joint_estimate(const double h_in[8], const double start_in[4], double q_out[4]);
 
 /*
  * Error of the joint estimate: covariance for lengths of standard deviation noise, worst for errors up
@@ -244,7 +277,7 @@ int awiwi_thumb_joint_estimate(const double h[8], const double start[4], double 
  *   out  worst[4] in rad
  * Cost: 68 add, 99 mul, 6 div, 1 neg, 6 sqrt, 2 sincos, 8 calls.
  */
-void awiwi_thumb_joint_estimate_error(const double q[4], const double noise[1], double covariance[16], double worst[4]);
+void awiwi_thumb_joint_estimate_error(const double q_in[4], const double noise_in[1], double covariance_out[16], double worst_out[4]);
 
 /*
  * Tendon forces from f_min to f_max that give the joint torque tau and come nearest to the joint
@@ -261,7 +294,7 @@ void awiwi_thumb_joint_estimate_error(const double q[4], const double noise[1], 
  * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
  * Cost: at most 357 times that of thumb_coupling and thumb_tendon_stiffness and thumb_coupling_derivative, and the solver's own.
  */
-int awiwi_thumb_tendon_distribution(const double q[4], const double tau[4], const double K[16], const double f_min[1], const double f_max[1], double f[8]);
+int awiwi_thumb_tendon_distribution(const double q_in[4], const double tau_in[4], const double K_in[16], const double f_min_in[1], const double f_max_in[1], double f_out[8]);
 
 /*
  * Base joint angles whose span lengths are nearest to the measured h, by gradient search from start.
@@ -272,7 +305,7 @@ int awiwi_thumb_tendon_distribution(const double q[4], const double tau[4], cons
  * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
  * Cost: at most 51 times that of thumb_tendon_lengths and thumb_coupling, and the solver's own.
  */
-int awiwi_thumb_base_estimate_by_gradient(const double h[4], const double start[2], double q[2]);
+int awiwi_thumb_base_estimate_by_gradient(const double h_in[4], const double start_in[2], double q_out[2]);
 
 /*
  * Stiffness of every tendon that is pulled with a tension: spring and fibre in series, and its
@@ -286,7 +319,7 @@ int awiwi_thumb_base_estimate_by_gradient(const double h[4], const double start[
  * what is not defined is NaN.
  * Cost: 198 add, 198 mul, 7 calls.
  */
-int awiwi_index_tendon_stiffness(const double tension[8], double k[8], double slope[8], double curvature[8]);
+int awiwi_index_tendon_stiffness(const double tension_in[8], double k_out[8], double slope_out[8], double curvature_out[8]);
 
 /*
  * Pose of the fingertip: maps fingertip coordinates into the finger's base frame.
@@ -295,7 +328,7 @@ int awiwi_index_tendon_stiffness(const double tension[8], double k[8], double sl
  *   out  T[4][4] in 1, m
  * Cost: 9 add, 14 mul, 3 neg, 4 sincos.
  */
-void awiwi_index_fingertip_pose(const double q[4], double T[16]);
+void awiwi_index_fingertip_pose(const double q_in[4], double T_out[16]);
 
 /*
  * Pose of every link frame (at its joint, turning with the link) in the finger's base frame.
@@ -304,7 +337,7 @@ void awiwi_index_fingertip_pose(const double q[4], double T[16]);
  *   out  T[4][4][4] in 1, m
  * Cost: 9 add, 24 mul, 10 neg, 4 sincos.
  */
-void awiwi_index_link_poses(const double q[4], double T[64]);
+void awiwi_index_link_poses(const double q_in[4], double T_out[64]);
 
 /*
  * Fingertip Jacobian in base axes: velocity of the tip (rows 0-2) and angular velocity (rows 3-5).
@@ -313,7 +346,7 @@ void awiwi_index_link_poses(const double q[4], double T[64]);
  *   out  J[6][4] in m/rad, 1
  * Cost: 9 add, 16 mul, 3 neg, 4 sincos.
  */
-void awiwi_index_jacobian(const double q[4], double J[24]);
+void awiwi_index_jacobian(const double q_in[4], double J_out[24]);
 
 /*
  * Pose of the fingertip and its Jacobian, both in base axes, in one call that shares their work.
@@ -323,7 +356,7 @@ void awiwi_index_jacobian(const double q[4], double J[24]);
  *   out  J[6][4] in m/rad, 1
  * Cost: 9 add, 20 mul, 8 neg, 4 sincos.
  */
-void awiwi_index_pose_and_jacobian(const double q[4], double T[16], double J[24]);
+void awiwi_index_pose_and_jacobian(const double q_in[4], double T_out[16], double J_out[24]);
 
 /*
  * Mass matrix: the kinetic energy is half qd' M qd.
@@ -332,7 +365,7 @@ void awiwi_index_pose_and_jacobian(const double q[4], double T[16], double J[24]
  *   out  M[4][4] in kg m^2
  * Cost: 33 add, 30 mul, 3 sincos.
  */
-void awiwi_index_mass_matrix(const double q[4], double M[16]);
+void awiwi_index_mass_matrix(const double q_in[4], double M_out[16]);
 
 /*
  * Coriolis matrix of Christoffel symbols, so that dM/dt - 2 C is skew-symmetric.
@@ -342,7 +375,7 @@ void awiwi_index_mass_matrix(const double q[4], double M[16]);
  *   out  C[4][4] in N m s/rad
  * Cost: 46 add, 47 mul, 2 neg, 3 sincos.
  */
-void awiwi_index_coriolis_matrix(const double q[4], const double qd[4], double C[16]);
+void awiwi_index_coriolis_matrix(const double q_in[4], const double qd_in[4], double C_out[16]);
 
 /*
  * Joint torques that hold the finger still against gravity g (in base axes).
@@ -352,7 +385,7 @@ void awiwi_index_coriolis_matrix(const double q[4], const double qd[4], double C
  *   out  gravity[4] in N m
  * Cost: 16 add, 18 mul, 4 sincos.
  */
-void awiwi_index_gravity(const double q[4], const double g[3], double gravity[4]);
+void awiwi_index_gravity(const double q_in[4], const double g_in[3], double gravity_out[4]);
 
 /*
  * Coriolis, centrifugal and gravity torques together: C qd + gravity.
@@ -363,7 +396,7 @@ void awiwi_index_gravity(const double q[4], const double g[3], double gravity[4]
  *   out  bias[4] in N m
  * Cost: 54 add, 72 mul, 4 sincos.
  */
-void awiwi_index_bias(const double q[4], const double qd[4], const double g[3], double bias[4]);
+void awiwi_index_bias(const double q_in[4], const double qd_in[4], const double g_in[3], double bias_out[4]);
 
 /*
  * Joint torques that produce the accelerations qdd: M qdd + C qd + gravity.
@@ -375,7 +408,7 @@ void awiwi_index_bias(const double q[4], const double qd[4], const double g[3], 
  *   out  tau[4] in N m
  * Cost: 81 add, 98 mul, 4 sincos.
  */
-void awiwi_index_inverse_dynamics(const double q[4], const double qd[4], const double qdd[4], const double g[3], double tau[4]);
+void awiwi_index_inverse_dynamics(const double q_in[4], const double qd_in[4], const double qdd_in[4], const double g_in[3], double tau_out[4]);
 
 /*
  * Partial derivatives of the inverse dynamics with respect to the positions and the velocities.
@@ -388,7 +421,7 @@ void awiwi_index_inverse_dynamics(const double q[4], const double qd[4], const d
  *   out  dtau_dqd[4][4] in N m s/rad
  * Cost: 161 add, 191 mul, 4 sincos.
  */
-void awiwi_index_inverse_dynamics_derivatives(const double q[4], const double qd[4], const double qdd[4], const double g[3], double dtau_dq[16], double dtau_dqd[16]);
+void awiwi_index_inverse_dynamics_derivatives(const double q_in[4], const double qd_in[4], const double qdd_in[4], const double g_in[3], double dtau_dq_out[16], double dtau_dqd_out[16]);
 
 /*
  * Joint accelerations under the joint torques tau.
@@ -400,7 +433,7 @@ void awiwi_index_inverse_dynamics_derivatives(const double q[4], const double qd
  *   out  qdd[4] in rad/s^2
  * Cost: 94 add, 119 mul, 3 div, 2 neg, 4 sincos.
  */
-void awiwi_index_forward_dynamics(const double q[4], const double qd[4], const double tau[4], const double g[3], double qdd[4]);
+void awiwi_index_forward_dynamics(const double q_in[4], const double qd_in[4], const double tau_in[4], const double g_in[3], double qdd_out[4]);
 
 /*
  * Mass matrix, Coriolis matrix and gravity torques in one call that shares their work.
@@ -413,7 +446,7 @@ void awiwi_index_forward_dynamics(const double q[4], const double qd[4], const d
  *   out  gravity[4] in N m
  * Cost: 77 add, 83 mul, 2 neg, 4 sincos.
  */
-void awiwi_index_dynamics(const double q[4], const double qd[4], const double g[3], double M[16], double C[16], double gravity[4]);
+void awiwi_index_dynamics(const double q_in[4], const double qd_in[4], const double g_in[3], double M_out[16], double C_out[16], double gravity_out[4]);
 
 /*
  * Kinetic energy and potential energy in the gravity field g (zero at the base frame's origin).
@@ -425,7 +458,7 @@ void awiwi_index_dynamics(const double q[4], const double qd[4], const double g[
  *   out  potential[1] in J
  * Cost: 43 add, 56 mul, 4 sincos.
  */
-void awiwi_index_energy(const double q[4], const double qd[4], const double g[3], double kinetic[1], double potential[1]);
+void awiwi_index_energy(const double q_in[4], const double qd_in[4], const double g_in[3], double kinetic_out[1], double potential_out[1]);
 
 /*
  * Length of every tendon's path in the finger, from its routing.
@@ -434,7 +467,7 @@ void awiwi_index_energy(const double q[4], const double qd[4], const double g[3]
  *   out  h[8] in m
  * Cost: 3 add, 4 mul, 4 neg.
  */
-void awiwi_index_tendon_lengths(const double q[4], double h[8]);
+void awiwi_index_tendon_lengths(const double q_in[4], double h_out[8]);
 
 /*
  * Coupling matrix P = dh/dq: tendon velocities are P qd.
@@ -443,7 +476,7 @@ void awiwi_index_tendon_lengths(const double q[4], double h[8]);
  *   out  P[8][4] in m/rad
  * Cost: nothing but moves.
  */
-void awiwi_index_coupling(const double q[4], double P[32]);
+void awiwi_index_coupling(const double q_in[4], double P_out[32]);
 
 /*
  * Second derivatives of the tendon lengths: dP[i, j, k] = d2 h_i / dq_j dq_k.
@@ -452,7 +485,7 @@ void awiwi_index_coupling(const double q[4], double P[32]);
  *   out  dP[8][4][4] in m/rad^2
  * Cost: nothing but moves.
  */
-void awiwi_index_coupling_derivative(const double q[4], double dP[128]);
+void awiwi_index_coupling_derivative(const double q_in[4], double dP_out[128]);
 
 /*
  * Joint torques -P' f of the tendon forces f.
@@ -462,7 +495,7 @@ void awiwi_index_coupling_derivative(const double q[4], double dP[128]);
  *   out  tau[4] in N m
  * Cost: 7 add, 4 mul.
  */
-void awiwi_index_joint_torque(const double q[4], const double f[8], double tau[4]);
+void awiwi_index_joint_torque(const double q_in[4], const double f_in[8], double tau_out[4]);
 
 /*
  * Joint stiffness -d tau/dq felt through tendons of stiffness k that pull with forces f.
@@ -473,7 +506,7 @@ void awiwi_index_joint_torque(const double q[4], const double f[8], double tau[4
  *   out  K[4][4] in N m/rad
  * Cost: 7 add, 6 mul.
  */
-void awiwi_index_joint_stiffness(const double q[4], const double f[8], const double k[8], double K[16]);
+void awiwi_index_joint_stiffness(const double q_in[4], const double f_in[8], const double k_in[8], double K_out[16]);
 
 /*
  * Joint torques and joint stiffness of the tendons in one call that shares their work.
@@ -485,7 +518,7 @@ void awiwi_index_joint_stiffness(const double q[4], const double f[8], const dou
  *   out  K[4][4] in N m/rad
  * Cost: 14 add, 10 mul.
  */
-void awiwi_index_joint_torque_and_stiffness(const double q[4], const double f[8], const double k[8], double tau[4], double K[16]);
+void awiwi_index_joint_torque_and_stiffness(const double q_in[4], const double f_in[8], const double k_in[8], double tau_out[4], double K_out[16]);
 
 /*
  * Joint angles whose tendon lengths are nearest to the measured h; start is the last estimate.
@@ -495,7 +528,7 @@ void awiwi_index_joint_torque_and_stiffness(const double q[4], const double f[8]
  *   out  q[4] in rad
  * Cost: 7 add, 4 mul.
  */
-void awiwi_index_joint_estimate(const double h[8], const double start[4], double q[4]);
+void awiwi_index_joint_estimate(const double h_in[8], const double start_in[4], double q_out[4]);
 
 /*
  * Error of the joint estimate: covariance for lengths of standard deviation noise, worst for errors up
@@ -507,7 +540,7 @@ void awiwi_index_joint_estimate(const double h[8], const double start[4], double
  *   out  worst[4] in rad
  * Cost: 10 mul.
  */
-void awiwi_index_joint_estimate_error(const double q[4], const double noise[1], double covariance[16], double worst[4]);
+void awiwi_index_joint_estimate_error(const double q_in[4], const double noise_in[1], double covariance_out[16], double worst_out[4]);
 
 /*
  * Tendon forces from f_min to f_max that give the joint torque tau and come nearest to the joint
@@ -524,7 +557,7 @@ void awiwi_index_joint_estimate_error(const double q[4], const double noise[1], 
  * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
  * Cost: at most 66 times that of index_coupling and index_tendon_stiffness, and the solver's own.
  */
-int awiwi_index_tendon_distribution(const double q[4], const double tau[4], const double K[16], const double f_min[1], const double f_max[1], double f[8]);
+int awiwi_index_tendon_distribution(const double q_in[4], const double tau_in[4], const double K_in[16], const double f_min_in[1], const double f_max_in[1], double f_out[8]);
 
 /*
  * Stiffness of every tendon that is pulled with a tension: spring and fibre in series, and its
@@ -538,7 +571,7 @@ int awiwi_index_tendon_distribution(const double q[4], const double tau[4], cons
  * what is not defined is NaN.
  * Cost: 198 add, 198 mul, 7 calls.
  */
-int awiwi_middle_tendon_stiffness(const double tension[8], double k[8], double slope[8], double curvature[8]);
+int awiwi_middle_tendon_stiffness(const double tension_in[8], double k_out[8], double slope_out[8], double curvature_out[8]);
 
 /*
  * Pose of the fingertip: maps fingertip coordinates into the finger's base frame.
@@ -547,7 +580,7 @@ int awiwi_middle_tendon_stiffness(const double tension[8], double k[8], double s
  *   out  T[4][4] in 1, m
  * Cost: 9 add, 14 mul, 3 neg, 4 sincos.
  */
-void awiwi_middle_fingertip_pose(const double q[4], double T[16]);
+void awiwi_middle_fingertip_pose(const double q_in[4], double T_out[16]);
 
 /*
  * Pose of every link frame (at its joint, turning with the link) in the finger's base frame.
@@ -556,7 +589,7 @@ void awiwi_middle_fingertip_pose(const double q[4], double T[16]);
  *   out  T[4][4][4] in 1, m
  * Cost: 9 add, 24 mul, 10 neg, 4 sincos.
  */
-void awiwi_middle_link_poses(const double q[4], double T[64]);
+void awiwi_middle_link_poses(const double q_in[4], double T_out[64]);
 
 /*
  * Fingertip Jacobian in base axes: velocity of the tip (rows 0-2) and angular velocity (rows 3-5).
@@ -565,7 +598,7 @@ void awiwi_middle_link_poses(const double q[4], double T[64]);
  *   out  J[6][4] in m/rad, 1
  * Cost: 9 add, 16 mul, 3 neg, 4 sincos.
  */
-void awiwi_middle_jacobian(const double q[4], double J[24]);
+void awiwi_middle_jacobian(const double q_in[4], double J_out[24]);
 
 /*
  * Pose of the fingertip and its Jacobian, both in base axes, in one call that shares their work.
@@ -575,7 +608,7 @@ void awiwi_middle_jacobian(const double q[4], double J[24]);
  *   out  J[6][4] in m/rad, 1
  * Cost: 9 add, 20 mul, 8 neg, 4 sincos.
  */
-void awiwi_middle_pose_and_jacobian(const double q[4], double T[16], double J[24]);
+void awiwi_middle_pose_and_jacobian(const double q_in[4], double T_out[16], double J_out[24]);
 
 /*
  * Mass matrix: the kinetic energy is half qd' M qd.
@@ -584,7 +617,7 @@ void awiwi_middle_pose_and_jacobian(const double q[4], double T[16], double J[24
  *   out  M[4][4] in kg m^2
  * Cost: 33 add, 30 mul, 3 sincos.
  */
-void awiwi_middle_mass_matrix(const double q[4], double M[16]);
+void awiwi_middle_mass_matrix(const double q_in[4], double M_out[16]);
 
 /*
  * Coriolis matrix of Christoffel symbols, so that dM/dt - 2 C is skew-symmetric.
@@ -594,7 +627,7 @@ void awiwi_middle_mass_matrix(const double q[4], double M[16]);
  *   out  C[4][4] in N m s/rad
  * Cost: 46 add, 47 mul, 2 neg, 3 sincos.
  */
-void awiwi_middle_coriolis_matrix(const double q[4], const double qd[4], double C[16]);
+void awiwi_middle_coriolis_matrix(const double q_in[4], const double qd_in[4], double C_out[16]);
 
 /*
  * Joint torques that hold the finger still against gravity g (in base axes).
@@ -604,7 +637,7 @@ void awiwi_middle_coriolis_matrix(const double q[4], const double qd[4], double 
  *   out  gravity[4] in N m
  * Cost: 16 add, 18 mul, 4 sincos.
  */
-void awiwi_middle_gravity(const double q[4], const double g[3], double gravity[4]);
+void awiwi_middle_gravity(const double q_in[4], const double g_in[3], double gravity_out[4]);
 
 /*
  * Coriolis, centrifugal and gravity torques together: C qd + gravity.
@@ -615,7 +648,7 @@ void awiwi_middle_gravity(const double q[4], const double g[3], double gravity[4
  *   out  bias[4] in N m
  * Cost: 54 add, 72 mul, 4 sincos.
  */
-void awiwi_middle_bias(const double q[4], const double qd[4], const double g[3], double bias[4]);
+void awiwi_middle_bias(const double q_in[4], const double qd_in[4], const double g_in[3], double bias_out[4]);
 
 /*
  * Joint torques that produce the accelerations qdd: M qdd + C qd + gravity.
@@ -627,7 +660,7 @@ void awiwi_middle_bias(const double q[4], const double qd[4], const double g[3],
  *   out  tau[4] in N m
  * Cost: 81 add, 98 mul, 4 sincos.
  */
-void awiwi_middle_inverse_dynamics(const double q[4], const double qd[4], const double qdd[4], const double g[3], double tau[4]);
+void awiwi_middle_inverse_dynamics(const double q_in[4], const double qd_in[4], const double qdd_in[4], const double g_in[3], double tau_out[4]);
 
 /*
  * Partial derivatives of the inverse dynamics with respect to the positions and the velocities.
@@ -640,7 +673,7 @@ void awiwi_middle_inverse_dynamics(const double q[4], const double qd[4], const 
  *   out  dtau_dqd[4][4] in N m s/rad
  * Cost: 161 add, 191 mul, 4 sincos.
  */
-void awiwi_middle_inverse_dynamics_derivatives(const double q[4], const double qd[4], const double qdd[4], const double g[3], double dtau_dq[16], double dtau_dqd[16]);
+void awiwi_middle_inverse_dynamics_derivatives(const double q_in[4], const double qd_in[4], const double qdd_in[4], const double g_in[3], double dtau_dq_out[16], double dtau_dqd_out[16]);
 
 /*
  * Joint accelerations under the joint torques tau.
@@ -652,7 +685,7 @@ void awiwi_middle_inverse_dynamics_derivatives(const double q[4], const double q
  *   out  qdd[4] in rad/s^2
  * Cost: 94 add, 119 mul, 3 div, 2 neg, 4 sincos.
  */
-void awiwi_middle_forward_dynamics(const double q[4], const double qd[4], const double tau[4], const double g[3], double qdd[4]);
+void awiwi_middle_forward_dynamics(const double q_in[4], const double qd_in[4], const double tau_in[4], const double g_in[3], double qdd_out[4]);
 
 /*
  * Mass matrix, Coriolis matrix and gravity torques in one call that shares their work.
@@ -665,7 +698,7 @@ void awiwi_middle_forward_dynamics(const double q[4], const double qd[4], const 
  *   out  gravity[4] in N m
  * Cost: 77 add, 83 mul, 2 neg, 4 sincos.
  */
-void awiwi_middle_dynamics(const double q[4], const double qd[4], const double g[3], double M[16], double C[16], double gravity[4]);
+void awiwi_middle_dynamics(const double q_in[4], const double qd_in[4], const double g_in[3], double M_out[16], double C_out[16], double gravity_out[4]);
 
 /*
  * Kinetic energy and potential energy in the gravity field g (zero at the base frame's origin).
@@ -677,7 +710,7 @@ void awiwi_middle_dynamics(const double q[4], const double qd[4], const double g
  *   out  potential[1] in J
  * Cost: 43 add, 56 mul, 4 sincos.
  */
-void awiwi_middle_energy(const double q[4], const double qd[4], const double g[3], double kinetic[1], double potential[1]);
+void awiwi_middle_energy(const double q_in[4], const double qd_in[4], const double g_in[3], double kinetic_out[1], double potential_out[1]);
 
 /*
  * Length of every tendon's path in the finger, from its routing.
@@ -686,7 +719,7 @@ void awiwi_middle_energy(const double q[4], const double qd[4], const double g[3
  *   out  h[8] in m
  * Cost: 3 add, 4 mul, 4 neg.
  */
-void awiwi_middle_tendon_lengths(const double q[4], double h[8]);
+void awiwi_middle_tendon_lengths(const double q_in[4], double h_out[8]);
 
 /*
  * Coupling matrix P = dh/dq: tendon velocities are P qd.
@@ -695,7 +728,7 @@ void awiwi_middle_tendon_lengths(const double q[4], double h[8]);
  *   out  P[8][4] in m/rad
  * Cost: nothing but moves.
  */
-void awiwi_middle_coupling(const double q[4], double P[32]);
+void awiwi_middle_coupling(const double q_in[4], double P_out[32]);
 
 /*
  * Second derivatives of the tendon lengths: dP[i, j, k] = d2 h_i / dq_j dq_k.
@@ -704,7 +737,7 @@ void awiwi_middle_coupling(const double q[4], double P[32]);
  *   out  dP[8][4][4] in m/rad^2
  * Cost: nothing but moves.
  */
-void awiwi_middle_coupling_derivative(const double q[4], double dP[128]);
+void awiwi_middle_coupling_derivative(const double q_in[4], double dP_out[128]);
 
 /*
  * Joint torques -P' f of the tendon forces f.
@@ -714,7 +747,7 @@ void awiwi_middle_coupling_derivative(const double q[4], double dP[128]);
  *   out  tau[4] in N m
  * Cost: 7 add, 4 mul.
  */
-void awiwi_middle_joint_torque(const double q[4], const double f[8], double tau[4]);
+void awiwi_middle_joint_torque(const double q_in[4], const double f_in[8], double tau_out[4]);
 
 /*
  * Joint stiffness -d tau/dq felt through tendons of stiffness k that pull with forces f.
@@ -725,7 +758,7 @@ void awiwi_middle_joint_torque(const double q[4], const double f[8], double tau[
  *   out  K[4][4] in N m/rad
  * Cost: 7 add, 6 mul.
  */
-void awiwi_middle_joint_stiffness(const double q[4], const double f[8], const double k[8], double K[16]);
+void awiwi_middle_joint_stiffness(const double q_in[4], const double f_in[8], const double k_in[8], double K_out[16]);
 
 /*
  * Joint torques and joint stiffness of the tendons in one call that shares their work.
@@ -737,7 +770,7 @@ void awiwi_middle_joint_stiffness(const double q[4], const double f[8], const do
  *   out  K[4][4] in N m/rad
  * Cost: 14 add, 10 mul.
  */
-void awiwi_middle_joint_torque_and_stiffness(const double q[4], const double f[8], const double k[8], double tau[4], double K[16]);
+void awiwi_middle_joint_torque_and_stiffness(const double q_in[4], const double f_in[8], const double k_in[8], double tau_out[4], double K_out[16]);
 
 /*
  * Joint angles whose tendon lengths are nearest to the measured h; start is the last estimate.
@@ -747,7 +780,7 @@ void awiwi_middle_joint_torque_and_stiffness(const double q[4], const double f[8
  *   out  q[4] in rad
  * Cost: 7 add, 4 mul.
  */
-void awiwi_middle_joint_estimate(const double h[8], const double start[4], double q[4]);
+void awiwi_middle_joint_estimate(const double h_in[8], const double start_in[4], double q_out[4]);
 
 /*
  * Error of the joint estimate: covariance for lengths of standard deviation noise, worst for errors up
@@ -759,7 +792,7 @@ void awiwi_middle_joint_estimate(const double h[8], const double start[4], doubl
  *   out  worst[4] in rad
  * Cost: 10 mul.
  */
-void awiwi_middle_joint_estimate_error(const double q[4], const double noise[1], double covariance[16], double worst[4]);
+void awiwi_middle_joint_estimate_error(const double q_in[4], const double noise_in[1], double covariance_out[16], double worst_out[4]);
 
 /*
  * Tendon forces from f_min to f_max that give the joint torque tau and come nearest to the joint
@@ -776,7 +809,7 @@ void awiwi_middle_joint_estimate_error(const double q[4], const double noise[1],
  * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
  * Cost: at most 66 times that of middle_coupling and middle_tendon_stiffness, and the solver's own.
  */
-int awiwi_middle_tendon_distribution(const double q[4], const double tau[4], const double K[16], const double f_min[1], const double f_max[1], double f[8]);
+int awiwi_middle_tendon_distribution(const double q_in[4], const double tau_in[4], const double K_in[16], const double f_min_in[1], const double f_max_in[1], double f_out[8]);
 
 /*
  * Stiffness of every tendon that is pulled with a tension: spring and fibre in series, and its
@@ -790,7 +823,7 @@ int awiwi_middle_tendon_distribution(const double q[4], const double tau[4], con
  * what is not defined is NaN.
  * Cost: 148 add, 148 mul, 5 calls.
  */
-int awiwi_ring_tendon_stiffness(const double tension[6], double k[6], double slope[6], double curvature[6]);
+int awiwi_ring_tendon_stiffness(const double tension_in[6], double k_out[6], double slope_out[6], double curvature_out[6]);
 
 /*
  * Pose of the fingertip: maps fingertip coordinates into the finger's base frame.
@@ -799,7 +832,7 @@ int awiwi_ring_tendon_stiffness(const double tension[6], double k[6], double slo
  *   out  T[4][4] in 1, m
  * Cost: 9 add, 15 mul, 3 neg, 4 sincos.
  */
-void awiwi_ring_fingertip_pose(const double q[3], double T[16]);
+void awiwi_ring_fingertip_pose(const double q_in[3], double T_out[16]);
 
 /*
  * Pose of every link frame (at its joint, turning with the link) in the finger's base frame.
@@ -808,7 +841,7 @@ void awiwi_ring_fingertip_pose(const double q[3], double T[16]);
  *   out  T[4][4][4] in 1, m
  * Cost: 9 add, 25 mul, 10 neg, 4 sincos.
  */
-void awiwi_ring_link_poses(const double q[3], double T[64]);
+void awiwi_ring_link_poses(const double q_in[3], double T_out[64]);
 
 /*
  * Fingertip Jacobian in base axes: velocity of the tip (rows 0-2) and angular velocity (rows 3-5).
@@ -817,7 +850,7 @@ void awiwi_ring_link_poses(const double q[3], double T[64]);
  *   out  J[6][3] in m/rad, 1
  * Cost: 11 add, 19 mul, 1 neg, 4 sincos.
  */
-void awiwi_ring_jacobian(const double q[3], double J[18]);
+void awiwi_ring_jacobian(const double q_in[3], double J_out[18]);
 
 /*
  * Pose of the fingertip and its Jacobian, both in base axes, in one call that shares their work.
@@ -827,7 +860,7 @@ void awiwi_ring_jacobian(const double q[3], double J[18]);
  *   out  J[6][3] in m/rad, 1
  * Cost: 11 add, 23 mul, 6 neg, 4 sincos.
  */
-void awiwi_ring_pose_and_jacobian(const double q[3], double T[16], double J[18]);
+void awiwi_ring_pose_and_jacobian(const double q_in[3], double T_out[16], double J_out[18]);
 
 /*
  * Mass matrix: the kinetic energy is half qd' M qd.
@@ -836,7 +869,7 @@ void awiwi_ring_pose_and_jacobian(const double q[3], double T[16], double J[18])
  *   out  M[3][3] in kg m^2
  * Cost: 37 add, 35 mul, 3 sincos.
  */
-void awiwi_ring_mass_matrix(const double q[3], double M[9]);
+void awiwi_ring_mass_matrix(const double q_in[3], double M_out[9]);
 
 /*
  * Coriolis matrix of Christoffel symbols, so that dM/dt - 2 C is skew-symmetric.
@@ -846,7 +879,7 @@ void awiwi_ring_mass_matrix(const double q[3], double M[9]);
  *   out  C[3][3] in N m s/rad
  * Cost: 51 add, 56 mul, 3 sincos.
  */
-void awiwi_ring_coriolis_matrix(const double q[3], const double qd[3], double C[9]);
+void awiwi_ring_coriolis_matrix(const double q_in[3], const double qd_in[3], double C_out[9]);
 
 /*
  * Joint torques that hold the finger still against gravity g (in base axes).
@@ -856,7 +889,7 @@ void awiwi_ring_coriolis_matrix(const double q[3], const double qd[3], double C[
  *   out  gravity[3] in N m
  * Cost: 17 add, 20 mul, 4 sincos.
  */
-void awiwi_ring_gravity(const double q[3], const double g[3], double gravity[3]);
+void awiwi_ring_gravity(const double q_in[3], const double g_in[3], double gravity_out[3]);
 
 /*
  * Coriolis, centrifugal and gravity torques together: C qd + gravity.
@@ -867,7 +900,7 @@ void awiwi_ring_gravity(const double q[3], const double g[3], double gravity[3])
  *   out  bias[3] in N m
  * Cost: 55 add, 75 mul, 4 sincos.
  */
-void awiwi_ring_bias(const double q[3], const double qd[3], const double g[3], double bias[3]);
+void awiwi_ring_bias(const double q_in[3], const double qd_in[3], const double g_in[3], double bias_out[3]);
 
 /*
  * Joint torques that produce the accelerations qdd: M qdd + C qd + gravity.
@@ -879,7 +912,7 @@ void awiwi_ring_bias(const double q[3], const double qd[3], const double g[3], d
  *   out  tau[3] in N m
  * Cost: 82 add, 102 mul, 4 sincos.
  */
-void awiwi_ring_inverse_dynamics(const double q[3], const double qd[3], const double qdd[3], const double g[3], double tau[3]);
+void awiwi_ring_inverse_dynamics(const double q_in[3], const double qd_in[3], const double qdd_in[3], const double g_in[3], double tau_out[3]);
 
 /*
  * Partial derivatives of the inverse dynamics with respect to the positions and the velocities.
@@ -892,7 +925,7 @@ void awiwi_ring_inverse_dynamics(const double q[3], const double qd[3], const do
  *   out  dtau_dqd[3][3] in N m s/rad
  * Cost: 177 add, 212 mul, 4 sincos.
  */
-void awiwi_ring_inverse_dynamics_derivatives(const double q[3], const double qd[3], const double qdd[3], const double g[3], double dtau_dq[9], double dtau_dqd[9]);
+void awiwi_ring_inverse_dynamics_derivatives(const double q_in[3], const double qd_in[3], const double qdd_in[3], const double g_in[3], double dtau_dq_out[9], double dtau_dqd_out[9]);
 
 /*
  * Joint accelerations under the joint torques tau.
@@ -904,7 +937,7 @@ void awiwi_ring_inverse_dynamics_derivatives(const double q[3], const double qd[
  *   out  qdd[3] in rad/s^2
  * Cost: 94 add, 110 mul, 3 div, 1 neg, 4 sincos.
  */
-void awiwi_ring_forward_dynamics(const double q[3], const double qd[3], const double tau[3], const double g[3], double qdd[3]);
+void awiwi_ring_forward_dynamics(const double q_in[3], const double qd_in[3], const double tau_in[3], const double g_in[3], double qdd_out[3]);
 
 /*
  * Mass matrix, Coriolis matrix and gravity torques in one call that shares their work.
@@ -917,7 +950,7 @@ void awiwi_ring_forward_dynamics(const double q[3], const double qd[3], const do
  *   out  gravity[3] in N m
  * Cost: 87 add, 96 mul, 4 sincos.
  */
-void awiwi_ring_dynamics(const double q[3], const double qd[3], const double g[3], double M[9], double C[9], double gravity[3]);
+void awiwi_ring_dynamics(const double q_in[3], const double qd_in[3], const double g_in[3], double M_out[9], double C_out[9], double gravity_out[3]);
 
 /*
  * Kinetic energy and potential energy in the gravity field g (zero at the base frame's origin).
@@ -929,7 +962,7 @@ void awiwi_ring_dynamics(const double q[3], const double qd[3], const double g[3
  *   out  potential[1] in J
  * Cost: 43 add, 58 mul, 4 sincos.
  */
-void awiwi_ring_energy(const double q[3], const double qd[3], const double g[3], double kinetic[1], double potential[1]);
+void awiwi_ring_energy(const double q_in[3], const double qd_in[3], const double g_in[3], double kinetic_out[1], double potential_out[1]);
 
 /*
  * Length of every tendon's path in the finger, from its routing.
@@ -938,7 +971,7 @@ void awiwi_ring_energy(const double q[3], const double qd[3], const double g[3],
  *   out  h[6] in m
  * Cost: 2 add, 3 mul, 3 neg.
  */
-void awiwi_ring_tendon_lengths(const double q[3], double h[6]);
+void awiwi_ring_tendon_lengths(const double q_in[3], double h_out[6]);
 
 /*
  * Coupling matrix P = dh/dq: tendon velocities are P qd.
@@ -947,7 +980,7 @@ void awiwi_ring_tendon_lengths(const double q[3], double h[6]);
  *   out  P[6][3] in m/rad
  * Cost: nothing but moves.
  */
-void awiwi_ring_coupling(const double q[3], double P[18]);
+void awiwi_ring_coupling(const double q_in[3], double P_out[18]);
 
 /*
  * Second derivatives of the tendon lengths: dP[i, j, k] = d2 h_i / dq_j dq_k.
@@ -956,7 +989,7 @@ void awiwi_ring_coupling(const double q[3], double P[18]);
  *   out  dP[6][3][3] in m/rad^2
  * Cost: nothing but moves.
  */
-void awiwi_ring_coupling_derivative(const double q[3], double dP[54]);
+void awiwi_ring_coupling_derivative(const double q_in[3], double dP_out[54]);
 
 /*
  * Joint torques -P' f of the tendon forces f.
@@ -966,7 +999,7 @@ void awiwi_ring_coupling_derivative(const double q[3], double dP[54]);
  *   out  tau[3] in N m
  * Cost: 5 add, 3 mul.
  */
-void awiwi_ring_joint_torque(const double q[3], const double f[6], double tau[3]);
+void awiwi_ring_joint_torque(const double q_in[3], const double f_in[6], double tau_out[3]);
 
 /*
  * Joint stiffness -d tau/dq felt through tendons of stiffness k that pull with forces f.
@@ -977,7 +1010,7 @@ void awiwi_ring_joint_torque(const double q[3], const double f[6], double tau[3]
  *   out  K[3][3] in N m/rad
  * Cost: 5 add, 4 mul.
  */
-void awiwi_ring_joint_stiffness(const double q[3], const double f[6], const double k[6], double K[9]);
+void awiwi_ring_joint_stiffness(const double q_in[3], const double f_in[6], const double k_in[6], double K_out[9]);
 
 /*
  * Joint torques and joint stiffness of the tendons in one call that shares their work.
@@ -989,7 +1022,7 @@ void awiwi_ring_joint_stiffness(const double q[3], const double f[6], const doub
  *   out  K[3][3] in N m/rad
  * Cost: 10 add, 7 mul.
  */
-void awiwi_ring_joint_torque_and_stiffness(const double q[3], const double f[6], const double k[6], double tau[3], double K[9]);
+void awiwi_ring_joint_torque_and_stiffness(const double q_in[3], const double f_in[6], const double k_in[6], double tau_out[3], double K_out[9]);
 
 /*
  * Joint angles whose tendon lengths are nearest to the measured h; start is the last estimate.
@@ -999,7 +1032,7 @@ void awiwi_ring_joint_torque_and_stiffness(const double q[3], const double f[6],
  *   out  q[3] in rad
  * Cost: 5 add, 3 mul.
  */
-void awiwi_ring_joint_estimate(const double h[6], const double start[3], double q[3]);
+void awiwi_ring_joint_estimate(const double h_in[6], const double start_in[3], double q_out[3]);
 
 /*
  * Error of the joint estimate: covariance for lengths of standard deviation noise, worst for errors up
@@ -1011,7 +1044,7 @@ void awiwi_ring_joint_estimate(const double h[6], const double start[3], double 
  *   out  worst[3] in rad
  * Cost: 7 mul.
  */
-void awiwi_ring_joint_estimate_error(const double q[3], const double noise[1], double covariance[9], double worst[3]);
+void awiwi_ring_joint_estimate_error(const double q_in[3], const double noise_in[1], double covariance_out[9], double worst_out[3]);
 
 /*
  * Tendon forces from f_min to f_max that give the joint torque tau and come nearest to the joint
@@ -1028,7 +1061,7 @@ void awiwi_ring_joint_estimate_error(const double q[3], const double noise[1], d
  * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
  * Cost: at most 66 times that of ring_coupling and ring_tendon_stiffness, and the solver's own.
  */
-int awiwi_ring_tendon_distribution(const double q[3], const double tau[3], const double K[9], const double f_min[1], const double f_max[1], double f[6]);
+int awiwi_ring_tendon_distribution(const double q_in[3], const double tau_in[3], const double K_in[9], const double f_min_in[1], const double f_max_in[1], double f_out[6]);
 
 /*
  * Stiffness of every tendon that is pulled with a tension: spring and fibre in series, and its
@@ -1042,7 +1075,7 @@ int awiwi_ring_tendon_distribution(const double q[3], const double tau[3], const
  * what is not defined is NaN.
  * Cost: 198 add, 198 mul, 7 calls.
  */
-int awiwi_fifth_tendon_stiffness(const double tension[8], double k[8], double slope[8], double curvature[8]);
+int awiwi_fifth_tendon_stiffness(const double tension_in[8], double k_out[8], double slope_out[8], double curvature_out[8]);
 
 /*
  * Pose of the fingertip: maps fingertip coordinates into the finger's base frame.
@@ -1051,7 +1084,7 @@ int awiwi_fifth_tendon_stiffness(const double tension[8], double k[8], double sl
  *   out  T[4][4] in 1, m
  * Cost: 28 add, 44 mul, 1 div, 3 neg, 1 sqrt, 5 sincos.
  */
-void awiwi_fifth_fingertip_pose(const double q[4], double T[16]);
+void awiwi_fifth_fingertip_pose(const double q_in[4], double T_out[16]);
 
 /*
  * Pose of every link frame (at its joint, turning with the link) in the finger's base frame.
@@ -1060,7 +1093,7 @@ void awiwi_fifth_fingertip_pose(const double q[4], double T[16]);
  *   out  T[5][4][4] in 1, m
  * Cost: 38 add, 69 mul, 1 div, 13 neg, 1 sqrt, 5 sincos.
  */
-void awiwi_fifth_link_poses(const double q[4], double T[80]);
+void awiwi_fifth_link_poses(const double q_in[4], double T_out[80]);
 
 /*
  * Fingertip Jacobian in base axes: velocity of the tip (rows 0-2) and angular velocity (rows 3-5).
@@ -1069,7 +1102,7 @@ void awiwi_fifth_link_poses(const double q[4], double T[80]);
  *   out  J[6][4] in m/rad, 1
  * Cost: 33 add, 59 mul, 2 div, 4 neg, 1 sqrt, 5 sincos.
  */
-void awiwi_fifth_jacobian(const double q[4], double J[24]);
+void awiwi_fifth_jacobian(const double q_in[4], double J_out[24]);
 
 /*
  * Pose of the fingertip and its Jacobian, both in base axes, in one call that shares their work.
@@ -1079,7 +1112,7 @@ void awiwi_fifth_jacobian(const double q[4], double J[24]);
  *   out  J[6][4] in m/rad, 1
  * Cost: 41 add, 70 mul, 2 div, 8 neg, 1 sqrt, 5 sincos.
  */
-void awiwi_fifth_pose_and_jacobian(const double q[4], double T[16], double J[24]);
+void awiwi_fifth_pose_and_jacobian(const double q_in[4], double T_out[16], double J_out[24]);
 
 /*
  * Mass matrix: the kinetic energy is half qd' M qd.
@@ -1088,7 +1121,7 @@ void awiwi_fifth_pose_and_jacobian(const double q[4], double T[16], double J[24]
  *   out  M[4][4] in kg m^2
  * Cost: 113 add, 126 mul, 2 div, 1 sqrt, 5 sincos.
  */
-void awiwi_fifth_mass_matrix(const double q[4], double M[16]);
+void awiwi_fifth_mass_matrix(const double q_in[4], double M_out[16]);
 
 /*
  * Coriolis matrix of Christoffel symbols, so that dM/dt - 2 C is skew-symmetric.
@@ -1098,7 +1131,7 @@ void awiwi_fifth_mass_matrix(const double q[4], double M[16]);
  *   out  C[4][4] in N m s/rad
  * Cost: 309 add, 359 mul, 2 div, 2 neg, 1 sqrt, 5 sincos.
  */
-void awiwi_fifth_coriolis_matrix(const double q[4], const double qd[4], double C[16]);
+void awiwi_fifth_coriolis_matrix(const double q_in[4], const double qd_in[4], double C_out[16]);
 
 /*
  * Joint torques that hold the finger still against gravity g (in base axes).
@@ -1108,7 +1141,7 @@ void awiwi_fifth_coriolis_matrix(const double q[4], const double qd[4], double C
  *   out  gravity[4] in N m
  * Cost: 41 add, 55 mul, 2 div, 1 sqrt, 5 sincos.
  */
-void awiwi_fifth_gravity(const double q[4], const double g[3], double gravity[4]);
+void awiwi_fifth_gravity(const double q_in[4], const double g_in[3], double gravity_out[4]);
 
 /*
  * Coriolis, centrifugal and gravity torques together: C qd + gravity.
@@ -1119,7 +1152,7 @@ void awiwi_fifth_gravity(const double q[4], const double g[3], double gravity[4]
  *   out  bias[4] in N m
  * Cost: 223 add, 250 mul, 2 div, 1 sqrt, 5 sincos.
  */
-void awiwi_fifth_bias(const double q[4], const double qd[4], const double g[3], double bias[4]);
+void awiwi_fifth_bias(const double q_in[4], const double qd_in[4], const double g_in[3], double bias_out[4]);
 
 /*
  * Joint torques that produce the accelerations qdd: M qdd + C qd + gravity.
@@ -1131,7 +1164,7 @@ void awiwi_fifth_bias(const double q[4], const double qd[4], const double g[3], 
  *   out  tau[4] in N m
  * Cost: 238 add, 262 mul, 2 div, 1 sqrt, 5 sincos.
  */
-void awiwi_fifth_inverse_dynamics(const double q[4], const double qd[4], const double qdd[4], const double g[3], double tau[4]);
+void awiwi_fifth_inverse_dynamics(const double q_in[4], const double qd_in[4], const double qdd_in[4], const double g_in[3], double tau_out[4]);
 
 /*
  * Partial derivatives of the inverse dynamics with respect to the positions and the velocities.
@@ -1144,7 +1177,7 @@ void awiwi_fifth_inverse_dynamics(const double q[4], const double qd[4], const d
  *   out  dtau_dqd[4][4] in N m s/rad
  * Cost: 957 add, 1075 mul, 2 div, 1 sqrt, 5 sincos.
  */
-void awiwi_fifth_inverse_dynamics_derivatives(const double q[4], const double qd[4], const double qdd[4], const double g[3], double dtau_dq[16], double dtau_dqd[16]);
+void awiwi_fifth_inverse_dynamics_derivatives(const double q_in[4], const double qd_in[4], const double qdd_in[4], const double g_in[3], double dtau_dq_out[16], double dtau_dqd_out[16]);
 
 /*
  * Joint accelerations under the joint torques tau.
@@ -1156,7 +1189,7 @@ void awiwi_fifth_inverse_dynamics_derivatives(const double q[4], const double qd
  *   out  qdd[4] in rad/s^2
  * Cost: 329 add, 352 mul, 6 div, 1 neg, 1 sqrt, 5 sincos.
  */
-void awiwi_fifth_forward_dynamics(const double q[4], const double qd[4], const double tau[4], const double g[3], double qdd[4]);
+void awiwi_fifth_forward_dynamics(const double q_in[4], const double qd_in[4], const double tau_in[4], const double g_in[3], double qdd_out[4]);
 
 /*
  * Mass matrix, Coriolis matrix and gravity torques in one call that shares their work.
@@ -1169,7 +1202,7 @@ void awiwi_fifth_forward_dynamics(const double q[4], const double qd[4], const d
  *   out  gravity[4] in N m
  * Cost: 339 add, 401 mul, 2 div, 2 neg, 1 sqrt, 5 sincos.
  */
-void awiwi_fifth_dynamics(const double q[4], const double qd[4], const double g[3], double M[16], double C[16], double gravity[4]);
+void awiwi_fifth_dynamics(const double q_in[4], const double qd_in[4], const double g_in[3], double M_out[16], double C_out[16], double gravity_out[4]);
 
 /*
  * Kinetic energy and potential energy in the gravity field g (zero at the base frame's origin).
@@ -1181,7 +1214,7 @@ void awiwi_fifth_dynamics(const double q[4], const double qd[4], const double g[
  *   out  potential[1] in J
  * Cost: 133 add, 166 mul, 2 div, 1 sqrt, 5 sincos.
  */
-void awiwi_fifth_energy(const double q[4], const double qd[4], const double g[3], double kinetic[1], double potential[1]);
+void awiwi_fifth_energy(const double q_in[4], const double qd_in[4], const double g_in[3], double kinetic_out[1], double potential_out[1]);
 
 /*
  * Length of every tendon's path in the finger, from its routing.
@@ -1190,7 +1223,7 @@ void awiwi_fifth_energy(const double q[4], const double qd[4], const double g[3]
  *   out  h[8] in m
  * Cost: 2 add, 4 mul, 4 neg.
  */
-void awiwi_fifth_tendon_lengths(const double q[4], double h[8]);
+void awiwi_fifth_tendon_lengths(const double q_in[4], double h_out[8]);
 
 /*
  * Coupling matrix P = dh/dq: tendon velocities are P qd.
@@ -1199,7 +1232,7 @@ void awiwi_fifth_tendon_lengths(const double q[4], double h[8]);
  *   out  P[8][4] in m/rad
  * Cost: nothing but moves.
  */
-void awiwi_fifth_coupling(const double q[4], double P[32]);
+void awiwi_fifth_coupling(const double q_in[4], double P_out[32]);
 
 /*
  * Second derivatives of the tendon lengths: dP[i, j, k] = d2 h_i / dq_j dq_k.
@@ -1208,7 +1241,7 @@ void awiwi_fifth_coupling(const double q[4], double P[32]);
  *   out  dP[8][4][4] in m/rad^2
  * Cost: nothing but moves.
  */
-void awiwi_fifth_coupling_derivative(const double q[4], double dP[128]);
+void awiwi_fifth_coupling_derivative(const double q_in[4], double dP_out[128]);
 
 /*
  * Joint torques -P' f of the tendon forces f.
@@ -1218,7 +1251,7 @@ void awiwi_fifth_coupling_derivative(const double q[4], double dP[128]);
  *   out  tau[4] in N m
  * Cost: 6 add, 4 mul.
  */
-void awiwi_fifth_joint_torque(const double q[4], const double f[8], double tau[4]);
+void awiwi_fifth_joint_torque(const double q_in[4], const double f_in[8], double tau_out[4]);
 
 /*
  * Joint stiffness -d tau/dq felt through tendons of stiffness k that pull with forces f.
@@ -1229,7 +1262,7 @@ void awiwi_fifth_joint_torque(const double q[4], const double f[8], double tau[4
  *   out  K[4][4] in N m/rad
  * Cost: 6 add, 5 mul.
  */
-void awiwi_fifth_joint_stiffness(const double q[4], const double f[8], const double k[8], double K[16]);
+void awiwi_fifth_joint_stiffness(const double q_in[4], const double f_in[8], const double k_in[8], double K_out[16]);
 
 /*
  * Joint torques and joint stiffness of the tendons in one call that shares their work.
@@ -1241,7 +1274,7 @@ void awiwi_fifth_joint_stiffness(const double q[4], const double f[8], const dou
  *   out  K[4][4] in N m/rad
  * Cost: 12 add, 9 mul.
  */
-void awiwi_fifth_joint_torque_and_stiffness(const double q[4], const double f[8], const double k[8], double tau[4], double K[16]);
+void awiwi_fifth_joint_torque_and_stiffness(const double q_in[4], const double f_in[8], const double k_in[8], double tau_out[4], double K_out[16]);
 
 /*
  * Joint angles whose tendon lengths are nearest to the measured h; start is the last estimate.
@@ -1251,7 +1284,7 @@ void awiwi_fifth_joint_torque_and_stiffness(const double q[4], const double f[8]
  *   out  q[4] in rad
  * Cost: 6 add, 4 mul.
  */
-void awiwi_fifth_joint_estimate(const double h[8], const double start[4], double q[4]);
+void awiwi_fifth_joint_estimate(const double h_in[8], const double start_in[4], double q_out[4]);
 
 /*
  * Error of the joint estimate: covariance for lengths of standard deviation noise, worst for errors up
@@ -1263,7 +1296,7 @@ void awiwi_fifth_joint_estimate(const double h[8], const double start[4], double
  *   out  worst[4] in rad
  * Cost: 8 mul.
  */
-void awiwi_fifth_joint_estimate_error(const double q[4], const double noise[1], double covariance[16], double worst[4]);
+void awiwi_fifth_joint_estimate_error(const double q_in[4], const double noise_in[1], double covariance_out[16], double worst_out[4]);
 
 /*
  * Tendon forces from f_min to f_max that give the joint torque tau and come nearest to the joint
@@ -1280,7 +1313,7 @@ void awiwi_fifth_joint_estimate_error(const double q[4], const double noise[1], 
  * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
  * Cost: at most 66 times that of fifth_coupling and fifth_tendon_stiffness, and the solver's own.
  */
-int awiwi_fifth_tendon_distribution(const double q[4], const double tau[4], const double K[16], const double f_min[1], const double f_max[1], double f[8]);
+int awiwi_fifth_tendon_distribution(const double q_in[4], const double tau_in[4], const double K_in[16], const double f_min_in[1], const double f_max_in[1], double f_out[8]);
 
 /*
  * Angles of coupler and rocker at a joint angle, and their turns per turn of the joint. The
@@ -1296,7 +1329,7 @@ int awiwi_fifth_tendon_distribution(const double q[4], const double tau[4], cons
  * Returns 0 where the loop closes; elsewhere 1, and what is not defined is NaN.
  * Cost: 15 add, 25 mul, 2 div, 1 sqrt, 1 sincos, 2 calls.
  */
-int awiwi_fifth_hmc_four_bar(const double q[1], double coupler[1], double rocker[1], double coupler_ratio[1], double rocker_ratio[1], double transmission[1]);
+int awiwi_fifth_hmc_four_bar(const double q_in[1], double coupler_out[1], double rocker_out[1], double coupler_ratio_out[1], double rocker_ratio_out[1], double transmission_out[1]);
 
 /*
  * The palm's points A, B and C in frame {0} of the forearm.
@@ -1310,7 +1343,7 @@ int awiwi_fifth_hmc_four_bar(const double q[1], double coupler[1], double rocker
  * short of A0 and bar AA0 reaches; elsewhere 1, and what is not defined is NaN.
  * Cost: 20 add, 39 mul, 2 div, 1 neg, 1 sqrt, 2 sincos.
  */
-int awiwi_wrist_points(const double q71[1], const double q73[1], double A[3], double B[3], double C[3]);
+int awiwi_wrist_points(const double q71_in[1], const double q73_in[1], double A_out[3], double B_out[3], double C_out[3]);
 
 /*
  * Pose of the palm: maps palm coordinates into frame {0} of the forearm.
@@ -1322,7 +1355,7 @@ int awiwi_wrist_points(const double q71[1], const double q73[1], double A[3], do
  * short of A0 and bar AA0 reaches; elsewhere 1, and what is not defined is NaN.
  * Cost: 24 add, 48 mul, 2 div, 1 neg, 1 sqrt, 2 sincos.
  */
-int awiwi_wrist_palm_pose(const double q71[1], const double q73[1], double T[16]);
+int awiwi_wrist_palm_pose(const double q71_in[1], const double q73_in[1], double T_out[16]);
 
 /*
  * Length of every tendon's straight run through the wrist.
@@ -1334,7 +1367,7 @@ int awiwi_wrist_palm_pose(const double q71[1], const double q73[1], double T[16]
  * short of A0 and bar AA0 reaches; elsewhere 1, and what is not defined is NaN.
  * Cost: 180 add, 143 mul, 2 div, 39 sqrt, 2 sincos.
  */
-int awiwi_wrist_tendon_lengths(const double q71[1], const double q73[1], double h[38]);
+int awiwi_wrist_tendon_lengths(const double q71_in[1], const double q73_in[1], double h_out[38]);
 
 /*
  * Derivatives of the tendons' lengths in the wrist with respect to q71 and q73.
@@ -1346,7 +1379,7 @@ int awiwi_wrist_tendon_lengths(const double q71[1], const double q73[1], double 
  * short of A0 and bar AA0 reaches; elsewhere 1, and what is not defined is NaN.
  * Cost: 436 add, 478 mul, 41 div, 39 sqrt, 2 sincos.
  */
-int awiwi_wrist_coupling(const double q71[1], const double q73[1], double dh[76]);
+int awiwi_wrist_coupling(const double q71_in[1], const double q73_in[1], double dh_out[76]);
 
 /*
  * Length of every tendon's path in its finger and in the wrist, whose internal angles are wrist =
@@ -1359,7 +1392,7 @@ int awiwi_wrist_coupling(const double q71[1], const double q73[1], double dh[76]
  * short of A0 and bar AA0 reaches; elsewhere 1, and what is not defined is NaN.
  * Cost: 254 add, 180 mul, 2 div, 43 sqrt, 4 sincos.
  */
-int awiwi_hand_tendon_lengths(const double q[19], const double wrist[2], double h[38]);
+int awiwi_hand_tendon_lengths(const double q_in[19], const double wrist_in[2], double h_out[38]);
 
 /*
  * Coupling matrix P = dh/dq of all tendons and joints; zero outside the blocks of the fingers.
@@ -1368,7 +1401,7 @@ int awiwi_hand_tendon_lengths(const double q[19], const double wrist[2], double 
  *   out  P[38][19] in m/rad
  * Cost: 44 add, 50 mul, 4 div, 4 sqrt, 2 sincos.
  */
-void awiwi_hand_coupling(const double q[19], double P[722]);
+void awiwi_hand_coupling(const double q_in[19], double P_out[722]);
 
 /*
  * Joint torques -P' f of the tendon forces f.
@@ -1378,7 +1411,7 @@ void awiwi_hand_coupling(const double q[19], double P[722]);
  *   out  tau[19] in N m
  * Cost: 86 add, 67 mul, 4 div, 4 sqrt, 2 sincos.
  */
-void awiwi_hand_joint_torque(const double q[19], const double f[38], double tau[19]);
+void awiwi_hand_joint_torque(const double q_in[19], const double f_in[38], double tau_out[19]);
 
 /*
  * Joint stiffness -d tau/dq through tendons of stiffness k that pull with forces f; zero outside the
@@ -1390,7 +1423,7 @@ void awiwi_hand_joint_torque(const double q[19], const double f[38], double tau[
  *   out  K[19][19] in N m/rad
  * Cost: 150 add, 156 mul, 4 div, 4 sqrt, 2 sincos.
  */
-void awiwi_hand_joint_stiffness(const double q[19], const double f[38], const double k[38], double K[361]);
+void awiwi_hand_joint_stiffness(const double q_in[19], const double f_in[38], const double k_in[38], double K_out[361]);
 
 /*
  * Tendon lengths in the finger, of motor angles theta, elongations x and changes w of the lengths in
@@ -1403,7 +1436,7 @@ void awiwi_hand_joint_stiffness(const double q[19], const double f[38], const do
  *   out  h[8] in m
  * Cost: 20 add, 8 mul.
  */
-void awiwi_thumb_measured_lengths(const double theta[8], const double x[8], const double w[8], double h[8]);
+void awiwi_thumb_measured_lengths(const double theta_in[8], const double x_in[8], const double w_in[8], double h_out[8]);
 
 /*
  * Tendon lengths in the finger, of motor angles theta, elongations x and changes w of the lengths in
@@ -1416,7 +1449,7 @@ void awiwi_thumb_measured_lengths(const double theta[8], const double x[8], cons
  *   out  h[8] in m
  * Cost: 16 add, 8 mul.
  */
-void awiwi_index_measured_lengths(const double theta[8], const double x[8], const double w[8], double h[8]);
+void awiwi_index_measured_lengths(const double theta_in[8], const double x_in[8], const double w_in[8], double h_out[8]);
 
 /*
  * Tendon lengths in the finger, of motor angles theta, elongations x and changes w of the lengths in
@@ -1429,7 +1462,7 @@ void awiwi_index_measured_lengths(const double theta[8], const double x[8], cons
  *   out  h[8] in m
  * Cost: 16 add, 8 mul.
  */
-void awiwi_middle_measured_lengths(const double theta[8], const double x[8], const double w[8], double h[8]);
+void awiwi_middle_measured_lengths(const double theta_in[8], const double x_in[8], const double w_in[8], double h_out[8]);
 
 /*
  * Tendon lengths in the finger, of motor angles theta, elongations x and changes w of the lengths in
@@ -1442,7 +1475,7 @@ void awiwi_middle_measured_lengths(const double theta[8], const double x[8], con
  *   out  h[6] in m
  * Cost: 12 add, 6 mul.
  */
-void awiwi_ring_measured_lengths(const double theta[6], const double x[6], const double w[6], double h[6]);
+void awiwi_ring_measured_lengths(const double theta_in[6], const double x_in[6], const double w_in[6], double h_out[6]);
 
 /*
  * Tendon lengths in the finger, of motor angles theta, elongations x and changes w of the lengths in
@@ -1455,7 +1488,7 @@ void awiwi_ring_measured_lengths(const double theta[6], const double x[6], const
  *   out  h[8] in m
  * Cost: 16 add, 8 mul.
  */
-void awiwi_fifth_measured_lengths(const double theta[8], const double x[8], const double w[8], double h[8]);
+void awiwi_fifth_measured_lengths(const double theta_in[8], const double x_in[8], const double w_in[8], double h_out[8]);
 
 /*
  * Kinetic energy of rotor and gear: half of B thd^2, with the inertia B that the output shaft feels.
@@ -1464,7 +1497,7 @@ void awiwi_fifth_measured_lengths(const double theta[8], const double x[8], cons
  *   out  energy[1] in J
  * Cost: 2 mul.
  */
-void awiwi_motor_energy(const double thd[1], double energy[1]);
+void awiwi_motor_energy(const double thd_in[1], double energy_out[1]);
 
 /*
  * Friction torque of motor and gear at the speed thd: what the motor must overcome, positive for
@@ -1474,7 +1507,7 @@ void awiwi_motor_energy(const double thd[1], double energy[1]);
  *   out  tau[1] in N m
  * Cost: 1 add, 3 mul, 1 calls.
  */
-void awiwi_motor_friction(const double thd[1], double tau[1]);
+void awiwi_motor_friction(const double thd_in[1], double tau_out[1]);
 
 /*
  * Slope of the friction torque; an explicit step of a simulation must stay below 2 B / damping.
@@ -1483,7 +1516,7 @@ void awiwi_motor_friction(const double thd[1], double tau[1]);
  *   out  damping[1] in N m s/rad
  * Cost: 2 add, 1 mul, 1 div.
  */
-void awiwi_motor_damping(const double thd[1], double damping[1]);
+void awiwi_motor_damping(const double thd_in[1], double damping_out[1]);
 
 /*
  * Periodic disturbance torque of both shafts at the angle theta: what the motor must overcome.
@@ -1492,7 +1525,7 @@ void awiwi_motor_damping(const double thd[1], double damping[1]);
  *   out  tau[1] in N m
  * Cost: 11 add, 12 mul, 2 sincos.
  */
-void awiwi_motor_ripple(const double theta[1], double tau[1]);
+void awiwi_motor_ripple(const double theta_in[1], double tau_out[1]);
 
 /*
  * Motor torque to feed forward against friction and ripple: the share of both that is safe to
@@ -1503,7 +1536,7 @@ void awiwi_motor_ripple(const double theta[1], double tau[1]);
  *   out  tau[1] in N m
  * Cost: 13 add, 15 mul, 2 sincos, 1 calls.
  */
-void awiwi_motor_compensation(const double theta[1], const double thd[1], double tau[1]);
+void awiwi_motor_compensation(const double theta_in[1], const double thd_in[1], double tau_out[1]);
 
 /*
  * Acceleration under the motor torque tau and the tendon force f: (tau - friction - ripple - r f) / B.
@@ -1515,7 +1548,7 @@ void awiwi_motor_compensation(const double theta[1], const double thd[1], double
  *   out  thdd[1] in rad/s^2
  * Cost: 15 add, 16 mul, 2 sincos, 1 calls.
  */
-void awiwi_motor_acceleration(const double theta[1], const double thd[1], const double tau[1], const double f[1], double thdd[1]);
+void awiwi_motor_acceleration(const double theta_in[1], const double thd_in[1], const double tau_in[1], const double f_in[1], double thdd_out[1]);
 
 /*
  * Motor torque of a motion under the tendon force f: B thdd + friction + ripple + r f.
@@ -1527,7 +1560,7 @@ void awiwi_motor_acceleration(const double theta[1], const double thd[1], const 
  *   out  tau[1] in N m
  * Cost: 15 add, 17 mul, 2 sincos, 1 calls.
  */
-void awiwi_motor_torque(const double theta[1], const double thd[1], const double thdd[1], const double f[1], double tau[1]);
+void awiwi_motor_torque(const double theta_in[1], const double thd_in[1], const double thdd_in[1], const double f_in[1], double tau_out[1]);
 
 /*
  * Length dL of tendon in the mechanism, force and stiffness of the tendon at the lever angle theta.
@@ -1541,7 +1574,7 @@ void awiwi_motor_torque(const double theta[1], const double thd[1], const double
  * and what is not defined is NaN.
  * Cost: 38 add, 54 mul, 7 div, 3 sqrt, 1 sincos, 2 calls.
  */
-int awiwi_spring_lever(const double theta[1], double dL[1], double force[1], double stiffness[1]);
+int awiwi_spring_lever(const double theta_in[1], double dL_out[1], double force_out[1], double stiffness_out[1]);
 
 /*
  * Tendon force at the elongation x, counted from the slack end of the lever's travel. A polynomial
@@ -1553,7 +1586,7 @@ int awiwi_spring_lever(const double theta[1], double dL[1], double force[1], dou
  * and what is not defined is NaN.
  * Cost: 18 add, 18 mul.
  */
-int awiwi_spring_force(const double x[1], double f[1]);
+int awiwi_spring_force(const double x_in[1], double f_out[1]);
 
 /*
  * Tendon stiffness at the elongation x, counted from the slack end of the lever's travel.
@@ -1564,7 +1597,7 @@ int awiwi_spring_force(const double x[1], double f[1]);
  * and what is not defined is NaN.
  * Cost: 18 add, 18 mul.
  */
-int awiwi_spring_stiffness(const double x[1], double k[1]);
+int awiwi_spring_stiffness(const double x_in[1], double k_out[1]);
 
 /*
  * Elongation at which the tendon's force is f: the inverse of the force.
@@ -1575,7 +1608,7 @@ int awiwi_spring_stiffness(const double x[1], double k[1]);
  * and what is not defined is NaN.
  * Cost: 18 add, 18 mul.
  */
-int awiwi_spring_elongation(const double f[1], double x[1]);
+int awiwi_spring_elongation(const double f_in[1], double x_out[1]);
 
 /*
  * dL, force and stiffness of every tendon from its sensor: the design's, or its own where it was
@@ -1589,7 +1622,7 @@ int awiwi_spring_elongation(const double f[1], double x[1]);
  * and what is not defined is NaN.
  * Cost: 1062 add, 1062 mul, 37 calls.
  */
-int awiwi_calibration_readings(const double readings[38], double dL[38], double force[38], double stiffness[38]);
+int awiwi_calibration_readings(const double readings_in[38], double dL_out[38], double force_out[38], double stiffness_out[38]);
 
 /*
  * dL, force and stiffness of one sensor's counts by polynomials from the bench, coefficients from the
@@ -1608,7 +1641,7 @@ int awiwi_calibration_readings(const double readings[38], double dL[38], double 
  * and what is not defined is NaN.
  * Cost: 23 add, 19 mul, 1 div.
  */
-int awiwi_calibration_polynomials(const double counts[1], const double ends[2], const double length_powers[7], const double force_powers[7], const double stiffness_powers[7], double dL[1], double force[1], double stiffness[1]);
+int awiwi_calibration_polynomials(const double counts_in[1], const double ends_in[2], const double length_powers_in[7], const double force_powers_in[7], const double stiffness_powers_in[7], double dL_out[1], double force_out[1], double stiffness_out[1]);
 
 /*
  * Elongation of the fibre under the force f.
@@ -1617,7 +1650,7 @@ int awiwi_calibration_polynomials(const double counts[1], const double ends[2], 
  *   out  x[1] in m
  * Cost: 1 mul.
  */
-void awiwi_tendon_stretch(const double f[1], double x[1]);
+void awiwi_tendon_stretch(const double f_in[1], double x_out[1]);
 
 /*
  * Stiffness of a whole tendon: of the fibre, in series with its mechanism of stiffness k.
@@ -1626,7 +1659,7 @@ void awiwi_tendon_stretch(const double f[1], double x[1]);
  *   out  stiffness[1] in N/m
  * Cost: 1 add, 2 div.
  */
-void awiwi_tendon_stiffness(const double k[1], double stiffness[1]);
+void awiwi_tendon_stiffness(const double k_in[1], double stiffness_out[1]);
 
 /*
  * Force lost in the guidings by a tendon that is pulled with the force f and bent by the angle bend in
@@ -1637,7 +1670,7 @@ void awiwi_tendon_stiffness(const double k[1], double stiffness[1]);
  *   out  loss[1] in N
  * Cost: 1 add, 2 mul, 1 calls.
  */
-void awiwi_guiding_friction(const double f[1], const double bend[1], double loss[1]);
+void awiwi_guiding_friction(const double f_in[1], const double bend_in[1], double loss_out[1]);
 
 /*
  * Controller stiffness that, behind tendons of stiffness K_mech, makes the joints feel like K_eff.
@@ -1654,7 +1687,7 @@ void awiwi_guiding_friction(const double f[1], const double bend[1], double loss
  * K_eff is positive; elsewhere 1, and what is not defined is NaN.
  * Cost: 91 add, 111 mul, 7 div, 5 neg.
  */
-int awiwi_stiffness_correction(const double K_eff[16], const double K_mech[16], double K_imp[16]);
+int awiwi_stiffness_correction(const double K_eff_in[16], const double K_mech_in[16], double K_imp_out[16]);
 
 /*
  * The same for one joint, and by how much k_imp changes with k_mech: what a poor guess of the tendons
@@ -1668,7 +1701,7 @@ int awiwi_stiffness_correction(const double K_eff[16], const double K_mech[16], 
  * defined is NaN.
  * Cost: 1 add, 4 mul, 2 div, 3 neg.
  */
-int awiwi_stiffness_correction_scalar(const double k_eff[1], const double k_mech[1], double k_imp[1], double sensitivity[1]);
+int awiwi_stiffness_correction_scalar(const double k_eff_in[1], const double k_mech_in[1], double k_imp_out[1], double sensitivity_out[1]);
 
 /*
  * Friction torque of a motor that turned under the torque u against the load tau in the sample that
@@ -1689,7 +1722,7 @@ int awiwi_stiffness_correction_scalar(const double k_eff[1], const double k_mech
  * elsewhere 1, and what is not defined is NaN.
  * Cost: 5 add, 5 mul, 1 div, 1 neg.
  */
-int awiwi_friction_observer(const double momentum[1], const double u[1], const double tau[1], const double thd[1], const double B[1], const double gain[1], const double period[1], double momentum_next[1], double friction[1]);
+int awiwi_friction_observer(const double momentum_in[1], const double u_in[1], const double tau_in[1], const double thd_in[1], const double B_in[1], const double gain_in[1], const double period_in[1], double momentum_next_out[1], double friction_out[1]);
 
 /*
  * Joint torques that make the joints feel like a spring K and a damper D about the desired motion. M,
@@ -1709,7 +1742,7 @@ int awiwi_friction_observer(const double momentum[1], const double u[1], const d
  *   out  tau[4] in N m
  * Cost: 72 add, 64 mul.
  */
-void awiwi_joint_impedance(const double M[16], const double C[16], const double gravity[4], const double q[4], const double qd[4], const double q_des[4], const double qd_des[4], const double qdd_des[4], const double K[16], const double D[16], double tau[4]);
+void awiwi_joint_impedance(const double M_in[16], const double C_in[16], const double gravity_in[4], const double q_in[4], const double qd_in[4], const double q_des_in[4], const double qd_des_in[4], const double qdd_des_in[4], const double K_in[16], const double D_in[16], double tau_out[4]);
 
 /*
  * Motor torque that brings a motor to the angle at which its tendon pulls with f_des; a spring and a
@@ -1729,7 +1762,7 @@ void awiwi_joint_impedance(const double M[16], const double C[16], const double 
  * derivative gain is positive; elsewhere 1, and what is not defined is NaN.
  * Cost: 4 add, 3 mul.
  */
-int awiwi_motor_impedance(const double theta[1], const double thd[1], const double theta_des[1], const double f_des[1], const double friction[1], const double r[1], const double motor_kp[1], const double motor_kd[1], double tau[1]);
+int awiwi_motor_impedance(const double theta_in[1], const double thd_in[1], const double theta_des_in[1], const double f_des_in[1], const double friction_in[1], const double r_in[1], const double motor_kp_in[1], const double motor_kd_in[1], double tau_out[1]);
 
 /*
  * Motor torque that makes the error of a tendon's force die out as e'' + kd e' + kp e = 0, whatever
@@ -1755,7 +1788,7 @@ int awiwi_motor_impedance(const double theta[1], const double thd[1], const doub
  * and what is not defined is NaN.
  * Cost: 8 add, 8 mul, 2 div.
  */
-int awiwi_cascade(const double f[1], const double xd[1], const double stiffness[1], const double slope[1], const double hdd[1], const double f_des[1], const double fd_des[1], const double fdd_des[1], const double friction[1], const double r[1], const double B[1], const double force_kp[1], const double force_kd[1], double tau[1]);
+int awiwi_cascade(const double f_in[1], const double xd_in[1], const double stiffness_in[1], const double slope_in[1], const double hdd_in[1], const double f_des_in[1], const double fd_des_in[1], const double fdd_des_in[1], const double friction_in[1], const double r_in[1], const double B_in[1], const double force_kp_in[1], const double force_kd_in[1], double tau_out[1]);
 
 /*
  * Whether joint damping D and force loops kp, kd make a stable cascade: proved where the margin is
@@ -1775,7 +1808,7 @@ int awiwi_cascade(const double f[1], const double xd[1], const double stiffness[
  * not defined is NaN.
  * Cost: 166 add, 210 mul, 23 div, 20 calls.
  */
-int awiwi_cascade_certificate(const double D[16], const double P[32], const double kp[8], const double kd[8], const double weight[1], const double omega[1], double margin[1], double S[24]);
+int awiwi_cascade_certificate(const double D_in[16], const double P_in[32], const double kp_in[8], const double kd_in[8], const double weight_in[1], const double omega_in[1], double margin_out[1], double S_out[24]);
 
 /*
  * Motor torque that brings the tendon force f to f_des: kp and kd on its error, estimates cancel the
@@ -1796,7 +1829,7 @@ int awiwi_cascade_certificate(const double D[16], const double P[32], const doub
  * derivative gain is positive; elsewhere 1, and what is not defined is NaN.
  * Cost: 5 add, 3 mul.
  */
-int awiwi_tendon_force_pd(const double f[1], const double fd[1], const double f_des[1], const double fd_des[1], const double f_hat[1], const double friction[1], const double r[1], const double kp[1], const double kd[1], double tau[1]);
+int awiwi_tendon_force_pd(const double f_in[1], const double fd_in[1], const double f_des_in[1], const double fd_des_in[1], const double f_hat_in[1], const double friction_in[1], const double r_in[1], const double kp_in[1], const double kd_in[1], double tau_out[1]);
 
 /*
  * Motor torque that brings the tendon force to f_des as a motor of inertia b does on a spring of
@@ -1822,7 +1855,7 @@ int awiwi_tendon_force_pd(const double f[1], const double fd[1], const double f_
  * positive and the proportional gain is positive; elsewhere 1, and what is not defined is NaN.
  * Cost: 6 add, 15 mul, 1 div.
  */
-int awiwi_tendon_force_scheduled(const double f[1], const double fd[1], const double f_des[1], const double fd_des[1], const double f_hat[1], const double friction[1], const double r[1], const double b[1], const double stiffness[1], const double stiffness_rate[1], const double omega0[1], const double xi0[1], double tau[1], double gains[2]);
+int awiwi_tendon_force_scheduled(const double f_in[1], const double fd_in[1], const double f_des_in[1], const double fd_des_in[1], const double f_hat_in[1], const double friction_in[1], const double r_in[1], const double b_in[1], const double stiffness_in[1], const double stiffness_rate_in[1], const double omega0_in[1], const double xi0_in[1], double tau_out[1], double gains_out[2]);
 
 /*
  * Gains of a motor that pulls against a grounded spring k: poles of frequency omega0 and damping ratio
@@ -1838,7 +1871,7 @@ int awiwi_tendon_force_scheduled(const double f[1], const double fd[1], const do
  * target's damping ratio is positive; elsewhere 1, and what is not defined is NaN.
  * Cost: 2 add, 4 mul.
  */
-int awiwi_pole_placement_motor(const double b[1], const double dtheta[1], const double k[1], const double omega0[1], const double xi0[1], double K[2]);
+int awiwi_pole_placement_motor(const double b_in[1], const double dtheta_in[1], const double k_in[1], const double omega0_in[1], const double xi0_in[1], double K_out[2]);
 
 /*
  * Gains and torque of a motor on a tendon: optimal for the secant between theta and theta_des, in
@@ -1858,7 +1891,7 @@ int awiwi_pole_placement_motor(const double b[1], const double dtheta[1], const 
  * weight is positive and the speed's weight is positive; elsewhere 1, and what is not defined is NaN.
  * Cost: 12 add, 18 mul, 2 div, 2 neg, 2 sqrt.
  */
-int awiwi_sdre_tendon(const double theta[1], const double thd[1], const double theta_des[1], const double b[1], const double dtheta[1], const double spring[3], const double weights[2], const double R[1], double K[2], double u[1]);
+int awiwi_sdre_tendon(const double theta_in[1], const double thd_in[1], const double theta_des_in[1], const double b_in[1], const double dtheta_in[1], const double spring_in[3], const double weights_in[2], const double R_in[1], double K_out[2], double u_out[1]);
 
 /*
  * Gains on (q, dq/dt, theta, dtheta/dt) that make a joint with a spring k two oscillators omega and
@@ -1878,7 +1911,7 @@ int awiwi_sdre_tendon(const double theta[1], const double thd[1], const double t
  * defined is NaN.
  * Cost: 14 add, 26 mul, 2 div.
  */
-int awiwi_pole_placement(const double m[1], const double b[1], const double k[1], const double dq[1], const double dtheta[1], const double omega[2], const double xi[2], double K[4]);
+int awiwi_pole_placement(const double m_in[1], const double b_in[1], const double k_in[1], const double dq_in[1], const double dtheta_in[1], const double omega_in[2], const double xi_in[2], double K_out[4]);
 
 /*
  * Motor torque u_des - K (x - x_des), where u_des holds the desired state; for optimal gains just as
@@ -1891,7 +1924,7 @@ int awiwi_pole_placement(const double m[1], const double b[1], const double k[1]
  *   out  u[1] in N m
  * Cost: 8 add, 4 mul.
  */
-void awiwi_pole_placement_law(const double K[4], const double x[4], const double x_des[4], const double u_des[1], double u[1]);
+void awiwi_pole_placement_law(const double K_in[4], const double x_in[4], const double x_des_in[4], const double u_des_in[1], double u_out[1]);
 
 /*
  * Secant stiffness of a cubic spring between two deflexions, and its torque at the second.
@@ -1903,7 +1936,7 @@ void awiwi_pole_placement_law(const double K[4], const double x[4], const double
  *   out  torque[1] in N m
  * Cost: 4 add, 5 mul.
  */
-void awiwi_secant_stiffness(const double spring[3], const double deflexion[1], const double deflexion_des[1], double k[1], double torque[1]);
+void awiwi_secant_stiffness(const double spring_in[3], const double deflexion_in[1], const double deflexion_des_in[1], double k_out[1], double torque_out[1]);
 
 /*
  * Gains and torque of a joint with a spring: optimal for its secant between the state and the desired
@@ -1924,7 +1957,7 @@ void awiwi_secant_stiffness(const double spring[3], const double deflexion[1], c
  * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
  * Cost: at most 1 times that of secant_stiffness and pole_placement_law, and the solver's own.
  */
-int awiwi_sdre_joint(const double m[1], const double b[1], const double dq[1], const double dtheta[1], const double spring[3], const double weights[4], const double R[1], const double K_last[4], const double x[4], const double x_des[4], double K[4], double u[1]);
+int awiwi_sdre_joint(const double m_in[1], const double b_in[1], const double dq_in[1], const double dtheta_in[1], const double spring_in[3], const double weights_in[4], const double R_in[1], const double K_last_in[4], const double x_in[4], const double x_des_in[4], double K_out[4], double u_out[1]);
 
 /*
  * Gains of u = -K x that minimise the integral of x'Q x + R u^2, and the least cost x'S x; in coherent
@@ -1942,7 +1975,7 @@ int awiwi_sdre_joint(const double m[1], const double b[1], const double dq[1], c
  * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
  * Cost: the solver's own.
  */
-int awiwi_lqr(const double A[16], const double B[4], const double Q[16], const double R[1], double K[4], double S[16], double residual[1]);
+int awiwi_lqr(const double A_in[16], const double B_in[4], const double Q_in[16], const double R_in[1], double K_out[4], double S_out[16], double residual_out[1]);
 
 /*
  * Control of the example x1' = -x1^3 + x1^2 + x2, x2' = u.
@@ -1953,7 +1986,7 @@ int awiwi_lqr(const double A[16], const double B[4], const double Q[16], const d
  * Returns 0 where k1 is positive and k2 is positive; elsewhere 1, and what is not defined is NaN.
  * Cost: 6 add, 7 mul.
  */
-int awiwi_backstepping_academic(const double x[2], const double k[2], double u[1]);
+int awiwi_backstepping_academic(const double x_in[2], const double k_in[2], double u_out[1]);
 
 /*
  * Energy of the example, its rate under the law, and the virtual control of x2.
@@ -1965,7 +1998,7 @@ int awiwi_backstepping_academic(const double x[2], const double k[2], double u[1
  *   out  controls[1] in 1
  * Cost: 5 add, 6 mul, 2 neg.
  */
-void awiwi_backstepping_academic_lyapunov(const double x[2], const double k[2], double V[1], double Vdot[1], double controls[1]);
+void awiwi_backstepping_academic_lyapunov(const double x_in[2], const double k_in[2], double V_out[1], double Vdot_out[1], double controls_out[1]);
 
 /*
  * Motor torque that takes the link (q and three derivatives) to desired (q_d and four); scales of 1 as
@@ -1982,7 +2015,7 @@ void awiwi_backstepping_academic_lyapunov(const double x[2], const double k[2], 
  * positive and c3 is positive and c4 is positive; elsewhere 1, and what is not defined is NaN.
  * Cost: 22 add, 16 mul, 4 div.
  */
-int awiwi_backstepping_position(const double motion[4], const double desired[5], const double plant[3], const double rates[4], const double scales[3], double tau_m[1]);
+int awiwi_backstepping_position(const double motion_in[4], const double desired_in[5], const double plant_in[3], const double rates_in[4], const double scales_in[3], double tau_m_out[1]);
 
 /*
  * Energy of the position law's errors, its rate under the law, and the virtual controls of q', q'' and
@@ -1998,7 +2031,7 @@ int awiwi_backstepping_position(const double motion[4], const double desired[5],
  *   out  controls[3] in rad/s, rad/s^2, rad/s^3
  * Cost: 22 add, 20 mul, 2 div, 1 neg.
  */
-void awiwi_backstepping_position_lyapunov(const double motion[4], const double desired[5], const double plant[3], const double rates[4], const double scales[3], double V[1], double Vdot[1], double controls[3]);
+void awiwi_backstepping_position_lyapunov(const double motion_in[4], const double desired_in[5], const double plant_in[3], const double rates_in[4], const double scales_in[3], double V_out[1], double Vdot_out[1], double controls_out[3]);
 
 /*
  * Motor torque that gives the link the stiffness K_p and the damping K_d about desired (q_d and four
@@ -2018,7 +2051,7 @@ void awiwi_backstepping_position_lyapunov(const double motion[4], const double d
  * is positive and C_s is positive; elsewhere 1, and what is not defined is NaN.
  * Cost: 22 add, 16 mul, 4 div.
  */
-int awiwi_backstepping_impedance(const double state[4], const double desired[5], const double external[2], const double plant[3], const double gains[4], const double weights[2], double tau_m[1]);
+int awiwi_backstepping_impedance(const double state_in[4], const double desired_in[5], const double external_in[2], const double plant_in[3], const double gains_in[4], const double weights_in[2], double tau_m_out[1]);
 
 /*
  * Energy of the impedance law, its rate under the law, and the virtual controls of tau and tau'.
@@ -2035,7 +2068,7 @@ int awiwi_backstepping_impedance(const double state[4], const double desired[5],
  *   out  controls[2] in N m, N m/s
  * Cost: 18 add, 18 mul, 2 div, 1 neg.
  */
-void awiwi_backstepping_impedance_lyapunov(const double state[4], const double desired[5], const double external[2], const double plant[3], const double gains[4], const double weights[2], double V[1], double Vdot[1], double controls[2]);
+void awiwi_backstepping_impedance_lyapunov(const double state_in[4], const double desired_in[5], const double external_in[2], const double plant_in[3], const double gains_in[4], const double weights_in[2], double V_out[1], double Vdot_out[1], double controls_out[2]);
 
 /*
  * The impedance law behind a nonlinear spring phi: tau = phi, and spring is (phi', phi'') at its
@@ -2054,7 +2087,7 @@ void awiwi_backstepping_impedance_lyapunov(const double state[4], const double d
  * and C_t is positive and C_s is positive; elsewhere 1, and what is not defined is NaN.
  * Cost: 23 add, 20 mul, 4 div.
  */
-int awiwi_backstepping_nonlinear(const double state[4], const double desired[5], const double external[2], const double bodies[2], const double spring[2], const double gains[4], const double weights[2], double tau_m[1]);
+int awiwi_backstepping_nonlinear(const double state_in[4], const double desired_in[5], const double external_in[2], const double bodies_in[2], const double spring_in[2], const double gains_in[4], const double weights_in[2], double tau_m_out[1]);
 
 /*
  * Torques of both motors: impedance of the link and common torque of the springs, exact for all six
@@ -2080,7 +2113,7 @@ int awiwi_backstepping_nonlinear(const double state[4], const double desired[5],
  * defined is NaN.
  * Cost: 42 add, 32 mul, 7 div.
  */
-int awiwi_backstepping_antagonistic(const double joint[2], const double torques[4], const double desired[5], const double pretension[3], const double external[2], const double inertias[3], const double springs[4], const double impedance[2], const double tunings[8], double tau_m[2]);
+int awiwi_backstepping_antagonistic(const double joint_in[2], const double torques_in[4], const double desired_in[5], const double pretension_in[3], const double external_in[2], const double inertias_in[3], const double springs_in[4], const double impedance_in[2], const double tunings_in[8], double tau_m_out[2]);
 
 /*
  * Energy of the six states, its rate under the law, and the virtual controls of each motor's torque
@@ -2100,7 +2133,7 @@ int awiwi_backstepping_antagonistic(const double joint[2], const double torques[
  *   out  controls[2][2] in N m, N m/s
  * Cost: 31 add, 29 mul, 3 div, 1 neg.
  */
-void awiwi_backstepping_antagonistic_lyapunov(const double joint[2], const double torques[4], const double desired[5], const double pretension[3], const double external[2], const double inertias[3], const double springs[4], const double impedance[2], const double tunings[8], double V[1], double Vdot[1], double controls[4]);
+void awiwi_backstepping_antagonistic_lyapunov(const double joint_in[2], const double torques_in[4], const double desired_in[5], const double pretension_in[3], const double external_in[2], const double inertias_in[3], const double springs_in[4], const double impedance_in[2], const double tunings_in[8], double V_out[1], double Vdot_out[1], double controls_out[4]);
 
 /*
  * The printed decoupling of the motors, for comparison only: it takes the pretension for motion and
@@ -2124,7 +2157,7 @@ void awiwi_backstepping_antagonistic_lyapunov(const double joint[2], const doubl
  * defined is NaN.
  * Cost: 48 add, 40 mul, 7 div.
  */
-int awiwi_backstepping_antagonistic_decoupled(const double joint[2], const double torques[4], const double desired[5], const double pretension[3], const double external[2], const double inertias[3], const double springs[4], const double impedance[2], const double tunings[8], double tau_m[2]);
+int awiwi_backstepping_antagonistic_decoupled(const double joint_in[2], const double torques_in[4], const double desired_in[5], const double pretension_in[3], const double external_in[2], const double inertias_in[3], const double springs_in[4], const double impedance_in[2], const double tunings_in[8], double tau_m_out[2]);
 
 /*
  * The impedance law as tau_m = -K (q, q', tau, tau') + h (tau_ext, tau_ext'), linear spring, q_d = 0.
@@ -2139,7 +2172,7 @@ int awiwi_backstepping_antagonistic_decoupled(const double joint[2], const doubl
  *   out  h[2] in 1, s
  * Cost: 11 add, 15 mul, 4 div, 1 neg.
  */
-void awiwi_backstepping_state_gains(const double plant[3], const double gains[4], const double weights[2], double K[4], double K_cancelled[4], double h[2]);
+void awiwi_backstepping_state_gains(const double plant_in[3], const double gains_in[4], const double weights_in[2], double K_out[4], double K_cancelled_out[4], double h_out[2]);
 
 /*
  * Slopes of K_cancelled by the gains K_p, K_d, K_3, K_4.
@@ -2150,7 +2183,7 @@ void awiwi_backstepping_state_gains(const double plant[3], const double gains[4]
  *   out  dK[4][4] in 1, 1/s, N m s/rad, s, N m s^2/rad, rad/(N m), rad/(N m s), s rad/(N m), s^2
  * Cost: 7 add, 14 mul, 4 div.
  */
-void awiwi_backstepping_state_gains_derivatives(const double plant[3], const double gains[4], const double weights[2], double dK[16]);
+void awiwi_backstepping_state_gains_derivatives(const double plant_in[3], const double gains_in[4], const double weights_in[2], double dK_out[16]);
 
 /*
  * K_3 and K_4 that give tau and tau' the feedback gains K_opt, with (K_p, K_d) and the weights given.
@@ -2166,7 +2199,7 @@ void awiwi_backstepping_state_gains_derivatives(const double plant[3], const dou
  * and what is not defined is NaN.
  * Cost: 7 add, 8 mul, 5 div, 3 neg, 1 sqrt.
  */
-int awiwi_optimal_backstepping_rates(const double K_opt[4], const double plant[3], const double impedance[2], const double weights[2], double rates[2]);
+int awiwi_optimal_backstepping_rates(const double K_opt_in[4], const double plant_in[3], const double impedance_in[2], const double weights_in[2], double rates_out[2]);
 
 /*
  * (K_3, K_4) and the weights (C_t, C_s) that give all four feedback gains K_opt exactly, with (K_p,
@@ -2183,7 +2216,7 @@ int awiwi_optimal_backstepping_rates(const double K_opt[4], const double plant[3
  * is positive and C_s is positive; elsewhere 1, and what is not defined is NaN.
  * Cost: 8 add, 10 mul, 5 div, 3 neg.
  */
-int awiwi_optimal_backstepping_weights(const double K_opt[4], const double plant[3], const double impedance[2], double rates[2], double weights[2]);
+int awiwi_optimal_backstepping_weights(const double K_opt_in[4], const double plant_in[3], const double impedance_in[2], double rates_out[2], double weights_out[2]);
 
 /*
  * (K_p, K_d) and (K_3, K_4) whose feedback gains are nearest to K_opt, by relative errors; start is a
@@ -2200,7 +2233,7 @@ int awiwi_optimal_backstepping_weights(const double K_opt[4], const double plant
  * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
  * Cost: at most 40 times that of backstepping_state_gains and backstepping_state_gains_derivatives, and the solver's own.
  */
-int awiwi_optimal_backstepping(const double K_opt[4], const double plant[3], const double weights[2], const double start[4], double impedance[2], double rates[2]);
+int awiwi_optimal_backstepping(const double K_opt_in[4], const double plant_in[3], const double weights_in[2], const double start_in[4], double impedance_out[2], double rates_out[2]);
 
 /*
  * A motion and its first four derivatives, a sample later, on the way to the desired motion and its
@@ -2217,7 +2250,7 @@ int awiwi_optimal_backstepping(const double K_opt[4], const double plant[3], con
  * defined is NaN.
  * Cost: 45 add, 50 mul, 5 div.
  */
-int awiwi_reference_filter(const double motion[5], const double desired[5], const double delay[1], const double period[1], double motion_next[5]);
+int awiwi_reference_filter(const double motion_in[5], const double desired_in[5], const double delay_in[1], const double period_in[1], double motion_next_out[5]);
 
 /*
  * All that the laws of such a joint ask for, a sample ahead, from angles of motors, elongations and
@@ -2248,7 +2281,7 @@ int awiwi_reference_filter(const double motion[5], const double desired[5], cons
  *   out  resistance[2] in N m
  * Cost: 119 add, 132 mul, 13 div, 4 neg, 12 calls.
  */
-void awiwi_antagonistic_observer(const double memory[13], const double thetas[2], const double stretches[2], const double measured[2], const double acted[2], const double acting[2], const double inertias[3], const double tendons[6], const double damping[1], const double friction[3], const double bandwidths[4], const double period[1], double memory_next[13], double joint[2], double motors[4], double torques[4], double springs[4], double load[1], double modelled[2], double resistance[2]);
+void awiwi_antagonistic_observer(const double memory_in[13], const double thetas_in[2], const double stretches_in[2], const double measured_in[2], const double acted_in[2], const double acting_in[2], const double inertias_in[3], const double tendons_in[6], const double damping_in[1], const double friction_in[3], const double bandwidths_in[4], const double period_in[1], double memory_next_out[13], double joint_out[2], double motors_out[4], double torques_out[4], double springs_out[4], double load_out[1], double modelled_out[2], double resistance_out[2]);
 
 /*
  * State and motor torques of a desired motion, with springs that are linear about their elongations.
@@ -2265,7 +2298,7 @@ void awiwi_antagonistic_observer(const double memory[13], const double thetas[2]
  * NaN.
  * Cost: 15 add, 15 mul, 2 div.
  */
-int awiwi_antagonistic_setpoint(const double desired[5], const double pretension[3], const double elongations[2], const double slopes[2], const double inertias[3], const double damping[1], double x_des[6], double u_des[2]);
+int awiwi_antagonistic_setpoint(const double desired_in[5], const double pretension_in[3], const double elongations_in[2], const double slopes_in[2], const double inertias_in[3], const double damping_in[1], double x_des_out[6], double u_des_out[2]);
 
 /*
  * Motor torques u_des - K (x - x_des), with the gains K = feedback, and what the motors must overcome
@@ -2279,7 +2312,7 @@ int awiwi_antagonistic_setpoint(const double desired[5], const double pretension
  *   out  tau_m[2] in N m
  * Cost: 20 add, 12 mul.
  */
-void awiwi_antagonistic_feedback(const double x[6], const double x_des[6], const double u_des[2], const double feedback[12], const double resistance[2], double tau_m[2]);
+void awiwi_antagonistic_feedback(const double x_in[6], const double x_des_in[6], const double u_des_in[2], const double feedback_in[12], const double resistance_in[2], double tau_m_out[2]);
 
 /*
  * Angle and speed of half the motors' difference, which moves the link, and of half their sum, which
@@ -2290,7 +2323,7 @@ void awiwi_antagonistic_feedback(const double x[6], const double x_des[6], const
  *   out  together[2] in rad, rad/s
  * Cost: 4 add, 4 mul.
  */
-void awiwi_antagonistic_modes(const double motors[4], double against[2], double together[2]);
+void awiwi_antagonistic_modes(const double motors_in[4], double against_out[2], double together_out[2]);
 
 /*
  * Torques of the springs that together pull the link with a torque, about a common pretension.
@@ -2300,7 +2333,7 @@ void awiwi_antagonistic_modes(const double motors[4], double against[2], double 
  *   out  shares[2] in N m
  * Cost: 2 add, 1 mul.
  */
-void awiwi_antagonistic_sharing(const double torque[1], const double pretension[3], double shares[2]);
+void awiwi_antagonistic_sharing(const double torque_in[1], const double pretension_in[3], double shares_out[2]);
 
 /*
  * The antagonistic law for a link with damping; springs, external torque and resistance are those
@@ -2326,7 +2359,7 @@ void awiwi_antagonistic_sharing(const double torque[1], const double pretension[
  * defined is NaN.
  * Cost: 49 add, 37 mul, 7 div.
  */
-int awiwi_backstepping_adaptive(const double joint[2], const double torques[4], const double desired[5], const double pretension[3], const double external[2], const double inertias[3], const double springs[4], const double damping[1], const double impedance[2], const double tunings[8], const double resistance[2], double tau_m[2]);
+int awiwi_backstepping_adaptive(const double joint_in[2], const double torques_in[4], const double desired_in[5], const double pretension_in[3], const double external_in[2], const double inertias_in[3], const double springs_in[4], const double damping_in[1], const double impedance_in[2], const double tunings_in[8], const double resistance_in[2], double tau_m_out[2]);
 
 /*
  * A motor that winds up a tendon with a spring, the joint held: rates of x = (theta, theta'), and the
@@ -2344,7 +2377,7 @@ int awiwi_backstepping_adaptive(const double joint[2], const double torques[4], 
  *   out  f[1] in N
  * Cost: 7 add, 9 mul, 1 div, 2 calls.
  */
-void awiwi_plant_tendon(const double x[2], const double u[1], const double path[1], const double motor[2], const double line[3], const double friction[3], double xd[2], double f[1]);
+void awiwi_plant_tendon(const double x_in[2], const double u_in[1], const double path_in[1], const double motor_in[2], const double line_in[3], const double friction_in[3], double xd_out[2], double f_out[1]);
 
 /*
  * A link behind a linear spring: rates of x = (q, q', theta, theta'), and the spring's torque tau with
@@ -2359,7 +2392,7 @@ void awiwi_plant_tendon(const double x[2], const double u[1], const double path[
  *   out  tau[2] in N m, N m/s
  * Cost: 6 add, 4 mul, 2 div.
  */
-void awiwi_plant_joint_linear(const double x[4], const double u[1], const double load[1], const double plant[3], const double damping[2], double xd[4], double tau[2]);
+void awiwi_plant_joint_linear(const double x_in[4], const double u_in[1], const double load_in[1], const double plant_in[3], const double damping_in[2], double xd_out[4], double tau_out[2]);
 
 /*
  * The same behind a spring phi(d) = k1 d + k3 d^3, with the coefficients curve; spring is (phi',
@@ -2376,7 +2409,7 @@ void awiwi_plant_joint_linear(const double x[4], const double u[1], const double
  *   out  spring[2] in N m/rad, N m/rad^2
  * Cost: 8 add, 8 mul, 2 div, 1 neg.
  */
-void awiwi_plant_joint_nonlinear(const double x[4], const double u[1], const double load[1], const double bodies[2], const double curve[2], const double damping[2], double xd[4], double tau[2], double spring[2]);
+void awiwi_plant_joint_nonlinear(const double x_in[4], const double u_in[1], const double load_in[1], const double bodies_in[2], const double curve_in[2], const double damping_in[2], double xd_out[4], double tau_out[2], double spring_out[2]);
 
 /*
  * A link between two tendons: rates of (q, q', theta1, theta1', theta2, theta2'); elongations and
@@ -2396,7 +2429,7 @@ void awiwi_plant_joint_nonlinear(const double x[4], const double u[1], const dou
  *   out  tau[2] in N m
  * Cost: 19 add, 16 mul, 3 div, 1 neg, 4 calls.
  */
-void awiwi_plant_antagonistic(const double x[6], const double u[2], const double load[1], const double inertias[3], const double tendons[6], const double damping[1], const double friction[3], double xd[6], double stretches[2], double tau[2]);
+void awiwi_plant_antagonistic(const double x_in[6], const double u_in[2], const double load_in[1], const double inertias_in[3], const double tendons_in[6], const double damping_in[1], const double friction_in[3], double xd_out[6], double stretches_out[2], double tau_out[2]);
 
 /*
  * What both springs of such a joint do at given elongations: a row (tau, tau') and a row (phi', phi'')
@@ -2409,7 +2442,7 @@ void awiwi_plant_antagonistic(const double x[6], const double u[2], const double
  *   out  springs[2][2] in N m/rad, N m/rad^2
  * Cost: 12 add, 18 mul, 2 calls.
  */
-void awiwi_antagonistic_springs(const double stretches[2], const double speeds[2], const double tendons[6], double torques[4], double springs[4]);
+void awiwi_antagonistic_springs(const double stretches_in[2], const double speeds_in[2], const double tendons_in[6], double torques_out[4], double springs_out[4]);
 
 /*
  * Forces of a finger's tendons: path is what its joints take of each, slack where it begins to pull.
@@ -2424,7 +2457,7 @@ void awiwi_antagonistic_springs(const double stretches[2], const double speeds[2
  *   out  f[8] in N
  * Cost: 40 add, 35 mul, 8 calls.
  */
-void awiwi_plant_finger_forces(const double thetas[8], const double path[8], const double slack[8], const double motor[2], const double line[3], double f[8]);
+void awiwi_plant_finger_forces(const double thetas_in[8], const double path_in[8], const double slack_in[8], const double motor_in[2], const double line_in[3], double f_out[8]);
 
 /*
  * The other half: rates of (q, q', theta, theta') of four joints, which accelerate with qdd, and eight
@@ -2440,7 +2473,7 @@ void awiwi_plant_finger_forces(const double thetas[8], const double path[8], con
  *   out  xd[24] in rad/s, rad/s^2
  * Cost: 24 add, 40 mul, 1 div, 8 calls.
  */
-void awiwi_plant_finger(const double qd[4], const double qdd[4], const double thds[8], const double f[8], const double u[8], const double motor[2], const double friction[3], double xd[24]);
+void awiwi_plant_finger(const double qd_in[4], const double qdd_in[4], const double thds_in[8], const double f_in[8], const double u_in[8], const double motor_in[2], const double friction_in[3], double xd_out[24]);
 
 #ifdef __cplusplus
 }

@@ -15,10 +15,11 @@
  * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
  * Cost: the solver's own.
  */
+#include "numerics.h"
 #include "awiwi_regulators.h"
 #include "kernels.h"
 
-int awiwi_lqr(const double A[restrict 16], const double B[restrict 4], const double Q[restrict 16], const double R[restrict 1], double K[restrict 4], double S[restrict 16], double residual[restrict 1])
+int awiwi_lqr(const double A_in[restrict 16], const double B_in[restrict 4], const double Q_in[restrict 16], const double R_in[restrict 1], double K_out[restrict 4], double S_out[restrict 16], double residual_out[restrict 1])
 {
-    return awiwi_riccati(4, A, B, Q, R[0], 32, K, S, residual);
+    return awiwi_riccati(4, A_in, B_in, Q_in, R_in[0], 32, K_out, S_out, residual_out);
 }

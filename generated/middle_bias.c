@@ -9,16 +9,17 @@
  * Cost: 54 add, 72 mul, 4 sincos.
  * Inputs: sha256 1d14df31080c22a6b2a63985ab825994c4f9fca5775b0188bae4408ea91fd96e.
  */
-#include "trig.h"
+#include "numerics.h"
+#include "sincos.h"
 #include "kernels.h"
 
-void awiwi_middle_bias(const double q[restrict 4], const double qd[restrict 4], const double g[restrict 3], double bias[restrict 4])
+void awiwi_middle_bias(const double q_in[restrict 4], const double qd_in[restrict 4], const double g_in[restrict 3], double bias_out[restrict 4])
 {
-    const double t0 = q[2] + q[1];
-    const double t1 = q[3] - 1.5485777614681775 + t0;
-    const awiwi_turn4 a0 = awiwi_sincos4(q[1], t0, t1, q[0]);
-    const double t2 = qd[2] + qd[1];
-    const double t3 = qd[1]*qd[1];
+    const double t0 = q_in[2] + q_in[1];
+    const double t1 = q_in[3] - 1.5485777614681775 + t0;
+    const awiwi_sincos4_result a0 = awiwi_sincos4(q_in[1], t0, t1, q_in[0]);
+    const double t2 = qd_in[2] + qd_in[1];
+    const double t3 = qd_in[1]*qd_in[1];
     const double t4 = t2*t2;
     double s5 = t3*(1.16724e-06*a0.cos[0] - 1.166e-08*a0.sin[0]) + t4*(7.1078e-07*a0.cos[1] - 6.56e-09*a0.sin[1]);
     const double t6 = 0.0007128*a0.cos[0] - 3.3e-06*a0.sin[0];
@@ -26,7 +27,7 @@ void awiwi_middle_bias(const double q[restrict 4], const double qd[restrict 4], 
     const double t8 = 3.780933218135438e-05*a0.sin[2];
     const double t9 = t7 - t8;
     double s10 = a0.sin[0]*(0.044*t9 + 2.771021e-05*a0.cos[0] - 8.92e-08*a0.sin[0]) + 4.46e-08;
-    const double t11 = qd[3] + t2;
+    const double t11 = qd_in[3] + t2;
     const double t12 = t11*t11;
     s5 -= t12*(1.0664033896870507e-09*a0.cos[2] + 1.5960308558361416e-07*a0.sin[2]);
     const double t13 = 0.044*a0.cos[0];
@@ -41,28 +42,28 @@ void awiwi_middle_bias(const double q[restrict 4], const double qd[restrict 4], 
     const double t21 = a0.sin[1]*(6.78634e-06*a0.cos[1] - 2.56e-08*a0.sin[1] - t18) + t16*t17 + 1.28e-08;
     const double t22 = 0.033*a0.cos[1];
     s20 += (t16 + t22)*t19;
-    s5 -= 2.0*qd[0]*(qd[1]*s10 + t2*t21 + t11*s20);
-    const double t23 = qd[0]*qd[0];
+    s5 -= 2.0*qd_in[0]*(qd_in[1]*s10 + t2*t21 + t11*s20);
+    const double t23 = qd_in[0]*qd_in[0];
     const double t24 = a0.sin[1]*t18 + t22*t19;
     double s25 = t23*s20 + t4*t24;
     double s26 = t23*t21 - t12*t24;
-    double s27 = t23*s10 - g[2]*t6;
-    const double t28 = g[2] + t3*t15;
+    double s27 = t23*s10 - g_in[2]*t6;
+    const double t28 = g_in[2] + t3*t15;
     s25 += t28*t8;
     s26 -= t28*t7;
     s27 += t15*(t4*t7 - t12*t8);
     s27 -= t13*(t4*t17 + t12*t19);
-    const double t29 = g[0]*a0.cos[3] + g[1]*a0.sin[3];
+    const double t29 = g_in[0]*a0.cos[3] + g_in[1]*a0.sin[3];
     s5 += 2.806e-05*t29;
-    s5 += (g[0]*a0.sin[3] - g[1]*a0.cos[3])*(t6 + t9 + 0.0001347);
-    bias[0] = s5;
+    s5 += (g_in[0]*a0.sin[3] - g_in[1]*a0.cos[3])*(t6 + t9 + 0.0001347);
+    bias_out[0] = s5;
     const double t30 = t3*t13 + t29;
     s25 += t30*t19;
-    bias[3] = s25;
+    bias_out[3] = s25;
     s26 += t30*t17;
     s26 += s25;
-    bias[2] = s26;
+    bias_out[2] = s26;
     s27 += t14*t29;
     s27 += s26;
-    bias[1] = s27;
+    bias_out[1] = s27;
 }

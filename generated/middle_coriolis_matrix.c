@@ -8,15 +8,16 @@
  * Cost: 46 add, 47 mul, 2 neg, 3 sincos.
  * Inputs: sha256 27e22bc7c4ee6e86004522d8f50690fdd8de460926c911ade00c68bec4af2ee2.
  */
-#include "trig.h"
+#include "numerics.h"
+#include "sincos.h"
 #include "kernels.h"
 
-void awiwi_middle_coriolis_matrix(const double q[restrict 4], const double qd[restrict 4], double C[restrict 16])
+void awiwi_middle_coriolis_matrix(const double q_in[restrict 4], const double qd_in[restrict 4], double C_out[restrict 16])
 {
-    C[15] = 0.0;
-    const double t0 = q[2] + q[1];
-    const double t1 = q[3] - 1.5485777614681775 + t0;
-    const awiwi_turn3 a0 = awiwi_sincos3(q[1], t0, t1);
+    C_out[15] = 0.0;
+    const double t0 = q_in[2] + q_in[1];
+    const double t1 = q_in[3] - 1.5485777614681775 + t0;
+    const awiwi_sincos3_result a0 = awiwi_sincos3(q_in[1], t0, t1);
     const double t2 = a0.cos[0] + 0.13636363636363635;
     const double t3 = 0.75*a0.cos[1];
     const double t4 = 1.6636106159795927e-06*a0.cos[2];
@@ -32,37 +33,37 @@ void awiwi_middle_coriolis_matrix(const double q[restrict 4], const double qd[re
     const double t12 = 1.06744e-05*a0.cos[1] - t9 - 5.72e-08*a0.sin[1];
     const double t13 = a0.cos[0]*(t6 + t4) - a0.sin[0]*t12;
     const double t14 = a0.sin[0]*(t12 + 2.771021e-05*a0.cos[0] - 8.92e-08*a0.sin[0] + 4.2768e-06) + 1.98e-08*a0.cos[0] + s7 + 4.46e-08;
-    double s15 = qd[3]*s5 - qd[1]*t14;
-    s15 -= qd[2]*s7;
-    C[0] = s15;
-    const double t16 = qd[2] + qd[1];
-    const double t17 = qd[3] + t16;
+    double s15 = qd_in[3]*s5 - qd_in[1]*t14;
+    s15 -= qd_in[2]*s7;
+    C_out[0] = s15;
+    const double t16 = qd_in[2] + qd_in[1];
+    const double t17 = qd_in[3] + t16;
     const double t18 = t17*(1.0664033896870507e-09*a0.cos[2] + 1.5960308558361416e-07*a0.sin[2]);
     const double t19 = t16*(7.1078e-07*a0.cos[1] - 6.56e-09*a0.sin[1]) - t18;
-    double s20 = qd[1]*(1.16724e-06*a0.cos[0] - 1.166e-08*a0.sin[0]) + t19;
-    const double t21 = qd[0]*t14;
-    C[4] = t21;
+    double s20 = qd_in[1]*(1.16724e-06*a0.cos[0] - 1.166e-08*a0.sin[0]) + t19;
+    const double t21 = qd_in[0]*t14;
+    C_out[4] = t21;
     s20 -= t21;
-    C[1] = s20;
-    const double t22 = qd[0]*s7;
-    C[8] = t22;
-    C[2] = t19 - t22;
-    const double t23 = qd[0]*s5;
-    C[12] = -t23;
-    C[3] = t23 - t18;
-    const double t24 = qd[1]*t13;
+    C_out[1] = s20;
+    const double t22 = qd_in[0]*s7;
+    C_out[8] = t22;
+    C_out[2] = t19 - t22;
+    const double t23 = qd_in[0]*s5;
+    C_out[12] = -t23;
+    C_out[3] = t23 - t18;
+    const double t24 = qd_in[1]*t13;
     const double t25 = t16*t10;
-    C[14] = t25;
+    C_out[14] = t25;
     const double t26 = -t17*t10;
-    C[11] = t26;
+    C_out[11] = t26;
     const double t27 = t17*t11;
     double s28 = t16*(t11 - t13) - t27;
-    C[7] = t26 - t27;
+    C_out[7] = t26 - t27;
     const double t29 = t26 + t25;
-    C[10] = t29;
+    C_out[10] = t29;
     s28 += t29;
-    C[6] = s28;
-    C[5] = s28 + t24;
-    C[9] = t29 + t24;
-    C[13] = qd[1]*t11 + t25;
+    C_out[6] = s28;
+    C_out[5] = s28 + t24;
+    C_out[9] = t29 + t24;
+    C_out[13] = qd_in[1]*t11 + t25;
 }

@@ -7,41 +7,42 @@
  * Cost: nothing but moves.
  * Inputs: sha256 6a98ac93d320159725bea4ee759d5d3b1d512df899adaef986e09318a6fe1430.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-void awiwi_middle_coupling(const double q[restrict 4], double P[restrict 32])
+void awiwi_middle_coupling(const double q_in[restrict 4], double P_out[restrict 32])
 {
-    (void)q;
-    P[0] = 0.009;
-    P[4] = 0.009;
-    P[8] = -0.009;
-    P[12] = -0.009;
-    P[1] = 0.0065;
-    P[5] = -0.0065;
-    P[9] = 0.0065;
-    P[13] = -0.0065;
-    P[2] = 0.0;
-    P[3] = 0.0;
-    P[6] = 0.0;
-    P[7] = 0.0;
-    P[10] = 0.0;
-    P[11] = 0.0;
-    P[14] = 0.0;
-    P[15] = 0.0;
-    P[16] = 0.0;
-    P[17] = 0.0;
-    P[19] = 0.0;
-    P[20] = 0.0;
-    P[21] = 0.0;
-    P[23] = 0.0;
-    P[24] = 0.0;
-    P[25] = 0.0;
-    P[28] = 0.0;
-    P[29] = 0.0;
-    P[18] = 0.006;
-    P[22] = -0.006;
-    P[26] = 0.006;
-    P[30] = -0.006;
-    P[27] = -0.0045;
-    P[31] = 0.0045;
+    (void)q_in;
+    P_out[0] = 0.009;
+    P_out[4] = 0.009;
+    P_out[8] = -0.009;
+    P_out[12] = -0.009;
+    P_out[1] = 0.0065;
+    P_out[5] = -0.0065;
+    P_out[9] = 0.0065;
+    P_out[13] = -0.0065;
+    P_out[2] = 0.0;
+    P_out[3] = 0.0;
+    P_out[6] = 0.0;
+    P_out[7] = 0.0;
+    P_out[10] = 0.0;
+    P_out[11] = 0.0;
+    P_out[14] = 0.0;
+    P_out[15] = 0.0;
+    P_out[16] = 0.0;
+    P_out[17] = 0.0;
+    P_out[19] = 0.0;
+    P_out[20] = 0.0;
+    P_out[21] = 0.0;
+    P_out[23] = 0.0;
+    P_out[24] = 0.0;
+    P_out[25] = 0.0;
+    P_out[28] = 0.0;
+    P_out[29] = 0.0;
+    P_out[18] = 0.006;
+    P_out[22] = -0.006;
+    P_out[26] = 0.006;
+    P_out[30] = -0.006;
+    P_out[27] = -0.0045;
+    P_out[31] = 0.0045;
 }

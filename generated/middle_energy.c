@@ -10,23 +10,24 @@
  * Cost: 43 add, 56 mul, 4 sincos.
  * Inputs: sha256 6dc3171fbd7a3bb4e8ba1b2ad4c5197dcf6b595756784e4b6b74a397a420a135.
  */
-#include "trig.h"
+#include "numerics.h"
+#include "sincos.h"
 #include "kernels.h"
 
-void awiwi_middle_energy(const double q[restrict 4], const double qd[restrict 4], const double g[restrict 3], double kinetic[restrict 1], double potential[restrict 1])
+void awiwi_middle_energy(const double q_in[restrict 4], const double qd_in[restrict 4], const double g_in[restrict 3], double kinetic_out[restrict 1], double potential_out[restrict 1])
 {
-    const double t0 = q[2] + q[1];
-    const double t1 = q[3] - 1.5485777614681775 + t0;
-    const double t2 = qd[2] + qd[1];
-    const awiwi_turn4 a0 = awiwi_sincos4(q[1], t0, t1, q[0]);
-    const double t3 = 0.044*qd[1];
+    const double t0 = q_in[2] + q_in[1];
+    const double t1 = q_in[3] - 1.5485777614681775 + t0;
+    const double t2 = qd_in[2] + qd_in[1];
+    const awiwi_sincos4_result a0 = awiwi_sincos4(q_in[1], t0, t1, q_in[0]);
+    const double t3 = 0.044*qd_in[1];
     const double t4 = a0.cos[0]*t3;
     const double t5 = t3*a0.sin[0];
     const double t6 = 0.0002426*a0.cos[1] - 1.3e-06*a0.sin[1];
     const double t7 = 1.3e-06*a0.cos[1] + 0.0002426*a0.sin[1];
-    double s8 = t2*(3.43403e-06*t2 + t4*t6 + t5*t7) + 1.3955095e-05*qd[1]*qd[1];
+    double s8 = t2*(3.43403e-06*t2 + t4*t6 + t5*t7) + 1.3955095e-05*qd_in[1]*qd_in[1];
     double s9 = t7 + 3.3e-06*a0.cos[0] + 0.0007128*a0.sin[0];
-    const double t10 = qd[3] + t2;
+    const double t10 = qd_in[3] + t2;
     const double t11 = 0.033*t2;
     const double t12 = 3.780933218135438e-05*a0.cos[2];
     double s13 = (t5 + t11*a0.sin[1])*t12 + 2.58184e-07*t10;
@@ -37,14 +38,14 @@ void awiwi_middle_energy(const double q[restrict 4], const double qd[restrict 4]
     s8 += t10*s13;
     const double t16 = a0.cos[1]*(0.24490395417429173*a0.cos[1] - 0.0009238472028901982*a0.sin[1] - 0.09005402427370233*a0.sin[2]);
     double s17 = t16 + 0.06157293829045353;
-    double s18 = qd[1]*(1.166e-08*a0.cos[0] + 1.16724e-06*a0.sin[0]) + t2*(6.56e-09*a0.cos[1] + 7.1078e-07*a0.sin[1]);
+    double s18 = qd_in[1]*(1.166e-08*a0.cos[0] + 1.16724e-06*a0.sin[0]) + t2*(6.56e-09*a0.cos[1] + 7.1078e-07*a0.sin[1]);
     s17 -= a0.cos[2]*(0.00039427593310353175*a0.sin[2] + 0.017088073337986856*a0.cos[2]);
     s18 += t10*(1.5960308558361416e-07*a0.cos[2] - 1.0664033896870507e-09*a0.sin[2]);
     const double t19 = 0.0007128*a0.cos[0] - 3.3e-06*a0.sin[0];
     s17 += a0.cos[0]*(a0.cos[0] + 3175.724759935056*t15 - 0.0032190300975705344*a0.sin[0]);
     s17 += 433.0533763547804*(t19 + t15);
-    s18 += 1.3855105e-05*qd[0]*s17;
-    s8 += qd[0]*s18;
-    kinetic[0] = s8;
-    potential[0] = 2.806e-05*(g[0]*a0.sin[3] - g[1]*a0.cos[3]) - g[2]*s9 - (g[0]*a0.cos[3] + g[1]*a0.sin[3])*(t19 + t15 + 0.0001347);
+    s18 += 1.3855105e-05*qd_in[0]*s17;
+    s8 += qd_in[0]*s18;
+    kinetic_out[0] = s8;
+    potential_out[0] = 2.806e-05*(g_in[0]*a0.sin[3] - g_in[1]*a0.cos[3]) - g_in[2]*s9 - (g_in[0]*a0.cos[3] + g_in[1]*a0.sin[3])*(t19 + t15 + 0.0001347);
 }

@@ -10,17 +10,18 @@
  * Cost: 94 add, 119 mul, 3 div, 2 neg, 4 sincos.
  * Inputs: sha256 ae4a85ce0785917635eb44a968958b9f879dffad6da58c0336320b942386f084.
  */
-#include "trig.h"
+#include "numerics.h"
+#include "sincos.h"
 #include "kernels.h"
 
-void awiwi_middle_forward_dynamics(const double q[restrict 4], const double qd[restrict 4], const double tau[restrict 4], const double g[restrict 3], double qdd[restrict 4])
+void awiwi_middle_forward_dynamics(const double q_in[restrict 4], const double qd_in[restrict 4], const double tau_in[restrict 4], const double g_in[restrict 3], double qdd_out[restrict 4])
 {
-    const double t0 = q[2] + q[1];
-    const double t1 = q[3] - 1.5418962645735244 + t0;
-    const double t2 = qd[2] + qd[1];
-    const double t3 = qd[3] + t2;
+    const double t0 = q_in[2] + q_in[1];
+    const double t1 = q_in[3] - 1.5418962645735244 + t0;
+    const double t2 = qd_in[2] + qd_in[1];
+    const double t3 = qd_in[3] + t2;
     const double t4 = t3*t3;
-    const awiwi_turn4 a0 = awiwi_sincos4(t1, q[1], t0, q[0]);
+    const awiwi_sincos4_result a0 = awiwi_sincos4(t1, q_in[1], t0, q_in[0]);
     const double t5 = 0.044*a0.cos[1];
     const double t6 = t5 + 0.006;
     const double t7 = 0.033*a0.cos[2];
@@ -33,7 +34,7 @@ void awiwi_middle_forward_dynamics(const double q[restrict 4], const double qd[r
     double s13 = t6*t12 + 1.28e-08;
     const double t14 = 2.526210559471061e-07*a0.cos[0] - 3.7808488234814314e-05*a0.sin[0];
     const double t15 = 0.3090947699747778*a0.cos[0];
-    double s16 = t4*(1.5960664818233607e-07*a0.sin[0]) + tau[0];
+    double s16 = t4*(1.5960664818233607e-07*a0.sin[0]) + tau_in[0];
     const double t17 = 0.033*t14;
     const double t18 = 6.78634e-06*a0.cos[2] + t17 - 2.56e-08*a0.sin[2];
     s13 += a0.sin[2]*t18;
@@ -46,14 +47,14 @@ void awiwi_middle_forward_dynamics(const double q[restrict 4], const double qd[r
     const double t24 = 0.044*t23;
     const double t25 = 2.771021e-05*a0.cos[1] + t24 - 8.92e-08*a0.sin[1];
     const double t26 = a0.sin[1]*t25 + 0.006*t21 + 4.46e-08;
-    s19 += qd[1]*t26;
-    const double t27 = qd[1]*qd[1];
-    s16 += 2.0*qd[0]*s19;
-    const double t28 = qd[0]*qd[0];
-    double s29 = tau[1] - t28*t26;
+    s19 += qd_in[1]*t26;
+    const double t27 = qd_in[1]*qd_in[1];
+    s16 += 2.0*qd_in[0]*s19;
+    const double t28 = qd_in[0]*qd_in[0];
+    double s29 = tau_in[1] - t28*t26;
     s11 -= a0.cos[1]*(t24 + t25);
     const double t30 = 0.044*a0.sin[1];
-    const double t31 = t27*t30 + g[2];
+    const double t31 = t27*t30 + g_in[2];
     double s32 = t31*t14 - t28*s9;
     double s33 = t31*t22 - t28*s13;
     const double t34 = 0.033*a0.sin[2];
@@ -62,17 +63,17 @@ void awiwi_middle_forward_dynamics(const double q[restrict 4], const double qd[r
     s32 -= t20*t35;
     s33 += t4*t35;
     const double t37 = 1936603.352647724*t36;
-    s32 += tau[3];
-    s33 -= tau[3];
-    s33 += tau[2];
-    s29 -= tau[2];
+    s32 += tau_in[3];
+    s33 -= tau_in[3];
+    s33 += tau_in[2];
+    s29 -= tau_in[2];
     const double t38 = 6.56e-09*a0.cos[2] + 7.1078e-07*a0.sin[2] - t15*t36;
     s16 -= t20*(7.1078e-07*a0.cos[2] - 6.56e-09*a0.sin[2]);
     const double t39 = 1.0/(t36*t37 - 6.86806e-06);
     const double t40 = t38*t39;
     s11 -= t38*t40;
     const double t41 = 0.0007128*a0.cos[1] - 3.3e-06*a0.sin[1];
-    s29 += g[2]*t41;
+    s29 += g_in[2]*t41;
     const double t42 = t23 + t41;
     s11 -= 0.012*t42;
     double s43 = t5*t22 + t30*t12;
@@ -87,7 +88,7 @@ void awiwi_middle_forward_dynamics(const double q[restrict 4], const double qd[r
     s16 -= t27*(1.16724e-06*a0.cos[1] - 1.166e-08*a0.sin[1]);
     const double t49 = t47*t48;
     s11 -= t47*t49;
-    const double t50 = g[0]*a0.cos[3] + g[1]*a0.sin[3];
+    const double t50 = g_in[0]*a0.cos[3] + g_in[1]*a0.sin[3];
     const double t51 = t27*t5 + t50;
     s32 -= t51*t8;
     s33 -= t51*t12;
@@ -98,15 +99,15 @@ void awiwi_middle_forward_dynamics(const double q[restrict 4], const double qd[r
     s16 += s33*t40;
     s16 += s29*t49;
     s16 -= 2.806e-05*t50;
-    s16 -= (g[0]*a0.sin[3] - g[1]*a0.cos[3])*(t42 + 0.0001347);
+    s16 -= (g_in[0]*a0.sin[3] - g_in[1]*a0.cos[3])*(t42 + 0.0001347);
     s16 -= t15*s32;
     const double t52 = s16/s11;
-    qdd[0] = -t52;
+    qdd_out[0] = -t52;
     const double t53 = s29*t48 + t49*t52;
-    qdd[1] = -t53;
+    qdd_out[1] = -t53;
     const double t54 = s33*t39 + t40*t52 + t46*t53;
     double s55 = 1936603.352647724*s32 + t15*t52 + t45*t53;
-    qdd[2] = t53 - t54;
+    qdd_out[2] = t53 - t54;
     s55 += (t37 + 1.0)*t54;
-    qdd[3] = s55;
+    qdd_out[3] = s55;
 }

@@ -10,26 +10,27 @@
  * Cost: 81 add, 98 mul, 4 sincos.
  * Inputs: sha256 ae4a85ce0785917635eb44a968958b9f879dffad6da58c0336320b942386f084.
  */
-#include "trig.h"
+#include "numerics.h"
+#include "sincos.h"
 #include "kernels.h"
 
-void awiwi_middle_inverse_dynamics(const double q[restrict 4], const double qd[restrict 4], const double qdd[restrict 4], const double g[restrict 3], double tau[restrict 4])
+void awiwi_middle_inverse_dynamics(const double q_in[restrict 4], const double qd_in[restrict 4], const double qdd_in[restrict 4], const double g_in[restrict 3], double tau_out[restrict 4])
 {
-    const double t0 = q[2] + q[1];
-    const double t1 = q[3] - 1.5485777614681775 + t0;
-    const awiwi_turn4 a0 = awiwi_sincos4(q[1], t0, t1, q[0]);
-    const double t2 = 22.727272727272727*g[0];
-    const double t3 = 22.727272727272727*g[1];
-    const double t4 = qdd[2] + qdd[1];
-    const double t5 = qd[2] + qd[1];
-    const double t6 = qd[1]*qd[1];
-    const double t7 = qdd[1]*a0.cos[0] - t6*a0.sin[0];
-    const double t8 = qdd[1]*a0.sin[0] + a0.cos[0]*t6;
+    const double t0 = q_in[2] + q_in[1];
+    const double t1 = q_in[3] - 1.5485777614681775 + t0;
+    const awiwi_sincos4_result a0 = awiwi_sincos4(q_in[1], t0, t1, q_in[0]);
+    const double t2 = 22.727272727272727*g_in[0];
+    const double t3 = 22.727272727272727*g_in[1];
+    const double t4 = qdd_in[2] + qdd_in[1];
+    const double t5 = qd_in[2] + qd_in[1];
+    const double t6 = qd_in[1]*qd_in[1];
+    const double t7 = qdd_in[1]*a0.cos[0] - t6*a0.sin[0];
+    const double t8 = qdd_in[1]*a0.sin[0] + a0.cos[0]*t6;
     const double t9 = t5*t5;
     const double t10 = t4*a0.cos[1] - t9*a0.sin[1];
     const double t11 = a0.cos[1]*t9 + t4*a0.sin[1];
-    const double t12 = qdd[3] + t4;
-    const double t13 = qd[3] + t5;
+    const double t12 = qdd_in[3] + t4;
+    const double t13 = qd_in[3] + t5;
     const double t14 = t13*t13;
     const double t15 = t12*a0.cos[2] - t14*a0.sin[2];
     const double t16 = a0.cos[2]*t14 + t12*a0.sin[2];
@@ -43,14 +44,14 @@ void awiwi_middle_inverse_dynamics(const double q[restrict 4], const double qd[r
     double s24 = 5.4627344521224085e-09 - a0.sin[2]*t22;
     const double t25 = 1.2477079619846946e-06*a0.sin[2];
     const double t26 = 1.6636106159795927e-06*a0.cos[2];
-    double s27 = 5.16368e-07*t12 + qdd[0]*(1.5960308558361416e-07*a0.cos[2] - 1.0664033896870507e-09*a0.sin[2]);
+    double s27 = 5.16368e-07*t12 + qdd_in[0]*(1.5960308558361416e-07*a0.cos[2] - 1.0664033896870507e-09*a0.sin[2]);
     const double t28 = 6.78634e-06*a0.cos[1] - 2.56e-08*a0.sin[1] - t25;
     s23 += a0.cos[1]*(t25 - t28);
     double s29 = a0.sin[1]*t28 + 1.28e-08;
     const double t30 = 2.771021e-05*a0.cos[0] + t20 - 8.92e-08*a0.sin[0];
     s23 -= a0.cos[0]*(t20 + t30);
     double s31 = a0.sin[0]*t30 + 4.46e-08;
-    double s32 = 1.166e-08*t7 + 1.16724e-06*t8 + 6.56e-09*t10 + 7.1078e-07*t11 + 1.5960308558361416e-07*t15 - qdd[0]*s23 - 1.0664033896870507e-09*t16;
+    double s32 = 1.166e-08*t7 + 1.16724e-06*t8 + 6.56e-09*t10 + 7.1078e-07*t11 + 1.5960308558361416e-07*t15 - qdd_in[0]*s23 - 1.0664033896870507e-09*t16;
     const double t33 = a0.cos[0] + 0.13636363636363635;
     const double t34 = 5.72e-08*a0.cos[1] + 1.06744e-05*a0.sin[1];
     s29 += t33*t34;
@@ -58,19 +59,19 @@ void awiwi_middle_inverse_dynamics(const double q[restrict 4], const double qd[r
     double s35 = t5*s29 + t13*s24;
     const double t36 = 1.452e-07*a0.cos[0] + 3.13632e-05*a0.sin[0];
     s31 += 0.13636363636363635*t36;
-    s35 += qd[1]*s31;
-    s32 -= 2.0*qd[0]*s35;
-    const double t37 = qd[0]*qd[0];
+    s35 += qd_in[1]*s31;
+    s32 -= 2.0*qd_in[0]*s35;
+    const double t37 = qd_in[0]*qd_in[0];
     s27 += t37*s24;
     double s38 = 6.86806e-06*t4 + t37*s29;
-    double s39 = 2.791019e-05*qdd[1] + t37*s31;
-    s39 += qdd[0]*(1.166e-08*a0.cos[0] + 1.16724e-06*a0.sin[0]);
-    s38 += qdd[0]*(6.56e-09*a0.cos[1] + 7.1078e-07*a0.sin[1]);
+    double s39 = 2.791019e-05*qdd_in[1] + t37*s31;
+    s39 += qdd_in[0]*(1.166e-08*a0.cos[0] + 1.16724e-06*a0.sin[0]);
+    s38 += qdd_in[0]*(6.56e-09*a0.cos[1] + 7.1078e-07*a0.sin[1]);
     s38 -= 1.2477079619846946e-06*(a0.cos[1]*t16 - a0.sin[1]*t15);
     double s40 = 29.08410167796491*t15 + t10;
     s40 += 186.6153846153846*t11;
     s39 -= 5.72e-08*(a0.cos[0]*(29.08410167796491*t16 + t11 - 186.6153846153846*t10) - a0.sin[0]*s40);
-    const double t41 = 22.727272727272727*g[2];
+    const double t41 = 22.727272727272727*g_in[2];
     const double t42 = t41 - t7;
     s27 += t19*(t42 - 0.75*t10);
     s38 -= t42*t18;
@@ -78,14 +79,14 @@ void awiwi_middle_inverse_dynamics(const double q[restrict 4], const double qd[r
     const double t43 = a0.cos[3]*t2 + t3*a0.sin[3];
     s32 += 1.23464e-06*t43;
     s32 -= (a0.cos[3]*t3 - t2*a0.sin[3])*(t21 + 5.9268e-06);
-    tau[0] = s32;
+    tau_out[0] = s32;
     const double t44 = t8 + t43;
     s27 += t26*(0.75*t11 + t44);
-    tau[3] = s27;
+    tau_out[3] = s27;
     s38 += t44*t34;
     s38 += s27;
-    tau[2] = s38;
+    tau_out[2] = s38;
     s39 += t36*t43;
     s39 += s38;
-    tau[1] = s39;
+    tau_out[1] = s39;
 }

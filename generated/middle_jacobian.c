@@ -7,43 +7,44 @@
  * Cost: 9 add, 16 mul, 3 neg, 4 sincos.
  * Inputs: sha256 f97fd1ddc88da616075a1c9877058146fe0ad1e2c493dc00244366f615b4428f.
  */
-#include "trig.h"
+#include "numerics.h"
+#include "sincos.h"
 #include "kernels.h"
 
-void awiwi_middle_jacobian(const double q[restrict 4], double J[restrict 24])
+void awiwi_middle_jacobian(const double q_in[restrict 4], double J_out[restrict 24])
 {
-    J[8] = 0.0;
-    J[12] = 0.0;
-    J[16] = 0.0;
-    J[21] = 0.0;
-    J[22] = 0.0;
-    J[23] = 0.0;
-    J[20] = 1.0;
-    const double t0 = q[2] + q[1];
-    const double t1 = q[3] + t0;
-    const awiwi_turn4 a0 = awiwi_sincos4(q[1], t0, t1, q[0]);
+    J_out[8] = 0.0;
+    J_out[12] = 0.0;
+    J_out[16] = 0.0;
+    J_out[21] = 0.0;
+    J_out[22] = 0.0;
+    J_out[23] = 0.0;
+    J_out[20] = 1.0;
+    const double t0 = q_in[2] + q_in[1];
+    const double t1 = q_in[3] + t0;
+    const awiwi_sincos4_result a0 = awiwi_sincos4(q_in[1], t0, t1, q_in[0]);
     const double t2 = 0.021*a0.cos[2];
-    J[11] = t2;
+    J_out[11] = t2;
     const double t3 = 0.033*a0.cos[1] + t2;
-    J[10] = t3;
+    J_out[10] = t3;
     const double t4 = 0.044*a0.cos[0] + t3;
-    J[9] = t4;
+    J_out[9] = t4;
     const double t5 = t4 + 0.006;
     const double t6 = -0.021*a0.sin[2];
     const double t7 = t6 - 0.033*a0.sin[1];
     const double t8 = t7 - 0.044*a0.sin[0];
-    J[17] = -a0.cos[3];
-    J[18] = -a0.cos[3];
-    J[19] = -a0.cos[3];
-    J[13] = a0.sin[3];
-    J[14] = a0.sin[3];
-    J[15] = a0.sin[3];
-    J[0] = -0.0047*a0.cos[3] - a0.sin[3]*t5;
-    J[4] = a0.cos[3]*t5 - 0.0047*a0.sin[3];
-    J[1] = a0.cos[3]*t8;
-    J[5] = a0.sin[3]*t8;
-    J[2] = a0.cos[3]*t7;
-    J[3] = a0.cos[3]*t6;
-    J[6] = a0.sin[3]*t7;
-    J[7] = a0.sin[3]*t6;
+    J_out[17] = -a0.cos[3];
+    J_out[18] = -a0.cos[3];
+    J_out[19] = -a0.cos[3];
+    J_out[13] = a0.sin[3];
+    J_out[14] = a0.sin[3];
+    J_out[15] = a0.sin[3];
+    J_out[0] = -0.0047*a0.cos[3] - a0.sin[3]*t5;
+    J_out[4] = a0.cos[3]*t5 - 0.0047*a0.sin[3];
+    J_out[1] = a0.cos[3]*t8;
+    J_out[5] = a0.sin[3]*t8;
+    J_out[2] = a0.cos[3]*t7;
+    J_out[3] = a0.cos[3]*t6;
+    J_out[6] = a0.sin[3]*t7;
+    J_out[7] = a0.sin[3]*t6;
 }

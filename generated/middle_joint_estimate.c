@@ -8,16 +8,17 @@
  * Cost: 7 add, 4 mul.
  * Inputs: sha256 18044db94917e82bcdc4ae78e01c59609a2c2a9a4c142bc715f2caddd12df3a6.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-void awiwi_middle_joint_estimate(const double h[restrict 8], const double start[restrict 4], double q[restrict 4])
+void awiwi_middle_joint_estimate(const double h_in[restrict 8], const double start_in[restrict 4], double q_out[restrict 4])
 {
-    (void)start;
-    const double t0 = h[0] - h[3];
-    const double t1 = h[1] - h[2];
-    q[0] = 27.77777777777778*(t0 + t1);
-    q[1] = 38.46153846153846*(t0 - t1);
-    const double t2 = h[4] - h[5];
-    q[2] = 83.33333333333333*t2;
-    q[3] = -111.11111111111111*(h[6] - t2 - h[7]);
+    (void)start_in;
+    const double t0 = h_in[0] - h_in[3];
+    const double t1 = h_in[1] - h_in[2];
+    q_out[0] = 27.77777777777778*(t0 + t1);
+    q_out[1] = 38.46153846153846*(t0 - t1);
+    const double t2 = h_in[4] - h_in[5];
+    q_out[2] = 83.33333333333333*t2;
+    q_out[3] = -111.11111111111111*(h_in[6] - t2 - h_in[7]);
 }

@@ -10,31 +10,32 @@
  * Cost: 10 mul.
  * Inputs: sha256 6a98ac93d320159725bea4ee759d5d3b1d512df899adaef986e09318a6fe1430.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-void awiwi_middle_joint_estimate_error(const double q[restrict 4], const double noise[restrict 1], double covariance[restrict 16], double worst[restrict 4])
+void awiwi_middle_joint_estimate_error(const double q_in[restrict 4], const double noise_in[restrict 1], double covariance_out[restrict 16], double worst_out[restrict 4])
 {
-    (void)q;
-    covariance[1] = 0.0;
-    covariance[2] = 0.0;
-    covariance[3] = 0.0;
-    covariance[4] = 0.0;
-    covariance[6] = 0.0;
-    covariance[7] = 0.0;
-    covariance[8] = 0.0;
-    covariance[9] = 0.0;
-    covariance[12] = 0.0;
-    covariance[13] = 0.0;
-    const double t0 = noise[0]*noise[0];
-    covariance[0] = 3086.41975308642*t0;
-    covariance[5] = 5917.15976331361*t0;
-    covariance[10] = 13888.888888888889*t0;
+    (void)q_in;
+    covariance_out[1] = 0.0;
+    covariance_out[2] = 0.0;
+    covariance_out[3] = 0.0;
+    covariance_out[4] = 0.0;
+    covariance_out[6] = 0.0;
+    covariance_out[7] = 0.0;
+    covariance_out[8] = 0.0;
+    covariance_out[9] = 0.0;
+    covariance_out[12] = 0.0;
+    covariance_out[13] = 0.0;
+    const double t0 = noise_in[0]*noise_in[0];
+    covariance_out[0] = 3086.41975308642*t0;
+    covariance_out[5] = 5917.15976331361*t0;
+    covariance_out[10] = 13888.888888888889*t0;
     const double t1 = 18518.51851851852*t0;
-    covariance[11] = t1;
-    covariance[14] = t1;
-    covariance[15] = 49382.71604938272*t0;
-    worst[0] = 111.11111111111111*noise[0];
-    worst[1] = 153.84615384615384*noise[0];
-    worst[2] = 166.66666666666666*noise[0];
-    worst[3] = 444.44444444444446*noise[0];
+    covariance_out[11] = t1;
+    covariance_out[14] = t1;
+    covariance_out[15] = 49382.71604938272*t0;
+    worst_out[0] = 111.11111111111111*noise_in[0];
+    worst_out[1] = 153.84615384615384*noise_in[0];
+    worst_out[2] = 166.66666666666666*noise_in[0];
+    worst_out[3] = 444.44444444444446*noise_in[0];
 }

@@ -9,32 +9,33 @@
  * Cost: 7 add, 6 mul.
  * Inputs: sha256 6a98ac93d320159725bea4ee759d5d3b1d512df899adaef986e09318a6fe1430.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-void awiwi_middle_joint_stiffness(const double q[restrict 4], const double f[restrict 8], const double k[restrict 8], double K[restrict 16])
+void awiwi_middle_joint_stiffness(const double q_in[restrict 4], const double f_in[restrict 8], const double k_in[restrict 8], double K_out[restrict 16])
 {
-    (void)q;
-    (void)f;
-    K[2] = 0.0;
-    K[3] = 0.0;
-    K[6] = 0.0;
-    K[7] = 0.0;
-    K[8] = 0.0;
-    K[9] = 0.0;
-    K[12] = 0.0;
-    K[13] = 0.0;
-    const double t0 = k[0] + k[3];
-    const double t1 = k[1] + k[2];
+    (void)q_in;
+    (void)f_in;
+    K_out[2] = 0.0;
+    K_out[3] = 0.0;
+    K_out[6] = 0.0;
+    K_out[7] = 0.0;
+    K_out[8] = 0.0;
+    K_out[9] = 0.0;
+    K_out[12] = 0.0;
+    K_out[13] = 0.0;
+    const double t0 = k_in[0] + k_in[3];
+    const double t1 = k_in[1] + k_in[2];
     const double t2 = t0 + t1;
     const double t3 = 5.85e-05*(t0 - t1);
-    K[1] = t3;
-    K[4] = t3;
-    K[0] = 8.1e-05*t2;
-    K[5] = 4.225e-05*t2;
-    const double t4 = k[6] + k[7];
-    K[10] = 3.6e-05*(k[4] + k[5] + t4);
+    K_out[1] = t3;
+    K_out[4] = t3;
+    K_out[0] = 8.1e-05*t2;
+    K_out[5] = 4.225e-05*t2;
+    const double t4 = k_in[6] + k_in[7];
+    K_out[10] = 3.6e-05*(k_in[4] + k_in[5] + t4);
     const double t5 = -2.7e-05*t4;
-    K[11] = t5;
-    K[14] = t5;
-    K[15] = 2.025e-05*t4;
+    K_out[11] = t5;
+    K_out[14] = t5;
+    K_out[15] = 2.025e-05*t4;
 }

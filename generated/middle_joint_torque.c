@@ -8,16 +8,17 @@
  * Cost: 7 add, 4 mul.
  * Inputs: sha256 6a98ac93d320159725bea4ee759d5d3b1d512df899adaef986e09318a6fe1430.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-void awiwi_middle_joint_torque(const double q[restrict 4], const double f[restrict 8], double tau[restrict 4])
+void awiwi_middle_joint_torque(const double q_in[restrict 4], const double f_in[restrict 8], double tau_out[restrict 4])
 {
-    (void)q;
-    const double t0 = f[0] - f[3];
-    const double t1 = f[1] - f[2];
-    tau[0] = -0.009*(t0 + t1);
-    tau[1] = -0.0065*(t0 - t1);
-    const double t2 = f[6] - f[7];
-    tau[2] = -0.006*(f[4] + t2 - f[5]);
-    tau[3] = 0.0045*t2;
+    (void)q_in;
+    const double t0 = f_in[0] - f_in[3];
+    const double t1 = f_in[1] - f_in[2];
+    tau_out[0] = -0.009*(t0 + t1);
+    tau_out[1] = -0.0065*(t0 - t1);
+    const double t2 = f_in[6] - f_in[7];
+    tau_out[2] = -0.006*(f_in[4] + t2 - f_in[5]);
+    tau_out[3] = 0.0045*t2;
 }

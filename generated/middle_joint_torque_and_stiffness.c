@@ -10,38 +10,39 @@
  * Cost: 14 add, 10 mul.
  * Inputs: sha256 6a98ac93d320159725bea4ee759d5d3b1d512df899adaef986e09318a6fe1430.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-void awiwi_middle_joint_torque_and_stiffness(const double q[restrict 4], const double f[restrict 8], const double k[restrict 8], double tau[restrict 4], double K[restrict 16])
+void awiwi_middle_joint_torque_and_stiffness(const double q_in[restrict 4], const double f_in[restrict 8], const double k_in[restrict 8], double tau_out[restrict 4], double K_out[restrict 16])
 {
-    (void)q;
-    K[2] = 0.0;
-    K[3] = 0.0;
-    K[6] = 0.0;
-    K[7] = 0.0;
-    K[8] = 0.0;
-    K[9] = 0.0;
-    K[12] = 0.0;
-    K[13] = 0.0;
-    const double t0 = f[0] - f[3];
-    const double t1 = f[1] - f[2];
-    tau[0] = -0.009*(t0 + t1);
-    tau[1] = -0.0065*(t0 - t1);
-    const double t2 = f[6] - f[7];
-    tau[2] = -0.006*(f[4] + t2 - f[5]);
-    tau[3] = 0.0045*t2;
-    const double t3 = k[0] + k[3];
-    const double t4 = k[1] + k[2];
+    (void)q_in;
+    K_out[2] = 0.0;
+    K_out[3] = 0.0;
+    K_out[6] = 0.0;
+    K_out[7] = 0.0;
+    K_out[8] = 0.0;
+    K_out[9] = 0.0;
+    K_out[12] = 0.0;
+    K_out[13] = 0.0;
+    const double t0 = f_in[0] - f_in[3];
+    const double t1 = f_in[1] - f_in[2];
+    tau_out[0] = -0.009*(t0 + t1);
+    tau_out[1] = -0.0065*(t0 - t1);
+    const double t2 = f_in[6] - f_in[7];
+    tau_out[2] = -0.006*(f_in[4] + t2 - f_in[5]);
+    tau_out[3] = 0.0045*t2;
+    const double t3 = k_in[0] + k_in[3];
+    const double t4 = k_in[1] + k_in[2];
     const double t5 = t3 + t4;
     const double t6 = 5.85e-05*(t3 - t4);
-    K[1] = t6;
-    K[4] = t6;
-    K[0] = 8.1e-05*t5;
-    K[5] = 4.225e-05*t5;
-    const double t7 = k[6] + k[7];
-    K[10] = 3.6e-05*(k[4] + k[5] + t7);
+    K_out[1] = t6;
+    K_out[4] = t6;
+    K_out[0] = 8.1e-05*t5;
+    K_out[5] = 4.225e-05*t5;
+    const double t7 = k_in[6] + k_in[7];
+    K_out[10] = 3.6e-05*(k_in[4] + k_in[5] + t7);
     const double t8 = -2.7e-05*t7;
-    K[11] = t8;
-    K[14] = t8;
-    K[15] = 2.025e-05*t7;
+    K_out[11] = t8;
+    K_out[14] = t8;
+    K_out[15] = 2.025e-05*t7;
 }

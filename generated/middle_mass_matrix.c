@@ -7,15 +7,16 @@
  * Cost: 33 add, 30 mul, 3 sincos.
  * Inputs: sha256 ae4a85ce0785917635eb44a968958b9f879dffad6da58c0336320b942386f084.
  */
-#include "trig.h"
+#include "numerics.h"
+#include "sincos.h"
 #include "kernels.h"
 
-void awiwi_middle_mass_matrix(const double q[restrict 4], double M[restrict 16])
+void awiwi_middle_mass_matrix(const double q_in[restrict 4], double M_out[restrict 16])
 {
-    M[15] = 5.16368e-07;
-    const double t0 = q[2] + q[1];
-    const double t1 = q[3] - 1.5485777614681775 + t0;
-    const awiwi_turn3 a0 = awiwi_sincos3(t0, t1, q[1]);
+    M_out[15] = 5.16368e-07;
+    const double t0 = q_in[2] + q_in[1];
+    const double t1 = q_in[3] - 1.5485777614681775 + t0;
+    const awiwi_sincos3_result a0 = awiwi_sincos3(t0, t1, q_in[1]);
     const double t2 = a0.sin[0] - 186.6153846153846*a0.cos[0];
     const double t3 = t2 + 29.08410167796491*a0.sin[1];
     double s4 = a0.cos[0]*(6.78634e-06*a0.cos[0] - 2.56e-08*a0.sin[0] - 2.495415923969389e-06*a0.sin[1]) + 3.518744394618834e-08*t3;
@@ -23,29 +24,29 @@ void awiwi_middle_mass_matrix(const double q[restrict 4], double M[restrict 16])
     const double t5 = (a0.cos[2] + 0.4439461883408072)*(2.771021e-05*a0.cos[2] - 1.144e-07*t3 - 3.7482421076233183e-06 - 8.92e-08*a0.sin[2]);
     s4 += t5;
     s4 -= a0.cos[1]*(4.735141006910168e-07*a0.cos[1] + 1.0925468904244817e-08*a0.sin[1]);
-    M[0] = s4;
+    M_out[0] = s4;
     const double t6 = 1.5960308558361416e-07*a0.cos[1] - 1.0664033896870507e-09*a0.sin[1];
-    M[3] = t6;
-    M[12] = t6;
+    M_out[3] = t6;
+    M_out[12] = t6;
     const double t7 = t6 + 6.56e-09*a0.cos[0] + 7.1078e-07*a0.sin[0];
-    M[2] = t7;
-    M[8] = t7;
+    M_out[2] = t7;
+    M_out[8] = t7;
     const double t8 = t7 + 1.166e-08*a0.cos[2] + 1.16724e-06*a0.sin[2];
-    M[1] = t8;
-    M[4] = t8;
+    M_out[1] = t8;
+    M_out[4] = t8;
     const double t9 = 1.2477079619846946e-06*(a0.cos[0]*a0.sin[1] - a0.sin[0]*a0.cos[1]);
     const double t10 = 1.6636106159795927e-06*(a0.cos[2]*a0.sin[1] - a0.sin[2]*a0.cos[1]);
     const double t11 = 5.72e-08*(a0.cos[2]*t2 - a0.sin[2]*(a0.cos[0] + 186.6153846153846*a0.sin[0])) + t10;
     const double t12 = 5.16368e-07 - t9;
-    M[11] = t12;
-    M[14] = t12;
+    M_out[11] = t12;
+    M_out[14] = t12;
     const double t13 = t12 + 6.86806e-06 - t9;
-    M[10] = t13;
+    M_out[10] = t13;
     const double t14 = t13 - t11;
-    M[6] = t14;
-    M[9] = t14;
-    M[5] = t14 + 2.791019e-05 - t11;
+    M_out[6] = t14;
+    M_out[9] = t14;
+    M_out[5] = t14 + 2.791019e-05 - t11;
     const double t15 = t12 - t10;
-    M[7] = t15;
-    M[13] = t15;
+    M_out[7] = t15;
+    M_out[13] = t15;
 }

@@ -7,22 +7,23 @@
  * Cost: 3 add, 4 mul, 4 neg.
  * Inputs: sha256 18044db94917e82bcdc4ae78e01c59609a2c2a9a4c142bc715f2caddd12df3a6.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-void awiwi_middle_tendon_lengths(const double q[restrict 4], double h[restrict 8])
+void awiwi_middle_tendon_lengths(const double q_in[restrict 4], double h_out[restrict 8])
 {
-    const double t0 = 0.009*q[0];
-    const double t1 = 0.0065*q[1];
+    const double t0 = 0.009*q_in[0];
+    const double t1 = 0.0065*q_in[1];
     const double t2 = t0 + t1;
-    h[0] = t2;
-    h[3] = -t2;
+    h_out[0] = t2;
+    h_out[3] = -t2;
     const double t3 = t0 - t1;
-    h[1] = t3;
-    h[2] = -t3;
-    const double t4 = 0.006*q[2];
-    h[4] = t4;
-    h[5] = -t4;
-    const double t5 = t4 - 0.0045*q[3];
-    h[6] = t5;
-    h[7] = -t5;
+    h_out[1] = t3;
+    h_out[2] = -t3;
+    const double t4 = 0.006*q_in[2];
+    h_out[4] = t4;
+    h_out[5] = -t4;
+    const double t5 = t4 - 0.0045*q_in[3];
+    h_out[6] = t5;
+    h_out[7] = -t5;
 }

@@ -9,21 +9,22 @@
  * Cost: 13 add, 15 mul, 2 sincos, 1 calls.
  * Inputs: sha256 4ac7c242f09df3b78e0f5c0776a7286d65f6e0b1d3d9afc8e4e505e87a15808c.
  */
+#include "numerics.h"
 #include "elementary.h"
-#include "trig.h"
+#include "sincos.h"
 #include "kernels.h"
 
-void awiwi_motor_compensation(const double theta[restrict 1], const double thd[restrict 1], double tau[restrict 1])
+void awiwi_motor_compensation(const double theta_in[restrict 1], const double thd_in[restrict 1], double tau_out[restrict 1])
 {
-    const double t0 = 100.0*theta[0] - 0.8726646259971648;
-    const awiwi_turn2 a0 = awiwi_sincos2(theta[0], t0);
+    const double t0 = 100.0*theta_in[0] - 0.8726646259971648;
+    const awiwi_sincos2_result a0 = awiwi_sincos2(theta_in[0], t0);
     const double t1 = a0.sin[0]*a0.sin[0] - 0.5;
     double s2 = 0.018706148721743875*t1 - 0.004688500797007119;
     double s3 = a0.sin[0]*(0.0108*t1 + 0.02658980933132962) - 0.009508910889165736;
     s3 += a0.cos[1]*(0.040783850416649246*a0.sin[1] + 0.019017821778331473*a0.cos[1] + 0.054);
     s2 += a0.sin[0]*(0.0108*a0.cos[0] + 0.018706148721743875*a0.sin[0]);
     s3 -= a0.cos[0]*s2;
-    s3 += 0.03204*thd[0];
-    s3 += 0.50274*awiwi_atan(10.0*thd[0]);
-    tau[0] = s3;
+    s3 += 0.03204*thd_in[0];
+    s3 += 0.50274*awiwi_atan(10.0*thd_in[0]);
+    tau_out[0] = s3;
 }

@@ -7,9 +7,10 @@
  * Cost: 2 add, 1 mul, 1 div.
  * Inputs: sha256 441d8317e70b645c8505a3a59d6454fafebc7990caf19f705f4dd61b7a81acb8.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-void awiwi_motor_damping(const double thd[restrict 1], double damping[restrict 1])
+void awiwi_motor_damping(const double thd_in[restrict 1], double damping_out[restrict 1])
 {
-    damping[0] = 0.05586/(thd[0]*thd[0] + 0.01) + 0.0356;
+    damping_out[0] = 0.05586/(thd_in[0]*thd_in[0] + 0.01) + 0.0356;
 }

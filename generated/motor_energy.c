@@ -7,9 +7,10 @@
  * Cost: 2 mul.
  * Inputs: sha256 441466b15d258aa419a5a6d752e3f4ace0bfb429cf1c0007376547f696fa0189.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-void awiwi_motor_energy(const double thd[restrict 1], double energy[restrict 1])
+void awiwi_motor_energy(const double thd_in[restrict 1], double energy_out[restrict 1])
 {
-    energy[0] = 0.0010005*(thd[0]*thd[0]);
+    energy_out[0] = 0.0010005*(thd_in[0]*thd_in[0]);
 }

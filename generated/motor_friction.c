@@ -8,10 +8,11 @@
  * Cost: 1 add, 3 mul, 1 calls.
  * Inputs: sha256 441d8317e70b645c8505a3a59d6454fafebc7990caf19f705f4dd61b7a81acb8.
  */
+#include "numerics.h"
 #include "elementary.h"
 #include "kernels.h"
 
-void awiwi_motor_friction(const double thd[restrict 1], double tau[restrict 1])
+void awiwi_motor_friction(const double thd_in[restrict 1], double tau_out[restrict 1])
 {
-    tau[0] = 0.0356*thd[0] + 0.5586*awiwi_atan(10.0*thd[0]);
+    tau_out[0] = 0.0356*thd_in[0] + 0.5586*awiwi_atan(10.0*thd_in[0]);
 }

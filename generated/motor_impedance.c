@@ -18,10 +18,11 @@
  * Cost: 4 add, 3 mul.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-int awiwi_motor_impedance(const double theta[restrict 1], const double thd[restrict 1], const double theta_des[restrict 1], const double f_des[restrict 1], const double friction[restrict 1], const double r[restrict 1], const double motor_kp[restrict 1], const double motor_kd[restrict 1], double tau[restrict 1])
+int awiwi_motor_impedance(const double theta_in[restrict 1], const double thd_in[restrict 1], const double theta_des_in[restrict 1], const double f_des_in[restrict 1], const double friction_in[restrict 1], const double r_in[restrict 1], const double motor_kp_in[restrict 1], const double motor_kd_in[restrict 1], double tau_out[restrict 1])
 {
-    tau[0] = friction[0] + f_des[0]*r[0] - motor_kp[0]*(theta[0] - theta_des[0]) - motor_kd[0]*thd[0];
-    return r[0] > 0.0 && motor_kp[0] > 0.0 && motor_kd[0] > 0.0 ? 0 : 1;
+    tau_out[0] = friction_in[0] + f_des_in[0]*r_in[0] - motor_kp_in[0]*(theta_in[0] - theta_des_in[0]) - motor_kd_in[0]*thd_in[0];
+    return r_in[0] > 0.0 && motor_kp_in[0] > 0.0 && motor_kd_in[0] > 0.0 ? 0 : 1;
 }

@@ -7,18 +7,19 @@
  * Cost: 11 add, 12 mul, 2 sincos.
  * Inputs: sha256 ea0ff5458d9ba8020bdc719c73a89bcf85a500a02d7d6ad99a02f15127a4839a.
  */
-#include "trig.h"
+#include "numerics.h"
+#include "sincos.h"
 #include "kernels.h"
 
-void awiwi_motor_ripple(const double theta[restrict 1], double tau[restrict 1])
+void awiwi_motor_ripple(const double theta_in[restrict 1], double tau_out[restrict 1])
 {
-    const double t0 = 100.0*theta[0] - 0.8726646259971648;
-    const awiwi_turn2 a0 = awiwi_sincos2(theta[0], t0);
+    const double t0 = 100.0*theta_in[0] - 0.8726646259971648;
+    const awiwi_sincos2_result a0 = awiwi_sincos2(theta_in[0], t0);
     const double t1 = a0.sin[0]*a0.sin[0] - 0.5;
     double s2 = 0.020784609690826527*t1 - 0.005209445330007911;
     double s3 = a0.sin[0]*(0.012*t1 + 0.029544232590366242) - 0.010565456543517485;
     s3 += a0.cos[1]*(0.0453153893518325*a0.sin[1] + 0.02113091308703497*a0.cos[1] + 0.06);
     s2 += a0.sin[0]*(0.012*a0.cos[0] + 0.020784609690826527*a0.sin[0]);
     s3 -= a0.cos[0]*s2;
-    tau[0] = s3;
+    tau_out[0] = s3;
 }

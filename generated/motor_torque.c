@@ -10,21 +10,22 @@
  * Cost: 15 add, 17 mul, 2 sincos, 1 calls.
  * Inputs: sha256 7084e234668ca468d45c39abb733d38309f0ac7101d19ea59d2d77b39478c1d3.
  */
+#include "numerics.h"
 #include "elementary.h"
-#include "trig.h"
+#include "sincos.h"
 #include "kernels.h"
 
-void awiwi_motor_torque(const double theta[restrict 1], const double thd[restrict 1], const double thdd[restrict 1], const double f[restrict 1], double tau[restrict 1])
+void awiwi_motor_torque(const double theta_in[restrict 1], const double thd_in[restrict 1], const double thdd_in[restrict 1], const double f_in[restrict 1], double tau_out[restrict 1])
 {
-    const double t0 = 100.0*theta[0] - 0.8726646259971648;
-    const awiwi_turn2 a0 = awiwi_sincos2(theta[0], t0);
+    const double t0 = 100.0*theta_in[0] - 0.8726646259971648;
+    const awiwi_sincos2_result a0 = awiwi_sincos2(theta_in[0], t0);
     const double t1 = a0.sin[0]*a0.sin[0] - 0.5;
     double s2 = 0.020784609690826527*t1 - 0.005209445330007911;
-    double s3 = a0.sin[0]*(0.012*t1 + 0.029544232590366242) + 0.004*f[0] + 0.002001*thdd[0] - 0.010565456543517485;
+    double s3 = a0.sin[0]*(0.012*t1 + 0.029544232590366242) + 0.004*f_in[0] + 0.002001*thdd_in[0] - 0.010565456543517485;
     s3 += a0.cos[1]*(0.0453153893518325*a0.sin[1] + 0.02113091308703497*a0.cos[1] + 0.06);
     s2 += a0.sin[0]*(0.012*a0.cos[0] + 0.020784609690826527*a0.sin[0]);
     s3 -= a0.cos[0]*s2;
-    s3 += 0.0356*thd[0];
-    s3 += 0.5586*awiwi_atan(10.0*thd[0]);
-    tau[0] = s3;
+    s3 += 0.0356*thd_in[0];
+    s3 += 0.5586*awiwi_atan(10.0*thd_in[0]);
+    tau_out[0] = s3;
 }

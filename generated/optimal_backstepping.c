@@ -14,6 +14,7 @@
  * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
  * Cost: at most 40 times that of backstepping_state_gains and backstepping_state_gains_derivatives, and the solver's own.
  */
+#include "numerics.h"
 #include "awiwi_solvers.h"
 #include "dense.h"
 #include "kernels.h"
@@ -38,25 +39,25 @@ static void model(const void *context, const awiwi_real *parts, awiwi_real *h, a
     }
 }
 
-int awiwi_optimal_backstepping(const double K_opt[restrict 4], const double plant[restrict 3], const double weights[restrict 2], const double start[restrict 4], double impedance[restrict 2], double rates[restrict 2])
+int awiwi_optimal_backstepping(const double K_opt_in[restrict 4], const double plant_in[restrict 3], const double weights_in[restrict 2], const double start_in[restrict 4], double impedance_out[restrict 2], double rates_out[restrict 2])
 {
     const awiwi_real range = (awiwi_real)1000000.0, exact = 16384 * AWIWI_REAL_EPSILON, tolerance = 1e-11;
     const awiwi_real one[4] = {1, 1, 1, 1}, low[4] = {1 / range, 1 / range, 1 / range, 1 / range};
     const awiwi_real high[4] = {range, range, range, range};
-    const given context = {K_opt, plant, weights, start};
+    const given context = {K_opt_in, plant_in, weights_in, start_in};
     const awiwi_problem problem = {model, &context, 4, 4, low, high};
     awiwi_real parts[4] = {1, 1, 1, 1}, h[4], P[16];
-    const int finite = awiwi_all_finite(K_opt, 4) && awiwi_all_finite(plant, 3) && awiwi_all_finite(weights, 2)
-                       && awiwi_all_finite(start, 4);
+    const int finite = awiwi_all_finite(K_opt_in, 4) && awiwi_all_finite(plant_in, 3) && awiwi_all_finite(weights_in, 2)
+                       && awiwi_all_finite(start_in, 4);
     int positive = 1, matched = 1, status = AWIWI_OUT_OF_DOMAIN;
 
     for (int i = 0; i < 4; i++)
-        positive = positive && start[i] > 0 && K_opt[i] > 0 && (i == 3 || plant[i] > 0) && (i > 1 || weights[i] > 0);
+        positive = positive && start_in[i] > 0 && K_opt_in[i] > 0 && (i == 3 || plant_in[i] > 0) && (i > 1 || weights_in[i] > 0);
     if (finite && positive)
         status = awiwi_least_squares(&problem, one, one, 40, tolerance, parts);
     for (int i = 0; i < 2; i++) {
-        impedance[i] = finite ? parts[i] * start[i] : 0;
-        rates[i] = finite ? parts[i + 2] * start[i + 2] : 0;
+        impedance_out[i] = finite ? parts[i] * start_in[i] : 0;
+        rates_out[i] = finite ? parts[i + 2] * start_in[i + 2] : 0;
     }
     if (!finite || !positive)
         return finite ? AWIWI_OUT_OF_DOMAIN : AWIWI_NOT_FINITE;
@@ -64,7 +65,7 @@ int awiwi_optimal_backstepping(const double K_opt[restrict 4], const double plan
     for (int i = 0; i < 4; i++)
         matched = matched && h[i] - 1 < exact && 1 - h[i] < exact;
     /* K_3 K_4, K_p and K_d only add to what the weights alone make of the third gain */
-    if (!(plant[2] * K_opt[2] > plant[1] * (weights[0] / weights[1] + 1 / (plant[0] * weights[0]))))
+    if (!(plant_in[2] * K_opt_in[2] > plant_in[1] * (weights_in[0] / weights_in[1] + 1 / (plant_in[0] * weights_in[0]))))
         return AWIWI_OUT_OF_DOMAIN;
     return status == AWIWI_NOT_FINITE ? status : matched ? AWIWI_OK : AWIWI_NOT_CONVERGED;
 }

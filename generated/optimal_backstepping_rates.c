@@ -14,18 +14,19 @@
  * Cost: 7 add, 8 mul, 5 div, 3 neg, 1 sqrt.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
+#include "numerics.h"
 #include <math.h>
 #include "kernels.h"
 
-int awiwi_optimal_backstepping_rates(const double K_opt[restrict 4], const double plant[restrict 3], const double impedance[restrict 2], const double weights[restrict 2], double rates[restrict 2])
+int awiwi_optimal_backstepping_rates(const double K_opt_in[restrict 4], const double plant_in[restrict 3], const double impedance_in[restrict 2], const double weights_in[restrict 2], double rates_out[restrict 2])
 {
-    const double t0 = 1.0/plant[0];
-    const double t1 = plant[2]/plant[1];
-    const double t2 = impedance[1]*t0 - K_opt[3]*t1;
-    const double t3 = weights[0]/weights[1] + t0*(impedance[0] + 1.0/weights[0] - impedance[1]*t2) - K_opt[2]*t1;
+    const double t0 = 1.0/plant_in[0];
+    const double t1 = plant_in[2]/plant_in[1];
+    const double t2 = impedance_in[1]*t0 - K_opt_in[3]*t1;
+    const double t3 = weights_in[0]/weights_in[1] + t0*(impedance_in[0] + 1.0/weights_in[0] - impedance_in[1]*t2) - K_opt_in[2]*t1;
     const double t4 = 0.25*t2*t2 + t3;
     const double t5 = 0.5*t2 - sqrt(t4);
-    rates[0] = -t5;
-    rates[1] = t3/t5;
-    return plant[0] > 0.0 && plant[1] > 0.0 && plant[2] > 0.0 && impedance[0] > 0.0 && impedance[1] > 0.0 && weights[0] > 0.0 && weights[1] > 0.0 && t4 > 0.0 && -t2 > 0.0 && -t3 > 0.0 ? 0 : 1;
+    rates_out[0] = -t5;
+    rates_out[1] = t3/t5;
+    return plant_in[0] > 0.0 && plant_in[1] > 0.0 && plant_in[2] > 0.0 && impedance_in[0] > 0.0 && impedance_in[1] > 0.0 && weights_in[0] > 0.0 && weights_in[1] > 0.0 && t4 > 0.0 && -t2 > 0.0 && -t3 > 0.0 ? 0 : 1;
 }

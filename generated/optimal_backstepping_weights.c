@@ -15,23 +15,24 @@
  * Cost: 8 add, 10 mul, 5 div, 3 neg.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-int awiwi_optimal_backstepping_weights(const double K_opt[restrict 4], const double plant[restrict 3], const double impedance[restrict 2], double rates[restrict 2], double weights[restrict 2])
+int awiwi_optimal_backstepping_weights(const double K_opt_in[restrict 4], const double plant_in[restrict 3], const double impedance_in[restrict 2], double rates_out[restrict 2], double weights_out[restrict 2])
 {
-    const double t0 = plant[2]/plant[1];
-    const double t1 = K_opt[0]/impedance[0]*t0;
-    double s2 = impedance[1]*t1 - K_opt[1]*t0;
-    const double t3 = K_opt[3]*t0 - impedance[1]/plant[0];
-    s2 += impedance[0]*t3;
-    const double t4 = impedance[0] + impedance[1]*t3 - plant[0]*(K_opt[2]*t0 - t1);
+    const double t0 = plant_in[2]/plant_in[1];
+    const double t1 = K_opt_in[0]/impedance_in[0]*t0;
+    double s2 = impedance_in[1]*t1 - K_opt_in[1]*t0;
+    const double t3 = K_opt_in[3]*t0 - impedance_in[1]/plant_in[0];
+    s2 += impedance_in[0]*t3;
+    const double t4 = impedance_in[0] + impedance_in[1]*t3 - plant_in[0]*(K_opt_in[2]*t0 - t1);
     const double t5 = 1.0/t4;
-    weights[0] = -t5;
+    weights_out[0] = -t5;
     const double t6 = s2*t5;
-    rates[1] = t6;
+    rates_out[1] = t6;
     const double t7 = t3 - t6;
-    rates[0] = t7;
+    rates_out[0] = t7;
     const double t8 = t1 - t6*t7;
-    weights[1] = -(t5/t8);
-    return plant[0] > 0.0 && plant[1] > 0.0 && plant[2] > 0.0 && impedance[0] > 0.0 && impedance[1] > 0.0 && -t4 > 0.0 && t7 > 0.0 && t6 > 0.0 && t8 > 0.0 ? 0 : 1;
+    weights_out[1] = -(t5/t8);
+    return plant_in[0] > 0.0 && plant_in[1] > 0.0 && plant_in[2] > 0.0 && impedance_in[0] > 0.0 && impedance_in[1] > 0.0 && -t4 > 0.0 && t7 > 0.0 && t6 > 0.0 && t8 > 0.0 ? 0 : 1;
 }

@@ -18,36 +18,37 @@
  * Cost: 19 add, 16 mul, 3 div, 1 neg, 4 calls.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
+#include "numerics.h"
 #include <math.h>
 #include "elementary.h"
 #include "kernels.h"
 
-void awiwi_plant_antagonistic(const double x[restrict 6], const double u[restrict 2], const double load[restrict 1], const double inertias[restrict 3], const double tendons[restrict 6], const double damping[restrict 1], const double friction[restrict 3], double xd[restrict 6], double stretches[restrict 2], double tau[restrict 2])
+void awiwi_plant_antagonistic(const double x_in[restrict 6], const double u_in[restrict 2], const double load_in[restrict 1], const double inertias_in[restrict 3], const double tendons_in[restrict 6], const double damping_in[restrict 1], const double friction_in[restrict 3], double xd_out[restrict 6], double stretches_out[restrict 2], double tau_out[restrict 2])
 {
-    xd[0] = x[1];
-    xd[2] = x[3];
-    xd[4] = x[5];
-    double s0 = load[0] - damping[0]*x[1];
-    const double t1 = 0.5*x[0];
-    const double t2 = x[0] - x[2];
-    stretches[0] = -t2;
-    const double t3 = t1 - 0.5*(x[2] + fabs(t2));
-    const double t4 = t3*(t3*(tendons[1] - tendons[2]*t3) - tendons[0]);
-    tau[0] = t4;
+    xd_out[0] = x_in[1];
+    xd_out[2] = x_in[3];
+    xd_out[4] = x_in[5];
+    double s0 = load_in[0] - damping_in[0]*x_in[1];
+    const double t1 = 0.5*x_in[0];
+    const double t2 = x_in[0] - x_in[2];
+    stretches_out[0] = -t2;
+    const double t3 = t1 - 0.5*(x_in[2] + fabs(t2));
+    const double t4 = t3*(t3*(tendons_in[1] - tendons_in[2]*t3) - tendons_in[0]);
+    tau_out[0] = t4;
     s0 += t4;
-    double s5 = u[0] - t4;
-    const double t6 = x[0] + x[4];
-    stretches[1] = t6;
-    const double t7 = t1 + 0.5*(x[4] + fabs(t6));
-    const double t8 = t7*(tendons[3] + t7*(tendons[4] + tendons[5]*t7));
-    tau[1] = t8;
+    double s5 = u_in[0] - t4;
+    const double t6 = x_in[0] + x_in[4];
+    stretches_out[1] = t6;
+    const double t7 = t1 + 0.5*(x_in[4] + fabs(t6));
+    const double t8 = t7*(tendons_in[3] + t7*(tendons_in[4] + tendons_in[5]*t7));
+    tau_out[1] = t8;
     s0 -= t8;
-    xd[1] = s0/inertias[0];
-    double s9 = u[1] - t8;
-    s5 -= friction[2]*x[3];
-    s9 -= friction[2]*x[5];
-    s5 -= friction[1]*awiwi_atan(friction[0]*x[3]);
-    xd[3] = s5/inertias[1];
-    s9 -= friction[1]*awiwi_atan(friction[0]*x[5]);
-    xd[5] = s9/inertias[2];
+    xd_out[1] = s0/inertias_in[0];
+    double s9 = u_in[1] - t8;
+    s5 -= friction_in[2]*x_in[3];
+    s9 -= friction_in[2]*x_in[5];
+    s5 -= friction_in[1]*awiwi_atan(friction_in[0]*x_in[3]);
+    xd_out[3] = s5/inertias_in[1];
+    s9 -= friction_in[1]*awiwi_atan(friction_in[0]*x_in[5]);
+    xd_out[5] = s9/inertias_in[2];
 }

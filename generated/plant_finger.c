@@ -14,58 +14,59 @@
  * Cost: 24 add, 40 mul, 1 div, 8 calls.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
+#include "numerics.h"
 #include "elementary.h"
 #include "kernels.h"
 
-void awiwi_plant_finger(const double qd[restrict 4], const double qdd[restrict 4], const double thds[restrict 8], const double f[restrict 8], const double u[restrict 8], const double motor[restrict 2], const double friction[restrict 3], double xd[restrict 24])
+void awiwi_plant_finger(const double qd_in[restrict 4], const double qdd_in[restrict 4], const double thds_in[restrict 8], const double f_in[restrict 8], const double u_in[restrict 8], const double motor_in[restrict 2], const double friction_in[restrict 3], double xd_out[restrict 24])
 {
-    xd[0] = qd[0];
-    xd[1] = qd[1];
-    xd[2] = qd[2];
-    xd[3] = qd[3];
-    xd[4] = qdd[0];
-    xd[5] = qdd[1];
-    xd[6] = qdd[2];
-    xd[7] = qdd[3];
-    xd[8] = thds[0];
-    xd[9] = thds[1];
-    xd[10] = thds[2];
-    xd[11] = thds[3];
-    xd[12] = thds[4];
-    xd[13] = thds[5];
-    xd[14] = thds[6];
-    xd[15] = thds[7];
-    const double t0 = 1.0/motor[0];
-    double s1 = u[0] - f[0]*motor[1];
-    double s2 = u[1] - f[1]*motor[1];
-    double s3 = u[2] - f[2]*motor[1];
-    double s4 = u[3] - f[3]*motor[1];
-    double s5 = u[4] - f[4]*motor[1];
-    double s6 = u[5] - f[5]*motor[1];
-    double s7 = u[6] - f[6]*motor[1];
-    double s8 = u[7] - f[7]*motor[1];
-    s1 -= friction[2]*thds[0];
-    s1 -= friction[1]*awiwi_atan(friction[0]*thds[0]);
-    xd[16] = t0*s1;
-    s2 -= friction[2]*thds[1];
-    s2 -= friction[1]*awiwi_atan(friction[0]*thds[1]);
-    xd[17] = t0*s2;
-    s3 -= friction[2]*thds[2];
-    s3 -= friction[1]*awiwi_atan(friction[0]*thds[2]);
-    xd[18] = t0*s3;
-    s4 -= friction[2]*thds[3];
-    s4 -= friction[1]*awiwi_atan(friction[0]*thds[3]);
-    xd[19] = t0*s4;
-    s5 -= friction[2]*thds[4];
-    s5 -= friction[1]*awiwi_atan(friction[0]*thds[4]);
-    xd[20] = t0*s5;
-    s6 -= friction[2]*thds[5];
-    s6 -= friction[1]*awiwi_atan(friction[0]*thds[5]);
-    xd[21] = t0*s6;
-    s7 -= friction[2]*thds[6];
-    s7 -= friction[1]*awiwi_atan(friction[0]*thds[6]);
-    xd[22] = t0*s7;
-    s8 -= friction[2]*thds[7];
-    s8 -= friction[1]*awiwi_atan(friction[0]*thds[7]);
-    xd[23] = t0*s8;
+    xd_out[0] = qd_in[0];
+    xd_out[1] = qd_in[1];
+    xd_out[2] = qd_in[2];
+    xd_out[3] = qd_in[3];
+    xd_out[4] = qdd_in[0];
+    xd_out[5] = qdd_in[1];
+    xd_out[6] = qdd_in[2];
+    xd_out[7] = qdd_in[3];
+    xd_out[8] = thds_in[0];
+    xd_out[9] = thds_in[1];
+    xd_out[10] = thds_in[2];
+    xd_out[11] = thds_in[3];
+    xd_out[12] = thds_in[4];
+    xd_out[13] = thds_in[5];
+    xd_out[14] = thds_in[6];
+    xd_out[15] = thds_in[7];
+    const double t0 = 1.0/motor_in[0];
+    double s1 = u_in[0] - f_in[0]*motor_in[1];
+    double s2 = u_in[1] - f_in[1]*motor_in[1];
+    double s3 = u_in[2] - f_in[2]*motor_in[1];
+    double s4 = u_in[3] - f_in[3]*motor_in[1];
+    double s5 = u_in[4] - f_in[4]*motor_in[1];
+    double s6 = u_in[5] - f_in[5]*motor_in[1];
+    double s7 = u_in[6] - f_in[6]*motor_in[1];
+    double s8 = u_in[7] - f_in[7]*motor_in[1];
+    s1 -= friction_in[2]*thds_in[0];
+    s1 -= friction_in[1]*awiwi_atan(friction_in[0]*thds_in[0]);
+    xd_out[16] = t0*s1;
+    s2 -= friction_in[2]*thds_in[1];
+    s2 -= friction_in[1]*awiwi_atan(friction_in[0]*thds_in[1]);
+    xd_out[17] = t0*s2;
+    s3 -= friction_in[2]*thds_in[2];
+    s3 -= friction_in[1]*awiwi_atan(friction_in[0]*thds_in[2]);
+    xd_out[18] = t0*s3;
+    s4 -= friction_in[2]*thds_in[3];
+    s4 -= friction_in[1]*awiwi_atan(friction_in[0]*thds_in[3]);
+    xd_out[19] = t0*s4;
+    s5 -= friction_in[2]*thds_in[4];
+    s5 -= friction_in[1]*awiwi_atan(friction_in[0]*thds_in[4]);
+    xd_out[20] = t0*s5;
+    s6 -= friction_in[2]*thds_in[5];
+    s6 -= friction_in[1]*awiwi_atan(friction_in[0]*thds_in[5]);
+    xd_out[21] = t0*s6;
+    s7 -= friction_in[2]*thds_in[6];
+    s7 -= friction_in[1]*awiwi_atan(friction_in[0]*thds_in[6]);
+    xd_out[22] = t0*s7;
+    s8 -= friction_in[2]*thds_in[7];
+    s8 -= friction_in[1]*awiwi_atan(friction_in[0]*thds_in[7]);
+    xd_out[23] = t0*s8;
 }

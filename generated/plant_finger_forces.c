@@ -13,36 +13,37 @@
  * Cost: 40 add, 35 mul, 8 calls.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
+#include "numerics.h"
 #include <math.h>
 #include "kernels.h"
 
-void awiwi_plant_finger_forces(const double thetas[restrict 8], const double path[restrict 8], const double slack[restrict 8], const double motor[restrict 2], const double line[restrict 3], double f[restrict 8])
+void awiwi_plant_finger_forces(const double thetas_in[restrict 8], const double path_in[restrict 8], const double slack_in[restrict 8], const double motor_in[restrict 2], const double line_in[restrict 3], double f_out[restrict 8])
 {
-    const double t0 = path[0] - slack[0] + motor[1]*thetas[0];
+    const double t0 = path_in[0] - slack_in[0] + motor_in[1]*thetas_in[0];
     const double t1 = t0 + fabs(t0);
-    const double t2 = 0.5*line[0];
-    const double t3 = 0.25*line[1];
-    const double t4 = 0.125*line[2];
-    f[0] = t1*(t1*(t3 + t4*t1) + t2);
-    const double t5 = path[1] + motor[1]*thetas[1] - slack[1];
+    const double t2 = 0.5*line_in[0];
+    const double t3 = 0.25*line_in[1];
+    const double t4 = 0.125*line_in[2];
+    f_out[0] = t1*(t1*(t3 + t4*t1) + t2);
+    const double t5 = path_in[1] + motor_in[1]*thetas_in[1] - slack_in[1];
     const double t6 = t5 + fabs(t5);
-    f[1] = t6*(t6*(t3 + t4*t6) + t2);
-    const double t7 = path[2] + motor[1]*thetas[2] - slack[2];
+    f_out[1] = t6*(t6*(t3 + t4*t6) + t2);
+    const double t7 = path_in[2] + motor_in[1]*thetas_in[2] - slack_in[2];
     const double t8 = t7 + fabs(t7);
-    f[2] = t8*(t8*(t3 + t4*t8) + t2);
-    const double t9 = path[3] + motor[1]*thetas[3] - slack[3];
+    f_out[2] = t8*(t8*(t3 + t4*t8) + t2);
+    const double t9 = path_in[3] + motor_in[1]*thetas_in[3] - slack_in[3];
     const double t10 = t9 + fabs(t9);
-    f[3] = t10*(t10*(t3 + t4*t10) + t2);
-    const double t11 = path[4] + motor[1]*thetas[4] - slack[4];
+    f_out[3] = t10*(t10*(t3 + t4*t10) + t2);
+    const double t11 = path_in[4] + motor_in[1]*thetas_in[4] - slack_in[4];
     const double t12 = t11 + fabs(t11);
-    f[4] = t12*(t12*(t3 + t4*t12) + t2);
-    const double t13 = path[5] + motor[1]*thetas[5] - slack[5];
+    f_out[4] = t12*(t12*(t3 + t4*t12) + t2);
+    const double t13 = path_in[5] + motor_in[1]*thetas_in[5] - slack_in[5];
     const double t14 = t13 + fabs(t13);
-    f[5] = t14*(t14*(t3 + t4*t14) + t2);
-    const double t15 = path[6] + motor[1]*thetas[6] - slack[6];
-    const double t16 = motor[1]*thetas[7] + path[7] - slack[7];
+    f_out[5] = t14*(t14*(t3 + t4*t14) + t2);
+    const double t15 = path_in[6] + motor_in[1]*thetas_in[6] - slack_in[6];
+    const double t16 = motor_in[1]*thetas_in[7] + path_in[7] - slack_in[7];
     const double t17 = t15 + fabs(t15);
-    f[6] = t17*(t17*(t3 + t4*t17) + t2);
+    f_out[6] = t17*(t17*(t3 + t4*t17) + t2);
     const double t18 = t16 + fabs(t16);
-    f[7] = t18*(t2 + t18*(t3 + t4*t18));
+    f_out[7] = t18*(t2 + t18*(t3 + t4*t18));
 }

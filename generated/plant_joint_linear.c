@@ -13,19 +13,20 @@
  * Cost: 6 add, 4 mul, 2 div.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-void awiwi_plant_joint_linear(const double x[restrict 4], const double u[restrict 1], const double load[restrict 1], const double plant[restrict 3], const double damping[restrict 2], double xd[restrict 4], double tau[restrict 2])
+void awiwi_plant_joint_linear(const double x_in[restrict 4], const double u_in[restrict 1], const double load_in[restrict 1], const double plant_in[restrict 3], const double damping_in[restrict 2], double xd_out[restrict 4], double tau_out[restrict 2])
 {
-    xd[0] = x[1];
-    xd[2] = x[3];
-    const double t0 = plant[2]*(x[2] - x[0]);
-    tau[0] = t0;
-    double s1 = load[0] + t0;
-    double s2 = u[0] - t0;
-    s1 -= damping[0]*x[1];
-    xd[1] = s1/plant[0];
-    s2 -= damping[1]*x[3];
-    xd[3] = s2/plant[1];
-    tau[1] = plant[2]*(x[3] - x[1]);
+    xd_out[0] = x_in[1];
+    xd_out[2] = x_in[3];
+    const double t0 = plant_in[2]*(x_in[2] - x_in[0]);
+    tau_out[0] = t0;
+    double s1 = load_in[0] + t0;
+    double s2 = u_in[0] - t0;
+    s1 -= damping_in[0]*x_in[1];
+    xd_out[1] = s1/plant_in[0];
+    s2 -= damping_in[1]*x_in[3];
+    xd_out[3] = s2/plant_in[1];
+    tau_out[1] = plant_in[2]*(x_in[3] - x_in[1]);
 }

@@ -15,25 +15,26 @@
  * Cost: 8 add, 8 mul, 2 div, 1 neg.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-void awiwi_plant_joint_nonlinear(const double x[restrict 4], const double u[restrict 1], const double load[restrict 1], const double bodies[restrict 2], const double curve[restrict 2], const double damping[restrict 2], double xd[restrict 4], double tau[restrict 2], double spring[restrict 2])
+void awiwi_plant_joint_nonlinear(const double x_in[restrict 4], const double u_in[restrict 1], const double load_in[restrict 1], const double bodies_in[restrict 2], const double curve_in[restrict 2], const double damping_in[restrict 2], double xd_out[restrict 4], double tau_out[restrict 2], double spring_out[restrict 2])
 {
-    xd[0] = x[1];
-    xd[2] = x[3];
-    const double t0 = x[0] - x[2];
-    const double t1 = curve[1]*t0;
+    xd_out[0] = x_in[1];
+    xd_out[2] = x_in[3];
+    const double t0 = x_in[0] - x_in[2];
+    const double t1 = curve_in[1]*t0;
     const double t2 = t0*t1;
-    spring[1] = -6.0*t1;
-    const double t3 = t0*(t2 + curve[0]);
-    tau[0] = -t3;
-    const double t4 = 3.0*t2 + curve[0];
-    spring[0] = t4;
-    double s5 = load[0] - t3;
-    double s6 = t3 + u[0];
-    s5 -= damping[0]*x[1];
-    xd[1] = s5/bodies[0];
-    s6 -= damping[1]*x[3];
-    xd[3] = s6/bodies[1];
-    tau[1] = (x[3] - x[1])*t4;
+    spring_out[1] = -6.0*t1;
+    const double t3 = t0*(t2 + curve_in[0]);
+    tau_out[0] = -t3;
+    const double t4 = 3.0*t2 + curve_in[0];
+    spring_out[0] = t4;
+    double s5 = load_in[0] - t3;
+    double s6 = t3 + u_in[0];
+    s5 -= damping_in[0]*x_in[1];
+    xd_out[1] = s5/bodies_in[0];
+    s6 -= damping_in[1]*x_in[3];
+    xd_out[3] = s6/bodies_in[1];
+    tau_out[1] = (x_in[3] - x_in[1])*t4;
 }

@@ -16,16 +16,18 @@
  * Cost: 7 add, 9 mul, 1 div, 2 calls.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
+#include "numerics.h"
 #include <math.h>
 #include "elementary.h"
 #include "kernels.h"
 
-void awiwi_plant_tendon(const double x[restrict 2], const double u[restrict 1], const double path[restrict 1], const double motor[restrict 2], const double line[restrict 3], const double friction[restrict 3], double xd[restrict 2], double f[restrict 1])
+void awiwi_plant_tendon(const double x_in[restrict 2], const double u_in[restrict 1], const double path_in[restrict 1], const double motor_in[restrict 2], const double line_in[restrict 3], const double friction_in[restrict 3], double xd_out[restrict 2], double f_out[restrict 1])
 {
-    xd[0] = x[1];
-    const double t0 = path[0] + motor[1]*x[0];
+    xd_out[0] = x_in[1];
+    const double t0 = path_in[0] + motor_in[1]*x_in[0];
     const double t1 = 0.5*(t0 + fabs(t0));
-    const double t2 = t1*(t1*(line[1] + line[2]*t1) + line[0]);
-    f[0] = t2;
-    xd[1] = (u[0] - motor[1]*t2 - friction[2]*x[1] - friction[1]*awiwi_atan(friction[0]*x[1]))/motor[0];
+    const double t2 = t1*(t1*(line_in[1] + line_in[2]*t1) + line_in[0]);
+    f_out[0] = t2;
+    const double t3 = u_in[0] - motor_in[1]*t2 - friction_in[2]*x_in[1] - friction_in[1]*awiwi_atan(friction_in[0]*x_in[1]);
+    xd_out[1] = t3/motor_in[0];
 }

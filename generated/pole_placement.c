@@ -18,22 +18,23 @@
  * Cost: 14 add, 26 mul, 2 div.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-int awiwi_pole_placement(const double m[restrict 1], const double b[restrict 1], const double k[restrict 1], const double dq[restrict 1], const double dtheta[restrict 1], const double omega[restrict 2], const double xi[restrict 2], double K[restrict 4])
+int awiwi_pole_placement(const double m_in[restrict 1], const double b_in[restrict 1], const double k_in[restrict 1], const double dq_in[restrict 1], const double dtheta_in[restrict 1], const double omega_in[restrict 2], const double xi_in[restrict 2], double K_out[restrict 4])
 {
-    const double t0 = 1.0/k[0];
-    double s1 = omega[0]*omega[0] + omega[1]*omega[1];
-    const double t2 = omega[0]*omega[1];
-    s1 += 4.0*xi[0]*xi[1]*t2;
-    const double t3 = b[0]*m[0]*t2;
-    const double t4 = 1.0/m[0];
-    const double t5 = b[0]*(2.0*(omega[0]*xi[0] + omega[1]*xi[1]) - dq[0]*t4);
-    const double t6 = t5 - dtheta[0];
-    K[3] = t6;
-    const double t7 = b[0]*s1 - t4*(k[0]*(m[0] + b[0]) + dq[0]*(dtheta[0] + t6));
-    K[2] = t7;
-    K[0] = omega[0]*omega[1]*t0*t3 - t7;
-    K[1] = t0*(2.0*(omega[0]*xi[1] + omega[1]*xi[0])*t3 - dq[0]*t7) - t5 - dq[0];
-    return m[0] > 0.0 && b[0] > 0.0 && k[0] > 0.0 && omega[0] > 0.0 && omega[1] > 0.0 && xi[0] > 0.0 && xi[1] > 0.0 ? 0 : 1;
+    const double t0 = 1.0/k_in[0];
+    double s1 = omega_in[0]*omega_in[0] + omega_in[1]*omega_in[1];
+    const double t2 = omega_in[0]*omega_in[1];
+    s1 += 4.0*xi_in[0]*xi_in[1]*t2;
+    const double t3 = b_in[0]*m_in[0]*t2;
+    const double t4 = 1.0/m_in[0];
+    const double t5 = b_in[0]*(2.0*(omega_in[0]*xi_in[0] + omega_in[1]*xi_in[1]) - dq_in[0]*t4);
+    const double t6 = t5 - dtheta_in[0];
+    K_out[3] = t6;
+    const double t7 = b_in[0]*s1 - t4*(k_in[0]*(m_in[0] + b_in[0]) + dq_in[0]*(dtheta_in[0] + t6));
+    K_out[2] = t7;
+    K_out[0] = omega_in[0]*omega_in[1]*t0*t3 - t7;
+    K_out[1] = t0*(2.0*(omega_in[0]*xi_in[1] + omega_in[1]*xi_in[0])*t3 - dq_in[0]*t7) - t5 - dq_in[0];
+    return m_in[0] > 0.0 && b_in[0] > 0.0 && k_in[0] > 0.0 && omega_in[0] > 0.0 && omega_in[1] > 0.0 && xi_in[0] > 0.0 && xi_in[1] > 0.0 ? 0 : 1;
 }

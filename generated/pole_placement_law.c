@@ -11,13 +11,14 @@
  * Cost: 8 add, 4 mul.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-void awiwi_pole_placement_law(const double K[restrict 4], const double x[restrict 4], const double x_des[restrict 4], const double u_des[restrict 1], double u[restrict 1])
+void awiwi_pole_placement_law(const double K_in[restrict 4], const double x_in[restrict 4], const double x_des_in[restrict 4], const double u_des_in[restrict 1], double u_out[restrict 1])
 {
-    double s0 = u_des[0] - K[0]*(x[0] - x_des[0]);
-    s0 -= K[1]*(x[1] - x_des[1]);
-    s0 -= K[2]*(x[2] - x_des[2]);
-    s0 -= K[3]*(x[3] - x_des[3]);
-    u[0] = s0;
+    double s0 = u_des_in[0] - K_in[0]*(x_in[0] - x_des_in[0]);
+    s0 -= K_in[1]*(x_in[1] - x_des_in[1]);
+    s0 -= K_in[2]*(x_in[2] - x_des_in[2]);
+    s0 -= K_in[3]*(x_in[3] - x_des_in[3]);
+    u_out[0] = s0;
 }

@@ -14,12 +14,13 @@
  * Cost: 2 add, 4 mul.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-int awiwi_pole_placement_motor(const double b[restrict 1], const double dtheta[restrict 1], const double k[restrict 1], const double omega0[restrict 1], const double xi0[restrict 1], double K[restrict 2])
+int awiwi_pole_placement_motor(const double b_in[restrict 1], const double dtheta_in[restrict 1], const double k_in[restrict 1], const double omega0_in[restrict 1], const double xi0_in[restrict 1], double K_out[restrict 2])
 {
-    const double t0 = b[0]*omega0[0];
-    K[0] = omega0[0]*t0 - k[0];
-    K[1] = 2.0*xi0[0]*t0 - dtheta[0];
-    return b[0] > 0.0 && omega0[0] > 0.0 && xi0[0] > 0.0 ? 0 : 1;
+    const double t0 = b_in[0]*omega0_in[0];
+    K_out[0] = omega0_in[0]*t0 - k_in[0];
+    K_out[1] = 2.0*xi0_in[0]*t0 - dtheta_in[0];
+    return b_in[0] > 0.0 && omega0_in[0] > 0.0 && xi0_in[0] > 0.0 ? 0 : 1;
 }

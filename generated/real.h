@@ -4,6 +4,7 @@
 #define AWIWI_REAL_H
 
 typedef double awiwi_real;
+#define AWIWI_REAL_BITS 64
 #define AWIWI_REAL_MAX 1.7976931348623157e+308
 #define AWIWI_REAL_EPSILON 2.220446049250313e-16
 

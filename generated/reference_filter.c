@@ -15,53 +15,54 @@
  * Cost: 45 add, 50 mul, 5 div.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-int awiwi_reference_filter(const double motion[restrict 5], const double desired[restrict 5], const double delay[restrict 1], const double period[restrict 1], double motion_next[restrict 5])
+int awiwi_reference_filter(const double motion_in[restrict 5], const double desired_in[restrict 5], const double delay_in[restrict 1], const double period_in[restrict 1], double motion_next_out[restrict 5])
 {
-    const double t0 = desired[1] - motion[1];
-    double s1 = motion[0] + period[0]*(desired[1] - t0);
-    const double t2 = period[0]*period[0];
+    const double t0 = desired_in[1] - motion_in[1];
+    double s1 = motion_in[0] + period_in[0]*(desired_in[1] - t0);
+    const double t2 = period_in[0]*period_in[0];
     const double t3 = 0.5*t2;
-    const double t4 = period[0]*t2;
+    const double t4 = period_in[0]*t2;
     const double t5 = 0.16666666666666666*t4;
-    const double t6 = 0.041666666666666664*period[0]*t4;
-    const double t7 = desired[2] - motion[2];
-    const double t8 = desired[2] - t7;
+    const double t6 = 0.041666666666666664*period_in[0]*t4;
+    const double t7 = desired_in[2] - motion_in[2];
+    const double t8 = desired_in[2] - t7;
     s1 += t8*t3;
-    double s9 = motion[1] + period[0]*t8;
-    const double t10 = desired[3] - motion[3];
-    const double t11 = desired[3] - t10;
+    double s9 = motion_in[1] + period_in[0]*t8;
+    const double t10 = desired_in[3] - motion_in[3];
+    const double t11 = desired_in[3] - t10;
     s1 += t11*t5;
     s9 += t11*t3;
-    double s12 = motion[2] + period[0]*t11;
-    const double t13 = desired[4] - motion[4];
-    const double t14 = desired[4] - t13;
+    double s12 = motion_in[2] + period_in[0]*t11;
+    const double t13 = desired_in[4] - motion_in[4];
+    const double t14 = desired_in[4] - t13;
     s1 += t14*t6;
-    motion_next[0] = s1;
+    motion_next_out[0] = s1;
     s9 += t14*t5;
     s12 += t14*t3;
-    double s15 = motion[3] + period[0]*t14;
-    const double t16 = 15.0/delay[0];
-    const double t17 = delay[0]*delay[0];
+    double s15 = motion_in[3] + period_in[0]*t14;
+    const double t16 = 15.0/delay_in[0];
+    const double t17 = delay_in[0]*delay_in[0];
     const double t18 = 105.0/t17;
-    const double t19 = delay[0]*t17;
+    const double t19 = delay_in[0]*t17;
     const double t20 = 420.0/t19;
-    const double t21 = delay[0]*t19;
-    const double t22 = 945.0/(delay[0]*t21);
+    const double t21 = delay_in[0]*t19;
+    const double t22 = 945.0/(delay_in[0]*t21);
     const double t23 = 945.0/t21;
-    const double t24 = (desired[0] - motion[0])*t22 + t13*t16 + t10*t18 + t7*t20 + t0*t23;
+    const double t24 = (desired_in[0] - motion_in[0])*t22 + t13*t16 + t10*t18 + t7*t20 + t0*t23;
     s9 += t6*t24;
-    motion_next[1] = s9;
+    motion_next_out[1] = s9;
     const double t25 = t0*t22 + t13*t18 + t10*t20 + t7*t23 - t16*t24;
     s12 += t5*t24;
     s12 += t6*t25;
-    motion_next[2] = s12;
+    motion_next_out[2] = s12;
     const double t26 = t7*t22 + t13*t20 + t10*t23 - t18*t24 - t16*t25;
     s15 += t3*t24;
     s15 += t5*t25;
     s15 += t6*t26;
-    motion_next[3] = s15;
-    motion_next[4] = motion[4] + period[0]*t24 + t3*t25 + t5*t26 + t6*(t13*t23 + t10*t22 - t20*t24 - t18*t25 - t16*t26);
-    return delay[0] > 0.0 && period[0] > 0.0 ? 0 : 1;
+    motion_next_out[3] = s15;
+    motion_next_out[4] = motion_in[4] + period_in[0]*t24 + t3*t25 + t5*t26 + t6*(t13*t23 + t10*t22 - t20*t24 - t18*t25 - t16*t26);
+    return delay_in[0] > 0.0 && period_in[0] > 0.0 ? 0 : 1;
 }

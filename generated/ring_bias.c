@@ -9,15 +9,16 @@
  * Cost: 55 add, 75 mul, 4 sincos.
  * Inputs: sha256 629681b331d715cabc79e549054515e6ff19ef45f5083fc8fb3efe64fdde7fbb.
  */
-#include "trig.h"
+#include "numerics.h"
+#include "sincos.h"
 #include "kernels.h"
 
-void awiwi_ring_bias(const double q[restrict 3], const double qd[restrict 3], const double g[restrict 3], double bias[restrict 3])
+void awiwi_ring_bias(const double q_in[restrict 3], const double qd_in[restrict 3], const double g_in[restrict 3], double bias_out[restrict 3])
 {
-    double s0 = 0.7857142857142857*q[2] - 1.5485777614681775;
-    const double t1 = q[2] + q[1];
+    double s0 = 0.7857142857142857*q_in[2] - 1.5485777614681775;
+    const double t1 = q_in[2] + q_in[1];
     s0 += t1;
-    const awiwi_turn4 a0 = awiwi_sincos4(q[1], t1, s0, q[0]);
+    const awiwi_sincos4_result a0 = awiwi_sincos4(q_in[1], t1, s0, q_in[0]);
     const double t2 = 0.000615*a0.cos[0] - 3e-06*a0.sin[0];
     const double t3 = 0.0002108*a0.cos[1] - 1.2e-06*a0.sin[1];
     const double t4 = 3.600888779176608e-05*a0.sin[2];
@@ -36,24 +37,24 @@ void awiwi_ring_bias(const double q[restrict 3], const double qd[restrict 3], co
     const double t16 = 0.0305*a0.cos[1];
     s14 += (t10 + t16)*t13;
     const double t17 = a0.sin[1]*t12 + t16*t13;
-    const double t18 = g[0]*a0.cos[3] + g[1]*a0.sin[3];
-    double s19 = (g[0]*a0.sin[3] - g[1]*a0.cos[3])*(t2 + t5 + 0.0001245) + 2.64e-05*t18;
-    double s20 = t8*t18 - g[2]*t2;
-    const double t21 = qd[1]*qd[1];
+    const double t18 = g_in[0]*a0.cos[3] + g_in[1]*a0.sin[3];
+    double s19 = (g_in[0]*a0.sin[3] - g_in[1]*a0.cos[3])*(t2 + t5 + 0.0001245) + 2.64e-05*t18;
+    double s20 = t8*t18 - g_in[2]*t2;
+    const double t21 = qd_in[1]*qd_in[1];
     s19 += t21*(1.0264e-06*a0.cos[0] - 9.6e-09*a0.sin[0]);
     const double t22 = t18 + t21*t7;
-    const double t23 = g[2] + t21*t9;
-    const double t24 = qd[1] + qd[2];
-    const double t25 = 0.7857142857142857*qd[2] + t24;
-    double s26 = qd[1]*s6 + t24*t15;
+    const double t23 = g_in[2] + t21*t9;
+    const double t24 = qd_in[1] + qd_in[2];
+    const double t25 = 0.7857142857142857*qd_in[2] + t24;
+    double s26 = qd_in[1]*s6 + t24*t15;
     const double t27 = t24*t24;
     s26 += t25*s14;
     const double t28 = t25*t25;
     s19 += t27*(6.2216e-07*a0.cos[1] - 5.44e-09*a0.sin[1]);
     s19 -= t28*(1.0664033896870507e-09*a0.cos[2] + 1.5186117470838444e-07*a0.sin[2]);
-    s19 -= 2.0*qd[0]*s26;
-    bias[0] = s19;
-    const double t29 = qd[0]*qd[0];
+    s19 -= 2.0*qd_in[0]*s26;
+    bias_out[0] = s19;
+    const double t29 = qd_in[0]*qd_in[0];
     double s30 = t29*s14 + t23*t4;
     s30 += t22*t13;
     s30 += t27*t17;
@@ -62,6 +63,6 @@ void awiwi_ring_bias(const double q[restrict 3], const double qd[restrict 3], co
     s20 += t31;
     s20 += t29*s6;
     s20 -= t7*(t27*t11 + t28*t13);
-    bias[1] = s20;
-    bias[2] = t31 + 0.7857142857142857*s30;
+    bias_out[1] = s20;
+    bias_out[2] = t31 + 0.7857142857142857*s30;
 }

@@ -8,15 +8,16 @@
  * Cost: 51 add, 56 mul, 3 sincos.
  * Inputs: sha256 ed3232564f274d4be5483571e47101a84f2df0a316cf4e98203aa0bde8d76c89.
  */
-#include "trig.h"
+#include "numerics.h"
+#include "sincos.h"
 #include "kernels.h"
 
-void awiwi_ring_coriolis_matrix(const double q[restrict 3], const double qd[restrict 3], double C[restrict 9])
+void awiwi_ring_coriolis_matrix(const double q_in[restrict 3], const double qd_in[restrict 3], double C_out[restrict 9])
 {
-    double s0 = 0.7857142857142857*q[2] - 1.5485777614681775;
-    const double t1 = q[2] + q[1];
+    double s0 = 0.7857142857142857*q_in[2] - 1.5485777614681775;
+    const double t1 = q_in[2] + q_in[1];
     s0 += t1;
-    const awiwi_turn3 a0 = awiwi_sincos3(q[1], t1, s0);
+    const awiwi_sincos3_result a0 = awiwi_sincos3(q_in[1], t1, s0);
     const double t2 = a0.cos[0] + 0.14634146341463414;
     const double t3 = 0.7439024390243902*a0.cos[1];
     const double t4 = 1.4763643994624091e-06*a0.cos[2];
@@ -32,29 +33,29 @@ void awiwi_ring_coriolis_matrix(const double q[restrict 3], const double qd[rest
     const double t12 = 8.6428e-06*a0.cos[1] - t9 - 4.92e-08*a0.sin[1];
     const double t13 = a0.cos[0]*(t6 + t4) - a0.sin[0]*t12;
     const double t14 = a0.sin[0]*(t12 + 2.23216e-05*a0.cos[0] - 7.9e-08*a0.sin[0] + 3.69e-06) + 1.8e-08*a0.cos[0] + s7 + 3.95e-08;
-    const double t15 = 0.7857142857142857*qd[2];
-    C[0] = t15*s5 - qd[1]*t14 - qd[2]*s7;
-    const double t16 = qd[2] + qd[1];
+    const double t15 = 0.7857142857142857*qd_in[2];
+    C_out[0] = t15*s5 - qd_in[1]*t14 - qd_in[2]*s7;
+    const double t16 = qd_in[2] + qd_in[1];
     const double t17 = t15 + t16;
     const double t18 = t17*(1.0664033896870507e-09*a0.cos[2] + 1.5186117470838444e-07*a0.sin[2]);
     const double t19 = t16*(6.2216e-07*a0.cos[1] - 5.44e-09*a0.sin[1]) - t18;
-    double s20 = qd[1]*(1.0264e-06*a0.cos[0] - 9.6e-09*a0.sin[0]) + t19;
+    double s20 = qd_in[1]*(1.0264e-06*a0.cos[0] - 9.6e-09*a0.sin[0]) + t19;
     double s21 = t19 - 0.7857142857142857*t18;
-    const double t22 = qd[0]*t14;
-    C[3] = t22;
+    const double t22 = qd_in[0]*t14;
+    C_out[3] = t22;
     s20 -= t22;
-    C[1] = s20;
-    const double t23 = -0.7857142857142857*(qd[0]*s5) + qd[0]*s7;
-    C[6] = t23;
+    C_out[1] = s20;
+    const double t23 = -0.7857142857142857*(qd_in[0]*s5) + qd_in[0]*s7;
+    C_out[6] = t23;
     s21 -= t23;
-    C[2] = s21;
-    const double t24 = qd[1]*t13;
+    C_out[2] = s21;
+    const double t24 = qd_in[1]*t13;
     double s25 = t16*(t11 - t13) - t17*t11;
     const double t26 = t16*t10;
     const double t27 = t26 - t17*t10;
     s25 += t27;
-    C[5] = s25 - 0.7857142857142857*(t17*(t11 + t10));
-    C[4] = s25 + t24;
-    C[7] = t24 + t27 + 0.7857142857142857*(qd[1]*t11 + t26);
-    C[8] = t27 + (t16 - t17)*(0.7857142857142857*t10);
+    C_out[5] = s25 - 0.7857142857142857*(t17*(t11 + t10));
+    C_out[4] = s25 + t24;
+    C_out[7] = t24 + t27 + 0.7857142857142857*(qd_in[1]*t11 + t26);
+    C_out[8] = t27 + (t16 - t17)*(0.7857142857142857*t10);
 }

@@ -7,27 +7,28 @@
  * Cost: nothing but moves.
  * Inputs: sha256 f80c5937d3fb31c3c493cc21c311bbee377d7e4a85c9442b26bfcff48d3c3dd6.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-void awiwi_ring_coupling(const double q[restrict 3], double P[restrict 18])
+void awiwi_ring_coupling(const double q_in[restrict 3], double P_out[restrict 18])
 {
-    (void)q;
-    P[0] = 0.009;
-    P[3] = 0.009;
-    P[6] = -0.009;
-    P[9] = -0.009;
-    P[1] = 0.0065;
-    P[4] = -0.0065;
-    P[7] = 0.0065;
-    P[10] = -0.0065;
-    P[2] = 0.0;
-    P[5] = 0.0;
-    P[8] = 0.0;
-    P[11] = 0.0;
-    P[12] = 0.0;
-    P[13] = 0.0;
-    P[15] = 0.0;
-    P[16] = 0.0;
-    P[14] = 0.0055;
-    P[17] = -0.0055;
+    (void)q_in;
+    P_out[0] = 0.009;
+    P_out[3] = 0.009;
+    P_out[6] = -0.009;
+    P_out[9] = -0.009;
+    P_out[1] = 0.0065;
+    P_out[4] = -0.0065;
+    P_out[7] = 0.0065;
+    P_out[10] = -0.0065;
+    P_out[2] = 0.0;
+    P_out[5] = 0.0;
+    P_out[8] = 0.0;
+    P_out[11] = 0.0;
+    P_out[12] = 0.0;
+    P_out[13] = 0.0;
+    P_out[15] = 0.0;
+    P_out[16] = 0.0;
+    P_out[14] = 0.0055;
+    P_out[17] = -0.0055;
 }

@@ -11,15 +11,16 @@
  * Cost: 87 add, 96 mul, 4 sincos.
  * Inputs: sha256 d2fd8ea8122210c370a876d04ecdbc1ca49df3b198ba198458bb7b3639479b1a.
  */
-#include "trig.h"
+#include "numerics.h"
+#include "sincos.h"
 #include "kernels.h"
 
-void awiwi_ring_dynamics(const double q[restrict 3], const double qd[restrict 3], const double g[restrict 3], double M[restrict 9], double C[restrict 9], double gravity[restrict 3])
+void awiwi_ring_dynamics(const double q_in[restrict 3], const double qd_in[restrict 3], const double g_in[restrict 3], double M_out[restrict 9], double C_out[restrict 9], double gravity_out[restrict 3])
 {
-    double s0 = 0.7857142857142857*q[2] - 1.5415556515473878;
-    const double t1 = q[2] + q[1];
+    double s0 = 0.7857142857142857*q_in[2] - 1.5415556515473878;
+    const double t1 = q_in[2] + q_in[1];
     s0 += t1;
-    const awiwi_turn4 a0 = awiwi_sincos4(q[1], t1, s0, q[0]);
+    const awiwi_sincos4_result a0 = awiwi_sincos4(q_in[1], t1, s0, q_in[0]);
     const double t2 = 2.5285629012876123e-07*a0.cos[2] - 3.6007999995786246e-05*a0.sin[2];
     const double t3 = 0.0002108*a0.cos[1] + t2 - 1.2e-06*a0.sin[1];
     const double t4 = 0.000615*a0.cos[0] + t3 - 3e-06*a0.sin[0];
@@ -33,15 +34,15 @@ void awiwi_ring_dynamics(const double q[restrict 3], const double qd[restrict 3]
     double s11 = a0.sin[0]*t10 + 3.95e-08;
     const double t12 = 4.43189948913395e-07*a0.cos[2] + 1.5530124987980726e-08*a0.sin[2];
     s7 -= a0.cos[2]*t12;
-    M[0] = s7;
+    M_out[0] = s7;
     double s13 = a0.sin[2]*t12 - 7.765062493990363e-09;
     const double t14 = 5.44e-09*a0.cos[1] + 6.2216e-07*a0.sin[1] + 1.518649189246812e-07*a0.cos[2];
     const double t15 = 9.6e-09*a0.cos[0] + 1.0264e-06*a0.sin[0] + t14;
-    M[1] = t15;
-    M[3] = t15;
+    M_out[1] = t15;
+    M_out[3] = t15;
     const double t16 = t14 + 1.193224362979638e-07*a0.cos[2];
-    M[2] = t16;
-    M[6] = t16;
+    M_out[2] = t16;
+    M_out[6] = t16;
     const double t17 = 3.6007999995786246e-05*a0.cos[2] + 2.5285629012876123e-07*a0.sin[2];
     const double t18 = 0.041*a0.cos[0];
     const double t19 = 0.041*a0.sin[0];
@@ -55,12 +56,12 @@ void awiwi_ring_dynamics(const double q[restrict 3], const double qd[restrict 3]
     const double t27 = t25 + 4.8416e-07;
     const double t28 = t25 + t27 + 5.53848e-06;
     const double t29 = t22 + t28;
-    M[4] = t22 + t29 + 2.25034e-05;
+    M_out[4] = t22 + t29 + 2.25034e-05;
     double s30 = t29 + 0.7857142857142857*t27;
-    M[8] = t28 + 1.5714285714285714*t27 + 2.9889469387755104e-07;
+    M_out[8] = t28 + 1.5714285714285714*t27 + 2.9889469387755104e-07;
     s30 += 0.032214285714285716*(a0.cos[0]*t2 + a0.sin[0]*t17);
-    M[5] = s30;
-    M[7] = s30;
+    M_out[5] = s30;
+    M_out[7] = s30;
     const double t31 = t18 + 0.006;
     s13 -= (t23 + t31)*t17;
     s8 += t31*t20;
@@ -68,35 +69,35 @@ void awiwi_ring_dynamics(const double q[restrict 3], const double qd[restrict 3]
     s11 += s8;
     const double t32 = 3e-06*a0.cos[0] + 0.000615*a0.sin[0];
     s11 += 0.006*t32;
-    const double t33 = 0.7857142857142857*qd[2];
-    C[0] = t33*s13 - qd[1]*s11 - qd[2]*s8;
-    const double t34 = qd[2] + qd[1];
+    const double t33 = 0.7857142857142857*qd_in[2];
+    C_out[0] = t33*s13 - qd_in[1]*s11 - qd_in[2]*s8;
+    const double t34 = qd_in[2] + qd_in[1];
     const double t35 = t33 + t34;
     const double t36 = t35*a0.sin[2];
     const double t37 = t34*(6.2216e-07*a0.cos[1] - 5.44e-09*a0.sin[1]) - 1.518649189246812e-07*t36;
-    double s38 = qd[1]*(1.0264e-06*a0.cos[0] - 9.6e-09*a0.sin[0]) + t37;
+    double s38 = qd_in[1]*(1.0264e-06*a0.cos[0] - 9.6e-09*a0.sin[0]) + t37;
     double s39 = t37 - 1.193224362979638e-07*t36;
-    const double t40 = qd[0]*s11;
-    C[3] = t40;
+    const double t40 = qd_in[0]*s11;
+    C_out[3] = t40;
     s38 -= t40;
-    C[1] = s38;
-    const double t41 = qd[0]*(s8 - 0.7857142857142857*s13);
-    C[6] = t41;
+    C_out[1] = s38;
+    const double t41 = qd_in[0]*(s8 - 0.7857142857142857*s13);
+    C_out[6] = t41;
     s39 -= t41;
-    C[2] = s39;
+    C_out[2] = s39;
     const double t42 = t18*t21 - t19*t3;
     const double t43 = t18*t17 - t19*t2;
-    const double t44 = qd[1]*t42;
+    const double t44 = qd_in[1]*t42;
     double s45 = t34*(t43 - t42) - t35*t43;
     const double t46 = t34*t26;
     const double t47 = t46 - t35*t26;
     s45 += t47;
-    C[5] = s45 - 0.7857142857142857*t35*(t43 + t26);
-    C[4] = s45 + t44;
-    C[7] = t44 + t47 + 0.7857142857142857*(qd[1]*t43 + t46);
-    C[8] = 0.7857142857142857*(t34 - t35)*t26 + t47;
-    const double t48 = g[0]*a0.cos[3] + g[1]*a0.sin[3];
-    gravity[0] = (g[0]*a0.sin[3] - g[1]*a0.cos[3])*(t4 + 0.0001245) + 2.64e-05*t48;
-    gravity[1] = t48*(t32 + t21) - g[2]*t4;
-    gravity[2] = t48*t21 - g[2]*t3 - 0.7857142857142857*(g[2]*t2 - t48*t17);
+    C_out[5] = s45 - 0.7857142857142857*t35*(t43 + t26);
+    C_out[4] = s45 + t44;
+    C_out[7] = t44 + t47 + 0.7857142857142857*(qd_in[1]*t43 + t46);
+    C_out[8] = 0.7857142857142857*(t34 - t35)*t26 + t47;
+    const double t48 = g_in[0]*a0.cos[3] + g_in[1]*a0.sin[3];
+    gravity_out[0] = (g_in[0]*a0.sin[3] - g_in[1]*a0.cos[3])*(t4 + 0.0001245) + 2.64e-05*t48;
+    gravity_out[1] = t48*(t32 + t21) - g_in[2]*t4;
+    gravity_out[2] = t48*t21 - g_in[2]*t3 - 0.7857142857142857*(g_in[2]*t2 - t48*t17);
 }

@@ -10,15 +10,16 @@
  * Cost: 43 add, 58 mul, 4 sincos.
  * Inputs: sha256 002a38e3700c4633fdb4a7f5f3af58489ec3ef1c8d6654b8a99f77e3122edefa.
  */
-#include "trig.h"
+#include "numerics.h"
+#include "sincos.h"
 #include "kernels.h"
 
-void awiwi_ring_energy(const double q[restrict 3], const double qd[restrict 3], const double g[restrict 3], double kinetic[restrict 1], double potential[restrict 1])
+void awiwi_ring_energy(const double q_in[restrict 3], const double qd_in[restrict 3], const double g_in[restrict 3], double kinetic_out[restrict 1], double potential_out[restrict 1])
 {
-    double s0 = 0.7857142857142857*q[2] - 1.5485777614681775;
-    const double t1 = q[2] + q[1];
+    double s0 = 0.7857142857142857*q_in[2] - 1.5485777614681775;
+    const double t1 = q_in[2] + q_in[1];
     s0 += t1;
-    const awiwi_turn4 a0 = awiwi_sincos4(q[1], t1, s0, q[0]);
+    const awiwi_sincos4_result a0 = awiwi_sincos4(q_in[1], t1, s0, q_in[0]);
     const double t2 = 0.0002108*a0.cos[1] - 1.2e-06*a0.sin[1];
     const double t3 = 1.2e-06*a0.cos[1] + 0.0002108*a0.sin[1];
     const double t4 = 3.600888779176608e-05*a0.cos[2];
@@ -31,18 +32,18 @@ void awiwi_ring_energy(const double q[restrict 3], const double qd[restrict 3], 
     double s10 = t8 + t9;
     s7 += a0.cos[0]*(3673.571786968676*t9 + a0.cos[0] - 0.003539172819152749*a0.sin[0]);
     s10 += 0.0001245;
-    double s11 = qd[1]*(9.6e-09*a0.cos[0] + 1.0264e-06*a0.sin[0]) + 1.11608e-05*qd[0]*s7;
-    const double t12 = qd[1] + qd[2];
-    const double t13 = 0.7857142857142857*qd[2] + t12;
+    double s11 = qd_in[1]*(9.6e-09*a0.cos[0] + 1.0264e-06*a0.sin[0]) + 1.11608e-05*qd_in[0]*s7;
+    const double t12 = qd_in[1] + qd_in[2];
+    const double t13 = 0.7857142857142857*qd_in[2] + t12;
     s11 += t12*(5.44e-09*a0.cos[1] + 6.2216e-07*a0.sin[1]);
     s11 += t13*(1.5186117470838444e-07*a0.cos[2] - 1.0664033896870507e-09*a0.sin[2]);
-    double s14 = qd[0]*s11 + 1.12517e-05*qd[1]*qd[1];
-    const double t15 = 0.041*qd[1];
+    double s14 = qd_in[0]*s11 + 1.12517e-05*qd_in[1]*qd_in[1];
+    const double t15 = 0.041*qd_in[1];
     const double t16 = a0.cos[0]*t15;
     const double t17 = t15*a0.sin[0];
     s14 += t12*(t16*t2 + 2.76924e-06*t12 + t17*t3);
     const double t18 = 0.0305*t12;
     s14 += t13*((t17 + t18*a0.sin[1])*t4 + 2.4208e-07*t13 - (t16 + a0.cos[1]*t18)*t5);
-    kinetic[0] = s14;
-    potential[0] = 2.64e-05*(g[0]*a0.sin[3] - g[1]*a0.cos[3]) - g[2]*(3e-06*a0.cos[0] + 0.000615*a0.sin[0] + t3 + t4) - (g[0]*a0.cos[3] + g[1]*a0.sin[3])*s10;
+    kinetic_out[0] = s14;
+    potential_out[0] = 2.64e-05*(g_in[0]*a0.sin[3] - g_in[1]*a0.cos[3]) - g_in[2]*(3e-06*a0.cos[0] + 0.000615*a0.sin[0] + t3 + t4) - (g_in[0]*a0.cos[3] + g_in[1]*a0.sin[3])*s10;
 }

@@ -7,32 +7,33 @@
  * Cost: 9 add, 15 mul, 3 neg, 4 sincos.
  * Inputs: sha256 8b1e4049e08ada68fc0fffe59ae1b436246736a5f349d22efb157c0e2c972c0c.
  */
-#include "trig.h"
+#include "numerics.h"
+#include "sincos.h"
 #include "kernels.h"
 
-void awiwi_ring_fingertip_pose(const double q[restrict 3], double T[restrict 16])
+void awiwi_ring_fingertip_pose(const double q_in[restrict 3], double T_out[restrict 16])
 {
-    T[10] = 0.0;
-    T[12] = 0.0;
-    T[13] = 0.0;
-    T[14] = 0.0;
-    T[15] = 1.0;
-    const double t0 = q[1] + 1.7857142857142858*q[2];
-    const double t1 = q[2] + q[1];
-    const awiwi_turn4 a0 = awiwi_sincos4(t0, q[1], t1, q[0]);
-    T[9] = a0.cos[0];
-    T[8] = a0.sin[0];
+    T_out[10] = 0.0;
+    T_out[12] = 0.0;
+    T_out[13] = 0.0;
+    T_out[14] = 0.0;
+    T_out[15] = 1.0;
+    const double t0 = q_in[1] + 1.7857142857142858*q_in[2];
+    const double t1 = q_in[2] + q_in[1];
+    const awiwi_sincos4_result a0 = awiwi_sincos4(t0, q_in[1], t1, q_in[0]);
+    T_out[9] = a0.cos[0];
+    T_out[8] = a0.sin[0];
     double s2 = 0.041*a0.cos[1] + 0.0205*a0.cos[0] + 0.006;
     double s3 = 0.041*a0.sin[1] + 0.0205*a0.sin[0];
     s2 += 0.0305*a0.cos[2];
     s3 += 0.0305*a0.sin[2];
-    T[11] = s3;
-    T[6] = -a0.cos[3];
-    T[2] = a0.sin[3];
-    T[0] = a0.cos[3]*a0.cos[0];
-    T[4] = a0.sin[3]*a0.cos[0];
-    T[1] = -(a0.cos[3]*a0.sin[0]);
-    T[5] = -(a0.sin[3]*a0.sin[0]);
-    T[3] = a0.cos[3]*s2 - 0.0047*a0.sin[3];
-    T[7] = 0.0047*a0.cos[3] + a0.sin[3]*s2;
+    T_out[11] = s3;
+    T_out[6] = -a0.cos[3];
+    T_out[2] = a0.sin[3];
+    T_out[0] = a0.cos[3]*a0.cos[0];
+    T_out[4] = a0.sin[3]*a0.cos[0];
+    T_out[1] = -(a0.cos[3]*a0.sin[0]);
+    T_out[5] = -(a0.sin[3]*a0.sin[0]);
+    T_out[3] = a0.cos[3]*s2 - 0.0047*a0.sin[3];
+    T_out[7] = 0.0047*a0.cos[3] + a0.sin[3]*s2;
 }

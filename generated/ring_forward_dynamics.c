@@ -10,15 +10,16 @@
  * Cost: 94 add, 110 mul, 3 div, 1 neg, 4 sincos.
  * Inputs: sha256 d2fd8ea8122210c370a876d04ecdbc1ca49df3b198ba198458bb7b3639479b1a.
  */
-#include "trig.h"
+#include "numerics.h"
+#include "sincos.h"
 #include "kernels.h"
 
-void awiwi_ring_forward_dynamics(const double q[restrict 3], const double qd[restrict 3], const double tau[restrict 3], const double g[restrict 3], double qdd[restrict 3])
+void awiwi_ring_forward_dynamics(const double q_in[restrict 3], const double qd_in[restrict 3], const double tau_in[restrict 3], const double g_in[restrict 3], double qdd_out[restrict 3])
 {
-    double s0 = 0.7857142857142857*q[2] - 1.5415556515473878;
-    const double t1 = q[2] + q[1];
+    double s0 = 0.7857142857142857*q_in[2] - 1.5415556515473878;
+    const double t1 = q_in[2] + q_in[1];
     s0 += t1;
-    const awiwi_turn4 a0 = awiwi_sincos4(s0, q[1], t1, q[0]);
+    const awiwi_sincos4_result a0 = awiwi_sincos4(s0, q_in[1], t1, q_in[0]);
     const double t2 = 0.041*a0.cos[1];
     const double t3 = t2 + 0.006;
     const double t4 = 0.0305*a0.cos[2];
@@ -67,16 +68,16 @@ void awiwi_ring_forward_dynamics(const double q[restrict 3], const double qd[res
     const double t38 = t36*t31;
     s37 -= t36*t38;
     const double t39 = 1.0/s37;
-    const double t40 = qd[1] + qd[2];
-    const double t41 = 0.7857142857142857*qd[2] + t40;
+    const double t40 = qd_in[1] + qd_in[2];
+    const double t41 = 0.7857142857142857*qd_in[2] + t40;
     const double t42 = t41*t41;
-    const double t43 = qd[1]*qd[1];
+    const double t43 = qd_in[1]*qd_in[1];
     const double t44 = t40*t40;
-    double s45 = t42*(1.518649189246812e-07*a0.sin[0]) + tau[0] + 2.0*qd[0]*(t41*s6 + t40*s10 + qd[1]*t19);
-    const double t46 = qd[0]*qd[0];
+    double s45 = t42*(1.518649189246812e-07*a0.sin[0]) + tau_in[0] + 2.0*qd_in[0]*(t41*s6 + t40*s10 + qd_in[1]*t19);
+    const double t46 = qd_in[0]*qd_in[0];
     double s47 = t42*t27 - t46*s10;
-    double s48 = tau[1] + g[2]*t24 - t46*t19;
-    const double t49 = g[2] + t43*t26;
+    double s48 = tau_in[1] + g_in[2]*t24 - t46*t19;
+    const double t49 = g_in[2] + t43*t26;
     double s50 = t49*t11 - t46*s6 - t44*t27;
     s47 += t49*t15;
     s48 += t2*(t42*t5 + t44*t9);
@@ -85,22 +86,22 @@ void awiwi_ring_forward_dynamics(const double q[restrict 3], const double qd[res
     s45 -= t44*(6.2216e-07*a0.cos[2] - 5.44e-09*a0.sin[2]);
     const double t51 = s23*t39;
     s8 += s23*t51;
-    const double t52 = g[0]*a0.cos[3] + g[1]*a0.sin[3];
+    const double t52 = g_in[0]*a0.cos[3] + g_in[1]*a0.sin[3];
     const double t53 = t43*t2 + t52;
     s50 -= t53*t5;
     s47 += s50;
     s47 -= t53*t9;
-    const double t54 = tau[2] + 0.7857142857142857*s50 + s47;
+    const double t54 = tau_in[2] + 0.7857142857142857*s50 + s47;
     s48 += s47;
     s48 -= t14*t52;
     s48 -= t54*t38;
     s45 -= 2.64e-05*t52;
-    s45 -= (g[0]*a0.sin[3] - g[1]*a0.cos[3])*(t25 + 0.0001245);
+    s45 -= (g_in[0]*a0.sin[3] - g_in[1]*a0.cos[3])*(t25 + 0.0001245);
     s45 -= t54*t32;
     s45 -= s48*t51;
     const double t55 = s45/s8;
-    qdd[0] = -t55;
+    qdd_out[0] = -t55;
     const double t56 = s48*t39 + t51*t55;
-    qdd[1] = t56;
-    qdd[2] = t31*t54 + t32*t55 - t38*t56;
+    qdd_out[1] = t56;
+    qdd_out[2] = t31*t54 + t32*t55 - t38*t56;
 }

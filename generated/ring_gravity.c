@@ -8,24 +8,25 @@
  * Cost: 17 add, 20 mul, 4 sincos.
  * Inputs: sha256 bdbf3d4216ddd0986e54534ddc122a2523b4a4b40b48d386707d2a96cc08c710.
  */
-#include "trig.h"
+#include "numerics.h"
+#include "sincos.h"
 #include "kernels.h"
 
-void awiwi_ring_gravity(const double q[restrict 3], const double g[restrict 3], double gravity[restrict 3])
+void awiwi_ring_gravity(const double q_in[restrict 3], const double g_in[restrict 3], double gravity_out[restrict 3])
 {
-    const double t0 = q[1] - 1.5659183167054986;
-    const double t1 = q[1] + q[2];
-    double s2 = 0.7857142857142857*q[2] + t1;
+    const double t0 = q_in[1] - 1.5659183167054986;
+    const double t1 = q_in[1] + q_in[2];
+    double s2 = 0.7857142857142857*q_in[2] + t1;
     const double t3 = t1 - 1.5651037886640813;
     s2 -= 1.5485777614681775;
-    const awiwi_turn4 a0 = awiwi_sincos4(t0, t3, s2, q[0]);
+    const awiwi_sincos4_result a0 = awiwi_sincos4(t0, t3, s2, q_in[0]);
     const double t4 = 3.600888779176608e-05*a0.sin[2];
     const double t5 = 0.00021080341553210186*a0.sin[1] + t4;
     const double t6 = 0.0006150073170296432*a0.sin[0] + t5;
     const double t7 = 3.600888779176608e-05*a0.cos[2];
     const double t8 = 0.00021080341553210186*a0.cos[1] + t7;
-    const double t9 = g[0]*a0.cos[3] + g[1]*a0.sin[3];
-    gravity[0] = 2.64e-05*t9 - (g[0]*a0.sin[3] - g[1]*a0.cos[3])*(t6 - 0.0001245);
-    gravity[1] = g[2]*t6 + t9*(0.0006150073170296432*a0.cos[0] + t8);
-    gravity[2] = g[2]*t5 + t9*t8 + 0.7857142857142857*(g[2]*t4 + t9*t7);
+    const double t9 = g_in[0]*a0.cos[3] + g_in[1]*a0.sin[3];
+    gravity_out[0] = 2.64e-05*t9 - (g_in[0]*a0.sin[3] - g_in[1]*a0.cos[3])*(t6 - 0.0001245);
+    gravity_out[1] = g_in[2]*t6 + t9*(0.0006150073170296432*a0.cos[0] + t8);
+    gravity_out[2] = g_in[2]*t5 + t9*t8 + 0.7857142857142857*(g_in[2]*t4 + t9*t7);
 }

@@ -10,17 +10,18 @@
  * Cost: 82 add, 102 mul, 4 sincos.
  * Inputs: sha256 d2fd8ea8122210c370a876d04ecdbc1ca49df3b198ba198458bb7b3639479b1a.
  */
-#include "trig.h"
+#include "numerics.h"
+#include "sincos.h"
 #include "kernels.h"
 
-void awiwi_ring_inverse_dynamics(const double q[restrict 3], const double qd[restrict 3], const double qdd[restrict 3], const double g[restrict 3], double tau[restrict 3])
+void awiwi_ring_inverse_dynamics(const double q_in[restrict 3], const double qd_in[restrict 3], const double qdd_in[restrict 3], const double g_in[restrict 3], double tau_out[restrict 3])
 {
-    double s0 = 0.7857142857142857*q[2] - 1.5485777614681775;
-    const double t1 = q[2] + q[1];
+    double s0 = 0.7857142857142857*q_in[2] - 1.5485777614681775;
+    const double t1 = q_in[2] + q_in[1];
     s0 += t1;
-    const awiwi_turn4 a0 = awiwi_sincos4(q[1], t1, s0, q[0]);
-    const double t2 = 24.390243902439025*g[0];
-    const double t3 = 24.390243902439025*g[1];
+    const awiwi_sincos4_result a0 = awiwi_sincos4(q_in[1], t1, s0, q_in[0]);
+    const double t2 = 24.390243902439025*g_in[0];
+    const double t3 = 24.390243902439025*g_in[1];
     const double t4 = 2.5215e-05*a0.cos[0] - 1.23e-07*a0.sin[0];
     const double t5 = 8.6428e-06*a0.cos[1] - 4.92e-08*a0.sin[1];
     const double t6 = 1.4763643994624091e-06*a0.sin[2];
@@ -43,27 +44,27 @@ void awiwi_ring_inverse_dynamics(const double q[restrict 3], const double qd[res
     s11 += (t17 + 0.7439024390243902*a0.cos[1])*t19;
     const double t20 = 1.23e-07*a0.cos[0] + 2.5215e-05*a0.sin[0];
     s16 += 0.14634146341463414*t20;
-    const double t21 = 24.390243902439025*g[2];
-    double s22 = qdd[0]*(9.6e-09*a0.cos[0] + 1.0264e-06*a0.sin[0]) - t21*t4;
-    const double t23 = qd[1]*qd[1];
-    const double t24 = qdd[1]*a0.cos[0] - t23*a0.sin[0];
-    const double t25 = a0.cos[0]*t23 + qdd[1]*a0.sin[0];
-    double s26 = 9.6e-09*t24 + 1.0264e-06*t25 - qdd[0]*s10;
+    const double t21 = 24.390243902439025*g_in[2];
+    double s22 = qdd_in[0]*(9.6e-09*a0.cos[0] + 1.0264e-06*a0.sin[0]) - t21*t4;
+    const double t23 = qd_in[1]*qd_in[1];
+    const double t24 = qdd_in[1]*a0.cos[0] - t23*a0.sin[0];
+    const double t25 = a0.cos[0]*t23 + qdd_in[1]*a0.sin[0];
+    double s26 = 9.6e-09*t24 + 1.0264e-06*t25 - qdd_in[0]*s10;
     const double t27 = t21 - t24;
-    double s28 = qdd[0]*(5.44e-09*a0.cos[1] + 6.2216e-07*a0.sin[1]) - t27*t5;
-    s22 += 2.25034e-05*qdd[1];
-    const double t29 = qdd[1] + qdd[2];
-    const double t30 = 0.7857142857142857*qdd[2] + t29;
-    double s31 = qdd[0]*(1.5186117470838444e-07*a0.cos[2] - 1.0664033896870507e-09*a0.sin[2]) + 4.8416e-07*t30;
+    double s28 = qdd_in[0]*(5.44e-09*a0.cos[1] + 6.2216e-07*a0.sin[1]) - t27*t5;
+    s22 += 2.25034e-05*qdd_in[1];
+    const double t29 = qdd_in[1] + qdd_in[2];
+    const double t30 = 0.7857142857142857*qdd_in[2] + t29;
+    double s31 = qdd_in[0]*(1.5186117470838444e-07*a0.cos[2] - 1.0664033896870507e-09*a0.sin[2]) + 4.8416e-07*t30;
     s28 += 5.53848e-06*t29;
-    const double t32 = qd[1] + qd[2];
-    const double t33 = 0.7857142857142857*qd[2] + t32;
-    double s34 = qd[1]*s16 + t32*s14;
+    const double t32 = qd_in[1] + qd_in[2];
+    const double t33 = 0.7857142857142857*qd_in[2] + t32;
+    double s34 = qd_in[1]*s16 + t32*s14;
     const double t35 = t32*t32;
     s34 += t33*s11;
     const double t36 = t33*t33;
-    s26 -= 2.0*qd[0]*s34;
-    const double t37 = qd[0]*qd[0];
+    s26 -= 2.0*qd_in[0]*s34;
+    const double t37 = qd_in[0]*qd_in[0];
     s31 += t37*s11;
     s28 += t37*s14;
     s22 += t37*s16;
@@ -83,13 +84,13 @@ void awiwi_ring_inverse_dynamics(const double q[restrict 3], const double qd[res
     const double t43 = a0.cos[3]*t2 + t3*a0.sin[3];
     s26 += 1.0824e-06*t43;
     s26 -= (a0.cos[3]*t3 - t2*a0.sin[3])*(t8 + 5.1045e-06);
-    tau[0] = s26;
+    tau_out[0] = s26;
     const double t44 = t25 + t43;
     s31 += t19*(0.7439024390243902*t39 + t44);
     s28 += t44*t18;
     s28 += s31;
     s22 += t20*t43;
     s22 += s28;
-    tau[1] = s22;
-    tau[2] = s28 + 0.7857142857142857*s31;
+    tau_out[1] = s22;
+    tau_out[2] = s28 + 0.7857142857142857*s31;
 }

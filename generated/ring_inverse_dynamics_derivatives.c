@@ -11,17 +11,18 @@
  * Cost: 177 add, 212 mul, 4 sincos.
  * Inputs: sha256 629681b331d715cabc79e549054515e6ff19ef45f5083fc8fb3efe64fdde7fbb.
  */
-#include "trig.h"
+#include "numerics.h"
+#include "sincos.h"
 #include "kernels.h"
 
-void awiwi_ring_inverse_dynamics_derivatives(const double q[restrict 3], const double qd[restrict 3], const double qdd[restrict 3], const double g[restrict 3], double dtau_dq[restrict 9], double dtau_dqd[restrict 9])
+void awiwi_ring_inverse_dynamics_derivatives(const double q_in[restrict 3], const double qd_in[restrict 3], const double qdd_in[restrict 3], const double g_in[restrict 3], double dtau_dq_out[restrict 9], double dtau_dqd_out[restrict 9])
 {
-    double s0 = 0.7857142857142857*q[2] - 1.5415556515473878;
-    const double t1 = q[2] + q[1];
+    double s0 = 0.7857142857142857*q_in[2] - 1.5415556515473878;
+    const double t1 = q_in[2] + q_in[1];
     s0 += t1;
-    const double t2 = 32.78688524590164*g[1];
-    const double t3 = 32.78688524590164*g[0];
-    const awiwi_turn4 a0 = awiwi_sincos4(q[1], t1, s0, q[0]);
+    const double t2 = 32.78688524590164*g_in[1];
+    const double t3 = 32.78688524590164*g_in[0];
+    const awiwi_sincos4_result a0 = awiwi_sincos4(q_in[1], t1, s0, q_in[0]);
     const double t4 = 1.87575e-05*a0.cos[0] - 9.15e-08*a0.sin[0];
     const double t5 = 6.4294e-06*a0.cos[1] - 3.66e-08*a0.sin[1];
     const double t6 = 7.712116848927218e-09*a0.cos[2] - 1.0982439998714806e-06*a0.sin[2];
@@ -62,15 +63,15 @@ void awiwi_ring_inverse_dynamics_derivatives(const double q[restrict 3], const d
     s30 -= t34;
     const double t35 = t32*t12 + a0.sin[1]*t22 + 1.176e-08;
     const double t36 = 1.518649189246812e-07*a0.sin[2];
-    double s37 = qdd[0]*s20 + qdd[1]*t9;
-    const double t38 = qdd[1] + qdd[2];
-    const double t39 = 0.7857142857142857*qdd[2] + t38;
+    double s37 = qdd_in[0]*s20 + qdd_in[1]*t9;
+    const double t38 = qdd_in[1] + qdd_in[2];
+    const double t39 = 0.7857142857142857*qdd_in[2] + t38;
     s37 -= t39*t36;
     const double t40 = a0.cos[3]*t2 - t3*a0.sin[3];
     const double t41 = a0.cos[3]*t3 + t2*a0.sin[3];
-    dtau_dq[0] = t41*(t4 + t7 + 3.79725e-06) + 8.052e-07*t40;
+    dtau_dq_out[0] = t41*(t4 + t7 + 3.79725e-06) + 8.052e-07*t40;
     s37 += t40*t15;
-    double s42 = t4*t41 + qdd[0]*t9;
+    double s42 = t4*t41 + qdd_in[0]*t9;
     const double t43 = 1.961149999770501e-06*a0.cos[2] + 1.3771637230227176e-08*a0.sin[2];
     const double t44 = t18 + t43;
     const double t45 = a0.sin[1]*t44 - t34;
@@ -85,14 +86,14 @@ void awiwi_ring_inverse_dynamics_derivatives(const double q[restrict 3], const d
     double s51 = t33*t13 - 7.765062493990363e-09;
     const double t52 = 2.71187355222645e-07*a0.sin[2];
     s24 += (2.6885245901639343*a0.cos[0] + 0.39344262295081966)*t46;
-    double s53 = t40*t46 - t39*t52 - qdd[0]*s24;
-    const double t54 = qd[1] + qd[2];
-    const double t55 = 0.7857142857142857*qd[2] + t54;
+    double s53 = t40*t46 - t39*t52 - qdd_in[0]*s24;
+    const double t54 = qd_in[1] + qd_in[2];
+    const double t55 = 0.7857142857142857*qd_in[2] + t54;
     const double t56 = t54*t54;
     const double t57 = t38*t10 - t56*(5.44e-09*a0.cos[1] + 6.2216e-07*a0.sin[1]);
     s37 += t57;
     s53 += t57;
-    const double t58 = qd[1]*qd[1];
+    const double t58 = qd_in[1]*qd_in[1];
     s37 -= t58*(9.6e-09*a0.cos[0] + 1.0264e-06*a0.sin[0]);
     const double t59 = t55*t55;
     const double t60 = a0.cos[2]*t59;
@@ -100,19 +101,19 @@ void awiwi_ring_inverse_dynamics_derivatives(const double q[restrict 3], const d
     s53 -= 2.71187355222645e-07*t60;
     const double t61 = t40*t13;
     const double t62 = t40*t12 + t61;
-    dtau_dq[3] = t11*t40 + t62;
-    dtau_dq[6] = t62 + 0.7857142857142857*t61;
-    const double t63 = 32.78688524590164*g[2];
+    dtau_dq_out[3] = t11*t40 + t62;
+    dtau_dq_out[6] = t62 + 0.7857142857142857*t61;
+    const double t63 = 32.78688524590164*g_in[2];
     s42 += t63*t11;
-    const double t64 = qdd[1]*t31 - t58*t29;
+    const double t64 = qdd_in[1]*t31 - t58*t29;
     const double t65 = t63 - t64;
-    const double t66 = qdd[1]*t29 + t58*t31;
+    const double t66 = qdd_in[1]*t29 + t58*t31;
     const double t67 = t41 + t66;
-    const double t68 = qdd[0]*t10 + t12*t65 + t5*t67;
+    const double t68 = qdd_in[0]*t10 + t12*t65 + t5*t67;
     const double t69 = t38*a0.sin[1] + a0.cos[1]*t56;
     const double t70 = t67 + t69;
-    double s71 = qdd[0]*t52 + t69*t6;
-    double s72 = qdd[0]*t36 + t6*(t69 + t66 - t70);
+    double s71 = qdd_in[0]*t52 + t69*t6;
+    double s72 = qdd_in[0]*t36 + t6*(t69 + t66 - t70);
     double s73 = t12*t64 - t5*t66;
     s73 += t68;
     s71 -= t50*t70;
@@ -127,45 +128,45 @@ void awiwi_ring_inverse_dynamics_derivatives(const double q[restrict 3], const d
     s78 -= t59*t13;
     double s79 = t68 + a0.cos[1]*(t39*t13 + t59*t6 - t77) - a0.sin[1]*s78;
     double s80 = t29*(t38*t5 + t76 - t56*t12) - t31*(t38*t12 + t56*t5 + t77);
-    const double t81 = 2.0*qd[0];
-    s37 += t81*(t55*s21 + t54*s30 - qd[1]*s26);
-    dtau_dq[1] = s37;
-    s53 += t81*(qd[1]*t47 + t55*s49 + t54*t45);
-    dtau_dq[2] = s53;
-    const double t82 = qd[0]*qd[0];
+    const double t81 = 2.0*qd_in[0];
+    s37 += t81*(t55*s21 + t54*s30 - qd_in[1]*s26);
+    dtau_dq_out[1] = s37;
+    s53 += t81*(qd_in[1]*t47 + t55*s49 + t54*t45);
+    dtau_dq_out[2] = s53;
+    const double t82 = qd_in[0]*qd_in[0];
     s72 += t82*s21;
     s73 -= s72;
     s73 -= t82*s30;
     s42 += s73;
     s42 += t82*s26;
-    dtau_dq[4] = s42;
+    dtau_dq_out[4] = s42;
     s71 += t82*s49;
     s79 -= s71;
     s79 -= t82*t45;
     s80 += s79;
     s80 -= t82*t47;
-    dtau_dq[5] = s80;
-    dtau_dq[7] = s73 - 0.7857142857142857*s72;
-    dtau_dq[8] = s79 - 0.7857142857142857*s71;
+    dtau_dq_out[5] = s80;
+    dtau_dq_out[7] = s73 - 0.7857142857142857*s72;
+    dtau_dq_out[8] = s79 - 0.7857142857142857*s71;
     s51 += a0.cos[2]*(1.5530124987980726e-08*a0.cos[2] - 4.43189948913395e-07*a0.sin[2]);
     const double t83 = t55*a0.sin[2];
-    double s84 = 2.0*qd[1]*t9 - 3.037298378493624e-07*t83;
-    dtau_dqd[0] = -2.0*(t55*s51 + t54*t35 + qd[1]*t28);
+    double s84 = 2.0*qd_in[1]*t9 - 3.037298378493624e-07*t83;
+    dtau_dqd_out[0] = -2.0*(t55*s51 + t54*t35 + qd_in[1]*t28);
     const double t85 = 2.0*t54;
     const double t86 = t85*t10;
     s84 += t86;
     double s87 = t86 - 5.4237471044529e-07*t83;
-    const double t88 = 2.6885245901639343*qd[1];
+    const double t88 = 2.6885245901639343*qd_in[1];
     const double t89 = a0.cos[0]*t88;
     const double t90 = t88*a0.sin[0];
     const double t91 = s51 + t35;
     s87 -= t81*(t35 + 1.7857142857142858*s51);
-    dtau_dqd[2] = s87;
+    dtau_dqd_out[2] = s87;
     s84 -= t81*(t91 + t28);
-    dtau_dqd[1] = s84;
+    dtau_dqd_out[1] = s84;
     const double t92 = t81*t91;
-    dtau_dqd[3] = t81*t28 + t92;
-    dtau_dqd[6] = 1.5714285714285714*qd[0]*s51 + t92;
+    dtau_dqd_out[3] = t81*t28 + t92;
+    dtau_dqd_out[6] = 1.5714285714285714*qd_in[0]*s51 + t92;
     const double t93 = t85*t5;
     double s94 = t89*t12 - t90*t5;
     const double t95 = t85*t12;
@@ -181,10 +182,10 @@ void awiwi_ring_inverse_dynamics_derivatives(const double q[restrict 3], const d
     const double t103 = t99*t13 - t98*t6;
     const double t104 = t103 - 3.5714285714285716*t101;
     double s105 = t29*(t93 + 3.5714285714285716*t96) + t104;
-    dtau_dqd[7] = 0.7857142857142857*t100 + s94;
-    dtau_dqd[8] = 0.7857142857142857*t103 + t104;
+    dtau_dqd_out[7] = 0.7857142857142857*t100 + s94;
+    dtau_dqd_out[8] = 0.7857142857142857*t103 + t104;
     s102 -= t31*(t95 + 2.0*t97);
-    dtau_dqd[4] = s102;
+    dtau_dqd_out[4] = s102;
     s105 -= t31*(t95 + 3.5714285714285716*t97);
-    dtau_dqd[5] = s105;
+    dtau_dqd_out[5] = s105;
 }

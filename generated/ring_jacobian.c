@@ -7,36 +7,37 @@
  * Cost: 11 add, 19 mul, 1 neg, 4 sincos.
  * Inputs: sha256 090304d03fe3bc2a4f7fd1fcdca40644c253e343cce00255c91570f1ebc31845.
  */
-#include "trig.h"
+#include "numerics.h"
+#include "sincos.h"
 #include "kernels.h"
 
-void awiwi_ring_jacobian(const double q[restrict 3], double J[restrict 18])
+void awiwi_ring_jacobian(const double q_in[restrict 3], double J_out[restrict 18])
 {
-    J[6] = 0.0;
-    J[9] = 0.0;
-    J[12] = 0.0;
-    J[16] = 0.0;
-    J[17] = 0.0;
-    J[15] = 1.0;
-    const double t0 = q[1] + q[2];
-    const double t1 = 0.7857142857142857*q[2] + t0;
-    const awiwi_turn4 a0 = awiwi_sincos4(q[1], t0, t1, q[0]);
+    J_out[6] = 0.0;
+    J_out[9] = 0.0;
+    J_out[12] = 0.0;
+    J_out[16] = 0.0;
+    J_out[17] = 0.0;
+    J_out[15] = 1.0;
+    const double t0 = q_in[1] + q_in[2];
+    const double t1 = 0.7857142857142857*q_in[2] + t0;
+    const awiwi_sincos4_result a0 = awiwi_sincos4(q_in[1], t0, t1, q_in[0]);
     const double t2 = 0.0305*a0.cos[1] + 0.0205*a0.cos[2];
     const double t3 = 0.041*a0.cos[0] + t2;
-    J[7] = t3;
+    J_out[7] = t3;
     const double t4 = t3 + 0.006;
     const double t5 = -0.0205*a0.sin[2] - 0.0305*a0.sin[1];
     const double t6 = t5 - 0.041*a0.sin[0];
     const double t7 = t5 - 0.016107142857142858*a0.sin[2];
-    J[8] = 0.016107142857142858*a0.cos[2] + t2;
-    J[13] = -a0.cos[3];
-    J[10] = a0.sin[3];
-    J[0] = -0.0047*a0.cos[3] - a0.sin[3]*t4;
-    J[3] = a0.cos[3]*t4 - 0.0047*a0.sin[3];
-    J[1] = a0.cos[3]*t6;
-    J[4] = a0.sin[3]*t6;
-    J[2] = a0.cos[3]*t7;
-    J[5] = a0.sin[3]*t7;
-    J[11] = 1.7857142857142858*a0.sin[3];
-    J[14] = -1.7857142857142858*a0.cos[3];
+    J_out[8] = 0.016107142857142858*a0.cos[2] + t2;
+    J_out[13] = -a0.cos[3];
+    J_out[10] = a0.sin[3];
+    J_out[0] = -0.0047*a0.cos[3] - a0.sin[3]*t4;
+    J_out[3] = a0.cos[3]*t4 - 0.0047*a0.sin[3];
+    J_out[1] = a0.cos[3]*t6;
+    J_out[4] = a0.sin[3]*t6;
+    J_out[2] = a0.cos[3]*t7;
+    J_out[5] = a0.sin[3]*t7;
+    J_out[11] = 1.7857142857142858*a0.sin[3];
+    J_out[14] = -1.7857142857142858*a0.cos[3];
 }

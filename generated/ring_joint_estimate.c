@@ -8,14 +8,15 @@
  * Cost: 5 add, 3 mul.
  * Inputs: sha256 28ad353a97337f26dcc9bae727dad212a7fb7054d6d26854d14ab7e582c013de.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-void awiwi_ring_joint_estimate(const double h[restrict 6], const double start[restrict 3], double q[restrict 3])
+void awiwi_ring_joint_estimate(const double h_in[restrict 6], const double start_in[restrict 3], double q_out[restrict 3])
 {
-    (void)start;
-    const double t0 = h[0] - h[3];
-    const double t1 = h[1] - h[2];
-    q[0] = 27.77777777777778*(t0 + t1);
-    q[1] = 38.46153846153846*(t0 - t1);
-    q[2] = 90.9090909090909*(h[4] - h[5]);
+    (void)start_in;
+    const double t0 = h_in[0] - h_in[3];
+    const double t1 = h_in[1] - h_in[2];
+    q_out[0] = 27.77777777777778*(t0 + t1);
+    q_out[1] = 38.46153846153846*(t0 - t1);
+    q_out[2] = 90.9090909090909*(h_in[4] - h_in[5]);
 }

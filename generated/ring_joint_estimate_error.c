@@ -10,22 +10,23 @@
  * Cost: 7 mul.
  * Inputs: sha256 f80c5937d3fb31c3c493cc21c311bbee377d7e4a85c9442b26bfcff48d3c3dd6.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-void awiwi_ring_joint_estimate_error(const double q[restrict 3], const double noise[restrict 1], double covariance[restrict 9], double worst[restrict 3])
+void awiwi_ring_joint_estimate_error(const double q_in[restrict 3], const double noise_in[restrict 1], double covariance_out[restrict 9], double worst_out[restrict 3])
 {
-    (void)q;
-    covariance[1] = 0.0;
-    covariance[2] = 0.0;
-    covariance[3] = 0.0;
-    covariance[5] = 0.0;
-    covariance[6] = 0.0;
-    covariance[7] = 0.0;
-    const double t0 = noise[0]*noise[0];
-    covariance[0] = 3086.41975308642*t0;
-    covariance[4] = 5917.15976331361*t0;
-    covariance[8] = 16528.92561983471*t0;
-    worst[0] = 111.11111111111111*noise[0];
-    worst[1] = 153.84615384615384*noise[0];
-    worst[2] = 181.8181818181818*noise[0];
+    (void)q_in;
+    covariance_out[1] = 0.0;
+    covariance_out[2] = 0.0;
+    covariance_out[3] = 0.0;
+    covariance_out[5] = 0.0;
+    covariance_out[6] = 0.0;
+    covariance_out[7] = 0.0;
+    const double t0 = noise_in[0]*noise_in[0];
+    covariance_out[0] = 3086.41975308642*t0;
+    covariance_out[4] = 5917.15976331361*t0;
+    covariance_out[8] = 16528.92561983471*t0;
+    worst_out[0] = 111.11111111111111*noise_in[0];
+    worst_out[1] = 153.84615384615384*noise_in[0];
+    worst_out[2] = 181.8181818181818*noise_in[0];
 }

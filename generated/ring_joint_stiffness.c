@@ -9,23 +9,24 @@
  * Cost: 5 add, 4 mul.
  * Inputs: sha256 f80c5937d3fb31c3c493cc21c311bbee377d7e4a85c9442b26bfcff48d3c3dd6.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-void awiwi_ring_joint_stiffness(const double q[restrict 3], const double f[restrict 6], const double k[restrict 6], double K[restrict 9])
+void awiwi_ring_joint_stiffness(const double q_in[restrict 3], const double f_in[restrict 6], const double k_in[restrict 6], double K_out[restrict 9])
 {
-    (void)q;
-    (void)f;
-    K[2] = 0.0;
-    K[5] = 0.0;
-    K[6] = 0.0;
-    K[7] = 0.0;
-    const double t0 = k[0] + k[3];
-    const double t1 = k[1] + k[2];
+    (void)q_in;
+    (void)f_in;
+    K_out[2] = 0.0;
+    K_out[5] = 0.0;
+    K_out[6] = 0.0;
+    K_out[7] = 0.0;
+    const double t0 = k_in[0] + k_in[3];
+    const double t1 = k_in[1] + k_in[2];
     const double t2 = t0 + t1;
     const double t3 = 5.85e-05*(t0 - t1);
-    K[1] = t3;
-    K[3] = t3;
-    K[0] = 8.1e-05*t2;
-    K[4] = 4.225e-05*t2;
-    K[8] = 3.025e-05*(k[4] + k[5]);
+    K_out[1] = t3;
+    K_out[3] = t3;
+    K_out[0] = 8.1e-05*t2;
+    K_out[4] = 4.225e-05*t2;
+    K_out[8] = 3.025e-05*(k_in[4] + k_in[5]);
 }

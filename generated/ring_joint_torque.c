@@ -8,14 +8,15 @@
  * Cost: 5 add, 3 mul.
  * Inputs: sha256 f80c5937d3fb31c3c493cc21c311bbee377d7e4a85c9442b26bfcff48d3c3dd6.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-void awiwi_ring_joint_torque(const double q[restrict 3], const double f[restrict 6], double tau[restrict 3])
+void awiwi_ring_joint_torque(const double q_in[restrict 3], const double f_in[restrict 6], double tau_out[restrict 3])
 {
-    (void)q;
-    const double t0 = f[0] - f[3];
-    const double t1 = f[1] - f[2];
-    tau[0] = -0.009*(t0 + t1);
-    tau[1] = -0.0065*(t0 - t1);
-    tau[2] = -0.0055*(f[4] - f[5]);
+    (void)q_in;
+    const double t0 = f_in[0] - f_in[3];
+    const double t1 = f_in[1] - f_in[2];
+    tau_out[0] = -0.009*(t0 + t1);
+    tau_out[1] = -0.0065*(t0 - t1);
+    tau_out[2] = -0.0055*(f_in[4] - f_in[5]);
 }

@@ -10,27 +10,28 @@
  * Cost: 10 add, 7 mul.
  * Inputs: sha256 f80c5937d3fb31c3c493cc21c311bbee377d7e4a85c9442b26bfcff48d3c3dd6.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-void awiwi_ring_joint_torque_and_stiffness(const double q[restrict 3], const double f[restrict 6], const double k[restrict 6], double tau[restrict 3], double K[restrict 9])
+void awiwi_ring_joint_torque_and_stiffness(const double q_in[restrict 3], const double f_in[restrict 6], const double k_in[restrict 6], double tau_out[restrict 3], double K_out[restrict 9])
 {
-    (void)q;
-    K[2] = 0.0;
-    K[5] = 0.0;
-    K[6] = 0.0;
-    K[7] = 0.0;
-    const double t0 = f[0] - f[3];
-    const double t1 = f[1] - f[2];
-    tau[0] = -0.009*(t0 + t1);
-    tau[1] = -0.0065*(t0 - t1);
-    tau[2] = -0.0055*(f[4] - f[5]);
-    const double t2 = k[0] + k[3];
-    const double t3 = k[1] + k[2];
+    (void)q_in;
+    K_out[2] = 0.0;
+    K_out[5] = 0.0;
+    K_out[6] = 0.0;
+    K_out[7] = 0.0;
+    const double t0 = f_in[0] - f_in[3];
+    const double t1 = f_in[1] - f_in[2];
+    tau_out[0] = -0.009*(t0 + t1);
+    tau_out[1] = -0.0065*(t0 - t1);
+    tau_out[2] = -0.0055*(f_in[4] - f_in[5]);
+    const double t2 = k_in[0] + k_in[3];
+    const double t3 = k_in[1] + k_in[2];
     const double t4 = t2 + t3;
     const double t5 = 5.85e-05*(t2 - t3);
-    K[1] = t5;
-    K[3] = t5;
-    K[0] = 8.1e-05*t4;
-    K[4] = 4.225e-05*t4;
-    K[8] = 3.025e-05*(k[4] + k[5]);
+    K_out[1] = t5;
+    K_out[3] = t5;
+    K_out[0] = 8.1e-05*t4;
+    K_out[4] = 4.225e-05*t4;
+    K_out[8] = 3.025e-05*(k_in[4] + k_in[5]);
 }

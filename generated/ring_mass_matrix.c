@@ -7,15 +7,16 @@
  * Cost: 37 add, 35 mul, 3 sincos.
  * Inputs: sha256 d2fd8ea8122210c370a876d04ecdbc1ca49df3b198ba198458bb7b3639479b1a.
  */
-#include "trig.h"
+#include "numerics.h"
+#include "sincos.h"
 #include "kernels.h"
 
-void awiwi_ring_mass_matrix(const double q[restrict 3], double M[restrict 9])
+void awiwi_ring_mass_matrix(const double q_in[restrict 3], double M_out[restrict 9])
 {
-    double s0 = 0.7857142857142857*q[2] - 1.5485777614681775;
-    const double t1 = q[2] + q[1];
+    double s0 = 0.7857142857142857*q_in[2] - 1.5485777614681775;
+    const double t1 = q_in[2] + q_in[1];
     s0 += t1;
-    const awiwi_turn3 a0 = awiwi_sincos3(t1, s0, q[1]);
+    const awiwi_sincos3_result a0 = awiwi_sincos3(t1, s0, q_in[1]);
     double s2 = a0.cos[0]*(5.463e-06*a0.cos[0] - 2.352e-08*a0.sin[0] - 2.1965421552977306e-06*a0.sin[1]) + 2.856295978849227e-06;
     const double t3 = 8.6428e-06*a0.cos[0] - 4.92e-08*a0.sin[0];
     const double t4 = 1.4763643994624091e-06*a0.sin[1];
@@ -27,25 +28,25 @@ void awiwi_ring_mass_matrix(const double q[restrict 3], double M[restrict 9])
     double s8 = 9.6e-09*a0.cos[2] + 1.0264e-06*a0.sin[2];
     double s9 = a0.cos[2]*t3 + t7;
     s2 -= a0.cos[1]*(4.4336434353405724e-07*a0.cos[1] + 9.304540967423494e-09*a0.sin[1]);
-    M[0] = s2;
+    M_out[0] = s2;
     const double t10 = 1.5186117470838444e-07*a0.cos[1] - 1.0664033896870507e-09*a0.sin[1];
     const double t11 = 1.0982710776488653e-06*(a0.cos[0]*a0.sin[1] - a0.sin[0]*a0.cos[1]);
     const double t12 = 5.44e-09*a0.cos[0] + 6.2216e-07*a0.sin[0] + t10;
     s8 += t12;
-    M[1] = s8;
-    M[3] = s8;
+    M_out[1] = s8;
+    M_out[3] = s8;
     const double t13 = t12 + 0.7857142857142857*t10;
-    M[2] = t13;
-    M[6] = t13;
+    M_out[2] = t13;
+    M_out[6] = t13;
     s9 += a0.sin[2]*(4.92e-08*a0.cos[0] + 8.6428e-06*a0.sin[0]);
     const double t14 = t11 - 4.8416e-07;
     const double t15 = 5.53848e-06 - t11 - t14;
     double s16 = t15 - 1.5714285714285714*t14;
     const double t17 = t15 + s9;
-    M[4] = s9 + t17 + 2.25034e-05;
+    M_out[4] = s9 + t17 + 2.25034e-05;
     const double t18 = 0.7857142857142857*(t7 - t14) + t17;
-    M[5] = t18;
-    M[7] = t18;
+    M_out[5] = t18;
+    M_out[7] = t18;
     s16 += 2.9889469387755104e-07;
-    M[8] = s16;
+    M_out[8] = s16;
 }

@@ -11,14 +11,15 @@
  * Cost: 12 add, 6 mul.
  * Inputs: sha256 733381195cc7c1343549d4f52052b01d77dd4a2a44892029cf344e9fffe056d7.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-void awiwi_ring_measured_lengths(const double theta[restrict 6], const double x[restrict 6], const double w[restrict 6], double h[restrict 6])
+void awiwi_ring_measured_lengths(const double theta_in[restrict 6], const double x_in[restrict 6], const double w_in[restrict 6], double h_out[restrict 6])
 {
-    h[0] = x[0] - w[0] - 0.004*theta[0];
-    h[1] = x[1] - w[1] - 0.004*theta[1];
-    h[2] = x[2] - w[2] - 0.004*theta[2];
-    h[3] = x[3] - w[3] - 0.004*theta[3];
-    h[4] = x[4] - w[4] - 0.004*theta[4];
-    h[5] = x[5] - w[5] - 0.004*theta[5];
+    h_out[0] = x_in[0] - w_in[0] - 0.004*theta_in[0];
+    h_out[1] = x_in[1] - w_in[1] - 0.004*theta_in[1];
+    h_out[2] = x_in[2] - w_in[2] - 0.004*theta_in[2];
+    h_out[3] = x_in[3] - w_in[3] - 0.004*theta_in[3];
+    h_out[4] = x_in[4] - w_in[4] - 0.004*theta_in[4];
+    h_out[5] = x_in[5] - w_in[5] - 0.004*theta_in[5];
 }

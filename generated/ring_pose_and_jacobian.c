@@ -8,54 +8,55 @@
  * Cost: 11 add, 23 mul, 6 neg, 4 sincos.
  * Inputs: sha256 8b1e4049e08ada68fc0fffe59ae1b436246736a5f349d22efb157c0e2c972c0c.
  */
-#include "trig.h"
+#include "numerics.h"
+#include "sincos.h"
 #include "kernels.h"
 
-void awiwi_ring_pose_and_jacobian(const double q[restrict 3], double T[restrict 16], double J[restrict 18])
+void awiwi_ring_pose_and_jacobian(const double q_in[restrict 3], double T_out[restrict 16], double J_out[restrict 18])
 {
-    T[10] = 0.0;
-    T[12] = 0.0;
-    T[13] = 0.0;
-    T[14] = 0.0;
-    J[6] = 0.0;
-    J[9] = 0.0;
-    J[12] = 0.0;
-    J[16] = 0.0;
-    J[17] = 0.0;
-    T[15] = 1.0;
-    J[15] = 1.0;
-    const double t0 = q[1] + q[2];
-    const double t1 = 0.7857142857142857*q[2] + t0;
-    const awiwi_turn4 a0 = awiwi_sincos4(t1, q[1], t0, q[0]);
-    T[9] = a0.cos[0];
-    T[8] = a0.sin[0];
+    T_out[10] = 0.0;
+    T_out[12] = 0.0;
+    T_out[13] = 0.0;
+    T_out[14] = 0.0;
+    J_out[6] = 0.0;
+    J_out[9] = 0.0;
+    J_out[12] = 0.0;
+    J_out[16] = 0.0;
+    J_out[17] = 0.0;
+    T_out[15] = 1.0;
+    J_out[15] = 1.0;
+    const double t0 = q_in[1] + q_in[2];
+    const double t1 = 0.7857142857142857*q_in[2] + t0;
+    const awiwi_sincos4_result a0 = awiwi_sincos4(t1, q_in[1], t0, q_in[0]);
+    T_out[9] = a0.cos[0];
+    T_out[8] = a0.sin[0];
     const double t2 = 0.0305*a0.cos[2] + 0.0205*a0.cos[0];
     const double t3 = 0.041*a0.cos[1] + t2;
-    J[7] = t3;
+    J_out[7] = t3;
     const double t4 = t3 + 0.006;
     const double t5 = -0.0305*a0.sin[2] + -0.0205*a0.sin[0];
     const double t6 = -0.041*a0.sin[1] + t5;
-    T[11] = -t6;
+    T_out[11] = -t6;
     const double t7 = t5 - 0.016107142857142858*a0.sin[0];
-    J[8] = t2 + 0.016107142857142858*a0.cos[0];
-    T[6] = -a0.cos[3];
-    J[13] = -a0.cos[3];
-    T[2] = a0.sin[3];
-    J[10] = a0.sin[3];
-    T[0] = a0.cos[3]*a0.cos[0];
-    T[4] = a0.sin[3]*a0.cos[0];
-    T[1] = -(a0.cos[3]*a0.sin[0]);
-    T[5] = -(a0.sin[3]*a0.sin[0]);
+    J_out[8] = t2 + 0.016107142857142858*a0.cos[0];
+    T_out[6] = -a0.cos[3];
+    J_out[13] = -a0.cos[3];
+    T_out[2] = a0.sin[3];
+    J_out[10] = a0.sin[3];
+    T_out[0] = a0.cos[3]*a0.cos[0];
+    T_out[4] = a0.sin[3]*a0.cos[0];
+    T_out[1] = -(a0.cos[3]*a0.sin[0]);
+    T_out[5] = -(a0.sin[3]*a0.sin[0]);
     const double t8 = a0.cos[3]*t4 - 0.0047*a0.sin[3];
-    T[3] = t8;
-    J[3] = t8;
+    T_out[3] = t8;
+    J_out[3] = t8;
     const double t9 = a0.sin[3]*t4 + 0.0047*a0.cos[3];
-    T[7] = t9;
-    J[0] = -t9;
-    J[1] = a0.cos[3]*t6;
-    J[4] = a0.sin[3]*t6;
-    J[2] = a0.cos[3]*t7;
-    J[5] = a0.sin[3]*t7;
-    J[11] = 1.7857142857142858*a0.sin[3];
-    J[14] = -1.7857142857142858*a0.cos[3];
+    T_out[7] = t9;
+    J_out[0] = -t9;
+    J_out[1] = a0.cos[3]*t6;
+    J_out[4] = a0.sin[3]*t6;
+    J_out[2] = a0.cos[3]*t7;
+    J_out[5] = a0.sin[3]*t7;
+    J_out[11] = 1.7857142857142858*a0.sin[3];
+    J_out[14] = -1.7857142857142858*a0.cos[3];
 }

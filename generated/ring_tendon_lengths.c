@@ -7,19 +7,20 @@
  * Cost: 2 add, 3 mul, 3 neg.
  * Inputs: sha256 28ad353a97337f26dcc9bae727dad212a7fb7054d6d26854d14ab7e582c013de.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-void awiwi_ring_tendon_lengths(const double q[restrict 3], double h[restrict 6])
+void awiwi_ring_tendon_lengths(const double q_in[restrict 3], double h_out[restrict 6])
 {
-    const double t0 = 0.009*q[0];
-    const double t1 = 0.0065*q[1];
+    const double t0 = 0.009*q_in[0];
+    const double t1 = 0.0065*q_in[1];
     const double t2 = t0 + t1;
-    h[0] = t2;
-    h[3] = -t2;
+    h_out[0] = t2;
+    h_out[3] = -t2;
     const double t3 = t0 - t1;
-    h[1] = t3;
-    h[2] = -t3;
-    const double t4 = 0.0055*q[2];
-    h[4] = t4;
-    h[5] = -t4;
+    h_out[1] = t3;
+    h_out[2] = -t3;
+    const double t4 = 0.0055*q_in[2];
+    h_out[4] = t4;
+    h_out[5] = -t4;
 }

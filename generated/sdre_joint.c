@@ -18,17 +18,18 @@
  * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
  * Cost: at most 1 times that of secant_stiffness and pole_placement_law, and the solver's own.
  */
+#include "numerics.h"
 #include "awiwi_regulators.h"
 #include "kernels.h"
 
-int awiwi_sdre_joint(const double m[restrict 1], const double b[restrict 1], const double dq[restrict 1], const double dtheta[restrict 1], const double spring[restrict 3], const double weights[restrict 4], const double R[restrict 1], const double K_last[restrict 4], const double x[restrict 4], const double x_des[restrict 4], double K[restrict 4], double u[restrict 1])
+int awiwi_sdre_joint(const double m_in[restrict 1], const double b_in[restrict 1], const double dq_in[restrict 1], const double dtheta_in[restrict 1], const double spring_in[restrict 3], const double weights_in[restrict 4], const double R_in[restrict 1], const double K_last_in[restrict 4], const double x_in[restrict 4], const double x_des_in[restrict 4], double K_out[restrict 4], double u_out[restrict 1])
 {
-    const awiwi_real deflexion[1] = {x[2] - x[0]}, wanted[1] = {x_des[2] - x_des[0]};
+    const awiwi_real deflexion[1] = {x_in[2] - x_in[0]}, wanted[1] = {x_des_in[2] - x_des_in[0]};
     awiwi_real k[1], hold[1];
 
-    awiwi_secant_stiffness(spring, deflexion, wanted, k, hold);
-    const awiwi_joint joint = {m[0], b[0], k[0], dq[0], dtheta[0]};
-    const int status = awiwi_joint_gains(&joint, weights, R[0], K_last, 32, K);
-    awiwi_pole_placement_law(K, x, x_des, hold, u);
-    return awiwi_refuse(status, u, 1);
+    awiwi_secant_stiffness(spring_in, deflexion, wanted, k, hold);
+    const awiwi_joint joint = {m_in[0], b_in[0], k[0], dq_in[0], dtheta_in[0]};
+    const int status = awiwi_joint_gains(&joint, weights_in, R_in[0], K_last_in, 32, K_out);
+    awiwi_pole_placement_law(K_out, x_in, x_des_in, hold, u_out);
+    return awiwi_refuse(status, u_out, 1);
 }

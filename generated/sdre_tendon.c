@@ -18,24 +18,25 @@
  * Cost: 12 add, 18 mul, 2 div, 2 neg, 2 sqrt.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
+#include "numerics.h"
 #include <math.h>
 #include "kernels.h"
 
-int awiwi_sdre_tendon(const double theta[restrict 1], const double thd[restrict 1], const double theta_des[restrict 1], const double b[restrict 1], const double dtheta[restrict 1], const double spring[restrict 3], const double weights[restrict 2], const double R[restrict 1], double K[restrict 2], double u[restrict 1])
+int awiwi_sdre_tendon(const double theta_in[restrict 1], const double thd_in[restrict 1], const double theta_des_in[restrict 1], const double b_in[restrict 1], const double dtheta_in[restrict 1], const double spring_in[restrict 3], const double weights_in[restrict 2], const double R_in[restrict 1], double K_out[restrict 2], double u_out[restrict 1])
 {
-    const double t0 = 1.0/b[0];
-    const double t1 = 1.0/(R[0]*(b[0]*b[0]));
-    const double t2 = dtheta[0]*t0;
-    double s3 = weights[1]*t1 + t2*t2;
-    const double t4 = spring[1] + spring[2]*theta_des[0];
-    const double t5 = spring[0] + theta_des[0]*t4;
-    const double t6 = t0*(theta[0]*(t4 + spring[2]*theta[0]) + t5);
-    const double t7 = t6 - sqrt(weights[0]*t1 + t6*t6);
+    const double t0 = 1.0/b_in[0];
+    const double t1 = 1.0/(R_in[0]*(b_in[0]*b_in[0]));
+    const double t2 = dtheta_in[0]*t0;
+    double s3 = weights_in[1]*t1 + t2*t2;
+    const double t4 = spring_in[1] + spring_in[2]*theta_des_in[0];
+    const double t5 = spring_in[0] + theta_des_in[0]*t4;
+    const double t6 = t0*(theta_in[0]*(t4 + spring_in[2]*theta_in[0]) + t5);
+    const double t7 = t6 - sqrt(weights_in[0]*t1 + t6*t6);
     s3 -= 2.0*t7;
-    const double t8 = b[0]*t7;
-    K[0] = -t8;
-    const double t9 = b[0]*(t2 - sqrt(s3));
-    K[1] = -t9;
-    u[0] = theta_des[0]*t5 + (theta[0] - theta_des[0])*t8 + thd[0]*t9;
-    return b[0] > 0.0 && R[0] > 0.0 && weights[0] > 0.0 && weights[1] > 0.0 ? 0 : 1;
+    const double t8 = b_in[0]*t7;
+    K_out[0] = -t8;
+    const double t9 = b_in[0]*(t2 - sqrt(s3));
+    K_out[1] = -t9;
+    u_out[0] = theta_des_in[0]*t5 + (theta_in[0] - theta_des_in[0])*t8 + thd_in[0]*t9;
+    return b_in[0] > 0.0 && R_in[0] > 0.0 && weights_in[0] > 0.0 && weights_in[1] > 0.0 ? 0 : 1;
 }

@@ -10,12 +10,13 @@
  * Cost: 4 add, 5 mul.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-void awiwi_secant_stiffness(const double spring[restrict 3], const double deflexion[restrict 1], const double deflexion_des[restrict 1], double k[restrict 1], double torque[restrict 1])
+void awiwi_secant_stiffness(const double spring_in[restrict 3], const double deflexion_in[restrict 1], const double deflexion_des_in[restrict 1], double k_out[restrict 1], double torque_out[restrict 1])
 {
-    const double t0 = spring[1] + deflexion_des[0]*spring[2];
-    const double t1 = spring[0] + deflexion_des[0]*t0;
-    k[0] = deflexion[0]*(t0 + deflexion[0]*spring[2]) + t1;
-    torque[0] = deflexion_des[0]*t1;
+    const double t0 = spring_in[1] + deflexion_des_in[0]*spring_in[2];
+    const double t1 = spring_in[0] + deflexion_des_in[0]*t0;
+    k_out[0] = deflexion_in[0]*(t0 + deflexion_in[0]*spring_in[2]) + t1;
+    torque_out[0] = deflexion_des_in[0]*t1;
 }

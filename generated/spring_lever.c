@@ -12,14 +12,15 @@
  * Cost: 38 add, 54 mul, 7 div, 3 sqrt, 1 sincos, 2 calls.
  * Inputs: sha256 6a5695bb7e492700563a99433621bd21f8005fce81d41ed26a0365bf35bb62e3.
  */
+#include "numerics.h"
 #include <math.h>
 #include "elementary.h"
-#include "trig.h"
+#include "sincos.h"
 #include "kernels.h"
 
-int awiwi_spring_lever(const double theta[restrict 1], double dL[restrict 1], double force[restrict 1], double stiffness[restrict 1])
+int awiwi_spring_lever(const double theta_in[restrict 1], double dL_out[restrict 1], double force_out[restrict 1], double stiffness_out[restrict 1])
 {
-    const awiwi_turn a0 = awiwi_sincos(theta[0]);
+    const awiwi_sincos_result a0 = awiwi_sincos(theta_in[0]);
     const double t0 = 0.018*a0.sin;
     const double t1 = 0.008 + t0;
     const double t2 = 0.03*a0.sin;
@@ -54,14 +55,14 @@ int awiwi_spring_lever(const double theta[restrict 1], double dL[restrict 1], do
     const double t29 = t23*(0.006*t1 + t8*t18);
     const double t30 = awiwi_atan2(0.4601093262074292*t28 - 0.8878622685624981*t29, -0.8878622685624981*t28 - 0.4601093262074292*t29);
     s24 -= 0.006*t30;
-    dL[0] = s24;
+    dL_out[0] = s24;
     const double t31 = t12*t15;
     s4 += t31*t31;
     const double t32 = t6*t29 - t0*t28;
     const double t33 = t6*(t28 - t26) + t0*(t29 - t25);
     const double t34 = 7000.0*t14*(t31/t33);
-    force[0] = t34;
+    force_out[0] = t34;
     const double t35 = t6*t25 - t0*t26;
-    stiffness[0] = (7000.0*(t15*(t12*t31 - t14*s4)) + (t32*(t32/t18 - 1.0) + t35*(1.0 + t35/t21))*t34)/(t33*t33);
+    stiffness_out[0] = (7000.0*(t15*(t12*t31 - t14*s4)) + (t32*(t32/t18 - 1.0) + t35*(1.0 + t35/t21))*t34)/(t33*t33);
     return t20 > 0.0 && t17 > 0.0 && 0.37*t33 > 0.0 && t14 > 0.0 ? 0 : 1;
 }

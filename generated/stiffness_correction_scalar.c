@@ -12,12 +12,13 @@
  * Cost: 1 add, 4 mul, 2 div, 3 neg.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-int awiwi_stiffness_correction_scalar(const double k_eff[restrict 1], const double k_mech[restrict 1], double k_imp[restrict 1], double sensitivity[restrict 1])
+int awiwi_stiffness_correction_scalar(const double k_eff_in[restrict 1], const double k_mech_in[restrict 1], double k_imp_out[restrict 1], double sensitivity_out[restrict 1])
 {
-    const double t0 = k_eff[0] - k_mech[0];
-    k_imp[0] = -(k_eff[0]*k_mech[0]*(1.0/t0));
-    sensitivity[0] = -(k_eff[0]*k_eff[0]/(t0*t0));
-    return k_eff[0] > 0.0 && -t0 > 0.0 ? 0 : 1;
+    const double t0 = k_eff_in[0] - k_mech_in[0];
+    k_imp_out[0] = -(k_eff_in[0]*k_mech_in[0]*(1.0/t0));
+    sensitivity_out[0] = -(k_eff_in[0]*k_eff_in[0]/(t0*t0));
+    return k_eff_in[0] > 0.0 && -t0 > 0.0 ? 0 : 1;
 }

@@ -19,12 +19,13 @@
  * Cost: 5 add, 3 mul.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-int awiwi_tendon_force_pd(const double f[restrict 1], const double fd[restrict 1], const double f_des[restrict 1], const double fd_des[restrict 1], const double f_hat[restrict 1], const double friction[restrict 1], const double r[restrict 1], const double kp[restrict 1], const double kd[restrict 1], double tau[restrict 1])
+int awiwi_tendon_force_pd(const double f_in[restrict 1], const double fd_in[restrict 1], const double f_des_in[restrict 1], const double fd_des_in[restrict 1], const double f_hat_in[restrict 1], const double friction_in[restrict 1], const double r_in[restrict 1], const double kp_in[restrict 1], const double kd_in[restrict 1], double tau_out[restrict 1])
 {
-    double s0 = friction[0] + f_hat[0]*r[0] - kd[0]*(fd[0] - fd_des[0]);
-    s0 -= kp[0]*(f[0] - f_des[0]);
-    tau[0] = s0;
-    return r[0] > 0.0 && kp[0] > 0.0 && kd[0] > 0.0 ? 0 : 1;
+    double s0 = friction_in[0] + f_hat_in[0]*r_in[0] - kd_in[0]*(fd_in[0] - fd_des_in[0]);
+    s0 -= kp_in[0]*(f_in[0] - f_des_in[0]);
+    tau_out[0] = s0;
+    return r_in[0] > 0.0 && kp_in[0] > 0.0 && kd_in[0] > 0.0 ? 0 : 1;
 }

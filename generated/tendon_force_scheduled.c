@@ -24,18 +24,19 @@
  * Cost: 6 add, 15 mul, 1 div.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-int awiwi_tendon_force_scheduled(const double f[restrict 1], const double fd[restrict 1], const double f_des[restrict 1], const double fd_des[restrict 1], const double f_hat[restrict 1], const double friction[restrict 1], const double r[restrict 1], const double b[restrict 1], const double stiffness[restrict 1], const double stiffness_rate[restrict 1], const double omega0[restrict 1], const double xi0[restrict 1], double tau[restrict 1], double gains[restrict 2])
+int awiwi_tendon_force_scheduled(const double f_in[restrict 1], const double fd_in[restrict 1], const double f_des_in[restrict 1], const double fd_des_in[restrict 1], const double f_hat_in[restrict 1], const double friction_in[restrict 1], const double r_in[restrict 1], const double b_in[restrict 1], const double stiffness_in[restrict 1], const double stiffness_rate_in[restrict 1], const double omega0_in[restrict 1], const double xi0_in[restrict 1], double tau_out[restrict 1], double gains_out[restrict 2])
 {
-    const double t0 = 2.0*xi0[0];
-    const double t1 = stiffness[0]*t0;
-    const double t2 = omega0[0]*stiffness[0] - stiffness_rate[0]*t0;
-    const double t3 = b[0]*omega0[0]/(r[0]*r[0]*stiffness[0]*stiffness[0]);
-    const double t4 = r[0]*t3;
+    const double t0 = 2.0*xi0_in[0];
+    const double t1 = stiffness_in[0]*t0;
+    const double t2 = omega0_in[0]*stiffness_in[0] - stiffness_rate_in[0]*t0;
+    const double t3 = b_in[0]*omega0_in[0]/(r_in[0]*r_in[0]*stiffness_in[0]*stiffness_in[0]);
+    const double t4 = r_in[0]*t3;
     const double t5 = t2*t4;
-    gains[0] = t5;
-    tau[0] = r[0]*(f_hat[0] - (fd[0] - fd_des[0])*t1*t3) + friction[0] - (f[0] - f_des[0])*t5;
-    gains[1] = t1*t4;
-    return r[0] > 0.0 && b[0] > 0.0 && stiffness[0] > 0.0 && omega0[0] > 0.0 && xi0[0] > 0.0 && t2 > 0.0 ? 0 : 1;
+    gains_out[0] = t5;
+    tau_out[0] = r_in[0]*(f_hat_in[0] - (fd_in[0] - fd_des_in[0])*t1*t3) + friction_in[0] - (f_in[0] - f_des_in[0])*t5;
+    gains_out[1] = t1*t4;
+    return r_in[0] > 0.0 && b_in[0] > 0.0 && stiffness_in[0] > 0.0 && omega0_in[0] > 0.0 && xi0_in[0] > 0.0 && t2 > 0.0 ? 0 : 1;
 }

@@ -7,9 +7,10 @@
  * Cost: 1 add, 2 div.
  * Inputs: sha256 d3491a8c6e50c63e06d71a3eb1d428dd9c992c783e95dc4b2f0ea3c5639ad0f8.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-void awiwi_tendon_stiffness(const double k[restrict 1], double stiffness[restrict 1])
+void awiwi_tendon_stiffness(const double k_in[restrict 1], double stiffness_out[restrict 1])
 {
-    stiffness[0] = 1.0/(1.0/k[0] + 1.6666666666666667e-05);
+    stiffness_out[0] = 1.0/(1.0/k_in[0] + 1.6666666666666667e-05);
 }

@@ -7,9 +7,10 @@
  * Cost: 1 mul.
  * Inputs: sha256 d3491a8c6e50c63e06d71a3eb1d428dd9c992c783e95dc4b2f0ea3c5639ad0f8.
  */
+#include "numerics.h"
 #include "kernels.h"
 
-void awiwi_tendon_stretch(const double f[restrict 1], double x[restrict 1])
+void awiwi_tendon_stretch(const double f_in[restrict 1], double x_out[restrict 1])
 {
-    x[0] = 1.6666666666666667e-05*f[0];
+    x_out[0] = 1.6666666666666667e-05*f_in[0];
 }

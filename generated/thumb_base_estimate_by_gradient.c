@@ -8,6 +8,7 @@
  * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
  * Cost: at most 51 times that of thumb_tendon_lengths and thumb_coupling, and the solver's own.
  */
+#include "numerics.h"
 #include "awiwi_solvers.h"
 #include "kernels.h"
 
@@ -30,11 +31,11 @@ static void model(const void *context, const awiwi_real *base, awiwi_real *h, aw
     }
 }
 
-int awiwi_thumb_base_estimate_by_gradient(const double h[restrict 4], const double start[restrict 2], double q[restrict 2])
+int awiwi_thumb_base_estimate_by_gradient(const double h_in[restrict 4], const double start_in[restrict 2], double q_out[restrict 2])
 {
     static const awiwi_real low[2] = {-0.6108652381980153, -0.6108652381980153};
     static const awiwi_real high[2] = {0.6108652381980153, 0.6108652381980153};
     const awiwi_problem problem = {model, 0, 2, 4, low, high};
 
-    return awiwi_gradient_search(&problem, h, start, 50, 0, q);
+    return awiwi_gradient_search(&problem, h_in, start_in, 50, 0, q_out);
 }

@@ -9,15 +9,16 @@
  * Cost: 108 add, 131 mul, 4 sincos.
  * Inputs: sha256 4ff828818334cb83d928abc5829a5aed9e61790582438708448f0ec37e3ff7ea.
  */
-#include "trig.h"
+#include "numerics.h"
+#include "sincos.h"
 #include "kernels.h"
 
-void awiwi_thumb_bias(const double q[restrict 4], const double qd[restrict 4], const double g[restrict 3], double bias[restrict 4])
+void awiwi_thumb_bias(const double q_in[restrict 4], const double qd_in[restrict 4], const double g_in[restrict 3], double bias_out[restrict 4])
 {
-    const double t0 = q[3] + 0.982793723247329 + q[2];
-    const double t1 = 22.22222222222222*g[0];
-    const double t2 = 22.22222222222222*g[1];
-    const awiwi_turn4 a0 = awiwi_sincos4(q[2], t0, q[0], q[1]);
+    const double t0 = q_in[3] + 0.982793723247329 + q_in[2];
+    const double t1 = 22.22222222222222*g_in[0];
+    const double t2 = 22.22222222222222*g_in[1];
+    const awiwi_sincos4_result a0 = awiwi_sincos4(q_in[2], t0, q_in[0], q_in[1]);
     const double t3 = 3.59e-08*a0.cos[0] + 4.46e-09*a0.sin[0];
     const double t4 = 3.6055512754639894e-09*a0.sin[1];
     const double t5 = 8.96344e-06*a0.cos[0] - 5.97e-08*a0.sin[0];
@@ -26,41 +27,41 @@ void awiwi_thumb_bias(const double q[restrict 4], const double qd[restrict 4], c
     const double t8 = t6 + 1.1081e-07;
     const double t9 = 4.46e-09*a0.cos[0] - 3.59e-08*a0.sin[0];
     const double t10 = 3.6055512754639894e-09*a0.cos[1];
-    const double t11 = qd[3] + qd[2];
+    const double t11 = qd_in[3] + qd_in[2];
     const double t12 = 0.7111111111111111*a0.sin[0];
     const double t13 = 2.4412355635872335e-06*a0.cos[1] - 1.692390298683174e-06*a0.sin[1];
     const double t14 = 1.692390298683174e-06*a0.cos[1] + 2.4412355635872335e-06*a0.sin[1];
     const double t15 = 1.215e-07*a0.cos[0] + 1.49175e-05*a0.sin[0];
-    const double t16 = 22.22222222222222*g[2];
+    const double t16 = 22.22222222222222*g_in[2];
     const double t17 = 0.7111111111111111*a0.cos[0];
     const double t18 = 3.613846153846154e-07*a0.cos[1] - 9.15163076923077e-07*a0.sin[1];
     const double t19 = a0.cos[1]*t18;
     const double t20 = a0.sin[1]*t18 + 4.575815384615385e-07;
     const double t21 = t19 - 7.268123076923077e-07;
     const double t22 = 1.49175e-05*a0.cos[0] - 1.215e-07*a0.sin[0];
-    const double t23 = 2.0*qd[1];
-    const double t24 = qd[2]*t23;
-    const double t25 = qd[1]*qd[1];
+    const double t23 = 2.0*qd_in[1];
+    const double t24 = qd_in[2]*t23;
+    const double t25 = qd_in[1]*qd_in[1];
     const double t26 = t11*t23;
     double s27 = t24*(t6 - 9.07425e-06) - t26*(t19 + 3.654276923076923e-07);
     const double t28 = a0.cos[2]*t1 + t2*a0.sin[2];
     const double t29 = a0.cos[2]*t2 - t1*a0.sin[2];
     s27 += 4.86e-07*t29;
     double s30 = 4.05e-07*t28 - 9.18e-06*t29;
-    const double t31 = t28 + 0.13333333333333333*qd[0]*qd[0];
-    const double t32 = qd[0]*a0.cos[3];
-    const double t33 = qd[2] + t32;
+    const double t31 = t28 + 0.13333333333333333*qd_in[0]*qd_in[0];
+    const double t32 = qd_in[0]*a0.cos[3];
+    const double t33 = qd_in[2] + t32;
     const double t34 = t33*t33;
     const double t35 = t11 + t32;
     const double t36 = t35*t35;
     s27 += t9*(t25 - t34);
     s27 += t10*(t25 - t36);
-    const double t37 = qd[1]*t32;
+    const double t37 = qd_in[1]*t32;
     s27 += 9.1372e-07*t37;
     s30 -= 1.296e-07*t37;
     double s38 = 4.38e-07*t37 + 4.8195e-05*t29;
-    const double t39 = qd[0]*a0.sin[3];
-    const double t40 = qd[1]*t39;
+    const double t39 = qd_in[0]*a0.sin[3];
+    const double t40 = qd_in[1]*t39;
     s27 += 4.38e-07*t40;
     s38 += 8.4258e-05*t40;
     s30 -= 1.2852e-05*t40;
@@ -79,10 +80,10 @@ void awiwi_thumb_bias(const double q[restrict 4], const double qd[restrict 4], c
     double s47 = t26*t20 + 4.167214e-05*t41;
     const double t48 = 2.0*t39;
     const double t49 = a0.sin[3]*t39;
-    const double t50 = t41 + qd[2]*t48;
+    const double t50 = t41 + qd_in[2]*t48;
     const double t51 = t11*t48 + t41;
     const double t52 = t26*t13 + t14*t51;
-    double s53 = 1.4222222222222223*qd[1]*qd[2]*a0.sin[0] - t17*t50;
+    double s53 = 1.4222222222222223*qd_in[1]*qd_in[2]*a0.sin[0] - t17*t50;
     s27 += t7*t50;
     s27 += t12*t52;
     s27 -= t51*t20;
@@ -100,21 +101,21 @@ void awiwi_thumb_bias(const double q[restrict 4], const double qd[restrict 4], c
     s47 -= t14*s53;
     const double t57 = a0.cos[3]*t32;
     const double t58 = 2.0*t32;
-    const double t59 = qd[2]*(qd[2] + t58);
+    const double t59 = qd_in[2]*(qd_in[2] + t58);
     const double t60 = t11*(t11 + t58);
-    const double t61 = qd[0]*t57;
+    const double t61 = qd_in[0]*t57;
     s27 -= 2.95e-08*(t25 - t61);
     const double t62 = t25 + t61;
     const double t63 = t56 + t62;
     s43 += t15*t63;
     s30 += a0.sin[3]*s27;
-    const double t64 = qd[0]*t49;
+    const double t64 = qd_in[0]*t49;
     const double t65 = t61 + t64;
     const double t66 = t25 - t64;
     s42 -= t66*t20;
     s43 += t7*t66;
     s38 -= 1.58e-07*t66;
-    s47 += 2.19e-07*qd[0]*(t57 - t49);
+    s47 += 2.19e-07*qd_in[0]*(t57 - t49);
     s47 -= t3*(t64 - t34);
     s47 -= t4*(t64 - t36);
     s47 -= t24*(t7 + t15);
@@ -124,16 +125,16 @@ void awiwi_thumb_bias(const double q[restrict 4], const double qd[restrict 4], c
     s46 += t12*t67;
     s42 -= t14*s46;
     s42 -= t13*(t63 + t17*(t62 + t59));
-    bias[3] = s42;
+    bias_out[3] = s42;
     s43 += t12*t14*(t60 + t62);
     s43 += s42;
     s43 -= t17*t68;
-    bias[2] = s43;
+    bias_out[2] = s43;
     s38 += t69;
     s38 -= s43;
     s30 -= 0.13333333333333333*t69;
     s30 -= a0.cos[3]*s38;
-    bias[0] = s30;
+    bias_out[0] = s30;
     s47 += (t17 + 1.0)*t52;
-    bias[1] = s47;
+    bias_out[1] = s47;
 }

@@ -7,37 +7,38 @@
  * Cost: 44 add, 50 mul, 4 div, 4 sqrt, 2 sincos.
  * Inputs: sha256 587a65bca3163563dc3b07fe3ba2c07934dd21d567d7f82f1bc6b0fb691a7376.
  */
+#include "numerics.h"
 #include <math.h>
-#include "trig.h"
+#include "sincos.h"
 #include "kernels.h"
 
-void awiwi_thumb_coupling(const double q[restrict 4], double P[restrict 32])
+void awiwi_thumb_coupling(const double q_in[restrict 4], double P_out[restrict 32])
 {
-    P[27] = 0.006;
-    P[31] = -0.006;
-    P[2] = 0.0;
-    P[3] = 0.0;
-    P[6] = 0.0;
-    P[7] = 0.0;
-    P[10] = 0.0;
-    P[11] = 0.0;
-    P[14] = 0.0;
-    P[15] = 0.0;
-    P[16] = 0.0;
-    P[17] = 0.0;
-    P[19] = 0.0;
-    P[20] = 0.0;
-    P[21] = 0.0;
-    P[23] = 0.0;
-    P[24] = 0.0;
-    P[25] = 0.0;
-    P[28] = 0.0;
-    P[29] = 0.0;
-    P[18] = 0.008;
-    P[22] = -0.008;
-    P[26] = -0.008;
-    P[30] = 0.008;
-    const awiwi_turn2 a0 = awiwi_sincos2(q[0], q[1]);
+    P_out[27] = 0.006;
+    P_out[31] = -0.006;
+    P_out[2] = 0.0;
+    P_out[3] = 0.0;
+    P_out[6] = 0.0;
+    P_out[7] = 0.0;
+    P_out[10] = 0.0;
+    P_out[11] = 0.0;
+    P_out[14] = 0.0;
+    P_out[15] = 0.0;
+    P_out[16] = 0.0;
+    P_out[17] = 0.0;
+    P_out[19] = 0.0;
+    P_out[20] = 0.0;
+    P_out[21] = 0.0;
+    P_out[23] = 0.0;
+    P_out[24] = 0.0;
+    P_out[25] = 0.0;
+    P_out[28] = 0.0;
+    P_out[29] = 0.0;
+    P_out[18] = 0.008;
+    P_out[22] = -0.008;
+    P_out[26] = -0.008;
+    P_out[30] = 0.008;
+    const awiwi_sincos2_result a0 = awiwi_sincos2(q_in[0], q_in[1]);
     const double t0 = 0.003*a0.cos[0];
     const double t1 = 0.003*a0.sin[0];
     const double t2 = 0.047*a0.cos[1];
@@ -67,13 +68,13 @@ void awiwi_thumb_coupling(const double q[restrict 4], double P[restrict 32])
     const double t26 = t8*t25;
     const double t27 = t25*t25;
     const double t28 = 1.0/sqrt(t23 + t15*t15 + t14*t14);
-    P[0] = (t11*t14 - t13*t15)*t28;
+    P_out[0] = (t11*t14 - t13*t15)*t28;
     const double t29 = 1.0/sqrt(t23 + t19*t19 + t18*t18);
-    P[8] = (t16*t18 - t17*t19)*t29;
+    P_out[8] = (t16*t18 - t17*t19)*t29;
     const double t30 = a0.sin[0]*t20;
     const double t31 = a0.cos[0]*t20;
-    P[1] = (t30*t15 - t22 - t31*t14)*t28;
-    P[9] = (t31*t18 - t22 - t30*t19)*t29;
+    P_out[1] = (t30*t15 - t22 - t31*t14)*t28;
+    P_out[9] = (t31*t18 - t22 - t30*t19)*t29;
     const double t32 = a0.sin[0]*t9;
     const double t33 = t0 + t32;
     const double t34 = a0.cos[0]*t9;
@@ -87,9 +88,9 @@ void awiwi_thumb_coupling(const double q[restrict 4], double P[restrict 32])
     const double t42 = t41 - 0.002;
     const double t43 = t40 - 0.03;
     const double t44 = 1.0/sqrt(t27 + t37*t37 + t36*t36);
-    P[4] = (t33*t36 - t35*t37)*t44;
-    P[5] = (t38*t36 + t26 - t39*t37)*t44;
+    P_out[4] = (t33*t36 - t35*t37)*t44;
+    P_out[5] = (t38*t36 + t26 - t39*t37)*t44;
     const double t45 = 1.0/sqrt(t27 + t43*t43 + t42*t42);
-    P[12] = (t40*t42 - t41*t43)*t45;
-    P[13] = (t26 + t39*t43 - t38*t42)*t45;
+    P_out[12] = (t40*t42 - t41*t43)*t45;
+    P_out[13] = (t26 + t39*t43 - t38*t42)*t45;
 }

@@ -7,15 +7,16 @@
  * Cost: 101 add, 112 mul, 4 div, 4 sqrt, 2 sincos.
  * Inputs: sha256 4c7ea1578dc942e36d6e563cd97831da5179a3ff0e24a017614ea16cdc764ec6.
  */
+#include "numerics.h"
 #include <math.h>
 #include <string.h>
-#include "trig.h"
+#include "sincos.h"
 #include "kernels.h"
 
-void awiwi_thumb_coupling_derivative(const double q[restrict 4], double dP[restrict 128])
+void awiwi_thumb_coupling_derivative(const double q_in[restrict 4], double dP_out[restrict 128])
 {
-    memset(dP, 0, 128 * sizeof dP[0]);
-    const awiwi_turn2 a0 = awiwi_sincos2(q[1], q[0]);
+    memset(dP_out, 0, 128 * sizeof dP_out[0]);
+    const awiwi_sincos2_result a0 = awiwi_sincos2(q_in[1], q_in[0]);
     const double t0 = 0.047*a0.sin[0];
     const double t1 = 0.0025*a0.sin[0];
     const double t2 = 0.0025*a0.cos[0];
@@ -59,7 +60,7 @@ void awiwi_thumb_coupling_derivative(const double q[restrict 4], double dP[restr
     const double t39 = t32*t32;
     const double t40 = t37*t39;
     s38 -= t37*t40;
-    dP[0] = t32*s38;
+    dP_out[0] = t32*s38;
     const double t41 = a0.sin[1]*t2;
     const double t42 = a0.sin[1]*t0;
     const double t43 = a0.cos[1]*t2;
@@ -72,8 +73,8 @@ void awiwi_thumb_coupling_derivative(const double q[restrict 4], double dP[restr
     const double t48 = t43 - t44;
     s46 -= t48*t31;
     const double t49 = t32*(t45*t34 - t48*t36 - s46*t40);
-    dP[1] = t49;
-    dP[4] = t49;
+    dP_out[1] = t49;
+    dP_out[4] = t49;
     s10 += t48*t48;
     double s50 = s10 - s46*s46*t39;
     const double t51 = t43 + t44;
@@ -83,7 +84,7 @@ void awiwi_thumb_coupling_derivative(const double q[restrict 4], double dP[restr
     const double t53 = t20 - t18;
     const double t54 = t19 + t17;
     s50 -= t54*t24;
-    dP[5] = t32*s50;
+    dP_out[5] = t32*s50;
     const double t55 = t19 - t17;
     const double t56 = t16 - t23;
     double s57 = t11 + t56*t56;
@@ -104,12 +105,12 @@ void awiwi_thumb_coupling_derivative(const double q[restrict 4], double dP[restr
     s68 -= s58*s58*t69;
     const double t70 = t65*t69;
     s66 -= t65*t70;
-    dP[16] = t60*s66;
+    dP_out[16] = t60*s66;
     s67 -= s58*t70;
     const double t71 = t60*s67;
-    dP[17] = t71;
-    dP[20] = t71;
-    dP[21] = t60*s68;
+    dP_out[17] = t71;
+    dP_out[20] = t71;
+    dP_out[21] = t60*s68;
     const double t72 = t16 - t22;
     double s73 = t7 + t72*t72;
     const double t74 = t15 - t22;
@@ -141,12 +142,12 @@ void awiwi_thumb_coupling_derivative(const double q[restrict 4], double dP[restr
     s76 -= s75*s75*t93;
     const double t94 = t89*t93;
     s91 -= t89*t94;
-    dP[32] = t83*s91;
+    dP_out[32] = t83*s91;
     s92 += s75*t94;
     const double t95 = t83*s92;
-    dP[33] = t95;
-    dP[36] = t95;
-    dP[37] = t83*s76;
+    dP_out[33] = t95;
+    dP_out[36] = t95;
+    dP_out[37] = t83*s76;
     const double t96 = t87 - t85;
     const double t97 = t87*t77 - t79*t85;
     const double t98 = t79 - t77;
@@ -155,9 +156,9 @@ void awiwi_thumb_coupling_derivative(const double q[restrict 4], double dP[restr
     s81 -= s80*s80*t100;
     const double t101 = t97*t100;
     s99 -= t97*t101;
-    dP[48] = t86*s99;
+    dP_out[48] = t86*s99;
     const double t102 = t86*(s80*t101 - t51*t98 - t47*t96);
-    dP[49] = t102;
-    dP[52] = t102;
-    dP[53] = t86*s81;
+    dP_out[49] = t102;
+    dP_out[52] = t102;
+    dP_out[53] = t86*s81;
 }

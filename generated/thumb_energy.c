@@ -10,13 +10,14 @@
  * Cost: 65 add, 80 mul, 4 sincos.
  * Inputs: sha256 46e4c11520cb35f8c8b39b4a5f744de13eafc538dda122a909bd753de6881cc0.
  */
-#include "trig.h"
+#include "numerics.h"
+#include "sincos.h"
 #include "kernels.h"
 
-void awiwi_thumb_energy(const double q[restrict 4], const double qd[restrict 4], const double g[restrict 3], double kinetic[restrict 1], double potential[restrict 1])
+void awiwi_thumb_energy(const double q_in[restrict 4], const double qd_in[restrict 4], const double g_in[restrict 3], double kinetic_out[restrict 1], double potential_out[restrict 1])
 {
-    const double t0 = q[3] + 0.982793723247329 + q[2];
-    const awiwi_turn4 a0 = awiwi_sincos4(q[2], t0, q[1], q[0]);
+    const double t0 = q_in[3] + 0.982793723247329 + q_in[2];
+    const awiwi_sincos4_result a0 = awiwi_sincos4(q_in[2], t0, q_in[1], q_in[0]);
     const double t1 = 0.032*a0.cos[0];
     const double t2 = 3.7608673304070534e-05*a0.cos[1] + 5.424967919082741e-05*a0.sin[1];
     const double t3 = 0.032*a0.sin[0];
@@ -43,18 +44,18 @@ void awiwi_thumb_energy(const double q[restrict 4], const double qd[restrict 4],
     s18 += 4.296662230769231e-05;
     double s21 = s18 - t17;
     s21 -= 1.5405e-06;
-    double s22 = qd[3]*t9 - 0.5*qd[1]*(t13 + 0.064*a0.sin[0]*t4 + t17 - 9.439677692307693e-06);
-    s22 += qd[2]*t10;
-    double s23 = qd[2]*(qd[3]*t7 + 0.5*qd[2]*t8) + 5.4612e-07*qd[3]*qd[3] - qd[1]*s22;
+    double s22 = qd_in[3]*t9 - 0.5*qd_in[1]*(t13 + 0.064*a0.sin[0]*t4 + t17 - 9.439677692307693e-06);
+    s22 += qd_in[2]*t10;
+    double s23 = qd_in[2]*(qd_in[3]*t7 + 0.5*qd_in[2]*t8) + 5.4612e-07*qd_in[3]*qd_in[3] - qd_in[1]*s22;
     const double t24 = t15 + 0.001071;
     s21 += 1.296e-07*a0.sin[2];
     s21 -= a0.cos[2]*(0.012*t24 + a0.cos[2]*(s18 - 4.5686e-07) - 2.0*a0.sin[2]*(t20 + 2.19e-07));
-    const double t25 = qd[1]*(a0.cos[2]*(t10 - 2.95e-08) - a0.sin[2]*s6) + qd[3]*(a0.sin[2]*t14 - 0.006*t2 - a0.cos[2]*(t7 + 0.045*t2)) + qd[2]*(a0.sin[2]*t20 - 0.006*t15 - a0.cos[2]*(t8 + 0.045*t15)) + 0.5*qd[0]*s21;
-    s23 -= qd[0]*t25;
-    kinetic[0] = s23;
-    const double t26 = g[0]*a0.cos[3] + g[1]*a0.sin[3];
-    double s27 = (g[0]*a0.sin[3] - g[1]*a0.cos[3])*(t19 + 9e-06) - 0.000204*t26;
-    s27 -= 1.08e-05*(g[2]*a0.cos[2] - a0.sin[2]*t26);
-    s27 -= (a0.cos[2]*t26 + g[2]*a0.sin[2])*t24;
-    potential[0] = s27;
+    const double t25 = qd_in[1]*(a0.cos[2]*(t10 - 2.95e-08) - a0.sin[2]*s6) + qd_in[3]*(a0.sin[2]*t14 - 0.006*t2 - a0.cos[2]*(t7 + 0.045*t2)) + qd_in[2]*(a0.sin[2]*t20 - 0.006*t15 - a0.cos[2]*(t8 + 0.045*t15)) + 0.5*qd_in[0]*s21;
+    s23 -= qd_in[0]*t25;
+    kinetic_out[0] = s23;
+    const double t26 = g_in[0]*a0.cos[3] + g_in[1]*a0.sin[3];
+    double s27 = (g_in[0]*a0.sin[3] - g_in[1]*a0.cos[3])*(t19 + 9e-06) - 0.000204*t26;
+    s27 -= 1.08e-05*(g_in[2]*a0.cos[2] - a0.sin[2]*t26);
+    s27 -= (a0.cos[2]*t26 + g_in[2]*a0.sin[2])*t24;
+    potential_out[0] = s27;
 }

@@ -7,32 +7,33 @@
  * Cost: 11 add, 24 mul, 4 neg, 4 sincos.
  * Inputs: sha256 e56e526ea40970104fe9bee780b2560b3c841e631e95f0e1cea4522e61111cae.
  */
-#include "trig.h"
+#include "numerics.h"
+#include "sincos.h"
 #include "kernels.h"
 
-void awiwi_thumb_fingertip_pose(const double q[restrict 4], double T[restrict 16])
+void awiwi_thumb_fingertip_pose(const double q_in[restrict 4], double T_out[restrict 16])
 {
-    T[12] = 0.0;
-    T[13] = 0.0;
-    T[14] = 0.0;
-    T[15] = 1.0;
-    const double t0 = q[3] + q[2];
-    const awiwi_turn4 a0 = awiwi_sincos4(t0, q[2], q[0], q[1]);
+    T_out[12] = 0.0;
+    T_out[13] = 0.0;
+    T_out[14] = 0.0;
+    T_out[15] = 1.0;
+    const double t0 = q_in[3] + q_in[2];
+    const awiwi_sincos4_result a0 = awiwi_sincos4(t0, q_in[2], q_in[0], q_in[1]);
     const double t1 = 0.032*a0.cos[1] + 0.025*a0.cos[0] + 0.045;
     const double t2 = 0.032*a0.sin[1] + 0.025*a0.sin[0];
-    T[10] = a0.cos[3];
+    T_out[10] = a0.cos[3];
     const double t3 = 0.006 + a0.cos[3]*t1;
-    T[3] = a0.cos[2]*t3 - a0.sin[2]*t2;
-    T[7] = a0.cos[2]*t2 + a0.sin[2]*t3;
-    T[11] = a0.sin[3]*t1;
+    T_out[3] = a0.cos[2]*t3 - a0.sin[2]*t2;
+    T_out[7] = a0.cos[2]*t2 + a0.sin[2]*t3;
+    T_out[11] = a0.sin[3]*t1;
     const double t4 = a0.cos[2]*a0.cos[3];
-    T[0] = a0.cos[0]*t4 - a0.sin[2]*a0.sin[0];
-    T[1] = -(a0.sin[2]*a0.cos[0]) - t4*a0.sin[0];
-    T[2] = -(a0.cos[2]*a0.sin[3]);
+    T_out[0] = a0.cos[0]*t4 - a0.sin[2]*a0.sin[0];
+    T_out[1] = -(a0.sin[2]*a0.cos[0]) - t4*a0.sin[0];
+    T_out[2] = -(a0.cos[2]*a0.sin[3]);
     const double t5 = a0.cos[3]*a0.sin[2];
-    T[4] = a0.cos[2]*a0.sin[0] + a0.cos[0]*t5;
-    T[5] = a0.cos[2]*a0.cos[0] - t5*a0.sin[0];
-    T[6] = -(a0.sin[2]*a0.sin[3]);
-    T[8] = a0.sin[3]*a0.cos[0];
-    T[9] = -(a0.sin[3]*a0.sin[0]);
+    T_out[4] = a0.cos[2]*a0.sin[0] + a0.cos[0]*t5;
+    T_out[5] = a0.cos[2]*a0.cos[0] - t5*a0.sin[0];
+    T_out[6] = -(a0.sin[2]*a0.sin[3]);
+    T_out[8] = a0.sin[3]*a0.cos[0];
+    T_out[9] = -(a0.sin[3]*a0.sin[0]);
 }

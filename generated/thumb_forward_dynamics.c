@@ -10,26 +10,27 @@
  * Cost: 170 add, 184 mul, 3 div, 1 neg, 4 sincos.
  * Inputs: sha256 eb684d40ad53461219ce6205f05b311d2262086fa4be9e6eb81e8ea245c94e57.
  */
-#include "trig.h"
+#include "numerics.h"
+#include "sincos.h"
 #include "kernels.h"
 
-void awiwi_thumb_forward_dynamics(const double q[restrict 4], const double qd[restrict 4], const double tau[restrict 4], const double g[restrict 3], double qdd[restrict 4])
+void awiwi_thumb_forward_dynamics(const double q_in[restrict 4], const double qd_in[restrict 4], const double tau_in[restrict 4], const double g_in[restrict 3], double qdd_out[restrict 4])
 {
-    const double t0 = q[3] + 0.982793723247329 + q[2];
-    const double t1 = 22.22222222222222*g[1];
-    const double t2 = 22.22222222222222*g[0];
-    const awiwi_turn4 a0 = awiwi_sincos4(q[2], t0, q[0], q[1]);
+    const double t0 = q_in[3] + 0.982793723247329 + q_in[2];
+    const double t1 = 22.22222222222222*g_in[1];
+    const double t2 = 22.22222222222222*g_in[0];
+    const awiwi_sincos4_result a0 = awiwi_sincos4(q_in[2], t0, q_in[0], q_in[1]);
     const double t3 = 1.49175e-05*a0.cos[0] - 1.215e-07*a0.sin[0];
     const double t4 = 1.215e-07*a0.cos[0] + 1.49175e-05*a0.sin[0];
     const double t5 = 1.692390298683174e-06*a0.cos[1] + 2.4412355635872335e-06*a0.sin[1];
     const double t6 = 2.4412355635872335e-06*a0.cos[1] - 1.692390298683174e-06*a0.sin[1];
-    const double t7 = qd[3] + qd[2];
+    const double t7 = qd_in[3] + qd_in[2];
     const double t8 = 3.613846153846154e-07*a0.cos[1] - 9.15163076923077e-07*a0.sin[1];
     const double t9 = a0.sin[1]*t8 + 4.575815384615385e-07;
     const double t10 = a0.cos[1]*t8;
     const double t11 = 1.4222222222222223*a0.cos[0];
     const double t12 = 0.7111111111111111*a0.sin[0];
-    const double t13 = 22.22222222222222*g[2];
+    const double t13 = 22.22222222222222*g_in[2];
     const double t14 = 0.7111111111111111*a0.cos[0];
     const double t15 = 3.6055512754639894e-09*a0.cos[1];
     const double t16 = t10 - 7.268123076923077e-07;
@@ -49,19 +50,19 @@ void awiwi_thumb_forward_dynamics(const double q[restrict 4], const double qd[re
     const double t30 = t12*t5;
     const double t31 = a0.cos[2]*t1 - t2*a0.sin[2];
     const double t32 = a0.cos[2]*t2 + t1*a0.sin[2];
-    double s33 = tau[0] + 9.18e-06*t31 - 4.05e-07*t32;
-    const double t34 = t32 + 0.13333333333333333*qd[0]*qd[0];
+    double s33 = tau_in[0] + 9.18e-06*t31 - 4.05e-07*t32;
+    const double t34 = t32 + 0.13333333333333333*qd_in[0]*qd_in[0];
     const double t35 = a0.sin[3]*t18 - 0.13333333333333333*t5 - a0.cos[3]*(t5 + t20);
-    const double t36 = qd[0]*a0.cos[3];
-    const double t37 = qd[0]*a0.sin[3];
+    const double t36 = qd_in[0]*a0.cos[3];
+    const double t37 = qd_in[0]*a0.sin[3];
     const double t38 = a0.cos[3]*t36;
-    const double t39 = qd[0]*t38;
+    const double t39 = qd_in[0]*t38;
     const double t40 = a0.sin[3]*t37;
-    const double t41 = qd[0]*t40;
-    double s42 = tau[1] - 2.19e-07*qd[0]*(t38 - t40);
+    const double t41 = qd_in[0]*t40;
+    double s42 = tau_in[1] - 2.19e-07*qd_in[0]*(t38 - t40);
     const double t43 = t39 + t41;
     const double t44 = 2.0*t36;
-    const double t45 = qd[2]*(qd[2] + t44);
+    const double t45 = qd_in[2]*(qd_in[2] + t44);
     const double t46 = t7*(t7 + t44);
     const double t47 = t43 + t45;
     const double t48 = t13*a0.sin[3] + a0.cos[3]*t34;
@@ -74,18 +75,18 @@ void awiwi_thumb_forward_dynamics(const double q[restrict 4], const double qd[re
     double s53 = 4.86e-07*t31 + 1.58e-07*t50 + t4*t52;
     s42 -= 4.167214e-05*t50;
     const double t54 = 915549.6960375009*t35;
-    const double t55 = qd[1]*t36;
+    const double t55 = qd_in[1]*t36;
     double s56 = 7.211102550927979e-09*a0.sin[1]*t55 - t15*t50;
     s51 += 4.38e-07*t55;
     s53 += 9.1372e-07*t55;
     s33 += 1.296e-07*t55;
-    const double t57 = qd[1]*t37;
+    const double t57 = qd_in[1]*t37;
     double s58 = t12*t47 + t11*t57;
     s51 += 8.4258e-05*t57;
     s53 += 4.38e-07*t57;
     s33 += 1.2852e-05*t57;
     double s59 = t11*t5 + t28 + 4.2129e-05 - t16;
-    const double t60 = 2.0*qd[1];
+    const double t60 = 2.0*qd_in[1];
     double s61 = t60*t36*t22 - t25*t50;
     const double t62 = t60*t37;
     const double t63 = t62*t5 - t6*(t43 + t46);
@@ -100,21 +101,21 @@ void awiwi_thumb_forward_dynamics(const double q[restrict 4], const double qd[re
     s51 += t64;
     const double t66 = 2.0*t37;
     s33 += 0.13333333333333333*t64;
-    const double t67 = qd[1]*qd[1];
+    const double t67 = qd_in[1]*qd_in[1];
     const double t68 = t67 - t41;
     const double t69 = t39 + t67;
     const double t70 = t48 + t69;
     s56 += t68*t9;
     s56 += t6*(t14*(t45 + t69) + t70);
-    const double t71 = tau[3] + s56;
+    const double t71 = tau_in[3] + s56;
     s61 += s56;
     s61 -= t26*t68;
     s61 -= t30*(t46 + t69);
     s61 -= t4*t70;
     s51 += s61;
     s51 -= 1.58e-07*t68;
-    double s72 = s61 + tau[2];
-    double s73 = qd[1]*qd[2]*t27 - t52;
+    double s72 = s61 + tau_in[2];
+    double s73 = qd_in[1]*qd_in[2]*t27 - t52;
     s53 -= 2.95e-08*(t67 - t39);
     double s74 = t30 + t4;
     s74 += t26;
@@ -149,17 +150,17 @@ void awiwi_thumb_forward_dynamics(const double q[restrict 4], const double qd[re
     const double t86 = t78*t81;
     s33 += s72*t86;
     s85 += t81*t86;
-    const double t87 = qd[2]*t60;
+    const double t87 = qd_in[2]*t60;
     const double t88 = t7*t60;
     s53 += t87*t29;
     s53 -= t88*t17;
     s42 += t87*(t4 + t26);
     s42 -= t88*t9;
-    const double t89 = qd[2] + t36;
+    const double t89 = qd_in[2] + t36;
     const double t90 = t89*t89;
     const double t91 = t36 + t7;
     const double t92 = t91*t91;
-    const double t93 = qd[2]*t66 + t50;
+    const double t93 = qd_in[2]*t66 + t50;
     const double t94 = t50 + t7*t66;
     const double t95 = t88*t6 + t5*t94;
     s73 -= t14*t93;
@@ -192,10 +193,10 @@ void awiwi_thumb_forward_dynamics(const double q[restrict 4], const double qd[re
     s33 -= s42*t102;
     s85 -= s97*t102;
     const double t103 = s33/s85;
-    qdd[0] = -t103;
+    qdd_out[0] = -t103;
     const double t104 = t102*t103 - s42*t101;
-    qdd[1] = t104;
+    qdd_out[1] = t104;
     const double t105 = t78*s72 + t100*t104 - t86*t103;
-    qdd[2] = t105;
-    qdd[3] = 915549.6960375009*t71 + t76*t104 - t54*t103 - t77*t105;
+    qdd_out[2] = t105;
+    qdd_out[3] = 915549.6960375009*t71 + t76*t104 - t54*t103 - t77*t105;
 }

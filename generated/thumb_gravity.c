@@ -8,24 +8,25 @@
  * Cost: 17 add, 22 mul, 4 sincos.
  * Inputs: sha256 8fd21702b73cf8d9819e1c8e44a914a3c6a94a7985cff85e13ce63e1e2992754.
  */
-#include "trig.h"
+#include "numerics.h"
+#include "sincos.h"
 #include "kernels.h"
 
-void awiwi_thumb_gravity(const double q[restrict 4], const double g[restrict 3], double gravity[restrict 4])
+void awiwi_thumb_gravity(const double q_in[restrict 4], const double g_in[restrict 3], double gravity_out[restrict 4])
 {
-    const double t0 = q[2] - 1.5626517105100128;
-    const double t1 = q[2] + q[3] - 1.5526165117219184;
-    const awiwi_turn4 a0 = awiwi_sincos4(t0, t1, q[0], q[1]);
+    const double t0 = q_in[2] - 1.5626517105100128;
+    const double t1 = q_in[2] + q_in[3] - 1.5526165117219184;
+    const awiwi_sincos4_result a0 = awiwi_sincos4(t0, t1, q_in[0], q_in[1]);
     const double t2 = 6.601090818948033e-05*a0.cos[1];
     const double t3 = 0.0003315109952927655*a0.cos[0] + t2;
     const double t4 = 6.601090818948033e-05*a0.sin[1];
     const double t5 = 0.0003315109952927655*a0.sin[0] + t4;
     const double t6 = t5 - 0.001071;
-    const double t7 = g[0]*a0.cos[2] + g[1]*a0.sin[2];
-    const double t8 = g[0]*a0.sin[2] - g[1]*a0.cos[2];
-    gravity[0] = t7*(t3 + 9e-06) - t8*(1.08e-05*a0.sin[3] + a0.cos[3]*t6 - 0.000204);
-    const double t9 = a0.cos[3]*t7 + g[2]*a0.sin[3];
-    gravity[1] = (g[2]*a0.cos[3] - a0.sin[3]*t7)*t6 + 1.08e-05*t9;
-    gravity[2] = t9*t3 - t8*t5;
-    gravity[3] = t2*t9 - t8*t4;
+    const double t7 = g_in[0]*a0.cos[2] + g_in[1]*a0.sin[2];
+    const double t8 = g_in[0]*a0.sin[2] - g_in[1]*a0.cos[2];
+    gravity_out[0] = t7*(t3 + 9e-06) - t8*(1.08e-05*a0.sin[3] + a0.cos[3]*t6 - 0.000204);
+    const double t9 = a0.cos[3]*t7 + g_in[2]*a0.sin[3];
+    gravity_out[1] = (g_in[2]*a0.cos[3] - a0.sin[3]*t7)*t6 + 1.08e-05*t9;
+    gravity_out[2] = t9*t3 - t8*t5;
+    gravity_out[3] = t2*t9 - t8*t4;
 }

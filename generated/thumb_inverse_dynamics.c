@@ -10,24 +10,25 @@
  * Cost: 135 add, 141 mul, 4 sincos.
  * Inputs: sha256 b7fe551f96056cda15630ccc8e1048458a04fd2c391240ea725523ad5d20e299.
  */
-#include "trig.h"
+#include "numerics.h"
+#include "sincos.h"
 #include "kernels.h"
 
-void awiwi_thumb_inverse_dynamics(const double q[restrict 4], const double qd[restrict 4], const double qdd[restrict 4], const double g[restrict 3], double tau[restrict 4])
+void awiwi_thumb_inverse_dynamics(const double q_in[restrict 4], const double qd_in[restrict 4], const double qdd_in[restrict 4], const double g_in[restrict 3], double tau_out[restrict 4])
 {
-    const double t0 = q[3] + 0.982793723247329 + q[2];
-    const double t1 = 22.22222222222222*g[0];
-    const double t2 = 22.22222222222222*g[1];
-    const awiwi_turn4 a0 = awiwi_sincos4(q[2], t0, q[0], q[1]);
+    const double t0 = q_in[3] + 0.982793723247329 + q_in[2];
+    const double t1 = 22.22222222222222*g_in[0];
+    const double t2 = 22.22222222222222*g_in[1];
+    const awiwi_sincos4_result a0 = awiwi_sincos4(q_in[2], t0, q_in[0], q_in[1]);
     const double t3 = 4.46e-09*a0.cos[0] - 3.59e-08*a0.sin[0];
     const double t4 = 3.6055512754639894e-09*a0.cos[1];
-    const double t5 = qd[3] + qd[2];
+    const double t5 = qd_in[3] + qd_in[2];
     const double t6 = 8.96344e-06*a0.cos[0] - 5.97e-08*a0.sin[0];
     const double t7 = a0.sin[0]*t6 + 2.985e-08;
     const double t8 = a0.cos[0]*t6;
     const double t9 = t8 + 1.1081e-07;
     const double t10 = 1.215e-07*a0.cos[0] + 1.49175e-05*a0.sin[0];
-    const double t11 = 22.22222222222222*g[2];
+    const double t11 = 22.22222222222222*g_in[2];
     const double t12 = 0.7111111111111111*a0.sin[0];
     const double t13 = 1.692390298683174e-06*a0.cos[1] + 2.4412355635872335e-06*a0.sin[1];
     const double t14 = 2.4412355635872335e-06*a0.cos[1] - 1.692390298683174e-06*a0.sin[1];
@@ -35,7 +36,7 @@ void awiwi_thumb_inverse_dynamics(const double q[restrict 4], const double qd[re
     const double t16 = 1.49175e-05*a0.cos[0] - 1.215e-07*a0.sin[0];
     const double t17 = 0.7111111111111111*a0.cos[0];
     const double t18 = 3.6055512754639894e-09*a0.sin[1];
-    const double t19 = qdd[3] + qdd[2];
+    const double t19 = qdd_in[3] + qdd_in[2];
     const double t20 = 3.613846153846154e-07*a0.cos[1] - 9.15163076923077e-07*a0.sin[1];
     const double t21 = a0.sin[1]*t20 + 4.575815384615385e-07;
     const double t22 = a0.cos[1]*t20;
@@ -43,21 +44,21 @@ void awiwi_thumb_inverse_dynamics(const double q[restrict 4], const double qd[re
     const double t24 = a0.cos[2]*t1 + t2*a0.sin[2];
     const double t25 = a0.cos[2]*t2 - t1*a0.sin[2];
     double s26 = 4.05e-07*t24 - 9.18e-06*t25;
-    const double t27 = t24 + 0.13333333333333333*qd[0]*qd[0];
-    const double t28 = 0.13333333333333333*qdd[0] - t25;
-    s26 += 1.5405e-06*qdd[0];
-    const double t29 = qd[0]*a0.cos[3];
-    const double t30 = qd[2] + t29;
+    const double t27 = t24 + 0.13333333333333333*qd_in[0]*qd_in[0];
+    const double t28 = 0.13333333333333333*qdd_in[0] - t25;
+    s26 += 1.5405e-06*qdd_in[0];
+    const double t29 = qd_in[0]*a0.cos[3];
+    const double t30 = qd_in[2] + t29;
     const double t31 = t30*t30;
     const double t32 = t5 + t29;
     const double t33 = t32*t32;
-    const double t34 = qd[0]*a0.sin[3];
+    const double t34 = qd_in[0]*a0.sin[3];
     const double t35 = t29*t34;
-    const double t36 = t35 + qdd[1];
+    const double t36 = t35 + qdd_in[1];
     double s37 = 1.58e-07*t36 - 4.86e-07*t28;
-    const double t38 = qdd[1] - t35;
+    const double t38 = qdd_in[1] - t35;
     const double t39 = 2.0*t34;
-    const double t40 = t36 + qd[2]*t39;
+    const double t40 = t36 + qd_in[2]*t39;
     const double t41 = t5*t39 + t36;
     s37 += t7*t40;
     s37 -= t41*t21;
@@ -69,36 +70,36 @@ void awiwi_thumb_inverse_dynamics(const double q[restrict 4], const double qd[re
     s45 -= 4.8195e-05*t42;
     s45 -= t41*t23;
     const double t46 = a0.cos[3]*t29;
-    const double t47 = qd[0]*t46;
+    const double t47 = qd_in[0]*t46;
     double s48 = t17*t40 + t44;
     s45 += t16*(t40 + t44);
     const double t49 = a0.sin[3]*t34;
-    const double t50 = qd[0]*t49;
-    s45 += 2.19e-07*qd[0]*(t46 - t49);
+    const double t50 = qd_in[0]*t49;
+    s45 += 2.19e-07*qd_in[0]*(t46 - t49);
     s45 -= t15*(t50 - t31);
     s45 -= t18*(t50 - t33);
     const double t51 = t47 + t50;
     const double t52 = 2.0*t29;
-    const double t53 = qd[2]*(qd[2] + t52);
+    const double t53 = qd_in[2]*(qd_in[2] + t52);
     const double t54 = t5*(t52 + t5);
-    const double t55 = qd[1]*t29;
-    const double t56 = qdd[0]*a0.sin[3] + t55;
+    const double t55 = qd_in[1]*t29;
+    const double t56 = qdd_in[0]*a0.sin[3] + t55;
     const double t57 = t55 + t56;
     const double t58 = t55 - t56;
     s37 += 4.5686e-07*t57;
     s26 -= 6.48e-08*t57;
     s45 -= 1.58e-07*t58;
-    const double t59 = qd[1]*t34;
-    const double t60 = qdd[0]*a0.cos[3] - t59;
+    const double t59 = qd_in[1]*t34;
+    const double t60 = qdd_in[0]*a0.cos[3] - t59;
     const double t61 = t59 - t60;
-    const double t62 = qdd[2] - t61;
+    const double t62 = qdd_in[2] - t61;
     const double t63 = t19 - t61;
     s37 += 2.19e-07*t61;
     s37 -= t15*t62;
     s37 -= t18*t63;
     const double t64 = t60 + t59;
     const double t65 = t19 + t64;
-    const double t66 = qdd[2] + t64;
+    const double t66 = qdd_in[2] + t64;
     double s67 = 1.09224e-06*t65 - t18*t57 - t4*t38;
     double s68 = 9.18506e-06*t66 - t15*t57 - t3*t38;
     double s69 = 8.4258e-05*t59 + 2.19e-07*t57 - 2.95e-08*t38 - 4.8195e-05*t28;
@@ -110,9 +111,9 @@ void awiwi_thumb_inverse_dynamics(const double q[restrict 4], const double qd[re
     s45 += 2.95e-08*t64;
     s45 -= t3*t66;
     s45 -= t4*t65;
-    const double t72 = qd[1]*qd[1];
-    const double t73 = 2.0*qd[1];
-    const double t74 = qd[2]*t73 + t58;
+    const double t72 = qd_in[1]*qd_in[1];
+    const double t73 = 2.0*qd_in[1];
+    const double t74 = qd_in[2]*t73 + t58;
     const double t75 = t5*t73 + t58;
     const double t76 = t13*t41 + t14*t75;
     s48 -= t12*t74;
@@ -145,16 +146,16 @@ void awiwi_thumb_inverse_dynamics(const double q[restrict 4], const double qd[re
     s81 += t17*(t53 + t79);
     s67 += t13*s71;
     s67 -= t14*s81;
-    tau[3] = s67;
+    tau_out[3] = s67;
     s68 += s67;
     s68 += t17*t83;
     s68 += t12*(t13*(t79 + t54) - t14*t65);
-    tau[2] = s68;
+    tau_out[2] = s68;
     s69 += t84;
     s69 -= s68;
     s26 -= 0.13333333333333333*t84;
     s26 -= a0.cos[3]*s69;
-    tau[0] = s26;
+    tau_out[0] = s26;
     s45 += (t17 + 1.0)*t76;
-    tau[1] = s45;
+    tau_out[1] = s45;
 }

@@ -7,46 +7,47 @@
  * Cost: 11 add, 25 mul, 3 neg, 4 sincos.
  * Inputs: sha256 a7bb8ff1f782a8790c9bbc77b4aba27af39200e96fd5ea71f5378ce3f4c99cdf.
  */
-#include "trig.h"
+#include "numerics.h"
+#include "sincos.h"
 #include "kernels.h"
 
-void awiwi_thumb_jacobian(const double q[restrict 4], double J[restrict 24])
+void awiwi_thumb_jacobian(const double q_in[restrict 4], double J_out[restrict 24])
 {
-    J[8] = 0.0;
-    J[12] = 0.0;
-    J[16] = 0.0;
-    J[21] = 0.0;
-    J[20] = 1.0;
-    const double t0 = q[3] + q[2];
-    const awiwi_turn4 a0 = awiwi_sincos4(t0, q[2], q[0], q[1]);
+    J_out[8] = 0.0;
+    J_out[12] = 0.0;
+    J_out[16] = 0.0;
+    J_out[21] = 0.0;
+    J_out[20] = 1.0;
+    const double t0 = q_in[3] + q_in[2];
+    const awiwi_sincos4_result a0 = awiwi_sincos4(t0, q_in[2], q_in[0], q_in[1]);
     const double t1 = -0.025*a0.sin[0];
     const double t2 = 0.025*a0.cos[0];
     const double t3 = t1 - 0.032*a0.sin[1];
     const double t4 = 0.032*a0.cos[1] + t2;
     const double t5 = t4 + 0.045;
-    J[17] = -a0.cos[2];
-    J[13] = a0.sin[2];
-    J[22] = a0.cos[3];
-    J[23] = a0.cos[3];
+    J_out[17] = -a0.cos[2];
+    J_out[13] = a0.sin[2];
+    J_out[22] = a0.cos[3];
+    J_out[23] = a0.cos[3];
     const double t6 = a0.cos[3]*t5;
-    J[9] = t6;
+    J_out[9] = t6;
     const double t7 = 0.006 + t6;
-    J[0] = a0.cos[2]*t3 - a0.sin[2]*t7;
-    J[4] = a0.sin[2]*t3 + a0.cos[2]*t7;
+    J_out[0] = a0.cos[2]*t3 - a0.sin[2]*t7;
+    J_out[4] = a0.sin[2]*t3 + a0.cos[2]*t7;
     const double t8 = -a0.cos[2]*a0.sin[3];
-    J[14] = t8;
-    J[15] = t8;
-    J[1] = t8*t5;
+    J_out[14] = t8;
+    J_out[15] = t8;
+    J_out[1] = t8*t5;
     const double t9 = a0.cos[2]*a0.cos[3];
-    J[2] = t9*t3 - a0.sin[2]*t4;
-    J[3] = t9*t1 - a0.sin[2]*t2;
+    J_out[2] = t9*t3 - a0.sin[2]*t4;
+    J_out[3] = t9*t1 - a0.sin[2]*t2;
     const double t10 = a0.cos[3]*a0.sin[2];
     const double t11 = -a0.sin[2]*a0.sin[3];
-    J[18] = t11;
-    J[19] = t11;
-    J[5] = t11*t5;
-    J[6] = a0.cos[2]*t4 + t10*t3;
-    J[7] = a0.cos[2]*t2 + t10*t1;
-    J[10] = a0.sin[3]*t3;
-    J[11] = a0.sin[3]*t1;
+    J_out[18] = t11;
+    J_out[19] = t11;
+    J_out[5] = t11*t5;
+    J_out[6] = a0.cos[2]*t4 + t10*t3;
+    J_out[7] = a0.cos[2]*t2 + t10*t1;
+    J_out[10] = a0.sin[3]*t3;
+    J_out[11] = a0.sin[3]*t1;
 }

@@ -8,6 +8,7 @@
  * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
  * Cost: at most 24 times that of thumb_tendon_lengths and thumb_coupling, and the solver's own.
  */
+#include "numerics.h"
 #include "awiwi_solvers.h"
 #include "kernels.h"
 
@@ -18,12 +19,12 @@ static void model(const void *context, const awiwi_real *q, awiwi_real *h, awiwi
     awiwi_thumb_coupling(q, P);
 }
 
-int awiwi_thumb_joint_estimate(const double h[restrict 8], const double start[restrict 4], double q[restrict 4])
+int awiwi_thumb_joint_estimate(const double h_in[restrict 8], const double start_in[restrict 4], double q_out[restrict 4])
 {
     static const awiwi_real low[4] = {-0.6108652381980153, -0.6108652381980153, -0.08726646259971647, -0.08726646259971647};
     static const awiwi_real high[4] = {0.6108652381980153, 0.6108652381980153, 1.3962634015954636, 1.3962634015954636};
     const awiwi_real tolerance = 1e-11;
     const awiwi_problem problem = {model, 0, 4, 8, low, high};
 
-    return awiwi_least_squares(&problem, h, start, 24, tolerance, q);
+    return awiwi_least_squares(&problem, h_in, start_in, 24, tolerance, q_out);
 }

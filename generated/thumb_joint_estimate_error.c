@@ -10,22 +10,23 @@
  * Cost: 68 add, 99 mul, 6 div, 1 neg, 6 sqrt, 2 sincos, 8 calls.
  * Inputs: sha256 587a65bca3163563dc3b07fe3ba2c07934dd21d567d7f82f1bc6b0fb691a7376.
  */
+#include "numerics.h"
 #include <math.h>
-#include "trig.h"
+#include "sincos.h"
 #include "kernels.h"
 
-void awiwi_thumb_joint_estimate_error(const double q[restrict 4], const double noise[restrict 1], double covariance[restrict 16], double worst[restrict 4])
+void awiwi_thumb_joint_estimate_error(const double q_in[restrict 4], const double noise_in[restrict 1], double covariance_out[restrict 16], double worst_out[restrict 4])
 {
-    covariance[2] = 0.0;
-    covariance[3] = 0.0;
-    covariance[6] = 0.0;
-    covariance[7] = 0.0;
-    covariance[8] = 0.0;
-    covariance[9] = 0.0;
-    covariance[12] = 0.0;
-    covariance[13] = 0.0;
-    const double t0 = noise[0]*noise[0];
-    const awiwi_turn2 a0 = awiwi_sincos2(q[0], q[1]);
+    covariance_out[2] = 0.0;
+    covariance_out[3] = 0.0;
+    covariance_out[6] = 0.0;
+    covariance_out[7] = 0.0;
+    covariance_out[8] = 0.0;
+    covariance_out[9] = 0.0;
+    covariance_out[12] = 0.0;
+    covariance_out[13] = 0.0;
+    const double t0 = noise_in[0]*noise_in[0];
+    const awiwi_sincos2_result a0 = awiwi_sincos2(q_in[0], q_in[1]);
     const double t1 = 0.003*a0.cos[0];
     const double t2 = 0.003*a0.sin[0];
     const double t3 = 0.047*a0.cos[1];
@@ -98,18 +99,18 @@ void awiwi_thumb_joint_estimate_error(const double q[restrict 4], const double n
     const double t68 = t67*t67;
     const double t69 = t62*t68;
     const double t70 = -t0*t69;
-    covariance[1] = t70;
-    covariance[4] = t70;
-    covariance[0] = t0*t53 - t62*t70;
+    covariance_out[1] = t70;
+    covariance_out[4] = t70;
+    covariance_out[0] = t0*t53 - t62*t70;
     const double t71 = fabs(t33*t53 - t64*t69) + fabs(t34*t53 - t63*t69) + fabs(t50*t53 + t66*t69) + fabs(t51*t53 + t65*t69);
-    worst[0] = noise[0]*t71;
-    covariance[5] = t0*t68;
-    worst[1] = noise[0]*(fabs(t63*t68) + fabs(t64*t68) + fabs(t65*t68) + fabs(t66*t68));
-    covariance[10] = 7812.5*t0;
+    worst_out[0] = noise_in[0]*t71;
+    covariance_out[5] = t0*t68;
+    worst_out[1] = noise_in[0]*(fabs(t63*t68) + fabs(t64*t68) + fabs(t65*t68) + fabs(t66*t68));
+    covariance_out[10] = 7812.5*t0;
     const double t72 = 10416.666666666666*t0;
-    covariance[11] = t72;
-    covariance[14] = t72;
-    covariance[15] = 27777.777777777777*t0;
-    worst[2] = 125.0*noise[0];
-    worst[3] = 333.3333333333333*noise[0];
+    covariance_out[11] = t72;
+    covariance_out[14] = t72;
+    covariance_out[15] = 27777.777777777777*t0;
+    worst_out[2] = 125.0*noise_in[0];
+    worst_out[3] = 333.3333333333333*noise_in[0];
 }

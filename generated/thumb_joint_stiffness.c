@@ -9,21 +9,22 @@
  * Cost: 125 add, 135 mul, 4 div, 4 sqrt, 2 sincos.
  * Inputs: sha256 587a65bca3163563dc3b07fe3ba2c07934dd21d567d7f82f1bc6b0fb691a7376.
  */
+#include "numerics.h"
 #include <math.h>
-#include "trig.h"
+#include "sincos.h"
 #include "kernels.h"
 
-void awiwi_thumb_joint_stiffness(const double q[restrict 4], const double f[restrict 8], const double k[restrict 8], double K[restrict 16])
+void awiwi_thumb_joint_stiffness(const double q_in[restrict 4], const double f_in[restrict 8], const double k_in[restrict 8], double K_out[restrict 16])
 {
-    K[2] = 0.0;
-    K[3] = 0.0;
-    K[6] = 0.0;
-    K[7] = 0.0;
-    K[8] = 0.0;
-    K[9] = 0.0;
-    K[12] = 0.0;
-    K[13] = 0.0;
-    const awiwi_turn2 a0 = awiwi_sincos2(q[0], q[1]);
+    K_out[2] = 0.0;
+    K_out[3] = 0.0;
+    K_out[6] = 0.0;
+    K_out[7] = 0.0;
+    K_out[8] = 0.0;
+    K_out[9] = 0.0;
+    K_out[12] = 0.0;
+    K_out[13] = 0.0;
+    const awiwi_sincos2_result a0 = awiwi_sincos2(q_in[0], q_in[1]);
     const double t0 = 0.003*a0.sin[0];
     const double t1 = 0.003*a0.cos[0];
     const double t2 = t1 - 0.03;
@@ -60,7 +61,7 @@ void awiwi_thumb_joint_stiffness(const double q[restrict 4], const double f[rest
     const double t33 = 1.0/sqrt(t32 + t19*t19 + t28*t28);
     double s34 = t32 + t24*t24;
     const double t35 = t33*t33;
-    const double t36 = f[0]*t33;
+    const double t36 = f_in[0]*t33;
     const double t37 = t29*t35;
     const double t38 = t29*t37;
     const double t39 = t7 - t13;
@@ -70,7 +71,7 @@ void awiwi_thumb_joint_stiffness(const double q[restrict 4], const double f[rest
     const double t43 = 1.0/sqrt(t42 + t22*t22 + t40*t40);
     double s44 = t42 + t26*t26;
     const double t45 = t43*t43;
-    const double t46 = f[1]*t43;
+    const double t46 = f_in[1]*t43;
     const double t47 = t41*t45;
     const double t48 = t41*t47;
     const double t49 = t7 + t13;
@@ -83,38 +84,38 @@ void awiwi_thumb_joint_stiffness(const double q[restrict 4], const double f[rest
     const double t54 = 1.0/sqrt(s44);
     const double t55 = t49*t24 - t25*t50;
     const double t56 = t51*t51;
-    const double t57 = f[2]*t51;
+    const double t57 = f_in[2]*t51;
     const double t58 = t55*t56;
     const double t59 = t55*t58;
     const double t60 = t52*t26 - t27*t53;
     const double t61 = t54*t54;
-    const double t62 = f[3]*t54;
+    const double t62 = f_in[3]*t54;
     const double t63 = t60*t61;
     const double t64 = t60*t63;
     const double t65 = t14 + t28;
     double s66 = t14*t65 - t38;
     const double t67 = t20 - t19;
     s66 += t20*t67;
-    double s68 = t36*s66 + k[0]*t38;
+    double s68 = t36*s66 + k_in[0]*t38;
     const double t69 = t39 + t40;
     double s70 = t39*t69 - t48;
-    s68 += k[1]*t48;
+    s68 += k_in[1]*t48;
     const double t71 = t23 - t22;
     s70 += t23*t71;
     s68 += t46*s70;
     const double t72 = t49 - t50;
     double s73 = t49*t72 - t59;
-    s68 += k[2]*t59;
+    s68 += k_in[2]*t59;
     const double t74 = t25 - t24;
     s73 += t25*t74;
     s68 += t57*s73;
     const double t75 = t52 - t53;
     double s76 = t52*t75 - t64;
-    s68 += k[3]*t64;
+    s68 += k_in[3]*t64;
     const double t77 = t27 - t26;
     s76 += t27*t77;
     s68 += t62*s76;
-    K[0] = s68;
+    K_out[0] = s68;
     const double t78 = t3 + t9;
     const double t79 = t3 - t9;
     const double t80 = t78*t30;
@@ -133,10 +134,10 @@ void awiwi_thumb_joint_stiffness(const double q[restrict 4], const double f[rest
     double s93 = t84*t75 + t89*t77;
     s85 += t88*t88;
     const double t94 = t80 + t83*t19 - t88*t28;
-    const double t95 = k[0]*t94;
+    const double t95 = k_in[0]*t94;
     const double t96 = t80 + t88*t50 - t83*t24;
     s91 += t96*t58;
-    const double t97 = k[2]*t96;
+    const double t97 = k_in[2]*t96;
     s92 += t94*t37;
     double s98 = t95*t37 + t57*s91 - t97*t58 - t36*s92;
     const double t99 = t94*t35;
@@ -145,17 +146,17 @@ void awiwi_thumb_joint_stiffness(const double q[restrict 4], const double f[rest
     const double t102 = t79*t31;
     double s103 = t79*t79 + t89*t89 + t84*t84;
     const double t104 = t102 + t89*t40 - t84*t22;
-    const double t105 = k[1]*t104;
+    const double t105 = k_in[1]*t104;
     s90 -= t104*t47;
     const double t106 = t102 + t84*t26 - t89*t53;
-    const double t107 = k[3]*t106;
+    const double t107 = k_in[3]*t106;
     s93 -= t106*t63;
     s98 += t105*t47;
     s98 += t46*s90;
     s98 -= t107*t63;
     s98 -= t62*s93;
-    K[1] = s98;
-    K[4] = s98;
+    K_out[1] = s98;
+    K_out[4] = s98;
     const double t108 = t104*t45;
     const double t109 = t106*t61;
     s101 += t105*t108;
@@ -182,11 +183,11 @@ void awiwi_thumb_joint_stiffness(const double q[restrict 4], const double f[rest
     s101 += t46*s111;
     s101 += t57*s112;
     s101 += t62*s113;
-    K[5] = s101;
-    const double t118 = k[6] + k[7];
-    K[10] = 6.4e-05*(k[4] + k[5] + t118);
+    K_out[5] = s101;
+    const double t118 = k_in[6] + k_in[7];
+    K_out[10] = 6.4e-05*(k_in[4] + k_in[5] + t118);
     const double t119 = -4.8e-05*t118;
-    K[11] = t119;
-    K[14] = t119;
-    K[15] = 3.6e-05*t118;
+    K_out[11] = t119;
+    K_out[14] = t119;
+    K_out[15] = 3.6e-05*t118;
 }

@@ -8,17 +8,18 @@
  * Cost: 61 add, 52 mul, 4 div, 4 sqrt, 2 sincos.
  * Inputs: sha256 587a65bca3163563dc3b07fe3ba2c07934dd21d567d7f82f1bc6b0fb691a7376.
  */
+#include "numerics.h"
 #include <math.h>
-#include "trig.h"
+#include "sincos.h"
 #include "kernels.h"
 
-void awiwi_thumb_joint_torque(const double q[restrict 4], const double f[restrict 8], double tau[restrict 4])
+void awiwi_thumb_joint_torque(const double q_in[restrict 4], const double f_in[restrict 8], double tau_out[restrict 4])
 {
-    const awiwi_turn2 a0 = awiwi_sincos2(q[0], q[1]);
+    const awiwi_sincos2_result a0 = awiwi_sincos2(q_in[0], q_in[1]);
     const double t0 = 0.003*a0.sin[0];
     const double t1 = 0.003*a0.cos[0];
     const double t2 = t1 - 0.03;
-    const double t3 = f[6] - f[7];
+    const double t3 = f_in[6] - f_in[7];
     const double t4 = 0.0025*a0.sin[1];
     const double t5 = 0.047*a0.sin[1];
     const double t6 = a0.cos[0]*t4;
@@ -42,22 +43,22 @@ void awiwi_thumb_joint_torque(const double q[restrict 4], const double f[restric
     const double t24 = t5 - t12;
     const double t25 = t12 + t5;
     const double t26 = t24*t24;
-    const double t27 = f[0]/sqrt(t26 + t18*t18 + t23*t23);
+    const double t27 = f_in[0]/sqrt(t26 + t18*t18 + t23*t23);
     double s28 = t26 + t22*t22;
     const double t29 = t7 + t15;
     const double t30 = t25*t25;
-    const double t31 = f[3]/sqrt(t30 + t20*t20 + t29*t29);
+    const double t31 = f_in[3]/sqrt(t30 + t20*t20 + t29*t29);
     double s32 = t30 + t21*t21;
     double s33 = ((t7 - t13)*t18 - (t1 + t17)*t23)*t27 + ((t7 + t13)*t20 - (t1 + t19)*t29)*t31;
     const double t34 = t8 - t15;
     s32 += t34*t34;
-    const double t35 = f[1]/sqrt(s32);
+    const double t35 = f_in[1]/sqrt(s32);
     const double t36 = t8 + t15;
     s28 += t36*t36;
-    const double t37 = f[2]/sqrt(s28);
+    const double t37 = f_in[2]/sqrt(s28);
     s33 += ((t8 - t13)*t21 - (t1 - t19)*t34)*t35;
     s33 += ((t13 + t8)*t22 - (t1 - t17)*t36)*t37;
-    tau[0] = s33;
+    tau_out[0] = s33;
     const double t38 = a0.sin[0]*t11;
     const double t39 = a0.sin[0]*t5;
     const double t40 = a0.cos[0]*t11;
@@ -76,7 +77,7 @@ void awiwi_thumb_joint_torque(const double q[restrict 4], const double f[restric
     s47 -= t51*t29;
     s48 += t51*t34;
     s49 -= t50*t23;
-    tau[1] = s45*t37 - s47*t31 - s48*t35 - s49*t27;
-    tau[2] = -0.008*(f[4] - f[5] - t3);
-    tau[3] = -0.006*t3;
+    tau_out[1] = s45*t37 - s47*t31 - s48*t35 - s49*t27;
+    tau_out[2] = -0.008*(f_in[4] - f_in[5] - t3);
+    tau_out[3] = -0.006*t3;
 }

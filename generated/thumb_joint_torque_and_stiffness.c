@@ -10,21 +10,22 @@
  * Cost: 134 add, 145 mul, 4 div, 1 neg, 4 sqrt, 2 sincos.
  * Inputs: sha256 587a65bca3163563dc3b07fe3ba2c07934dd21d567d7f82f1bc6b0fb691a7376.
  */
+#include "numerics.h"
 #include <math.h>
-#include "trig.h"
+#include "sincos.h"
 #include "kernels.h"
 
-void awiwi_thumb_joint_torque_and_stiffness(const double q[restrict 4], const double f[restrict 8], const double k[restrict 8], double tau[restrict 4], double K[restrict 16])
+void awiwi_thumb_joint_torque_and_stiffness(const double q_in[restrict 4], const double f_in[restrict 8], const double k_in[restrict 8], double tau_out[restrict 4], double K_out[restrict 16])
 {
-    K[2] = 0.0;
-    K[3] = 0.0;
-    K[6] = 0.0;
-    K[7] = 0.0;
-    K[8] = 0.0;
-    K[9] = 0.0;
-    K[12] = 0.0;
-    K[13] = 0.0;
-    const awiwi_turn2 a0 = awiwi_sincos2(q[0], q[1]);
+    K_out[2] = 0.0;
+    K_out[3] = 0.0;
+    K_out[6] = 0.0;
+    K_out[7] = 0.0;
+    K_out[8] = 0.0;
+    K_out[9] = 0.0;
+    K_out[12] = 0.0;
+    K_out[13] = 0.0;
+    const awiwi_sincos2_result a0 = awiwi_sincos2(q_in[0], q_in[1]);
     const double t0 = 0.003*a0.sin[0];
     const double t1 = 0.003*a0.cos[0];
     const double t2 = t1 - 0.03;
@@ -60,7 +61,7 @@ void awiwi_thumb_joint_torque_and_stiffness(const double q[restrict 4], const do
     const double t32 = t30*t30;
     const double t33 = 1.0/sqrt(t32 + t19*t19 + t28*t28);
     double s34 = t32 + t26*t26;
-    const double t35 = f[3]*t33;
+    const double t35 = f_in[3]*t33;
     const double t36 = t33*t33;
     const double t37 = t7 + t13;
     const double t38 = t13 + t8;
@@ -68,7 +69,7 @@ void awiwi_thumb_joint_torque_and_stiffness(const double q[restrict 4], const do
     const double t40 = t31*t31;
     const double t41 = 1.0/sqrt(t40 + t22*t22 + t38*t38);
     double s42 = t40 + t24*t24;
-    const double t43 = f[2]*t41;
+    const double t43 = f_in[2]*t41;
     const double t44 = t41*t41;
     const double t45 = t7 - t12;
     const double t46 = t12 - t8;
@@ -79,12 +80,12 @@ void awiwi_thumb_joint_torque_and_stiffness(const double q[restrict 4], const do
     s34 += t49*t49;
     const double t50 = 1.0/sqrt(s34);
     const double t51 = t45*t24 + t25*t46;
-    const double t52 = f[0]*t47;
+    const double t52 = f_in[0]*t47;
     const double t53 = t47*t47;
     const double t54 = t48*t26 + t27*t49;
-    const double t55 = f[1]*t50;
+    const double t55 = f_in[1]*t50;
     const double t56 = t50*t50;
-    tau[0] = t29*t35 + t39*t43 - t51*t52 - t54*t55;
+    tau_out[0] = t29*t35 + t39*t43 - t51*t52 - t54*t55;
     const double t57 = t3 - t9;
     const double t58 = t3 + t9;
     const double t59 = t57*t30;
@@ -104,10 +105,10 @@ void awiwi_thumb_joint_torque_and_stiffness(const double q[restrict 4], const do
     double s72 = t58*t58 + t68*t68 + t63*t63;
     const double t73 = t71 + t63*t24 - t68*t46;
     const double t74 = t71 + t68*t38 - t63*t22;
-    tau[1] = -(t69*t35) - t70*t55 - t73*t52 - t74*t43;
-    const double t75 = f[6] - f[7];
-    tau[2] = -0.008*(f[4] - f[5] - t75);
-    tau[3] = -0.006*t75;
+    tau_out[1] = -(t69*t35) - t70*t55 - t73*t52 - t74*t43;
+    const double t75 = f_in[6] - f_in[7];
+    tau_out[2] = -0.008*(f_in[4] - f_in[5] - t75);
+    tau_out[3] = -0.006*t75;
     const double t76 = t51*t53;
     const double t77 = t51*t76;
     const double t78 = t73*t53;
@@ -125,14 +126,14 @@ void awiwi_thumb_joint_torque_and_stiffness(const double q[restrict 4], const do
     double s90 = t73*t76 - t63*t88;
     const double t91 = t25 - t24;
     s89 += t25*t91;
-    double s92 = t52*s89 + k[0]*t77;
-    const double t93 = k[0]*t73;
+    double s92 = t52*s89 + k_in[0]*t77;
+    const double t93 = k_in[0]*t73;
     s90 += t68*t91;
     double s94 = t93*t76 - t52*s90;
     const double t95 = t48 + t49;
     double s96 = t48*t95 - t80;
-    s92 += k[1]*t80;
-    const double t97 = k[1]*t70;
+    s92 += k_in[1]*t80;
+    const double t97 = k_in[1]*t70;
     s94 += t97*t79;
     double s98 = t93*t78 + t97*t81;
     const double t99 = t27 - t26;
@@ -141,9 +142,9 @@ void awiwi_thumb_joint_torque_and_stiffness(const double q[restrict 4], const do
     s94 += t55*(t67*t99 - t62*t95 - t70*t79);
     const double t100 = t37 - t38;
     double s101 = t37*t100 - t83;
-    s92 += k[2]*t83;
+    s92 += k_in[2]*t83;
     double s102 = t63*t100 + t74*t82;
-    const double t103 = k[2]*t74;
+    const double t103 = k_in[2]*t74;
     s94 -= t103*t82;
     s98 += t103*t84;
     const double t104 = t23 - t22;
@@ -153,19 +154,19 @@ void awiwi_thumb_joint_torque_and_stiffness(const double q[restrict 4], const do
     s94 += t43*s102;
     const double t105 = t14 - t28;
     double s106 = t14*t105 - t86;
-    s92 += k[3]*t86;
-    const double t107 = k[3]*t69;
+    s92 += k_in[3]*t86;
+    const double t107 = k_in[3]*t69;
     double s108 = t62*t105 - t69*t85;
     s94 -= t107*t85;
     s98 += t107*t87;
     const double t109 = t20 - t19;
     s106 += t20*t109;
     s92 += t35*s106;
-    K[0] = s92;
+    K_out[0] = s92;
     s108 += t67*t109;
     s94 -= t35*s108;
-    K[1] = s94;
-    K[4] = s94;
+    K_out[1] = s94;
+    K_out[4] = s94;
     s72 += (t4 - t10)*t31;
     double s110 = s72 - t73*t78;
     s64 -= (t4 + t10)*t30;
@@ -188,11 +189,11 @@ void awiwi_thumb_joint_torque_and_stiffness(const double q[restrict 4], const do
     s98 += t55*s111;
     s98 += t43*s112;
     s98 += t35*s113;
-    K[5] = s98;
-    const double t118 = k[6] + k[7];
-    K[10] = 6.4e-05*(k[4] + k[5] + t118);
+    K_out[5] = s98;
+    const double t118 = k_in[6] + k_in[7];
+    K_out[10] = 6.4e-05*(k_in[4] + k_in[5] + t118);
     const double t119 = -4.8e-05*t118;
-    K[11] = t119;
-    K[14] = t119;
-    K[15] = 3.6e-05*t118;
+    K_out[11] = t119;
+    K_out[14] = t119;
+    K_out[15] = 3.6e-05*t118;
 }

@@ -7,24 +7,25 @@
  * Cost: 48 add, 46 mul, 3 sincos.
  * Inputs: sha256 eb684d40ad53461219ce6205f05b311d2262086fa4be9e6eb81e8ea245c94e57.
  */
-#include "trig.h"
+#include "numerics.h"
+#include "sincos.h"
 #include "kernels.h"
 
-void awiwi_thumb_mass_matrix(const double q[restrict 4], double M[restrict 16])
+void awiwi_thumb_mass_matrix(const double q_in[restrict 4], double M_out[restrict 16])
 {
-    M[15] = 1.09224e-06;
-    const double t0 = q[3] + 0.982793723247329 + q[2];
-    const awiwi_turn3 a0 = awiwi_sincos3(q[2], t0, q[1]);
+    M_out[15] = 1.09224e-06;
+    const double t0 = q_in[3] + 0.982793723247329 + q_in[2];
+    const awiwi_sincos3_result a0 = awiwi_sincos3(q_in[2], t0, q_in[1]);
     const double t1 = 1.2034775457302571e-06*a0.cos[1] + 1.7359897341064771e-06*a0.sin[1];
     const double t2 = 1.0608e-05*a0.cos[0] + t1 - 8.64e-08*a0.sin[0];
     const double t3 = 2.8125*t2;
     const double t4 = 1.7359897341064771e-06*a0.cos[1] - 1.2034775457302571e-06*a0.sin[1];
     const double t5 = a0.cos[0]*t1 - a0.sin[0]*t4;
     const double t6 = 2.0*t5 + 1.02773e-05;
-    M[10] = t6;
+    M_out[10] = t6;
     const double t7 = t5 + 1.09224e-06;
-    M[11] = t7;
-    M[14] = t7;
+    M_out[11] = t7;
+    M_out[14] = t7;
     const double t8 = t3 + t6 + 4.258586e-05;
     double s9 = t3 + 2.0*a0.cos[0]*t1 + 4.296662230769231e-05;
     const double t10 = 8.96344e-06*a0.cos[0] - 5.97e-08*a0.sin[0];
@@ -35,31 +36,31 @@ void awiwi_thumb_mass_matrix(const double q[restrict 4], double M[restrict 16])
     const double t14 = 3.6055512754639894e-09*a0.sin[1];
     s13 -= 2.6973153846153845e-07;
     const double t15 = -3.6055512754639894e-09*a0.cos[1];
-    M[7] = t15;
-    M[13] = t15;
+    M_out[7] = t15;
+    M_out[13] = t15;
     const double t16 = t15 + 3.59e-08*a0.sin[0] - 4.46e-09*a0.cos[0];
-    M[6] = t16;
-    M[9] = t16;
+    M_out[6] = t16;
+    M_out[9] = t16;
     double s17 = t12 + 2.0*a0.sin[0]*t4;
     const double t18 = 4.46e-09*a0.sin[0] + 3.59e-08*a0.cos[0] + t14;
     s13 -= (a0.cos[0] + 1.40625)*t4;
     s17 += t8;
     double s19 = t8 + 1.5405e-06 - s9;
     s17 -= 9.439677692307693e-06;
-    M[5] = s17;
+    M_out[5] = s17;
     double s20 = 0.375*t2 + 1.2852e-05;
     s20 += a0.cos[2]*(s9 - 4.5686e-07);
     s20 -= 2.0*a0.sin[2]*(t18 + 2.19e-07);
     s19 += a0.cos[2]*s20;
     s19 -= 1.296e-07*a0.sin[2];
-    M[0] = s19;
+    M_out[0] = s19;
     const double t21 = a0.sin[2]*s13 + a0.cos[2]*(t16 + 2.95e-08);
-    M[1] = t21;
-    M[4] = t21;
+    M_out[1] = t21;
+    M_out[4] = t21;
     const double t22 = 0.1875*t2 + a0.cos[2]*(t6 + 1.40625*t2) - a0.sin[2]*t18;
-    M[2] = t22;
-    M[8] = t22;
+    M_out[2] = t22;
+    M_out[8] = t22;
     const double t23 = 0.1875*t1 + a0.cos[2]*(t7 + 1.40625*t1) - a0.sin[2]*t14;
-    M[3] = t23;
-    M[12] = t23;
+    M_out[3] = t23;
+    M_out[12] = t23;
 }

@@ -8,66 +8,67 @@
  * Cost: 13 add, 34 mul, 8 neg, 4 sincos.
  * Inputs: sha256 e56e526ea40970104fe9bee780b2560b3c841e631e95f0e1cea4522e61111cae.
  */
-#include "trig.h"
+#include "numerics.h"
+#include "sincos.h"
 #include "kernels.h"
 
-void awiwi_thumb_pose_and_jacobian(const double q[restrict 4], double T[restrict 16], double J[restrict 24])
+void awiwi_thumb_pose_and_jacobian(const double q_in[restrict 4], double T_out[restrict 16], double J_out[restrict 24])
 {
-    T[12] = 0.0;
-    T[13] = 0.0;
-    T[14] = 0.0;
-    J[8] = 0.0;
-    J[12] = 0.0;
-    J[16] = 0.0;
-    J[21] = 0.0;
-    T[15] = 1.0;
-    J[20] = 1.0;
-    const double t0 = q[3] + q[2];
-    const awiwi_turn4 a0 = awiwi_sincos4(t0, q[2], q[0], q[1]);
+    T_out[12] = 0.0;
+    T_out[13] = 0.0;
+    T_out[14] = 0.0;
+    J_out[8] = 0.0;
+    J_out[12] = 0.0;
+    J_out[16] = 0.0;
+    J_out[21] = 0.0;
+    T_out[15] = 1.0;
+    J_out[20] = 1.0;
+    const double t0 = q_in[3] + q_in[2];
+    const awiwi_sincos4_result a0 = awiwi_sincos4(t0, q_in[2], q_in[0], q_in[1]);
     const double t1 = 0.032*a0.cos[1] + 0.025*a0.cos[0];
     const double t2 = t1 + 0.045;
     const double t3 = -0.025*a0.sin[0];
     const double t4 = t3 - 0.032*a0.sin[1];
-    J[17] = -a0.cos[2];
-    J[13] = a0.sin[2];
-    T[10] = a0.cos[3];
-    J[22] = a0.cos[3];
-    J[23] = a0.cos[3];
-    J[11] = a0.sin[3]*t3;
+    J_out[17] = -a0.cos[2];
+    J_out[13] = a0.sin[2];
+    T_out[10] = a0.cos[3];
+    J_out[22] = a0.cos[3];
+    J_out[23] = a0.cos[3];
+    J_out[11] = a0.sin[3]*t3;
     const double t5 = a0.cos[2]*a0.cos[3];
-    T[0] = a0.cos[0]*t5 - a0.sin[2]*a0.sin[0];
+    T_out[0] = a0.cos[0]*t5 - a0.sin[2]*a0.sin[0];
     const double t6 = a0.sin[2]*a0.cos[0] + t5*a0.sin[0];
-    T[1] = -t6;
-    J[2] = t5*t4 - a0.sin[2]*t1;
-    J[3] = -0.025*t6;
+    T_out[1] = -t6;
+    J_out[2] = t5*t4 - a0.sin[2]*t1;
+    J_out[3] = -0.025*t6;
     const double t7 = -a0.cos[2]*a0.sin[3];
-    T[2] = t7;
-    J[14] = t7;
-    J[15] = t7;
+    T_out[2] = t7;
+    J_out[14] = t7;
+    J_out[15] = t7;
     const double t8 = a0.cos[3]*t2;
-    J[9] = t8;
+    J_out[9] = t8;
     const double t9 = 0.006 + t8;
     const double t10 = a0.sin[2]*t4 + a0.cos[2]*t9;
-    T[3] = t10;
-    J[4] = t10;
+    T_out[3] = t10;
+    J_out[4] = t10;
     const double t11 = a0.cos[3]*a0.sin[2];
-    T[4] = a0.cos[2]*a0.sin[0] + a0.cos[0]*t11;
+    T_out[4] = a0.cos[2]*a0.sin[0] + a0.cos[0]*t11;
     const double t12 = a0.cos[2]*a0.cos[0] - t11*a0.sin[0];
-    T[5] = t12;
+    T_out[5] = t12;
     const double t13 = a0.sin[2]*t9 - a0.cos[2]*t4;
-    T[7] = t13;
-    J[0] = -t13;
-    T[8] = a0.sin[3]*a0.cos[0];
-    T[9] = -(a0.sin[3]*a0.sin[0]);
+    T_out[7] = t13;
+    J_out[0] = -t13;
+    T_out[8] = a0.sin[3]*a0.cos[0];
+    T_out[9] = -(a0.sin[3]*a0.sin[0]);
     const double t14 = a0.sin[3]*t2;
-    T[11] = t14;
-    J[1] = -(a0.cos[2]*t14);
-    J[5] = -(a0.sin[2]*t14);
+    T_out[11] = t14;
+    J_out[1] = -(a0.cos[2]*t14);
+    J_out[5] = -(a0.sin[2]*t14);
     const double t15 = -a0.sin[2]*a0.sin[3];
-    T[6] = t15;
-    J[18] = t15;
-    J[19] = t15;
-    J[6] = a0.cos[2]*t1 + t11*t4;
-    J[7] = 0.025*t12;
-    J[10] = a0.sin[3]*t4;
+    T_out[6] = t15;
+    J_out[18] = t15;
+    J_out[19] = t15;
+    J_out[6] = a0.cos[2]*t1 + t11*t4;
+    J_out[7] = 0.025*t12;
+    J_out[10] = a0.sin[3]*t4;
 }

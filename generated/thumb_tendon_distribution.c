@@ -14,6 +14,7 @@
  * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
  * Cost: at most 357 times that of thumb_coupling and thumb_tendon_stiffness and thumb_coupling_derivative, and the solver's own.
  */
+#include "numerics.h"
 #include "awiwi_distribution.h"
 #include "kernels.h"
 
@@ -23,7 +24,7 @@ static int curve(const void *context, const awiwi_real *f, awiwi_real *k, awiwi_
     return awiwi_thumb_tendon_stiffness(f, k, slope, curvature);
 }
 
-int awiwi_thumb_tendon_distribution(const double q[restrict 4], const double tau[restrict 4], const double K[restrict 16], const double f_min[restrict 1], const double f_max[restrict 1], double f[restrict 8])
+int awiwi_thumb_tendon_distribution(const double q_in[restrict 4], const double tau_in[restrict 4], const double K_in[restrict 16], const double f_min_in[restrict 1], const double f_max_in[restrict 1], double f_out[restrict 8])
 {
     static const awiwi_pair pairs[] = {{4, 5, 1}, {6, 7, 0}};
     static const int searched[] = {0, 1, 2, 3};
@@ -32,11 +33,11 @@ int awiwi_thumb_tendon_distribution(const double q[restrict 4], const double tau
     awiwi_real P[8 * 4];
     awiwi_real dP[8 * 4 * 4];
     const awiwi_tendons tendons = {
-        4, 8, P, dP, curve, context, f_min[0], f_max[0],
+        4, 8, P, dP, curve, context, f_min_in[0], f_max_in[0],
         2, pairs, 4, searched,
     };
 
-    awiwi_thumb_coupling(q, P);
-    awiwi_thumb_coupling_derivative(q, dP);
-    return awiwi_distribute(&tendons, tau, K, tolerance, f);
+    awiwi_thumb_coupling(q_in, P);
+    awiwi_thumb_coupling_derivative(q_in, dP);
+    return awiwi_distribute(&tendons, tau_in, K_in, tolerance, f_out);
 }

@@ -7,19 +7,20 @@
  * Cost: 26 add, 22 mul, 2 neg, 4 sqrt, 2 sincos.
  * Inputs: sha256 5e272fcaf53c5cd633ef6975d3c6c087a59d1d03e13b9a940e6fbe1831dd74a7.
  */
+#include "numerics.h"
 #include <math.h>
-#include "trig.h"
+#include "sincos.h"
 #include "kernels.h"
 
-void awiwi_thumb_tendon_lengths(const double q[restrict 4], double h[restrict 8])
+void awiwi_thumb_tendon_lengths(const double q_in[restrict 4], double h_out[restrict 8])
 {
-    const double t0 = 0.008*q[2];
-    h[4] = t0;
-    h[5] = -t0;
-    const double t1 = t0 - 0.006*q[3];
-    h[6] = -t1;
-    h[7] = t1;
-    const awiwi_turn2 a0 = awiwi_sincos2(q[1], q[0]);
+    const double t0 = 0.008*q_in[2];
+    h_out[4] = t0;
+    h_out[5] = -t0;
+    const double t1 = t0 - 0.006*q_in[3];
+    h_out[6] = -t1;
+    h_out[7] = t1;
+    const awiwi_sincos2_result a0 = awiwi_sincos2(q_in[1], q_in[0]);
     const double t2 = 0.0025*a0.cos[0] - 0.025;
     const double t3 = 0.006 + 0.047*a0.cos[0];
     const double t4 = 0.047*a0.sin[0];
@@ -42,18 +43,18 @@ void awiwi_thumb_tendon_lengths(const double q[restrict 4], double h[restrict 8]
     double s21 = t7 + t20*t20;
     const double t22 = t17 - t13;
     s19 += t22*t22;
-    h[0] = sqrt(s19);
+    h_out[0] = sqrt(s19);
     const double t23 = t13 + t17;
     s21 += t23*t23;
-    h[2] = sqrt(s21);
+    h_out[2] = sqrt(s21);
     const double t24 = t12 - t16;
     double s25 = t9 + t24*t24;
     const double t26 = t12 + t16;
     double s27 = t9 + t26*t26;
     const double t28 = t17 + t15;
     s25 += t28*t28;
-    h[1] = sqrt(s25);
+    h_out[1] = sqrt(s25);
     const double t29 = t17 - t15;
     s27 += t29*t29;
-    h[3] = sqrt(s27);
+    h_out[3] = sqrt(s27);
 }

@@ -10,17 +10,18 @@
  * Cost: 24 add, 48 mul, 2 div, 1 neg, 1 sqrt, 2 sincos.
  * Inputs: sha256 f3c3c5f8b9f1a1e1c692bd3c2cc78649d46a5699c6bfe9fac97394eae1cedb18.
  */
+#include "numerics.h"
 #include <math.h>
-#include "trig.h"
+#include "sincos.h"
 #include "kernels.h"
 
-int awiwi_wrist_palm_pose(const double q71[restrict 1], const double q73[restrict 1], double T[restrict 16])
+int awiwi_wrist_palm_pose(const double q71_in[restrict 1], const double q73_in[restrict 1], double T_out[restrict 16])
 {
-    T[12] = 0.0;
-    T[13] = 0.0;
-    T[14] = 0.0;
-    T[15] = 1.0;
-    const awiwi_turn2 a0 = awiwi_sincos2(q71[0], q73[0]);
+    T_out[12] = 0.0;
+    T_out[13] = 0.0;
+    T_out[14] = 0.0;
+    T_out[15] = 1.0;
+    const awiwi_sincos2_result a0 = awiwi_sincos2(q71_in[0], q73_in[0]);
     const double t0 = 0.005184*a0.cos[0]*a0.cos[0];
     double s1 = t0 - 0.01;
     const double t2 = 0.074565407529229*a0.cos[1];
@@ -38,7 +39,7 @@ int awiwi_wrist_palm_pose(const double q71[restrict 1], const double q73[restric
     s1 += t12*t12;
     const double t13 = 23.80952380952381*t10;
     const double t14 = 23.80952380952381*t9;
-    T[5] = t14;
+    T_out[5] = t14;
     const double t15 = t8*t13 + t12*t14;
     const double t16 = t0 + t15*t15;
     const double t17 = 1.0/t16;
@@ -48,20 +49,20 @@ int awiwi_wrist_palm_pose(const double q71[restrict 1], const double q73[restric
     const double t21 = t17*(0.5*a0.cos[0]*s1 + t15*t19);
     const double t22 = -a0.sin[0]*t20;
     const double t23 = a0.cos[0]*t21;
-    T[0] = t22 - t14*t23;
-    T[10] = t14*t22 - t23;
-    T[1] = a0.cos[0]*t13;
+    T_out[0] = t22 - t14*t23;
+    T_out[10] = t14*t22 - t23;
+    T_out[1] = a0.cos[0]*t13;
     const double t24 = a0.sin[0]*t21;
-    T[4] = t13*t21;
+    T_out[4] = t13*t21;
     const double t25 = a0.cos[0]*t20;
-    T[2] = t24 - t14*t25;
-    T[8] = t25 - t14*t24;
+    T_out[2] = t24 - t14*t25;
+    T_out[8] = t25 - t14*t24;
     const double t26 = 0.42857142857142855*t20;
     const double t27 = 0.5*t11 + t9*t26;
-    T[3] = a0.cos[0]*t27 - 0.018*t24;
-    T[6] = t13*t20;
-    T[7] = 0.5*t7 - t10*t26;
-    T[9] = a0.sin[0]*t13;
-    T[11] = 0.018*t23 + a0.sin[0]*t27;
+    T_out[3] = a0.cos[0]*t27 - 0.018*t24;
+    T_out[6] = t13*t20;
+    T_out[7] = 0.5*t7 - t10*t26;
+    T_out[9] = a0.sin[0]*t13;
+    T_out[11] = 0.018*t23 + a0.sin[0]*t27;
     return a0.sin[1] > 0.0 && 0.002592*a0.cos[0] > 0.0 && t18 > 0.0 ? 0 : 1;
 }

@@ -12,22 +12,23 @@
  * Cost: 20 add, 39 mul, 2 div, 1 neg, 1 sqrt, 2 sincos.
  * Inputs: sha256 db74b2a34f56c6ccad41684846d922ba049b7832368c63b234f7fba0d2100dce.
  */
+#include "numerics.h"
 #include <math.h>
-#include "trig.h"
+#include "sincos.h"
 #include "kernels.h"
 
-int awiwi_wrist_points(const double q71[restrict 1], const double q73[restrict 1], double A[restrict 3], double B[restrict 3], double C[restrict 3])
+int awiwi_wrist_points(const double q71_in[restrict 1], const double q73_in[restrict 1], double A_out[restrict 3], double B_out[restrict 3], double C_out[restrict 3])
 {
-    const awiwi_turn2 a0 = awiwi_sincos2(q71[0], q73[0]);
+    const awiwi_sincos2_result a0 = awiwi_sincos2(q71_in[0], q73_in[0]);
     const double t0 = 0.072*a0.cos[0];
     const double t1 = t0*t0;
     double s2 = t1 - 0.01;
     const double t3 = 0.074565407529229*a0.sin[1];
     const double t4 = 1.0/(1.650024824145215*a0.cos[1] - 1.9293993677555321);
     const double t5 = 0.074565407529229*a0.cos[1];
-    B[1] = t5;
+    B_out[1] = t5;
     const double t6 = (0.042 - t5)*t4;
-    C[1] = t6;
+    C_out[1] = t6;
     const double t7 = -t3*t4;
     const double t8 = t3 + t7;
     const double t9 = 0.072*a0.sin[0] - t8;
@@ -46,12 +47,12 @@ int awiwi_wrist_points(const double q71[restrict 1], const double q73[restrict 1
     const double t20 = t17*(t15*t13 - t0*t19);
     const double t21 = 0.5*t8 + 0.036*(t10*t20);
     const double t22 = 0.036*(t17*(t0*t13 + t15*t19));
-    A[1] = 0.5*t11 - 0.036*(t14*t20);
-    A[0] = a0.cos[0]*t21 - a0.sin[0]*t22;
-    A[2] = a0.cos[0]*t22 + a0.sin[0]*t21;
-    B[0] = a0.cos[0]*t3;
-    B[2] = a0.sin[0]*t3;
-    C[0] = a0.cos[0]*t7;
-    C[2] = a0.sin[0]*t7;
+    A_out[1] = 0.5*t11 - 0.036*(t14*t20);
+    A_out[0] = a0.cos[0]*t21 - a0.sin[0]*t22;
+    A_out[2] = a0.cos[0]*t22 + a0.sin[0]*t21;
+    B_out[0] = a0.cos[0]*t3;
+    B_out[2] = a0.sin[0]*t3;
+    C_out[0] = a0.cos[0]*t7;
+    C_out[2] = a0.sin[0]*t7;
     return a0.sin[1] > 0.0 && 0.002592*a0.cos[0] > 0.0 && t18 > 0.0 ? 0 : 1;
 }

@@ -10,13 +10,14 @@
  * Cost: 180 add, 143 mul, 2 div, 39 sqrt, 2 sincos.
  * Inputs: sha256 c9e8bcef7946e105e81ceb55d9a65cfc81331bce477c734136b5eb268c572442.
  */
+#include "numerics.h"
 #include <math.h>
-#include "trig.h"
+#include "sincos.h"
 #include "kernels.h"
 
-int awiwi_wrist_tendon_lengths(const double q71[restrict 1], const double q73[restrict 1], double h[restrict 38])
+int awiwi_wrist_tendon_lengths(const double q71_in[restrict 1], const double q73_in[restrict 1], double h_out[restrict 38])
 {
-    const awiwi_turn2 a0 = awiwi_sincos2(q73[0], q71[0]);
+    const awiwi_sincos2_result a0 = awiwi_sincos2(q73_in[0], q71_in[0]);
     const double t0 = 0.074565407529229*a0.cos[0];
     const double t1 = 1.0/(1.650024824145215*a0.cos[0] - 1.9293993677555321);
     const double t2 = (t0 - 0.042)*t1;
@@ -87,7 +88,7 @@ int awiwi_wrist_tendon_lengths(const double q71[restrict 1], const double q73[re
     s45 += s43;
     s13 += s43;
     s46 += s43;
-    h[7] = sqrt(s46);
+    h_out[7] = sqrt(s46);
     s21 += s43;
     s22 += s43;
     const double t53 = 0.028*a0.sin[1] + s25 - t39;
@@ -98,75 +99,75 @@ int awiwi_wrist_tendon_lengths(const double q71[restrict 1], const double q73[re
     s20 += s48;
     const double t55 = 0.022*t52;
     s44 -= t55;
-    h[0] = sqrt(s44);
-    h[14] = sqrt(t55 + s43 + 0.000962 - 0.01519047619047619*t5 - 0.058*t42);
+    h_out[0] = sqrt(s44);
+    h_out[14] = sqrt(t55 + s43 + 0.000962 - 0.01519047619047619*t5 - 0.058*t42);
     const double t56 = 0.02*t52;
-    h[1] = sqrt(s10 - 0.016*t42 - t56);
+    h_out[1] = sqrt(s10 - 0.016*t42 - t56);
     double s57 = s10 - 0.02*t42;
-    h[13] = sqrt(t56 + s43 + 0.000829 - 0.012857142857142857*t5 - 0.054*t42);
+    h_out[13] = sqrt(t56 + s43 + 0.000829 - 0.012857142857142857*t5 - 0.054*t42);
     const double t58 = 0.016*t52;
     s57 -= t58;
-    h[2] = sqrt(s57);
-    h[12] = sqrt(t58 + s43 + 0.00074 - 0.009904761904761904*t5 - 0.052*t42);
+    h_out[2] = sqrt(s57);
+    h_out[12] = sqrt(t58 + s43 + 0.00074 - 0.009904761904761904*t5 - 0.052*t42);
     const double t59 = 0.012*t52;
     s19 -= t59;
-    h[3] = sqrt(s19);
-    h[11] = sqrt(t59 + s43 + 0.000612 - 0.006857142857142857*t5 - 0.048*t42);
+    h_out[3] = sqrt(s19);
+    h_out[11] = sqrt(t59 + s43 + 0.000612 - 0.006857142857142857*t5 - 0.048*t42);
     const double t60 = 0.01*t52;
     s11 -= t60;
-    h[4] = sqrt(s11);
+    h_out[4] = sqrt(s11);
     double s61 = t60 + s43 - 0.046*t42;
     const double t62 = 0.006*t52;
     s45 -= t62;
-    h[5] = sqrt(s45);
+    h_out[5] = sqrt(s45);
     s22 += t62;
-    h[9] = sqrt(s22);
+    h_out[9] = sqrt(s22);
     const double t63 = 0.004*t52;
     s13 -= t63;
-    h[6] = sqrt(s13);
+    h_out[6] = sqrt(s13);
     s21 += t63;
-    h[8] = sqrt(s21);
+    h_out[8] = sqrt(s21);
     const double t64 = 0.000554 - 0.0054761904761904765*t5;
     s61 += t64;
-    h[10] = sqrt(s61);
+    h_out[10] = sqrt(s61);
     double s65 = t64 + 0.046*t47 + s48;
     const double t66 = 0.00113 - 0.019190476190476192*t5;
-    h[15] = sqrt(t66 + s43 + 0.026*t52 - 0.062*t42);
+    h_out[15] = sqrt(t66 + s43 + 0.026*t52 - 0.062*t42);
     double s67 = t66 + 0.062*t47 + s48;
-    h[16] = sqrt(s43 + 0.028*t52 + 0.00122 - 0.021333333333333333*t5 - 0.064*t42);
-    h[17] = sqrt(s43 + 0.032*t52 + 0.001412 - 0.025904761904761906*t5 - 0.068*t42);
-    h[18] = sqrt(s43 + 0.036*t52 + 0.001549 - 0.03*t5 - 0.07*t42);
+    h_out[16] = sqrt(s43 + 0.028*t52 + 0.00122 - 0.021333333333333333*t5 - 0.064*t42);
+    h_out[17] = sqrt(s43 + 0.032*t52 + 0.001412 - 0.025904761904761906*t5 - 0.068*t42);
+    h_out[18] = sqrt(s43 + 0.036*t52 + 0.001549 - 0.03*t5 - 0.07*t42);
     const double t68 = 0.026*t54;
     s67 -= t68;
-    h[19] = sqrt(t68 + 0.0037142857142857142*t5 + 0.012*t47 + s48 + 0.000205);
-    h[35] = sqrt(s67);
+    h_out[19] = sqrt(t68 + 0.0037142857142857142*t5 + 0.012*t47 + s48 + 0.000205);
+    h_out[35] = sqrt(s67);
     const double t69 = 0.022*t54;
     s49 += t69;
-    h[20] = sqrt(s49);
-    h[34] = sqrt(0.06*t47 + s48 + 0.001021 - t69 - 0.015714285714285715*t5);
+    h_out[20] = sqrt(s49);
+    h_out[34] = sqrt(0.06*t47 + s48 + 0.001021 - t69 - 0.015714285714285715*t5);
     const double t70 = 0.02*t54;
-    h[21] = sqrt(0.004285714285714286*t5 + 0.018*t47 + s48 + t70 + 0.000181);
-    h[33] = sqrt(0.056*t47 + s48 + 0.000884 - t70 - 0.013333333333333334*t5);
+    h_out[21] = sqrt(0.004285714285714286*t5 + 0.018*t47 + s48 + t70 + 0.000181);
+    h_out[33] = sqrt(0.056*t47 + s48 + 0.000884 - t70 - 0.013333333333333334*t5);
     const double t71 = 0.016*t54;
-    h[22] = sqrt(0.004190476190476191*t5 + 0.022*t47 + s48 + t71 + 0.000185);
-    h[32] = sqrt(0.054*t47 + s48 + 0.000793 - t71 - 0.010285714285714285*t5);
+    h_out[22] = sqrt(0.004190476190476191*t5 + 0.022*t47 + s48 + t71 + 0.000185);
+    h_out[32] = sqrt(0.054*t47 + s48 + 0.000793 - t71 - 0.010285714285714285*t5);
     const double t72 = 0.012*t54;
-    h[23] = sqrt(0.0034285714285714284*t5 + 0.024*t47 + s48 + t72 + 0.00018);
-    h[31] = sqrt(0.05*t47 + s48 + 0.000661 - t72 - 0.007142857142857143*t5);
+    h_out[23] = sqrt(0.0034285714285714284*t5 + 0.024*t47 + s48 + t72 + 0.00018);
+    h_out[31] = sqrt(0.05*t47 + s48 + 0.000661 - t72 - 0.007142857142857143*t5);
     const double t73 = 0.01*t54;
     s65 -= t73;
-    h[24] = sqrt(t73 + 0.0033333333333333335*t5 + 0.028*t47 + s48 + 0.000221);
-    h[30] = sqrt(s65);
+    h_out[24] = sqrt(t73 + 0.0033333333333333335*t5 + 0.028*t47 + s48 + 0.000221);
+    h_out[30] = sqrt(s65);
     const double t74 = 0.006*t54;
     s50 += t74;
-    h[25] = sqrt(s50);
+    h_out[25] = sqrt(s50);
     s20 -= t74;
-    h[29] = sqrt(s20);
+    h_out[29] = sqrt(s20);
     const double t75 = 0.004*t54;
-    h[26] = sqrt(0.0016190476190476191*t5 + 0.034*t47 + s48 + t75 + 0.000293);
-    h[28] = sqrt(0.04*t47 + s48 + 0.000404 - t75 - 0.0019047619047619048*t5);
-    h[27] = sqrt(0.038*t47 + s48 + 0.000361);
-    h[36] = sqrt(0.066*t47 + s48 + 0.001285 - 0.022*t5 - 0.028*t54);
-    h[37] = sqrt(0.07*t47 + s48 + 0.001481 - 0.02666666666666667*t5 - 0.032*t54);
+    h_out[26] = sqrt(0.0016190476190476191*t5 + 0.034*t47 + s48 + t75 + 0.000293);
+    h_out[28] = sqrt(0.04*t47 + s48 + 0.000404 - t75 - 0.0019047619047619048*t5);
+    h_out[27] = sqrt(0.038*t47 + s48 + 0.000361);
+    h_out[36] = sqrt(0.066*t47 + s48 + 0.001285 - 0.022*t5 - 0.028*t54);
+    h_out[37] = sqrt(0.07*t47 + s48 + 0.001481 - 0.02666666666666667*t5 - 0.032*t54);
     return a0.sin[0] > 0.0 && 0.002592*a0.cos[1] > 0.0 && t29 > 0.0 ? 0 : 1;
 }

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import subprocess
+from collections.abc import Sequence
 from pathlib import Path
 
 import mpmath
 import numpy as np
 
 from awiwi_gen.build import compiler
-from awiwi_gen.emit.files import own_files
+from awiwi_gen.emit.files import scalar_files
 from awiwi_gen.emit.options import Options
+from awiwi_gen.resources import CSRC
 
 ERROR = """
 #include <math.h>
@@ -41,19 +43,24 @@ def worst_ulp(computed: np.ndarray, function, *arguments: np.ndarray) -> float:
     return max(errors)
 
 
-def write(directory: Path, prefix: str, options: Options) -> None:
-    """The headers of one build."""
-    directory.mkdir(exist_ok=True)
-    for name, text in own_files(prefix, options).items():
-        (directory / name).write_text(text)
+def compile_with(directory: Path, options: Options, name: str, text: str, *flags: str) -> str:
+    """The object of a C text that includes headers of csrc in a scalar type."""
+    headers = directory / options.scalar
+    headers.mkdir(exist_ok=True)
+    for header, content in scalar_files(options).items():
+        (headers / header).write_text(content)
+    source, made = directory / f"{name}.c", directory / f"{name}.o"
+    source.write_text(text)
+    compiler().run("-std=c99", *flags, f"-I{headers}", f"-I{CSRC}", "-c", str(source), "-o", str(made))
+    return str(made)
 
 
-def build(directory: Path, text: str, *flags: str) -> str:
-    """A program of that text and of the C files there."""
-    (directory / "main.c").write_text(text)
-    sources = [str(path) for path in sorted(directory.rglob("*.c"))]
-    program = str(directory / "main")
-    compiler().run("-std=c99", "-ffp-contract=off", *flags, f"-I{directory}", *sources, "-o", program, "-lm")
+def build(directory: Path, options: Options, text: str, *flags: str, others: Sequence[str] = ()) -> str:
+    """A program of a C text, the table of sincos.h and other objects."""
+    table = compile_with(directory, options, "table", (CSRC / "sincos.c").read_text(), *flags)
+    main = compile_with(directory, options, "main", text, *flags)
+    program = str(directory / "program")
+    compiler().run(main, table, *others, "-o", program, "-lm")
     return program
 
 

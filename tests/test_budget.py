@@ -60,12 +60,12 @@ def test_a_pass_that_does_nothing_any_more_is_named(monkeypatch):
         return graph
 
     def costs(*beginning) -> tuple[tuple[str, int, int], ...]:
-        monkeypatch.setattr(passes, "BEGINNINGS", (beginning,))
-        monkeypatch.setattr(passes, "AGAIN", ())
+        monkeypatch.setattr(passes, "ORDERS", (beginning,))
+        monkeypatch.setattr(passes, "REPEATED", ())
         monkeypatch.setattr(passes, "ONCE", ())
         return make_records([(kernel, graphs, "digest")], "x", Options())[0].costs
 
-    beginning = passes.BEGINNINGS[2]
+    beginning = passes.ORDERS[2]
     before = costs(*beginning)
     (sentence,) = excess(before, costs(*(share_sums if p.__name__ == "share_sums" else p for p in beginning)))
 

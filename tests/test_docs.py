@@ -71,7 +71,7 @@ def test_the_code_of_the_walk_through_is_the_code_of_the_project():
 
 def test_the_passes_and_laws_are_those_of_the_documents():
     table = text("docs/compiler.md")
-    names = {apply.__name__ for way in (*passes.BEGINNINGS, passes.ONCE, passes.END) for apply in way} | {"bind"}
+    names = {apply.__name__ for way in (*passes.ORDERS, passes.ONCE, passes.FINAL) for apply in way} | {"bind"}
 
     assert {name for name in names if f"`{name}`" not in table} == set()
     assert physics.LIMIT == 1e-40

@@ -5,7 +5,7 @@ from __future__ import annotations
 import mpmath
 import numpy as np
 import pytest
-from functions import ERROR, build, pattern, run, worst_ulp, write
+from functions import ERROR, build, compile_with, pattern, run, worst_ulp
 
 from awiwi_gen.emit.options import Options
 from awiwi_gen.ir.elementary import DOUBLE, SINGLE, ULPS, atan2, exp
@@ -60,8 +60,10 @@ def test_the_exponential_function_refuses_what_is_beyond_its_limit(dtype):
 # ------------------------------------------------------------------------------------------------- in C
 
 EVERY = """
-#include "one/elementary.h"
-#include "two/elementary.h"
+#include "numerics.h"
+#include "elementary.h"
+
+double exact(double x);
 
 int main(void)
 {
@@ -72,7 +74,7 @@ int main(void)
             const uint32_t signed_bits = bits | sign << 31;
             float x;
             memcpy(&x, &signed_bits, 4);
-            const double found = error(one_FUNCTION(x), two_FUNCTION((double)x));
+            const double found = error(FUNCTION(x), exact((double)x));
             worst = found > worst ? found : worst;
         }
         printf("%a\\n", worst);
@@ -81,8 +83,20 @@ int main(void)
 }
 """
 
+EXACT = """
+#include "numerics.h"
+#include "elementary.h"
+
+double exact(double x);
+double exact(double x)
+{
+    return FUNCTION(x);
+}
+"""
+
 BOTH = """
 #include <stdio.h>
+#include "numerics.h"
 #include "elementary.h"
 
 int main(void)
@@ -97,9 +111,9 @@ int main(void)
 
 @pytest.mark.parametrize(("function", "signs", "end"), [("atan", [0], 2.0**4), ("exp", [0, 1], SINGLE.limit)])
 def test_in_single_precision_every_number_that_matters_is_within_the_stated_error(function, signs, end, tmp_path):
-    write(tmp_path / "one", "one", Options("f32"))
-    write(tmp_path / "two", "two", Options("f64"))
-    program = build(tmp_path, ERROR + EVERY, "-O3", f"-Done_FUNCTION=one_{function}", f"-Dtwo_FUNCTION=two_{function}")
+    flags = ("-O3", f"-DFUNCTION=awiwi_{function}")
+    exact = compile_with(tmp_path, Options(), "exact", EXACT, *flags)
+    program = build(tmp_path, Options("f32"), ERROR + EVERY, *flags, others=[exact])
     every, outer = (2.0**-5, end, 1), [(2.0**-20, 2.0**-5, 97), (end, 2.0**60, 997)]  # beyond, every so-manieth
     ranges = [every, *outer[: 2 if function == "atan" else 1]]
     text = "".join(f"{pattern(a)} {pattern(b)} {step} {sign}\n" for a, b, step in ranges for sign in signs)
@@ -110,9 +124,8 @@ def test_in_single_precision_every_number_that_matters_is_within_the_stated_erro
 
 @pytest.mark.parametrize("flags", [["-O0"], ["-O3"]], ids=" ".join)
 def test_c_and_python_compute_the_same_bits(flags, tmp_path):
-    write(tmp_path, "awiwi", Options())
     y, x = numbers(np.float64, 400.0, 2000), numbers(np.float64, 400.0, 4000)[2000:]
-    found = run(build(tmp_path, BOTH, *flags), np.stack([y, x], axis=1)).reshape(-1, 3)
+    found = run(build(tmp_path, Options(), BOTH, *flags), np.stack([y, x], axis=1)).reshape(-1, 3)
     expected = np.stack([atan2(y, x, np.float64), atan2(y, 1, np.float64), exp(x, np.float64)], axis=1)
 
     assert found.tobytes() == expected.tobytes()

@@ -12,19 +12,19 @@ from hypothesis import strategies as st
 from awiwi_gen.ir.builder import Builder
 from awiwi_gen.ir.cost import cost
 from awiwi_gen.ir.graph import SIGNLESS, Graph, Node, Output, canonical, node_of, operands
-from awiwi_gen.ir.passes import AGAIN, BEGINNINGS, END, optimise, stages
+from awiwi_gen.ir.passes import FINAL, ORDERS, REPEATED, optimise, stages
 from awiwi_gen.ir.passes.bind import bind
 from awiwi_gen.ir.passes.factor import factor
 from awiwi_gen.ir.passes.finish import orient, quotients
 from awiwi_gen.ir.passes.flatten import flatten
+from awiwi_gen.ir.passes.phase import phase
 from awiwi_gen.ir.passes.scale import scale
 from awiwi_gen.ir.passes.schedule import schedule
 from awiwi_gen.ir.passes.share import share_products, share_sums
 from awiwi_gen.ir.passes.signs import signs
-from awiwi_gen.ir.passes.turn import turn
 from awiwi_gen.verify.reference import ball_values, disagreement
 
-PASSES = (flatten, turn, share_products, share_sums, factor, scale, quotients, orient, signs, schedule)
+PASSES = (flatten, phase, share_products, share_sums, factor, scale, quotients, orient, signs, schedule)
 STEPS = st.lists(
     st.tuples(
         st.sampled_from(["add", "sub", "mul", "div", "neg", "sin", "cos", "sqrt"]),
@@ -123,7 +123,7 @@ def test_a_pass_keeps_the_value(apply, steps):
 
 
 @settings(deadline=None, max_examples=60)
-@pytest.mark.parametrize("passes", [*(begin + AGAIN + END for begin in BEGINNINGS), AGAIN + BEGINNINGS[0]])
+@pytest.mark.parametrize("passes", [*(order + REPEATED + FINAL for order in ORDERS), REPEATED + ORDERS[0]])
 @given(steps=STEPS)
 def test_passes_keep_the_value_one_after_the_other(passes, steps):
     graph = grow(steps)
@@ -139,7 +139,7 @@ def test_optimising_keeps_the_value_and_never_costs_more(steps):
     graph = grow(steps)
     best = optimise(graph)[-1][1]
 
-    assert cost(best).weight <= cost(stages(graph, END)[-1][1]).weight
+    assert cost(best).weight <= cost(stages(graph, FINAL)[-1][1]).weight
     assert disagreement(*(ball_values(g, points(), VALUES) for g in (graph, best))) < 1e-50
 
 

@@ -15,10 +15,10 @@ from awiwi_gen.ir.passes import optimise
 from awiwi_gen.ir.passes.factor import factor
 from awiwi_gen.ir.passes.finish import orient
 from awiwi_gen.ir.passes.flatten import flatten
+from awiwi_gen.ir.passes.phase import phase
 from awiwi_gen.ir.passes.scale import scale, units
 from awiwi_gen.ir.passes.shift import shift
 from awiwi_gen.ir.passes.signs import signs
-from awiwi_gen.ir.passes.turn import turn
 from awiwi_gen.verify.reference import ball_values, disagreement
 
 NUMBERS = st.integers(-9, 9).filter(bool).map(lambda k: Fraction(k, 7))
@@ -36,7 +36,7 @@ def form(builder: Builder, turned: tuple[Ref, Ref], a: Fraction, b: Fraction) ->
 def moments(
     bodies: list[tuple[int, Fraction, Fraction, Fraction, Fraction]], uses: list[tuple[str, int, int]]
 ) -> Graph:
-    """First and second moments of bodies that turn by three angles, and what is made of them."""
+    """First and second moments of bodies that rotate by three angles, and what is made of them."""
     builder = Builder()
     angles = [builder.input("x", 0), builder.add([builder.input("x", i) for i in (0, 1)]), builder.input("x", 2)]
     refs = [builder.input("x", 3)]
@@ -61,7 +61,7 @@ def values_differ(a: Graph, b: Graph) -> float:
 @given(BODIES, USES)
 def test_moments_in_turned_axes_and_scaled_moments_are_the_same_moments(bodies, uses):
     graph = flatten(moments(bodies, uses))
-    turned = turn(graph)
+    turned = phase(graph)
 
     assert values_differ(graph, turned) < 1e-50
     assert values_differ(graph, scale(graph)) < 1e-50
@@ -75,7 +75,7 @@ def test_turning_and_scaling_never_cost_products_or_sums(bodies, uses):
     graph = flatten(moments(bodies, uses))
 
     assert cost(scale(graph)).mul <= cost(graph).mul
-    assert cost(turn(graph)).add + cost(turn(graph)).mul <= cost(graph).add + cost(graph).mul
+    assert cost(phase(graph)).add + cost(phase(graph)).mul <= cost(graph).add + cost(graph).mul
 
 
 def pair(builder: Builder) -> tuple[Ref, Ref, Ref, Ref]:
@@ -89,7 +89,7 @@ def test_a_vector_that_turns_costs_two_products_and_a_phase():
     builder = Builder()
     _, _, x, y = pair(builder)
     graph = builder.graph([Output("y", (2,), (x, y))])
-    before, after = cost(graph), cost(turn(graph))
+    before, after = cost(graph), cost(phase(graph))
 
     assert (before.add, before.mul) == (2, 4)
     assert (after.add, after.mul, after.sincos) == (1, 2, 1)
@@ -100,7 +100,7 @@ def test_an_angle_whose_sine_is_itself_a_result_is_left_alone():
     _, sine, x, y = pair(builder)
     graph = builder.graph([Output("y", (3,), (x, y, sine))])
 
-    assert turn(graph) == graph
+    assert phase(graph) == graph
 
 
 def test_a_square_of_the_same_angle_turns_with_the_vector_and_stays_as_short():
@@ -110,8 +110,8 @@ def test_a_square_of_the_same_angle_turns_with_the_vector_and_stays_as_short():
     total = builder.add((square, builder.input("x", 1), builder.const(1)))
     graph = builder.graph([Output("y", (3,), (x, y, total))])
 
-    assert cost(turn(graph)).mul == cost(graph).mul - 2
-    assert values_differ(graph, turn(graph)) < 1e-50
+    assert cost(phase(graph)).mul == cost(graph).mul - 2
+    assert values_differ(graph, phase(graph)) < 1e-50
 
 
 def test_a_constant_that_can_be_carried_costs_no_product():
@@ -216,7 +216,7 @@ def test_an_acceleration_that_turns_with_a_body_turns_with_its_axes():
     c, d = Fraction(3, 10), Fraction(-7, 10)
     forces = form(builder, (first, second), c, d), form(builder, (first, second), -d, c)
     graph = builder.graph([Output("y", (4,), (x, y, *forces))])
-    before, after = cost(graph), cost(turn(graph))
+    before, after = cost(graph), cost(phase(graph))
 
     assert (after.add, after.mul) == (before.add - 3, before.mul - 4)
-    assert values_differ(graph, turn(graph)) < 1e-50
+    assert values_differ(graph, phase(graph)) < 1e-50

@@ -174,7 +174,7 @@ def nearly(graph: Graph) -> Graph:
 
 @pytest.mark.parametrize("broken", [forgetful, nearly])
 def test_a_broken_pass_is_found_and_named(small, monkeypatch, broken):
-    monkeypatch.setattr(passes, "BEGINNINGS", ((broken, *passes.BEGINNINGS[0]),))
+    monkeypatch.setattr(passes, "ORDERS", ((broken, *passes.ORDERS[0]),))
     kernel = kernel_named(small, "jaw_mass_matrix")
 
     with pytest.raises(VerificationError, match=rf"jaw_mass_matrix: pass {broken.__name__} changes its value by"):

@@ -1,6 +1,6 @@
 """A graph as C statements: the only printer of C expressions.
 
-Values used once are written where they are used, others get a name; parentheses keep the graph's order of
+Values used once are printed where they are used, others become locals; parentheses keep the graph's order of
 evaluation, so that the compiled function rounds exactly as the interpreter does.
 """
 
@@ -12,15 +12,16 @@ from dataclasses import dataclass
 from fractions import Fraction
 from math import prod
 
+from awiwi_gen.emit.names import function_name, input_name, output_name
 from awiwi_gen.emit.options import Options
 from awiwi_gen.ir.cost import Cost, cost
 from awiwi_gen.ir.elementary import OWN
 from awiwi_gen.ir.graph import LEAVES, Graph, Node, Ref, node_of, operands
-from awiwi_gen.ir.passes.rounds import angle_groups
+from awiwi_gen.ir.passes.sincos_groups import angle_groups
 from awiwi_gen.kernel import GUARDS
 
-SPARSE = 64  # this many zeros in an output are written at once
-LINE = 100  # longer expressions are cut into named parts
+SPARSE = 64  # an output with at least so many zeros is cleared by memset
+LINE = 100  # a longer expression gets a local variable
 ATOM, PRODUCT, SUM = 3, 2, 1  # how tightly a printed expression binds
 
 Text = tuple[str, int]
@@ -29,7 +30,7 @@ Shape = tuple[int, ...]
 
 @dataclass(frozen=True)
 class CFunction:
-    """All a template sees of a kernel: finished strings."""
+    """A kernel as finished strings: all that a template sees."""
 
     name: str
     prototype: str
@@ -54,16 +55,17 @@ def c_function(
     options: Options,
     part: str = "",
 ) -> CFunction:
-    """Print a graph. ``inputs`` maps port names to shapes; ``part`` is where its parameters live."""
-    printer = Printer(graph, options, prefix, f"p->{identifier(part)}_" if part else "p->")
+    """Print a graph. ``inputs`` maps port names to shapes; ``part`` is the path of its part in the hand file."""
+    printer = Printer(graph, options, f"params->{identifier(part)}_" if part else "params->")
     outputs = {o.name: o.shape for o in graph.outputs if o.name != GUARDS}
     result = "int" if len(outputs) < len(graph.outputs) else "void"
-    prototype, definition = signature(f"{result} {prefix}_{name}", inputs, outputs, options, graph.params and prefix)
+    head = f"{result} {function_name(prefix, name)}"
+    prototype, definition = signature(head, inputs, outputs, options, graph.params and prefix)
     read = {node[1] for node in graph.nodes if node[0] == "input"}
     functions = {node[0] for node in graph.nodes} - LEAVES - {"add", "mul", "div", "inv"}
     own = functions & OWN.keys() if options.math == "own" else set()
-    headers = {'"trig.h"' if function in ("sin", "cos") else '"elementary.h"' for function in own}
-    unused = tuple(f"(void){port};" for port in inputs if port not in read)
+    headers = {'"sincos.h"' if function in ("sin", "cos") else '"elementary.h"' for function in own}
+    unused = tuple(f"(void){input_name(port)};" for port in inputs if port not in read)
     statements = printer.statements()
     clears = any(line.startswith("memset") for line in statements)
     return CFunction(
@@ -84,10 +86,10 @@ def signature(
 
     ``params`` is the prefix of the parameter struct where one is read, else false.
     """
-    arguments = [f"const {options.c_type} {port}[%s{prod(shape)}]" for port, shape in inputs.items()]
-    arguments += [f"{options.c_type} {port}[%s{prod(shape)}]" for port, shape in outputs.items()]
+    arguments = [f"const {options.c_type} {input_name(port)}[%s{prod(shape)}]" for port, shape in inputs.items()]
+    arguments += [f"{options.c_type} {output_name(port)}[%s{prod(shape)}]" for port, shape in outputs.items()]
     if params:
-        arguments.insert(0, f"const {params}_params *%sp")
+        arguments.insert(0, f"const {params}_params *%sparams")
     text = f"{head}({', '.join(arguments)})"
     return text.replace("%s", ""), text.replace("[%s", "[restrict ").replace("*%s", "*restrict ")
 
@@ -100,55 +102,56 @@ def is_continued(graph: Graph, node: Node) -> bool:
 class Printer:
     """Turns the nodes of one graph into C text."""
 
-    def __init__(self, graph: Graph, options: Options, prefix: str, params: str) -> None:
-        self.graph, self.options, self.prefix, self.params = graph, options, prefix, params
-        self.turns: dict[Ref, str] = {}  # what the sine and the cosine of an angle are called
+    def __init__(self, graph: Graph, options: Options, params: str) -> None:
+        self.graph, self.options, self.params = graph, options, params
+        self.sincos_of: dict[Ref, str] = {}  # a format for the text of an angle's sine and cosine
         self.groups = angle_groups(graph) if options.math == "own" else {}
         self.texts: list[Text] = []
         self.lines: list[str] = []
         self.count = self.calls = 0
         self.angles = {node_of(r) for node in graph.nodes if node[0] in ("sin", "cos") for r in node[1:]}
         self.partial = {node[1] for node in graph.nodes if is_continued(graph, node)}
-        noughts = {o.name: sum(graph.nodes[node_of(ref)] == ("const", 0) for ref in o.elements) for o in graph.outputs}
-        self.cleared = {name for name, count in noughts.items() if count >= SPARSE}
-        self.places = self.written()
+        zeros = {o.name: sum(graph.nodes[node_of(ref)] == ("const", 0) for ref in o.elements) for o in graph.outputs}
+        self.cleared = {name for name, count in zeros.items() if count >= SPARSE}
+        self.stores = self.stored()
 
     def statements(self) -> list[str]:
-        """The nodes in their order; an output is written as soon as it is known."""
+        """The nodes in their order; an output is stored as soon as it is known."""
         for output in self.graph.outputs:
             if output.name in self.cleared:
-                self.lines.append(f"memset({output.name}, 0, {len(output.elements)} * sizeof {output.name}[0]);")
+                name = output_name(output.name)
+                self.lines.append(f"memset({name}, 0, {len(output.elements)} * sizeof {name}[0]);")
         for index, node in enumerate(self.graph.nodes):
             self.texts.append(self.value(index, node))
-            for place, ref in self.places.get(index, ()):
-                self.lines.append(f"{place} = {self.operand(ref, SUM)};")
-        nought = self.options.literal(Fraction(0))
+            for element, ref in self.stores.get(index, ()):
+                self.lines.append(f"{element} = {self.operand(ref, SUM)};")
+        zero = self.options.literal(Fraction(0))
         for output in self.graph.outputs:
             if output.name == GUARDS:
-                positive = [f"{self.operand(ref, SUM)} > {nought}" for ref in output.elements]
+                positive = [f"{self.operand(ref, SUM)} > {zero}" for ref in output.elements]
                 self.lines.append(f"return {' && '.join(positive)} ? 0 : 1;")
         return self.lines
 
-    def written(self) -> dict[int, list[tuple[str, Ref]]]:
-        """Where each node is written to, and with which sign."""
-        places: dict[int, list[tuple[str, Ref]]] = {}
+    def stored(self) -> dict[int, list[tuple[str, Ref]]]:
+        """The output elements that each node is stored in, and with which sign."""
+        stores: dict[int, list[tuple[str, Ref]]] = {}
         for output in self.graph.outputs:
             for position, ref in enumerate(output.elements):
-                is_nought = self.graph.nodes[node_of(ref)] == ("const", 0)
-                if output.name != GUARDS and not (is_nought and output.name in self.cleared):
-                    places.setdefault(node_of(ref), []).append((f"{output.name}[{position}]", ref))
-        return places
+                is_zero = self.graph.nodes[node_of(ref)] == ("const", 0)
+                if output.name != GUARDS and not (is_zero and output.name in self.cleared):
+                    stores.setdefault(node_of(ref), []).append((self.output_element(output.name, position), ref))
+        return stores
 
     def value(self, index: int, node: Node) -> Text:
-        """What a node is called from here on: its name, after a line that computes it, or its expression."""
+        """The text of a node from here on: a local variable, after the line that computes it, or an expression."""
         if node[0] in ("sin", "cos") and self.options.math == "own":
-            return self.turn(node[1], node[0]), ATOM
+            return self.sincos(node[1], node[0]), ATOM
         if is_continued(self.graph, node):
             return self.accumulate(node)
         text = self.expression(node)
         if node[0] in LEAVES:
             return text
-        uses, is_written = self.graph.uses[index], index in self.places
+        uses, is_written = self.graph.uses[index], index in self.stores
         if index in self.partial:
             return self.declare(node, text[0], "s", "")
         if uses > 1 or index in self.angles or node[0] in ("sin", "cos") or (len(text[0]) > LINE and not is_written):
@@ -156,32 +159,28 @@ class Printer:
         return text
 
     def accumulate(self, node: Node) -> Text:
-        """A sum that goes on: a line for each further term."""
+        """A sum that continues another: one line per further term."""
         name = self.texts[node[1]]
         for ref in node[2:]:
             self.lines.append(f"{name[0]} {'+=' if ref >= 0 else '-='} {self.operand(node_of(ref), SUM)};")
         return name
 
-    def turn(self, angle: Ref, function: str) -> str:
-        """A sine or cosine; those of all angles of its group are computed when the first is asked for."""
-        if angle not in self.turns:
+    def sincos(self, angle: Ref, function: str) -> str:
+        """A sine or cosine; the first one of a group prints the call that computes the whole group."""
+        if angle not in self.sincos_of:
             group = self.groups[angle]
             name, count = f"a{self.calls}", len(group)
             self.calls += 1
             lanes = str(count) if count > 1 else ""
-            call = f"{self.prefix}_sincos{lanes}({', '.join(self.operand(each, SUM) for each in group)})"
-            self.lines.append(f"const {self.prefix}_turn{lanes} {name} = {call};")
-            self.turns |= {each: f"{name}.%s[{lane}]" if lanes else f"{name}.%s" for lane, each in enumerate(group)}
-        return self.turns[angle] % function
+            call = f"awiwi_sincos{lanes}({', '.join(self.operand(each, SUM) for each in group)})"
+            self.lines.append(f"const awiwi_sincos{lanes}_result {name} = {call};")
+            self.sincos_of |= {each: f"{name}.%s[{lane}]" if lanes else f"{name}.%s" for lane, each in enumerate(group)}
+        return self.sincos_of[angle] % function
 
     def declare(self, node: Node, text: str, letter: str = "t", const: str = "const ") -> Text:
-        """Give a value a name."""
+        """Print a local variable with this value."""
         name = f"{letter}{self.count}"
-        leaf = self.graph.nodes[node_of(node[1])] if len(node) == 2 else None
-        if node[0] in ("sin", "cos") and leaf is not None and leaf[0] == "input":
-            name = f"{node[0]}_{leaf[1]}{leaf[2]}"
-        else:
-            self.count += 1
+        self.count += 1
         self.lines.append(f"{const}{self.options.c_type} {name} = {text};")
         return name, ATOM
 
@@ -191,7 +190,7 @@ class Printer:
         if operation == "const":
             return self.options.literal(node[1]), ATOM
         if operation == "input":
-            return f"{node[1]}[{node[2]}]", ATOM
+            return self.input_element(node[1], node[2]), ATOM
         if operation == "param":
             return self.parameter(node[1]), ATOM
         refs = operands(node)
@@ -207,12 +206,20 @@ class Printer:
         if operation == "inv":
             return f"{self.options.literal(Fraction(1))}/{self.operand(refs[0], ATOM)}", PRODUCT
         is_own = self.options.math == "own" and operation in OWN
-        name = f"{self.prefix}_{operation}" if is_own else self.options.function(operation)
+        name = f"awiwi_{operation}" if is_own else self.options.function(operation)
         return f"{name}({', '.join(self.operand(r, SUM) for r in refs)})", ATOM
 
     def parameter(self, path: str) -> str:
-        """How a number of the hand is read."""
+        """The field of the parameter struct that holds a number of the hand."""
         return self.params + identifier(path)
+
+    def input_element(self, port: str, element: int) -> str:
+        """The C of an element of an input."""
+        return f"{input_name(port)}[{element}]"
+
+    def output_element(self, port: str, element: int) -> str:
+        """The C of an element of an output."""
+        return f"{output_name(port)}[{element}]"
 
     def operand(self, ref: Ref, binding: int) -> str:
         """The text of a reference, in parentheses if it binds less tightly than asked."""

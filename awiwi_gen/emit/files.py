@@ -11,6 +11,7 @@ import jinja2
 import numpy as np
 
 from awiwi_gen.emit.c import CFunction, identifier
+from awiwi_gen.emit.names import C99_SIGNIFICANT, function_name, require_fields, short_name
 from awiwi_gen.emit.options import Options
 from awiwi_gen.ir.elementary import numbers
 from awiwi_gen.ir.trig import constants
@@ -101,6 +102,7 @@ def shared_files(
 ) -> dict[str, str]:
     """The header and the model file. The parameter struct exists only where parameters are read at run time."""
     runtime = options.params == "runtime"
+    require_fields({path: identifier(path) for path in quantities} if runtime else {})
     fields = [
         f"{options.c_type} {identifier(path)}; /* {path}, {quantity.unit} */" for path, quantity in quantities.items()
     ]
@@ -108,20 +110,14 @@ def shared_files(
         f".{identifier(path)} = {options.literal(quantity.value)}, /* {quantity.text} */"
         for path, quantity in quantities.items()
     ]
-    return (own_files(prefix, options) if options.math == "own" else {}) | {
-        "real.h": render(
-            "real.h.j2",
-            banner=banner(),
-            c_type=options.c_type,
-            largest=options.literal(Fraction(float(np.finfo(options.dtype).max))),
-            epsilon=options.literal(Fraction(float(np.finfo(options.dtype).eps))),
-        ),
+    return scalar_files(options) | {
         "kernels.h": render(
             "kernels.h.j2",
             banner=banner(),
             guard=f"{prefix.upper()}_KERNELS_H",
             prefix=prefix,
             functions=functions,
+            aliases=aliases(prefix, functions),
             fields=fields if runtime else [],
         ),
         "model.c": render(
@@ -130,10 +126,31 @@ def shared_files(
     }
 
 
-def own_files(prefix: str, options: Options) -> dict[str, str]:
-    """The functions of our own in the scalar type of this build."""
-    bits = 64 if options.scalar == "f64" else 32
-    common = {"banner": banner(), "prefix": prefix, "c_type": options.c_type, "bits": f"uint{bits}_t"}
+def scalar_files(options: Options) -> dict[str, str]:
+    """The headers that depend on the scalar type only; csrc needs no others."""
+    limits = np.finfo(options.dtype)
+    return {
+        "math_constants.h": math_constants(options),
+        "real.h": render(
+            "real.h.j2",
+            banner=banner(),
+            c_type=options.c_type,
+            bits=options.bits,
+            largest=options.literal(Fraction(float(limits.max))),
+            epsilon=options.literal(Fraction(float(limits.eps))),
+        ),
+    }
+
+
+def aliases(prefix: str, functions: Sequence[CFunction]) -> list[tuple[str, str]]:
+    """The external names that are too long for C99's 31 characters, with their short names."""
+    own = [f"{prefix}_model_digest", f"{prefix}_default_params"]
+    names = [*own, *(function_name(prefix, function.name) for function in functions)]
+    return [(name, short_name(name)) for name in names if len(name) > C99_SIGNIFICANT]
+
+
+def math_constants(options: Options) -> str:
+    """The header with the constants of sincos.h and elementary.h (csrc) in the scalar type of this build."""
     trig, others = constants(options.dtype), numbers(options.dtype)
 
     def literal(value: float) -> str:
@@ -141,44 +158,36 @@ def own_files(prefix: str, options: Options) -> dict[str, str]:
 
     def member(name: str, value: Any) -> tuple[str, str, str]:
         if isinstance(value, tuple):
-            return name, f"[{len(value)}]", f"{{{', '.join(f'FOUR({literal(v)})' for v in value)}}}"
-        return name, "", f"FOUR({literal(value)})"
+            return name, f"[{len(value)}]", f"{{{', '.join(f'AWIWI_FOUR({literal(v)})' for v in value)}}}"
+        return name, "", f"AWIWI_FOUR({literal(value)})"
 
     def column(name: str) -> str:
-        return _polynomial([f"k->{name}[{place}][i]" for place in range(len(getattr(trig, name)))])
+        return f"({_polynomial([f'k->{name}[{power}][i]' for power in range(len(getattr(trig, name)))])})"
 
-    texts: dict[str, object] = {name: literal(v) for name, v in vars(others).items() if isinstance(v, float)}
-    texts |= {name: [*map(literal, getattr(others, name))] for name in ("quarter_pi", "log_two")}
-    texts |= {"zero": literal(0.0), "one": literal(1.0), "two": literal(2.0)}
-    texts |= {"arctan": _polynomial([*map(literal, others.arctan)])}
-    texts |= {"exp": _polynomial([*map(literal, others.exp)], "r", "z")}
-    return {
-        "trig.h": render(
-            "trig.h.j2",
-            guard=f"{prefix.upper()}_TRIG_H",
-            top=bits - 1,
-            numbers=[member(name, value) for name, value in vars(trig).items()],
-            limit=f"{trig.limit:.0f}",
-            sine=column("sine"),
-            cosine=column("cosine"),
-            **common,
-        ),
-        "trig.c": render("trig.c.j2", **common),
-        "elementary.h": render(
-            "elementary.h.j2",
-            guard=f"{prefix.upper()}_ELEMENTARY_H",
-            k=texts,
-            limit=f"{others.limit:.0f}",
-            half_bits=others.half_bits,
-            top=bits - 1,
-            digits=others.digits,
-            **common,
-        ),
+    macros = {
+        "AWIWI_SINCOS_LIMIT": literal(trig.limit),
+        "AWIWI_SINE_TAIL(k, i, z, zz)": column("sine"),
+        "AWIWI_COSINE_TAIL(k, i, z, zz)": column("cosine"),
+        "AWIWI_TAN_PI_8": literal(others.eighth),
+        "AWIWI_PI_4_HIGH": literal(others.quarter_pi[0]),
+        "AWIWI_PI_4_LOW": literal(others.quarter_pi[1]),
+        "AWIWI_ATAN_TAIL(z, zz)": f"({_polynomial([*map(literal, others.arctan)])})",
+        "AWIWI_HALF_BITS": str(others.half_bits),
+        "AWIWI_EXP_LIMIT": literal(others.limit),
+        "AWIWI_EXP_OVERFLOW": literal(others.overflow),
+        "AWIWI_EXP_SHRINK": literal(others.shrink),
+        "AWIWI_EXP_INTEGER": literal(others.integer),
+        "AWIWI_LN2_HIGH": literal(others.log_two[0]),
+        "AWIWI_LN2_LOW": f"({literal(others.log_two[1])})",
+        "AWIWI_EXP_TAIL(r, z)": f"({_polynomial([*map(literal, others.exp)], 'r', 'z')})",
+        "AWIWI_FRACTION_BITS": str(others.digits),
     }
+    members = [member(name, value) for name, value in vars(trig).items()]
+    return render("math_constants.h.j2", banner=banner(), sincos=members, macros=macros.items())
 
 
 def _polynomial(coefficients: list[str], z: str = "z", zz: str = "zz") -> str:
-    """The text of ``ir.trig.polynomial``."""
+    """The C of `ir.trig.polynomial`."""
     first, *others = coefficients
     pair = f"{first} + {z} * {others[0]}" if others else first
     return f"({pair}) + {zz} * ({_polynomial(others[1:], z, zz)})" if len(others) > 1 else pair

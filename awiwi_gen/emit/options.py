@@ -1,4 +1,4 @@
-"""What can be chosen about the emitted C; one frozen value that is passed down."""
+"""Options of the emitted C, one frozen value that is passed down, and compiler flags of the batches."""
 
 from __future__ import annotations
 
@@ -8,10 +8,14 @@ from typing import Literal
 
 import numpy as np
 
+# What batches are compiled with on top of the flags for the machine; batches.h and build.py both read it here.
+VECTOR_FLAGS = ("-std=c99", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math")
+GCC_FLAGS = ("-fschedule-insns", "-fsched-pressure", "-fno-tree-loop-distribute-patterns")  # for long loops
+
 
 @dataclass(frozen=True)
 class Options:
-    """Scalar type, whether the hand's numbers are constants or come in a struct, whose functions the C calls."""
+    """Scalar type, whether the hand's numbers are constants or fields of a struct, our own functions or the C library's."""
 
     scalar: Literal["f64", "f32"] = "f64"
     params: Literal["baked", "runtime"] = "baked"
@@ -21,6 +25,11 @@ class Options:
     def c_type(self) -> str:
         """The C scalar type."""
         return "double" if self.scalar == "f64" else "float"
+
+    @property
+    def bits(self) -> int:
+        """Number of bits of the scalar type."""
+        return 64 if self.scalar == "f64" else 32
 
     @property
     def dtype(self) -> type:

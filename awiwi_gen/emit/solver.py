@@ -7,6 +7,7 @@ from fractions import Fraction
 
 from awiwi_gen.emit.c import CFunction, signature
 from awiwi_gen.emit.files import banner, describe, render
+from awiwi_gen.emit.names import function_name
 from awiwi_gen.emit.options import Options
 from awiwi_gen.ir.cost import Cost
 from awiwi_gen.kernel import Kernel, Solver
@@ -22,7 +23,7 @@ def solver_function(
     The cost is that of the worst case, without the solver's own linear algebra.
     """
     prototype, definition = signature(
-        f"int {prefix}_{kernel.name}",
+        f"int {function_name(prefix, kernel.name)}",
         {name: port.shape for name, port in kernel.inputs.items()},
         {name: port.shape for name, port in kernel.outputs.items()},
         options,
@@ -37,13 +38,13 @@ def solver_function(
         solver.template,
         banner=banner(*comment),
         definition=definition,
-        kernels={family: f"{prefix}_{function.name}" for family, function in used.items()},
+        kernels={family: function_name(prefix, function.name) for family, function in used.items()},
         context=f"(const {prefix}_params *)context, " if runtime else "",
         contexts={
             family: f"(const {prefix}_params *)context, " if "_params *" in function.prototype else ""
             for family, function in used.items()
         },
-        given="p" if runtime else "0",
+        given="params" if runtime else "0",
         n=len(solver.unknowns),
         m=len(solver.equations),
         equations=", ".join(map(str, solver.equations)),

@@ -111,8 +111,8 @@ def ball(value: Fraction | float | int) -> arb:
 
 
 UNIT_ROUNDOFF: dict[type, float] = {np.float64: 2.0**-53, np.float32: 2.0**-24}
-LIBM_ULPS = 4.0  # what is granted to a C library's function, in units of roundoff of its result
-EXACT = {"sqrt": 1.0, "fabs": 1.0}  # and to those that are rounded once; an ulp is at most two of these units
+LIBM_ULPS = 4.0  # allowed error of a C library's function, in unit roundoffs of its result
+EXACT = {"sqrt": 1.0, "fabs": 1.0}  # correctly rounded functions; an ulp is at most two unit roundoffs
 
 
 class Bounded:
@@ -188,7 +188,7 @@ class Dimensions:
     """Dimension checking: a value is a unit. Zero, which fits any unit, is None."""
 
     def __init__(self) -> None:
-        self._units: dict[Unit, Unit] = {one: one}  # one object for each, as it takes a while to tell two equal ones so
+        self._units: dict[Unit, Unit] = {one: one}  # one object per unit: comparing equal units is slow
         self._products: dict[tuple[int, int], tuple[Unit, Unit, Unit]] = {}  # by the factors' identities
         self._inverses: dict[int, tuple[Unit, Unit]] = {}
 

@@ -1,6 +1,6 @@
-"""Arcus tangent and exponential function of our own: constants, once for C and Python, and both on NumPy arrays.
+"""Arctangent and exponential function of our own: constants, once for C and Python, and both on NumPy arrays.
 
-Only + - * /, comparisons turned into selections, and moves of bits, no branches: the same bits on every IEEE machine.
+Only + - * /, comparisons as masks, and bit operations, no branches: the same bits on every IEEE machine.
 
 `atan2`: the smaller of |y| and |x| is divided by the larger, or, above tan(pi/8), their difference by their sum, so that
 the quotient r stays below tan(pi/8) in magnitude; its remainder is computed exactly (factors are cut in halves by
@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from awiwi_gen.ir.trig import ULPS as TURN_ULPS
+from awiwi_gen.ir.trig import ULPS as SINCOS_ULPS
 from awiwi_gen.ir.trig import polynomial, sincos
 
 
@@ -118,8 +118,8 @@ def atan2(y: Any, x: Any, dtype: type) -> Any:
 def halves(x: Any, k: Elementary, dtype: type) -> tuple[Any, Any]:
     """A number as a sum of two whose products are exact."""
     bits: Any = np.uint32 if dtype is np.float32 else np.uint64
-    kept = np.atleast_1d(x).view(bits) >> bits(k.half_bits) << bits(k.half_bits)
-    high = kept.view(dtype).reshape(np.shape(x))
+    upper = np.atleast_1d(x).view(bits) >> bits(k.half_bits) << bits(k.half_bits)
+    high = upper.view(dtype).reshape(np.shape(x))
     return high, x - high
 
 
@@ -149,4 +149,4 @@ OWN: dict[str, Callable[..., Any]] = {
     "atan2": atan2,
     "exp": exp,
 }
-ULPS = {"sin": TURN_ULPS, "cos": TURN_ULPS, "atan": 0.75, "atan2": 0.75, "exp": 0.8}  # their errors, at most
+ULPS = {"sin": SINCOS_ULPS, "cos": SINCOS_ULPS, "atan": 0.75, "atan2": 0.75, "exp": 0.8}  # their errors, at most

@@ -65,7 +65,7 @@ def _rules(builder: Builder) -> dict[int, Callable[..., Ref]]:
 
 
 class Expressions:
-    """The algebra of CasADi expressions: the interpreter turns a graph into one that CasADi can differentiate."""
+    """The algebra of CasADi expressions: the interpreter makes an expression that CasADi can differentiate."""
 
     def const(self, value: Fraction) -> ca.SX:
         """A constant, rounded to double."""

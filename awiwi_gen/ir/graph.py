@@ -149,13 +149,13 @@ def canonical(graph: Graph) -> Graph:
     for level in others:
         found = [(*_moved(graph.nodes[index], renamed, nodes, constants), index) for index in level]
         found.sort(key=_KEY)
-        for _, node, turned, index in found:
+        for _, node, negated, index in found:
             if node[0] == "add" and node[1] < 0:
-                node, turned = (node[0], *[~ref for ref in node[1:]]), True
+                node, negated = (node[0], *[~ref for ref in node[1:]]), True
             number = numbers.setdefault(node, len(nodes))
             if number == len(nodes):
                 nodes.append(node)
-            renamed[index] = ~number if turned else number
+            renamed[index] = ~number if negated else number
     return Graph(tuple(nodes), tuple(output.renamed(renamed) for output in graph.outputs))
 
 
@@ -165,15 +165,15 @@ _KEY = itemgetter(0)
 def _moved(node: Node, renamed: list[Ref], nodes: list[Node], constants: set[int]) -> tuple[Any, Node, bool]:
     """What to sort an operation by, the operation with renamed operands, and whether its sign was pulled out.
 
-    Operands of sums and products are sorted. An operand may have been turned since the node was made, and products
+    Operands of sums and products are sorted. An operand may have been negated since the node was made, and products
     keep no signs inside.
     """
     operation = node[0]
     refs = [renamed[ref] if ref >= 0 else ~renamed[~ref] for ref in node[1:]]
-    signless, turned = min(refs) >= 0, False
+    signless, negated = min(refs) >= 0, False
     bare = refs if signless else [ref if ref >= 0 else ~ref for ref in refs]
     if operation in SIGNLESS and not signless:
-        turned = operation not in EVEN and sum([ref < 0 for ref in refs]) % 2 == 1
+        negated = operation not in EVEN and sum([ref < 0 for ref in refs]) % 2 == 1
         refs, signless = bare, True
     variables, numbers = refs, []
     if not constants.isdisjoint(bare):
@@ -185,7 +185,7 @@ def _moved(node: Node, renamed: list[Ref], nodes: list[Node], constants: set[int
         refs = variables + numbers if operation == "add" else numbers + variables
     values = [nodes[ref][1] if ref >= 0 else -nodes[~ref][1] for ref in numbers]
     bare = variables if signless else [node_of(ref) for ref in variables]
-    return (operation, len(variables), bare, variables, values), (operation, *refs), turned
+    return (operation, len(variables), bare, variables, values), (operation, *refs), negated
 
 
 def prune(graph: Graph) -> Graph:

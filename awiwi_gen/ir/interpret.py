@@ -41,7 +41,7 @@ def evaluate(graph: Graph, algebra: Algebra[T], leaf: Callable[[Node], T]) -> di
 
     for index, node in enumerate(graph.nodes):
         values.append(_node(node, algebra, leaf, values, at))
-        for ref in operands(node):  # batches are large: what nobody reads any more is let go
+        for ref in operands(node):  # batches are large: free values after their last use
             if last[node_of(ref)] == index:
                 values[node_of(ref)] = gone
     return {output.name: [at(ref) for ref in output.elements] for output in graph.outputs}

@@ -11,7 +11,7 @@ in lanes. The steps, with h the upper bits of the reduced angle r and l the rest
 - sin r = h (1 - sixth h^2) + small terms, cos r = (1 - h^2/2) + small terms; what rounding does to the small terms is
   a few hundredths of the last place of the sum.
 - Polynomials are minimax fits on |r| <= pi/4 of (sin r - r + r^3/6)/r^5 and (cos r - 1 + r^2/2)/r^4, in z = r^2.
-- The two lowest bits of n tell the quadrant: one swaps sine and cosine, the other turns their signs.
+- The two lowest bits of n are the quadrant: one swaps sine and cosine, the other negates both.
 
 Error over the domain: below ULPS units in the last place (docs/trigonometry.md).
 """
@@ -109,9 +109,9 @@ def sincos(x: Any, dtype: type) -> tuple[Any, Any]:
     cosine = (one - half * square) + (zz * polynomial(k.cosine, z, zz, dtype) - gap)
     q, s, c = (np.atleast_1d(value).view(bits) for value in (shifted, sine, cosine))
     top = bits(8 * bits().itemsize - 1)
-    odd, turned = q << top, (q >> bits(1)) << top
+    odd, negative = q << top, (q >> bits(1)) << top
     swap = (s ^ c) & (bits(0) - (odd >> top))
-    s, c = s ^ swap ^ turned, c ^ swap ^ turned ^ odd
+    s, c = s ^ swap ^ negative, c ^ swap ^ negative ^ odd
     return s.view(dtype).reshape(x.shape)[()], c.view(dtype).reshape(x.shape)[()]
 
 

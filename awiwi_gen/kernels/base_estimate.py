@@ -70,7 +70,7 @@ def gradient_search(finger: Finger) -> Solver:
         strings={
             "joints": str(len(finger.joints)),
             "tendons": str(len(finger.tendons)),
-            "search": f"awiwi_gradient_search(&problem, h, start, {TRIALS}, 0, q)",
+            "search": f"awiwi_gradient_search(&problem, h_in, start_in, {TRIALS}, 0, q_out)",
         },
         iterations=TRIALS + 1,
         tolerance={"f64": 1e-6, "f32": 1e-4},

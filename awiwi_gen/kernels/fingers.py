@@ -256,7 +256,7 @@ def nonlinear_estimate(finger: Finger, iterations: int = 24) -> Solver | None:
         equations=tuple(range(len(finger.tendons))),
         unknowns=tuple(range(len(low))),
         arrays={"low": low, "high": high},
-        strings={"search": f"awiwi_least_squares(&problem, h, start, {iterations}, tolerance, q)"},
+        strings={"search": f"awiwi_least_squares(&problem, h_in, start_in, {iterations}, tolerance, q_out)"},
         iterations=iterations,
         tolerance={"f64": 1e-12, "f32": 1e-5},
     )

@@ -2,36 +2,37 @@
  *
  * antagonistic_feedback of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_antagonistic_feedback(const double x[6], const double x_des[6], const double u_des[2], const double feedback[12], const double resistance[2], double tau_m[2]);
+INLINED void awiwi_antagonistic_feedback(const double x_in[6], const double x_des_in[6], const double u_des_in[2], const double feedback_in[12], const double resistance_in[2], double tau_m_out[2]);
 #include "../antagonistic_feedback.c"
 
-VECTORS void block(const double *restrict x_at, ptrdiff_t x_row, const double *restrict x_des_at, ptrdiff_t x_des_row, const double *restrict u_des_at, ptrdiff_t u_des_row, const double *restrict feedback_at, ptrdiff_t feedback_row, const double *restrict resistance_at, ptrdiff_t resistance_row, double *restrict tau_m_at, ptrdiff_t tau_m_row)
+VECTORS void block(const double *restrict x_in_at, ptrdiff_t x_in_row, const double *restrict x_des_in_at, ptrdiff_t x_des_in_row, const double *restrict u_des_in_at, ptrdiff_t u_des_in_row, const double *restrict feedback_in_at, ptrdiff_t feedback_in_row, const double *restrict resistance_in_at, ptrdiff_t resistance_in_row, double *restrict tau_m_out_at, ptrdiff_t tau_m_out_row)
 {
     EACH_SAMPLE {
-        double x_one[6], x_des_one[6], u_des_one[2], feedback_one[12], resistance_one[2], tau_m_one[2];
-        TAKE(x, 6)
-        TAKE(x_des, 6)
-        TAKE(u_des, 2)
-        TAKE(feedback, 12)
-        TAKE(resistance, 2)
-        awiwi_antagonistic_feedback(x_one, x_des_one, u_des_one, feedback_one, resistance_one, tau_m_one);
-        GIVE(tau_m, 2)
+        double x_in_one[6], x_des_in_one[6], u_des_in_one[2], feedback_in_one[12], resistance_in_one[2], tau_m_out_one[2];
+        TAKE(x_in, 6)
+        TAKE(x_des_in, 6)
+        TAKE(u_des_in, 2)
+        TAKE(feedback_in, 12)
+        TAKE(resistance_in, 2)
+        awiwi_antagonistic_feedback(x_in_one, x_des_in_one, u_des_in_one, feedback_in_one, resistance_in_one, tau_m_out_one);
+        GIVE(tau_m_out, 2)
     }
 }
 
-void awiwi_antagonistic_feedback_batch(ptrdiff_t samples, const double *x, ptrdiff_t x_sample, ptrdiff_t x_element, const double *x_des, ptrdiff_t x_des_sample, ptrdiff_t x_des_element, const double *u_des, ptrdiff_t u_des_sample, ptrdiff_t u_des_element, const double *feedback, ptrdiff_t feedback_sample, ptrdiff_t feedback_element, const double *resistance, ptrdiff_t resistance_sample, ptrdiff_t resistance_element, double *tau_m, ptrdiff_t tau_m_sample, ptrdiff_t tau_m_element)
+void awiwi_antagonistic_feedback_batch(ptrdiff_t samples, const double *x_in, ptrdiff_t x_in_sample, ptrdiff_t x_in_element, const double *x_des_in, ptrdiff_t x_des_in_sample, ptrdiff_t x_des_in_element, const double *u_des_in, ptrdiff_t u_des_in_sample, ptrdiff_t u_des_in_element, const double *feedback_in, ptrdiff_t feedback_in_sample, ptrdiff_t feedback_in_element, const double *resistance_in, ptrdiff_t resistance_in_sample, ptrdiff_t resistance_in_element, double *tau_m_out, ptrdiff_t tau_m_out_sample, ptrdiff_t tau_m_out_element)
 {
-    double x_rows[6*BLOCK], x_des_rows[6*BLOCK], u_des_rows[2*BLOCK], feedback_rows[12*BLOCK], resistance_rows[2*BLOCK], tau_m_rows[2*BLOCK];
+    double x_in_rows[6*BLOCK], x_des_in_rows[6*BLOCK], u_des_in_rows[2*BLOCK], feedback_in_rows[12*BLOCK], resistance_in_rows[2*BLOCK], tau_m_out_rows[2*BLOCK];
     EACH_BLOCK {
-        GATHER(x, 6)
-        GATHER(x_des, 6)
-        GATHER(u_des, 2)
-        GATHER(feedback, 12)
-        GATHER(resistance, 2)
-        block(AT(x), AT(x_des), AT(u_des), AT(feedback), AT(resistance), AT(tau_m));
-        SCATTER(tau_m, 2)
+        GATHER(x_in, 6)
+        GATHER(x_des_in, 6)
+        GATHER(u_des_in, 2)
+        GATHER(feedback_in, 12)
+        GATHER(resistance_in, 2)
+        block(AT(x_in), AT(x_des_in), AT(u_des_in), AT(feedback_in), AT(resistance_in), AT(tau_m_out));
+        SCATTER(tau_m_out, 2)
     }
 }

@@ -2,30 +2,31 @@
  *
  * antagonistic_modes of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_antagonistic_modes(const double motors[4], double against[2], double together[2]);
+INLINED void awiwi_antagonistic_modes(const double motors_in[4], double against_out[2], double together_out[2]);
 #include "../antagonistic_modes.c"
 
-VECTORS void block(const double *restrict motors_at, ptrdiff_t motors_row, double *restrict against_at, ptrdiff_t against_row, double *restrict together_at, ptrdiff_t together_row)
+VECTORS void block(const double *restrict motors_in_at, ptrdiff_t motors_in_row, double *restrict against_out_at, ptrdiff_t against_out_row, double *restrict together_out_at, ptrdiff_t together_out_row)
 {
     EACH_SAMPLE {
-        double motors_one[4], against_one[2], together_one[2];
-        TAKE(motors, 4)
-        awiwi_antagonistic_modes(motors_one, against_one, together_one);
-        GIVE(against, 2)
-        GIVE(together, 2)
+        double motors_in_one[4], against_out_one[2], together_out_one[2];
+        TAKE(motors_in, 4)
+        awiwi_antagonistic_modes(motors_in_one, against_out_one, together_out_one);
+        GIVE(against_out, 2)
+        GIVE(together_out, 2)
     }
 }
 
-void awiwi_antagonistic_modes_batch(ptrdiff_t samples, const double *motors, ptrdiff_t motors_sample, ptrdiff_t motors_element, double *against, ptrdiff_t against_sample, ptrdiff_t against_element, double *together, ptrdiff_t together_sample, ptrdiff_t together_element)
+void awiwi_antagonistic_modes_batch(ptrdiff_t samples, const double *motors_in, ptrdiff_t motors_in_sample, ptrdiff_t motors_in_element, double *against_out, ptrdiff_t against_out_sample, ptrdiff_t against_out_element, double *together_out, ptrdiff_t together_out_sample, ptrdiff_t together_out_element)
 {
-    double motors_rows[4*BLOCK], against_rows[2*BLOCK], together_rows[2*BLOCK];
+    double motors_in_rows[4*BLOCK], against_out_rows[2*BLOCK], together_out_rows[2*BLOCK];
     EACH_BLOCK {
-        GATHER(motors, 4)
-        block(AT(motors), AT(against), AT(together));
-        SCATTER(against, 2)
-        SCATTER(together, 2)
+        GATHER(motors_in, 4)
+        block(AT(motors_in), AT(against_out), AT(together_out));
+        SCATTER(against_out, 2)
+        SCATTER(together_out, 2)
     }
 }

@@ -2,65 +2,66 @@
  *
  * antagonistic_observer of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_antagonistic_observer(const double memory[13], const double thetas[2], const double stretches[2], const double measured[2], const double acted[2], const double acting[2], const double inertias[3], const double tendons[6], const double damping[1], const double friction[3], const double bandwidths[4], const double period[1], double memory_next[13], double joint[2], double motors[4], double torques[4], double springs[4], double load[1], double modelled[2], double resistance[2]);
+INLINED void awiwi_antagonistic_observer(const double memory_in[13], const double thetas_in[2], const double stretches_in[2], const double measured_in[2], const double acted_in[2], const double acting_in[2], const double inertias_in[3], const double tendons_in[6], const double damping_in[1], const double friction_in[3], const double bandwidths_in[4], const double period_in[1], double memory_next_out[13], double joint_out[2], double motors_out[4], double torques_out[4], double springs_out[4], double load_out[1], double modelled_out[2], double resistance_out[2]);
 #include "../antagonistic_observer.c"
 
-VECTORS void block(const double *restrict memory_at, ptrdiff_t memory_row, const double *restrict thetas_at, ptrdiff_t thetas_row, const double *restrict stretches_at, ptrdiff_t stretches_row, const double *restrict measured_at, ptrdiff_t measured_row, const double *restrict acted_at, ptrdiff_t acted_row, const double *restrict acting_at, ptrdiff_t acting_row, const double *restrict inertias_at, ptrdiff_t inertias_row, const double *restrict tendons_at, ptrdiff_t tendons_row, const double *restrict damping_at, ptrdiff_t damping_row, const double *restrict friction_at, ptrdiff_t friction_row, const double *restrict bandwidths_at, ptrdiff_t bandwidths_row, const double *restrict period_at, ptrdiff_t period_row, double *restrict memory_next_at, ptrdiff_t memory_next_row, double *restrict joint_at, ptrdiff_t joint_row, double *restrict motors_at, ptrdiff_t motors_row, double *restrict torques_at, ptrdiff_t torques_row, double *restrict springs_at, ptrdiff_t springs_row, double *restrict load_at, ptrdiff_t load_row, double *restrict modelled_at, ptrdiff_t modelled_row, double *restrict resistance_at, ptrdiff_t resistance_row)
+VECTORS void block(const double *restrict memory_in_at, ptrdiff_t memory_in_row, const double *restrict thetas_in_at, ptrdiff_t thetas_in_row, const double *restrict stretches_in_at, ptrdiff_t stretches_in_row, const double *restrict measured_in_at, ptrdiff_t measured_in_row, const double *restrict acted_in_at, ptrdiff_t acted_in_row, const double *restrict acting_in_at, ptrdiff_t acting_in_row, const double *restrict inertias_in_at, ptrdiff_t inertias_in_row, const double *restrict tendons_in_at, ptrdiff_t tendons_in_row, const double *restrict damping_in_at, ptrdiff_t damping_in_row, const double *restrict friction_in_at, ptrdiff_t friction_in_row, const double *restrict bandwidths_in_at, ptrdiff_t bandwidths_in_row, const double *restrict period_in_at, ptrdiff_t period_in_row, double *restrict memory_next_out_at, ptrdiff_t memory_next_out_row, double *restrict joint_out_at, ptrdiff_t joint_out_row, double *restrict motors_out_at, ptrdiff_t motors_out_row, double *restrict torques_out_at, ptrdiff_t torques_out_row, double *restrict springs_out_at, ptrdiff_t springs_out_row, double *restrict load_out_at, ptrdiff_t load_out_row, double *restrict modelled_out_at, ptrdiff_t modelled_out_row, double *restrict resistance_out_at, ptrdiff_t resistance_out_row)
 {
     EACH_SAMPLE {
-        double memory_one[13], thetas_one[2], stretches_one[2], measured_one[2], acted_one[2], acting_one[2], inertias_one[3], tendons_one[6], damping_one[1], friction_one[3], bandwidths_one[4], period_one[1], memory_next_one[13], joint_one[2], motors_one[4], torques_one[4], springs_one[4], load_one[1], modelled_one[2], resistance_one[2];
-        TAKE(memory, 13)
-        TAKE(thetas, 2)
-        TAKE(stretches, 2)
-        TAKE(measured, 2)
-        TAKE(acted, 2)
-        TAKE(acting, 2)
-        TAKE(inertias, 3)
-        TAKE(tendons, 6)
-        TAKE(damping, 1)
-        TAKE(friction, 3)
-        TAKE(bandwidths, 4)
-        TAKE(period, 1)
-        awiwi_antagonistic_observer(memory_one, thetas_one, stretches_one, measured_one, acted_one, acting_one, inertias_one, tendons_one, damping_one, friction_one, bandwidths_one, period_one, memory_next_one, joint_one, motors_one, torques_one, springs_one, load_one, modelled_one, resistance_one);
-        GIVE(memory_next, 13)
-        GIVE(joint, 2)
-        GIVE(motors, 4)
-        GIVE(torques, 4)
-        GIVE(springs, 4)
-        GIVE(load, 1)
-        GIVE(modelled, 2)
-        GIVE(resistance, 2)
+        double memory_in_one[13], thetas_in_one[2], stretches_in_one[2], measured_in_one[2], acted_in_one[2], acting_in_one[2], inertias_in_one[3], tendons_in_one[6], damping_in_one[1], friction_in_one[3], bandwidths_in_one[4], period_in_one[1], memory_next_out_one[13], joint_out_one[2], motors_out_one[4], torques_out_one[4], springs_out_one[4], load_out_one[1], modelled_out_one[2], resistance_out_one[2];
+        TAKE(memory_in, 13)
+        TAKE(thetas_in, 2)
+        TAKE(stretches_in, 2)
+        TAKE(measured_in, 2)
+        TAKE(acted_in, 2)
+        TAKE(acting_in, 2)
+        TAKE(inertias_in, 3)
+        TAKE(tendons_in, 6)
+        TAKE(damping_in, 1)
+        TAKE(friction_in, 3)
+        TAKE(bandwidths_in, 4)
+        TAKE(period_in, 1)
+        awiwi_antagonistic_observer(memory_in_one, thetas_in_one, stretches_in_one, measured_in_one, acted_in_one, acting_in_one, inertias_in_one, tendons_in_one, damping_in_one, friction_in_one, bandwidths_in_one, period_in_one, memory_next_out_one, joint_out_one, motors_out_one, torques_out_one, springs_out_one, load_out_one, modelled_out_one, resistance_out_one);
+        GIVE(memory_next_out, 13)
+        GIVE(joint_out, 2)
+        GIVE(motors_out, 4)
+        GIVE(torques_out, 4)
+        GIVE(springs_out, 4)
+        GIVE(load_out, 1)
+        GIVE(modelled_out, 2)
+        GIVE(resistance_out, 2)
     }
 }
 
-void awiwi_antagonistic_observer_batch(ptrdiff_t samples, const double *memory, ptrdiff_t memory_sample, ptrdiff_t memory_element, const double *thetas, ptrdiff_t thetas_sample, ptrdiff_t thetas_element, const double *stretches, ptrdiff_t stretches_sample, ptrdiff_t stretches_element, const double *measured, ptrdiff_t measured_sample, ptrdiff_t measured_element, const double *acted, ptrdiff_t acted_sample, ptrdiff_t acted_element, const double *acting, ptrdiff_t acting_sample, ptrdiff_t acting_element, const double *inertias, ptrdiff_t inertias_sample, ptrdiff_t inertias_element, const double *tendons, ptrdiff_t tendons_sample, ptrdiff_t tendons_element, const double *damping, ptrdiff_t damping_sample, ptrdiff_t damping_element, const double *friction, ptrdiff_t friction_sample, ptrdiff_t friction_element, const double *bandwidths, ptrdiff_t bandwidths_sample, ptrdiff_t bandwidths_element, const double *period, ptrdiff_t period_sample, ptrdiff_t period_element, double *memory_next, ptrdiff_t memory_next_sample, ptrdiff_t memory_next_element, double *joint, ptrdiff_t joint_sample, ptrdiff_t joint_element, double *motors, ptrdiff_t motors_sample, ptrdiff_t motors_element, double *torques, ptrdiff_t torques_sample, ptrdiff_t torques_element, double *springs, ptrdiff_t springs_sample, ptrdiff_t springs_element, double *load, ptrdiff_t load_sample, ptrdiff_t load_element, double *modelled, ptrdiff_t modelled_sample, ptrdiff_t modelled_element, double *resistance, ptrdiff_t resistance_sample, ptrdiff_t resistance_element)
+void awiwi_antagonistic_observer_batch(ptrdiff_t samples, const double *memory_in, ptrdiff_t memory_in_sample, ptrdiff_t memory_in_element, const double *thetas_in, ptrdiff_t thetas_in_sample, ptrdiff_t thetas_in_element, const double *stretches_in, ptrdiff_t stretches_in_sample, ptrdiff_t stretches_in_element, const double *measured_in, ptrdiff_t measured_in_sample, ptrdiff_t measured_in_element, const double *acted_in, ptrdiff_t acted_in_sample, ptrdiff_t acted_in_element, const double *acting_in, ptrdiff_t acting_in_sample, ptrdiff_t acting_in_element, const double *inertias_in, ptrdiff_t inertias_in_sample, ptrdiff_t inertias_in_element, const double *tendons_in, ptrdiff_t tendons_in_sample, ptrdiff_t tendons_in_element, const double *damping_in, ptrdiff_t damping_in_sample, ptrdiff_t damping_in_element, const double *friction_in, ptrdiff_t friction_in_sample, ptrdiff_t friction_in_element, const double *bandwidths_in, ptrdiff_t bandwidths_in_sample, ptrdiff_t bandwidths_in_element, const double *period_in, ptrdiff_t period_in_sample, ptrdiff_t period_in_element, double *memory_next_out, ptrdiff_t memory_next_out_sample, ptrdiff_t memory_next_out_element, double *joint_out, ptrdiff_t joint_out_sample, ptrdiff_t joint_out_element, double *motors_out, ptrdiff_t motors_out_sample, ptrdiff_t motors_out_element, double *torques_out, ptrdiff_t torques_out_sample, ptrdiff_t torques_out_element, double *springs_out, ptrdiff_t springs_out_sample, ptrdiff_t springs_out_element, double *load_out, ptrdiff_t load_out_sample, ptrdiff_t load_out_element, double *modelled_out, ptrdiff_t modelled_out_sample, ptrdiff_t modelled_out_element, double *resistance_out, ptrdiff_t resistance_out_sample, ptrdiff_t resistance_out_element)
 {
-    double memory_rows[13*BLOCK], thetas_rows[2*BLOCK], stretches_rows[2*BLOCK], measured_rows[2*BLOCK], acted_rows[2*BLOCK], acting_rows[2*BLOCK], inertias_rows[3*BLOCK], tendons_rows[6*BLOCK], damping_rows[1*BLOCK], friction_rows[3*BLOCK], bandwidths_rows[4*BLOCK], period_rows[1*BLOCK], memory_next_rows[13*BLOCK], joint_rows[2*BLOCK], motors_rows[4*BLOCK], torques_rows[4*BLOCK], springs_rows[4*BLOCK], load_rows[1*BLOCK], modelled_rows[2*BLOCK], resistance_rows[2*BLOCK];
+    double memory_in_rows[13*BLOCK], thetas_in_rows[2*BLOCK], stretches_in_rows[2*BLOCK], measured_in_rows[2*BLOCK], acted_in_rows[2*BLOCK], acting_in_rows[2*BLOCK], inertias_in_rows[3*BLOCK], tendons_in_rows[6*BLOCK], damping_in_rows[1*BLOCK], friction_in_rows[3*BLOCK], bandwidths_in_rows[4*BLOCK], period_in_rows[1*BLOCK], memory_next_out_rows[13*BLOCK], joint_out_rows[2*BLOCK], motors_out_rows[4*BLOCK], torques_out_rows[4*BLOCK], springs_out_rows[4*BLOCK], load_out_rows[1*BLOCK], modelled_out_rows[2*BLOCK], resistance_out_rows[2*BLOCK];
     EACH_BLOCK {
-        GATHER(memory, 13)
-        GATHER(thetas, 2)
-        GATHER(stretches, 2)
-        GATHER(measured, 2)
-        GATHER(acted, 2)
-        GATHER(acting, 2)
-        GATHER(inertias, 3)
-        GATHER(tendons, 6)
-        GATHER(damping, 1)
-        GATHER(friction, 3)
-        GATHER(bandwidths, 4)
-        GATHER(period, 1)
-        EXPECT(memory_next, 13)
-        block(AT(memory), AT(thetas), AT(stretches), AT(measured), AT(acted), AT(acting), AT(inertias), AT(tendons), AT(damping), AT(friction), AT(bandwidths), AT(period), AT(memory_next), AT(joint), AT(motors), AT(torques), AT(springs), AT(load), AT(modelled), AT(resistance));
-        SCATTER(memory_next, 13)
-        SCATTER(joint, 2)
-        SCATTER(motors, 4)
-        SCATTER(torques, 4)
-        SCATTER(springs, 4)
-        SCATTER(load, 1)
-        SCATTER(modelled, 2)
-        SCATTER(resistance, 2)
+        GATHER(memory_in, 13)
+        GATHER(thetas_in, 2)
+        GATHER(stretches_in, 2)
+        GATHER(measured_in, 2)
+        GATHER(acted_in, 2)
+        GATHER(acting_in, 2)
+        GATHER(inertias_in, 3)
+        GATHER(tendons_in, 6)
+        GATHER(damping_in, 1)
+        GATHER(friction_in, 3)
+        GATHER(bandwidths_in, 4)
+        GATHER(period_in, 1)
+        PREFETCH_ROWS(memory_next_out, 13)
+        block(AT(memory_in), AT(thetas_in), AT(stretches_in), AT(measured_in), AT(acted_in), AT(acting_in), AT(inertias_in), AT(tendons_in), AT(damping_in), AT(friction_in), AT(bandwidths_in), AT(period_in), AT(memory_next_out), AT(joint_out), AT(motors_out), AT(torques_out), AT(springs_out), AT(load_out), AT(modelled_out), AT(resistance_out));
+        SCATTER(memory_next_out, 13)
+        SCATTER(joint_out, 2)
+        SCATTER(motors_out, 4)
+        SCATTER(torques_out, 4)
+        SCATTER(springs_out, 4)
+        SCATTER(load_out, 1)
+        SCATTER(modelled_out, 2)
+        SCATTER(resistance_out, 2)
     }
 }

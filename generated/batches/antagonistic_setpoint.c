@@ -2,42 +2,43 @@
  *
  * antagonistic_setpoint of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED int awiwi_antagonistic_setpoint(const double desired[5], const double pretension[3], const double elongations[2], const double slopes[2], const double inertias[3], const double damping[1], double x_des[6], double u_des[2]);
+INLINED int awiwi_antagonistic_setpoint(const double desired_in[5], const double pretension_in[3], const double elongations_in[2], const double slopes_in[2], const double inertias_in[3], const double damping_in[1], double x_des_out[6], double u_des_out[2]);
 #include "../antagonistic_setpoint.c"
 
-VECTORS void block(const double *restrict desired_at, ptrdiff_t desired_row, const double *restrict pretension_at, ptrdiff_t pretension_row, const double *restrict elongations_at, ptrdiff_t elongations_row, const double *restrict slopes_at, ptrdiff_t slopes_row, const double *restrict inertias_at, ptrdiff_t inertias_row, const double *restrict damping_at, ptrdiff_t damping_row, double *restrict x_des_at, ptrdiff_t x_des_row, double *restrict u_des_at, ptrdiff_t u_des_row, int *restrict status)
+VECTORS void block(const double *restrict desired_in_at, ptrdiff_t desired_in_row, const double *restrict pretension_in_at, ptrdiff_t pretension_in_row, const double *restrict elongations_in_at, ptrdiff_t elongations_in_row, const double *restrict slopes_in_at, ptrdiff_t slopes_in_row, const double *restrict inertias_in_at, ptrdiff_t inertias_in_row, const double *restrict damping_in_at, ptrdiff_t damping_in_row, double *restrict x_des_out_at, ptrdiff_t x_des_out_row, double *restrict u_des_out_at, ptrdiff_t u_des_out_row, int *restrict status)
 {
     EACH_SAMPLE {
-        double desired_one[5], pretension_one[3], elongations_one[2], slopes_one[2], inertias_one[3], damping_one[1], x_des_one[6], u_des_one[2];
-        TAKE(desired, 5)
-        TAKE(pretension, 3)
-        TAKE(elongations, 2)
-        TAKE(slopes, 2)
-        TAKE(inertias, 3)
-        TAKE(damping, 1)
-        status[i_] = awiwi_antagonistic_setpoint(desired_one, pretension_one, elongations_one, slopes_one, inertias_one, damping_one, x_des_one, u_des_one);
-        GIVE(x_des, 6)
-        GIVE(u_des, 2)
+        double desired_in_one[5], pretension_in_one[3], elongations_in_one[2], slopes_in_one[2], inertias_in_one[3], damping_in_one[1], x_des_out_one[6], u_des_out_one[2];
+        TAKE(desired_in, 5)
+        TAKE(pretension_in, 3)
+        TAKE(elongations_in, 2)
+        TAKE(slopes_in, 2)
+        TAKE(inertias_in, 3)
+        TAKE(damping_in, 1)
+        status[i_] = awiwi_antagonistic_setpoint(desired_in_one, pretension_in_one, elongations_in_one, slopes_in_one, inertias_in_one, damping_in_one, x_des_out_one, u_des_out_one);
+        GIVE(x_des_out, 6)
+        GIVE(u_des_out, 2)
     }
 }
 
-void awiwi_antagonistic_setpoint_batch(ptrdiff_t samples, const double *desired, ptrdiff_t desired_sample, ptrdiff_t desired_element, const double *pretension, ptrdiff_t pretension_sample, ptrdiff_t pretension_element, const double *elongations, ptrdiff_t elongations_sample, ptrdiff_t elongations_element, const double *slopes, ptrdiff_t slopes_sample, ptrdiff_t slopes_element, const double *inertias, ptrdiff_t inertias_sample, ptrdiff_t inertias_element, const double *damping, ptrdiff_t damping_sample, ptrdiff_t damping_element, double *x_des, ptrdiff_t x_des_sample, ptrdiff_t x_des_element, double *u_des, ptrdiff_t u_des_sample, ptrdiff_t u_des_element, int *status)
+void awiwi_antagonistic_setpoint_batch(ptrdiff_t samples, const double *desired_in, ptrdiff_t desired_in_sample, ptrdiff_t desired_in_element, const double *pretension_in, ptrdiff_t pretension_in_sample, ptrdiff_t pretension_in_element, const double *elongations_in, ptrdiff_t elongations_in_sample, ptrdiff_t elongations_in_element, const double *slopes_in, ptrdiff_t slopes_in_sample, ptrdiff_t slopes_in_element, const double *inertias_in, ptrdiff_t inertias_in_sample, ptrdiff_t inertias_in_element, const double *damping_in, ptrdiff_t damping_in_sample, ptrdiff_t damping_in_element, double *x_des_out, ptrdiff_t x_des_out_sample, ptrdiff_t x_des_out_element, double *u_des_out, ptrdiff_t u_des_out_sample, ptrdiff_t u_des_out_element, int *status)
 {
-    double desired_rows[5*BLOCK], pretension_rows[3*BLOCK], elongations_rows[2*BLOCK], slopes_rows[2*BLOCK], inertias_rows[3*BLOCK], damping_rows[1*BLOCK], x_des_rows[6*BLOCK], u_des_rows[2*BLOCK];
+    double desired_in_rows[5*BLOCK], pretension_in_rows[3*BLOCK], elongations_in_rows[2*BLOCK], slopes_in_rows[2*BLOCK], inertias_in_rows[3*BLOCK], damping_in_rows[1*BLOCK], x_des_out_rows[6*BLOCK], u_des_out_rows[2*BLOCK];
     int status_rows[BLOCK];
     EACH_BLOCK {
-        GATHER(desired, 5)
-        GATHER(pretension, 3)
-        GATHER(elongations, 2)
-        GATHER(slopes, 2)
-        GATHER(inertias, 3)
-        GATHER(damping, 1)
-        block(AT(desired), AT(pretension), AT(elongations), AT(slopes), AT(inertias), AT(damping), AT(x_des), AT(u_des), status_rows);
-        SCATTER(x_des, 6)
-        SCATTER(u_des, 2)
+        GATHER(desired_in, 5)
+        GATHER(pretension_in, 3)
+        GATHER(elongations_in, 2)
+        GATHER(slopes_in, 2)
+        GATHER(inertias_in, 3)
+        GATHER(damping_in, 1)
+        block(AT(desired_in), AT(pretension_in), AT(elongations_in), AT(slopes_in), AT(inertias_in), AT(damping_in), AT(x_des_out), AT(u_des_out), status_rows);
+        SCATTER(x_des_out, 6)
+        SCATTER(u_des_out, 2)
         memcpy(status + first_, status_rows, (size_t)COUNT * sizeof *status);
     }
 }

@@ -2,30 +2,31 @@
  *
  * antagonistic_sharing of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_antagonistic_sharing(const double torque[1], const double pretension[3], double shares[2]);
+INLINED void awiwi_antagonistic_sharing(const double torque_in[1], const double pretension_in[3], double shares_out[2]);
 #include "../antagonistic_sharing.c"
 
-VECTORS void block(const double *restrict torque_at, ptrdiff_t torque_row, const double *restrict pretension_at, ptrdiff_t pretension_row, double *restrict shares_at, ptrdiff_t shares_row)
+VECTORS void block(const double *restrict torque_in_at, ptrdiff_t torque_in_row, const double *restrict pretension_in_at, ptrdiff_t pretension_in_row, double *restrict shares_out_at, ptrdiff_t shares_out_row)
 {
     EACH_SAMPLE {
-        double torque_one[1], pretension_one[3], shares_one[2];
-        TAKE(torque, 1)
-        TAKE(pretension, 3)
-        awiwi_antagonistic_sharing(torque_one, pretension_one, shares_one);
-        GIVE(shares, 2)
+        double torque_in_one[1], pretension_in_one[3], shares_out_one[2];
+        TAKE(torque_in, 1)
+        TAKE(pretension_in, 3)
+        awiwi_antagonistic_sharing(torque_in_one, pretension_in_one, shares_out_one);
+        GIVE(shares_out, 2)
     }
 }
 
-void awiwi_antagonistic_sharing_batch(ptrdiff_t samples, const double *torque, ptrdiff_t torque_sample, ptrdiff_t torque_element, const double *pretension, ptrdiff_t pretension_sample, ptrdiff_t pretension_element, double *shares, ptrdiff_t shares_sample, ptrdiff_t shares_element)
+void awiwi_antagonistic_sharing_batch(ptrdiff_t samples, const double *torque_in, ptrdiff_t torque_in_sample, ptrdiff_t torque_in_element, const double *pretension_in, ptrdiff_t pretension_in_sample, ptrdiff_t pretension_in_element, double *shares_out, ptrdiff_t shares_out_sample, ptrdiff_t shares_out_element)
 {
-    double torque_rows[1*BLOCK], pretension_rows[3*BLOCK], shares_rows[2*BLOCK];
+    double torque_in_rows[1*BLOCK], pretension_in_rows[3*BLOCK], shares_out_rows[2*BLOCK];
     EACH_BLOCK {
-        GATHER(torque, 1)
-        GATHER(pretension, 3)
-        block(AT(torque), AT(pretension), AT(shares));
-        SCATTER(shares, 2)
+        GATHER(torque_in, 1)
+        GATHER(pretension_in, 3)
+        block(AT(torque_in), AT(pretension_in), AT(shares_out));
+        SCATTER(shares_out, 2)
     }
 }

@@ -2,34 +2,35 @@
  *
  * antagonistic_springs of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_antagonistic_springs(const double stretches[2], const double speeds[2], const double tendons[6], double torques[4], double springs[4]);
+INLINED void awiwi_antagonistic_springs(const double stretches_in[2], const double speeds_in[2], const double tendons_in[6], double torques_out[4], double springs_out[4]);
 #include "../antagonistic_springs.c"
 
-VECTORS void block(const double *restrict stretches_at, ptrdiff_t stretches_row, const double *restrict speeds_at, ptrdiff_t speeds_row, const double *restrict tendons_at, ptrdiff_t tendons_row, double *restrict torques_at, ptrdiff_t torques_row, double *restrict springs_at, ptrdiff_t springs_row)
+VECTORS void block(const double *restrict stretches_in_at, ptrdiff_t stretches_in_row, const double *restrict speeds_in_at, ptrdiff_t speeds_in_row, const double *restrict tendons_in_at, ptrdiff_t tendons_in_row, double *restrict torques_out_at, ptrdiff_t torques_out_row, double *restrict springs_out_at, ptrdiff_t springs_out_row)
 {
     EACH_SAMPLE {
-        double stretches_one[2], speeds_one[2], tendons_one[6], torques_one[4], springs_one[4];
-        TAKE(stretches, 2)
-        TAKE(speeds, 2)
-        TAKE(tendons, 6)
-        awiwi_antagonistic_springs(stretches_one, speeds_one, tendons_one, torques_one, springs_one);
-        GIVE(torques, 4)
-        GIVE(springs, 4)
+        double stretches_in_one[2], speeds_in_one[2], tendons_in_one[6], torques_out_one[4], springs_out_one[4];
+        TAKE(stretches_in, 2)
+        TAKE(speeds_in, 2)
+        TAKE(tendons_in, 6)
+        awiwi_antagonistic_springs(stretches_in_one, speeds_in_one, tendons_in_one, torques_out_one, springs_out_one);
+        GIVE(torques_out, 4)
+        GIVE(springs_out, 4)
     }
 }
 
-void awiwi_antagonistic_springs_batch(ptrdiff_t samples, const double *stretches, ptrdiff_t stretches_sample, ptrdiff_t stretches_element, const double *speeds, ptrdiff_t speeds_sample, ptrdiff_t speeds_element, const double *tendons, ptrdiff_t tendons_sample, ptrdiff_t tendons_element, double *torques, ptrdiff_t torques_sample, ptrdiff_t torques_element, double *springs, ptrdiff_t springs_sample, ptrdiff_t springs_element)
+void awiwi_antagonistic_springs_batch(ptrdiff_t samples, const double *stretches_in, ptrdiff_t stretches_in_sample, ptrdiff_t stretches_in_element, const double *speeds_in, ptrdiff_t speeds_in_sample, ptrdiff_t speeds_in_element, const double *tendons_in, ptrdiff_t tendons_in_sample, ptrdiff_t tendons_in_element, double *torques_out, ptrdiff_t torques_out_sample, ptrdiff_t torques_out_element, double *springs_out, ptrdiff_t springs_out_sample, ptrdiff_t springs_out_element)
 {
-    double stretches_rows[2*BLOCK], speeds_rows[2*BLOCK], tendons_rows[6*BLOCK], torques_rows[4*BLOCK], springs_rows[4*BLOCK];
+    double stretches_in_rows[2*BLOCK], speeds_in_rows[2*BLOCK], tendons_in_rows[6*BLOCK], torques_out_rows[4*BLOCK], springs_out_rows[4*BLOCK];
     EACH_BLOCK {
-        GATHER(stretches, 2)
-        GATHER(speeds, 2)
-        GATHER(tendons, 6)
-        block(AT(stretches), AT(speeds), AT(tendons), AT(torques), AT(springs));
-        SCATTER(torques, 4)
-        SCATTER(springs, 4)
+        GATHER(stretches_in, 2)
+        GATHER(speeds_in, 2)
+        GATHER(tendons_in, 6)
+        block(AT(stretches_in), AT(speeds_in), AT(tendons_in), AT(torques_out), AT(springs_out));
+        SCATTER(torques_out, 4)
+        SCATTER(springs_out, 4)
     }
 }

@@ -2,32 +2,33 @@
  *
  * backstepping_academic of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED int awiwi_backstepping_academic(const double x[2], const double k[2], double u[1]);
+INLINED int awiwi_backstepping_academic(const double x_in[2], const double k_in[2], double u_out[1]);
 #include "../backstepping_academic.c"
 
-VECTORS void block(const double *restrict x_at, ptrdiff_t x_row, const double *restrict k_at, ptrdiff_t k_row, double *restrict u_at, ptrdiff_t u_row, int *restrict status)
+VECTORS void block(const double *restrict x_in_at, ptrdiff_t x_in_row, const double *restrict k_in_at, ptrdiff_t k_in_row, double *restrict u_out_at, ptrdiff_t u_out_row, int *restrict status)
 {
     EACH_SAMPLE {
-        double x_one[2], k_one[2], u_one[1];
-        TAKE(x, 2)
-        TAKE(k, 2)
-        status[i_] = awiwi_backstepping_academic(x_one, k_one, u_one);
-        GIVE(u, 1)
+        double x_in_one[2], k_in_one[2], u_out_one[1];
+        TAKE(x_in, 2)
+        TAKE(k_in, 2)
+        status[i_] = awiwi_backstepping_academic(x_in_one, k_in_one, u_out_one);
+        GIVE(u_out, 1)
     }
 }
 
-void awiwi_backstepping_academic_batch(ptrdiff_t samples, const double *x, ptrdiff_t x_sample, ptrdiff_t x_element, const double *k, ptrdiff_t k_sample, ptrdiff_t k_element, double *u, ptrdiff_t u_sample, ptrdiff_t u_element, int *status)
+void awiwi_backstepping_academic_batch(ptrdiff_t samples, const double *x_in, ptrdiff_t x_in_sample, ptrdiff_t x_in_element, const double *k_in, ptrdiff_t k_in_sample, ptrdiff_t k_in_element, double *u_out, ptrdiff_t u_out_sample, ptrdiff_t u_out_element, int *status)
 {
-    double x_rows[2*BLOCK], k_rows[2*BLOCK], u_rows[1*BLOCK];
+    double x_in_rows[2*BLOCK], k_in_rows[2*BLOCK], u_out_rows[1*BLOCK];
     int status_rows[BLOCK];
     EACH_BLOCK {
-        GATHER(x, 2)
-        GATHER(k, 2)
-        block(AT(x), AT(k), AT(u), status_rows);
-        SCATTER(u, 1)
+        GATHER(x_in, 2)
+        GATHER(k_in, 2)
+        block(AT(x_in), AT(k_in), AT(u_out), status_rows);
+        SCATTER(u_out, 1)
         memcpy(status + first_, status_rows, (size_t)COUNT * sizeof *status);
     }
 }

@@ -2,34 +2,35 @@
  *
  * backstepping_academic_lyapunov of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_backstepping_academic_lyapunov(const double x[2], const double k[2], double V[1], double Vdot[1], double controls[1]);
+INLINED void awiwi_backstepping_academic_lyapunov(const double x_in[2], const double k_in[2], double V_out[1], double Vdot_out[1], double controls_out[1]);
 #include "../backstepping_academic_lyapunov.c"
 
-VECTORS void block(const double *restrict x_at, ptrdiff_t x_row, const double *restrict k_at, ptrdiff_t k_row, double *restrict V_at, ptrdiff_t V_row, double *restrict Vdot_at, ptrdiff_t Vdot_row, double *restrict controls_at, ptrdiff_t controls_row)
+VECTORS void block(const double *restrict x_in_at, ptrdiff_t x_in_row, const double *restrict k_in_at, ptrdiff_t k_in_row, double *restrict V_out_at, ptrdiff_t V_out_row, double *restrict Vdot_out_at, ptrdiff_t Vdot_out_row, double *restrict controls_out_at, ptrdiff_t controls_out_row)
 {
     EACH_SAMPLE {
-        double x_one[2], k_one[2], V_one[1], Vdot_one[1], controls_one[1];
-        TAKE(x, 2)
-        TAKE(k, 2)
-        awiwi_backstepping_academic_lyapunov(x_one, k_one, V_one, Vdot_one, controls_one);
-        GIVE(V, 1)
-        GIVE(Vdot, 1)
-        GIVE(controls, 1)
+        double x_in_one[2], k_in_one[2], V_out_one[1], Vdot_out_one[1], controls_out_one[1];
+        TAKE(x_in, 2)
+        TAKE(k_in, 2)
+        awiwi_backstepping_academic_lyapunov(x_in_one, k_in_one, V_out_one, Vdot_out_one, controls_out_one);
+        GIVE(V_out, 1)
+        GIVE(Vdot_out, 1)
+        GIVE(controls_out, 1)
     }
 }
 
-void awiwi_backstepping_academic_lyapunov_batch(ptrdiff_t samples, const double *x, ptrdiff_t x_sample, ptrdiff_t x_element, const double *k, ptrdiff_t k_sample, ptrdiff_t k_element, double *V, ptrdiff_t V_sample, ptrdiff_t V_element, double *Vdot, ptrdiff_t Vdot_sample, ptrdiff_t Vdot_element, double *controls, ptrdiff_t controls_sample, ptrdiff_t controls_element)
+void awiwi_backstepping_academic_lyapunov_batch(ptrdiff_t samples, const double *x_in, ptrdiff_t x_in_sample, ptrdiff_t x_in_element, const double *k_in, ptrdiff_t k_in_sample, ptrdiff_t k_in_element, double *V_out, ptrdiff_t V_out_sample, ptrdiff_t V_out_element, double *Vdot_out, ptrdiff_t Vdot_out_sample, ptrdiff_t Vdot_out_element, double *controls_out, ptrdiff_t controls_out_sample, ptrdiff_t controls_out_element)
 {
-    double x_rows[2*BLOCK], k_rows[2*BLOCK], V_rows[1*BLOCK], Vdot_rows[1*BLOCK], controls_rows[1*BLOCK];
+    double x_in_rows[2*BLOCK], k_in_rows[2*BLOCK], V_out_rows[1*BLOCK], Vdot_out_rows[1*BLOCK], controls_out_rows[1*BLOCK];
     EACH_BLOCK {
-        GATHER(x, 2)
-        GATHER(k, 2)
-        block(AT(x), AT(k), AT(V), AT(Vdot), AT(controls));
-        SCATTER(V, 1)
-        SCATTER(Vdot, 1)
-        SCATTER(controls, 1)
+        GATHER(x_in, 2)
+        GATHER(k_in, 2)
+        block(AT(x_in), AT(k_in), AT(V_out), AT(Vdot_out), AT(controls_out));
+        SCATTER(V_out, 1)
+        SCATTER(Vdot_out, 1)
+        SCATTER(controls_out, 1)
     }
 }

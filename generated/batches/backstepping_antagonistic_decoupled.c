@@ -2,46 +2,47 @@
  *
  * backstepping_antagonistic_decoupled of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED int awiwi_backstepping_antagonistic_decoupled(const double joint[2], const double torques[4], const double desired[5], const double pretension[3], const double external[2], const double inertias[3], const double springs[4], const double impedance[2], const double tunings[8], double tau_m[2]);
+INLINED int awiwi_backstepping_antagonistic_decoupled(const double joint_in[2], const double torques_in[4], const double desired_in[5], const double pretension_in[3], const double external_in[2], const double inertias_in[3], const double springs_in[4], const double impedance_in[2], const double tunings_in[8], double tau_m_out[2]);
 #include "../backstepping_antagonistic_decoupled.c"
 
-VECTORS void block(const double *restrict joint_at, ptrdiff_t joint_row, const double *restrict torques_at, ptrdiff_t torques_row, const double *restrict desired_at, ptrdiff_t desired_row, const double *restrict pretension_at, ptrdiff_t pretension_row, const double *restrict external_at, ptrdiff_t external_row, const double *restrict inertias_at, ptrdiff_t inertias_row, const double *restrict springs_at, ptrdiff_t springs_row, const double *restrict impedance_at, ptrdiff_t impedance_row, const double *restrict tunings_at, ptrdiff_t tunings_row, double *restrict tau_m_at, ptrdiff_t tau_m_row, int *restrict status)
+VECTORS void block(const double *restrict joint_in_at, ptrdiff_t joint_in_row, const double *restrict torques_in_at, ptrdiff_t torques_in_row, const double *restrict desired_in_at, ptrdiff_t desired_in_row, const double *restrict pretension_in_at, ptrdiff_t pretension_in_row, const double *restrict external_in_at, ptrdiff_t external_in_row, const double *restrict inertias_in_at, ptrdiff_t inertias_in_row, const double *restrict springs_in_at, ptrdiff_t springs_in_row, const double *restrict impedance_in_at, ptrdiff_t impedance_in_row, const double *restrict tunings_in_at, ptrdiff_t tunings_in_row, double *restrict tau_m_out_at, ptrdiff_t tau_m_out_row, int *restrict status)
 {
     EACH_SAMPLE {
-        double joint_one[2], torques_one[4], desired_one[5], pretension_one[3], external_one[2], inertias_one[3], springs_one[4], impedance_one[2], tunings_one[8], tau_m_one[2];
-        TAKE(joint, 2)
-        TAKE(torques, 4)
-        TAKE(desired, 5)
-        TAKE(pretension, 3)
-        TAKE(external, 2)
-        TAKE(inertias, 3)
-        TAKE(springs, 4)
-        TAKE(impedance, 2)
-        TAKE(tunings, 8)
-        status[i_] = awiwi_backstepping_antagonistic_decoupled(joint_one, torques_one, desired_one, pretension_one, external_one, inertias_one, springs_one, impedance_one, tunings_one, tau_m_one);
-        GIVE(tau_m, 2)
+        double joint_in_one[2], torques_in_one[4], desired_in_one[5], pretension_in_one[3], external_in_one[2], inertias_in_one[3], springs_in_one[4], impedance_in_one[2], tunings_in_one[8], tau_m_out_one[2];
+        TAKE(joint_in, 2)
+        TAKE(torques_in, 4)
+        TAKE(desired_in, 5)
+        TAKE(pretension_in, 3)
+        TAKE(external_in, 2)
+        TAKE(inertias_in, 3)
+        TAKE(springs_in, 4)
+        TAKE(impedance_in, 2)
+        TAKE(tunings_in, 8)
+        status[i_] = awiwi_backstepping_antagonistic_decoupled(joint_in_one, torques_in_one, desired_in_one, pretension_in_one, external_in_one, inertias_in_one, springs_in_one, impedance_in_one, tunings_in_one, tau_m_out_one);
+        GIVE(tau_m_out, 2)
     }
 }
 
-void awiwi_backstepping_antagonistic_decoupled_batch(ptrdiff_t samples, const double *joint, ptrdiff_t joint_sample, ptrdiff_t joint_element, const double *torques, ptrdiff_t torques_sample, ptrdiff_t torques_element, const double *desired, ptrdiff_t desired_sample, ptrdiff_t desired_element, const double *pretension, ptrdiff_t pretension_sample, ptrdiff_t pretension_element, const double *external, ptrdiff_t external_sample, ptrdiff_t external_element, const double *inertias, ptrdiff_t inertias_sample, ptrdiff_t inertias_element, const double *springs, ptrdiff_t springs_sample, ptrdiff_t springs_element, const double *impedance, ptrdiff_t impedance_sample, ptrdiff_t impedance_element, const double *tunings, ptrdiff_t tunings_sample, ptrdiff_t tunings_element, double *tau_m, ptrdiff_t tau_m_sample, ptrdiff_t tau_m_element, int *status)
+void awiwi_backstepping_antagonistic_decoupled_batch(ptrdiff_t samples, const double *joint_in, ptrdiff_t joint_in_sample, ptrdiff_t joint_in_element, const double *torques_in, ptrdiff_t torques_in_sample, ptrdiff_t torques_in_element, const double *desired_in, ptrdiff_t desired_in_sample, ptrdiff_t desired_in_element, const double *pretension_in, ptrdiff_t pretension_in_sample, ptrdiff_t pretension_in_element, const double *external_in, ptrdiff_t external_in_sample, ptrdiff_t external_in_element, const double *inertias_in, ptrdiff_t inertias_in_sample, ptrdiff_t inertias_in_element, const double *springs_in, ptrdiff_t springs_in_sample, ptrdiff_t springs_in_element, const double *impedance_in, ptrdiff_t impedance_in_sample, ptrdiff_t impedance_in_element, const double *tunings_in, ptrdiff_t tunings_in_sample, ptrdiff_t tunings_in_element, double *tau_m_out, ptrdiff_t tau_m_out_sample, ptrdiff_t tau_m_out_element, int *status)
 {
-    double joint_rows[2*BLOCK], torques_rows[4*BLOCK], desired_rows[5*BLOCK], pretension_rows[3*BLOCK], external_rows[2*BLOCK], inertias_rows[3*BLOCK], springs_rows[4*BLOCK], impedance_rows[2*BLOCK], tunings_rows[8*BLOCK], tau_m_rows[2*BLOCK];
+    double joint_in_rows[2*BLOCK], torques_in_rows[4*BLOCK], desired_in_rows[5*BLOCK], pretension_in_rows[3*BLOCK], external_in_rows[2*BLOCK], inertias_in_rows[3*BLOCK], springs_in_rows[4*BLOCK], impedance_in_rows[2*BLOCK], tunings_in_rows[8*BLOCK], tau_m_out_rows[2*BLOCK];
     int status_rows[BLOCK];
     EACH_BLOCK {
-        GATHER(joint, 2)
-        GATHER(torques, 4)
-        GATHER(desired, 5)
-        GATHER(pretension, 3)
-        GATHER(external, 2)
-        GATHER(inertias, 3)
-        GATHER(springs, 4)
-        GATHER(impedance, 2)
-        GATHER(tunings, 8)
-        block(AT(joint), AT(torques), AT(desired), AT(pretension), AT(external), AT(inertias), AT(springs), AT(impedance), AT(tunings), AT(tau_m), status_rows);
-        SCATTER(tau_m, 2)
+        GATHER(joint_in, 2)
+        GATHER(torques_in, 4)
+        GATHER(desired_in, 5)
+        GATHER(pretension_in, 3)
+        GATHER(external_in, 2)
+        GATHER(inertias_in, 3)
+        GATHER(springs_in, 4)
+        GATHER(impedance_in, 2)
+        GATHER(tunings_in, 8)
+        block(AT(joint_in), AT(torques_in), AT(desired_in), AT(pretension_in), AT(external_in), AT(inertias_in), AT(springs_in), AT(impedance_in), AT(tunings_in), AT(tau_m_out), status_rows);
+        SCATTER(tau_m_out, 2)
         memcpy(status + first_, status_rows, (size_t)COUNT * sizeof *status);
     }
 }

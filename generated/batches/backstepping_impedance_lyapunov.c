@@ -2,42 +2,43 @@
  *
  * backstepping_impedance_lyapunov of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_backstepping_impedance_lyapunov(const double state[4], const double desired[5], const double external[2], const double plant[3], const double gains[4], const double weights[2], double V[1], double Vdot[1], double controls[2]);
+INLINED void awiwi_backstepping_impedance_lyapunov(const double state_in[4], const double desired_in[5], const double external_in[2], const double plant_in[3], const double gains_in[4], const double weights_in[2], double V_out[1], double Vdot_out[1], double controls_out[2]);
 #include "../backstepping_impedance_lyapunov.c"
 
-VECTORS void block(const double *restrict state_at, ptrdiff_t state_row, const double *restrict desired_at, ptrdiff_t desired_row, const double *restrict external_at, ptrdiff_t external_row, const double *restrict plant_at, ptrdiff_t plant_row, const double *restrict gains_at, ptrdiff_t gains_row, const double *restrict weights_at, ptrdiff_t weights_row, double *restrict V_at, ptrdiff_t V_row, double *restrict Vdot_at, ptrdiff_t Vdot_row, double *restrict controls_at, ptrdiff_t controls_row)
+VECTORS void block(const double *restrict state_in_at, ptrdiff_t state_in_row, const double *restrict desired_in_at, ptrdiff_t desired_in_row, const double *restrict external_in_at, ptrdiff_t external_in_row, const double *restrict plant_in_at, ptrdiff_t plant_in_row, const double *restrict gains_in_at, ptrdiff_t gains_in_row, const double *restrict weights_in_at, ptrdiff_t weights_in_row, double *restrict V_out_at, ptrdiff_t V_out_row, double *restrict Vdot_out_at, ptrdiff_t Vdot_out_row, double *restrict controls_out_at, ptrdiff_t controls_out_row)
 {
     EACH_SAMPLE {
-        double state_one[4], desired_one[5], external_one[2], plant_one[3], gains_one[4], weights_one[2], V_one[1], Vdot_one[1], controls_one[2];
-        TAKE(state, 4)
-        TAKE(desired, 5)
-        TAKE(external, 2)
-        TAKE(plant, 3)
-        TAKE(gains, 4)
-        TAKE(weights, 2)
-        awiwi_backstepping_impedance_lyapunov(state_one, desired_one, external_one, plant_one, gains_one, weights_one, V_one, Vdot_one, controls_one);
-        GIVE(V, 1)
-        GIVE(Vdot, 1)
-        GIVE(controls, 2)
+        double state_in_one[4], desired_in_one[5], external_in_one[2], plant_in_one[3], gains_in_one[4], weights_in_one[2], V_out_one[1], Vdot_out_one[1], controls_out_one[2];
+        TAKE(state_in, 4)
+        TAKE(desired_in, 5)
+        TAKE(external_in, 2)
+        TAKE(plant_in, 3)
+        TAKE(gains_in, 4)
+        TAKE(weights_in, 2)
+        awiwi_backstepping_impedance_lyapunov(state_in_one, desired_in_one, external_in_one, plant_in_one, gains_in_one, weights_in_one, V_out_one, Vdot_out_one, controls_out_one);
+        GIVE(V_out, 1)
+        GIVE(Vdot_out, 1)
+        GIVE(controls_out, 2)
     }
 }
 
-void awiwi_backstepping_impedance_lyapunov_batch(ptrdiff_t samples, const double *state, ptrdiff_t state_sample, ptrdiff_t state_element, const double *desired, ptrdiff_t desired_sample, ptrdiff_t desired_element, const double *external, ptrdiff_t external_sample, ptrdiff_t external_element, const double *plant, ptrdiff_t plant_sample, ptrdiff_t plant_element, const double *gains, ptrdiff_t gains_sample, ptrdiff_t gains_element, const double *weights, ptrdiff_t weights_sample, ptrdiff_t weights_element, double *V, ptrdiff_t V_sample, ptrdiff_t V_element, double *Vdot, ptrdiff_t Vdot_sample, ptrdiff_t Vdot_element, double *controls, ptrdiff_t controls_sample, ptrdiff_t controls_element)
+void awiwi_backstepping_impedance_lyapunov_batch(ptrdiff_t samples, const double *state_in, ptrdiff_t state_in_sample, ptrdiff_t state_in_element, const double *desired_in, ptrdiff_t desired_in_sample, ptrdiff_t desired_in_element, const double *external_in, ptrdiff_t external_in_sample, ptrdiff_t external_in_element, const double *plant_in, ptrdiff_t plant_in_sample, ptrdiff_t plant_in_element, const double *gains_in, ptrdiff_t gains_in_sample, ptrdiff_t gains_in_element, const double *weights_in, ptrdiff_t weights_in_sample, ptrdiff_t weights_in_element, double *V_out, ptrdiff_t V_out_sample, ptrdiff_t V_out_element, double *Vdot_out, ptrdiff_t Vdot_out_sample, ptrdiff_t Vdot_out_element, double *controls_out, ptrdiff_t controls_out_sample, ptrdiff_t controls_out_element)
 {
-    double state_rows[4*BLOCK], desired_rows[5*BLOCK], external_rows[2*BLOCK], plant_rows[3*BLOCK], gains_rows[4*BLOCK], weights_rows[2*BLOCK], V_rows[1*BLOCK], Vdot_rows[1*BLOCK], controls_rows[2*BLOCK];
+    double state_in_rows[4*BLOCK], desired_in_rows[5*BLOCK], external_in_rows[2*BLOCK], plant_in_rows[3*BLOCK], gains_in_rows[4*BLOCK], weights_in_rows[2*BLOCK], V_out_rows[1*BLOCK], Vdot_out_rows[1*BLOCK], controls_out_rows[2*BLOCK];
     EACH_BLOCK {
-        GATHER(state, 4)
-        GATHER(desired, 5)
-        GATHER(external, 2)
-        GATHER(plant, 3)
-        GATHER(gains, 4)
-        GATHER(weights, 2)
-        block(AT(state), AT(desired), AT(external), AT(plant), AT(gains), AT(weights), AT(V), AT(Vdot), AT(controls));
-        SCATTER(V, 1)
-        SCATTER(Vdot, 1)
-        SCATTER(controls, 2)
+        GATHER(state_in, 4)
+        GATHER(desired_in, 5)
+        GATHER(external_in, 2)
+        GATHER(plant_in, 3)
+        GATHER(gains_in, 4)
+        GATHER(weights_in, 2)
+        block(AT(state_in), AT(desired_in), AT(external_in), AT(plant_in), AT(gains_in), AT(weights_in), AT(V_out), AT(Vdot_out), AT(controls_out));
+        SCATTER(V_out, 1)
+        SCATTER(Vdot_out, 1)
+        SCATTER(controls_out, 2)
     }
 }

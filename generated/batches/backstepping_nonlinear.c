@@ -2,42 +2,43 @@
  *
  * backstepping_nonlinear of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED int awiwi_backstepping_nonlinear(const double state[4], const double desired[5], const double external[2], const double bodies[2], const double spring[2], const double gains[4], const double weights[2], double tau_m[1]);
+INLINED int awiwi_backstepping_nonlinear(const double state_in[4], const double desired_in[5], const double external_in[2], const double bodies_in[2], const double spring_in[2], const double gains_in[4], const double weights_in[2], double tau_m_out[1]);
 #include "../backstepping_nonlinear.c"
 
-VECTORS void block(const double *restrict state_at, ptrdiff_t state_row, const double *restrict desired_at, ptrdiff_t desired_row, const double *restrict external_at, ptrdiff_t external_row, const double *restrict bodies_at, ptrdiff_t bodies_row, const double *restrict spring_at, ptrdiff_t spring_row, const double *restrict gains_at, ptrdiff_t gains_row, const double *restrict weights_at, ptrdiff_t weights_row, double *restrict tau_m_at, ptrdiff_t tau_m_row, int *restrict status)
+VECTORS void block(const double *restrict state_in_at, ptrdiff_t state_in_row, const double *restrict desired_in_at, ptrdiff_t desired_in_row, const double *restrict external_in_at, ptrdiff_t external_in_row, const double *restrict bodies_in_at, ptrdiff_t bodies_in_row, const double *restrict spring_in_at, ptrdiff_t spring_in_row, const double *restrict gains_in_at, ptrdiff_t gains_in_row, const double *restrict weights_in_at, ptrdiff_t weights_in_row, double *restrict tau_m_out_at, ptrdiff_t tau_m_out_row, int *restrict status)
 {
     EACH_SAMPLE {
-        double state_one[4], desired_one[5], external_one[2], bodies_one[2], spring_one[2], gains_one[4], weights_one[2], tau_m_one[1];
-        TAKE(state, 4)
-        TAKE(desired, 5)
-        TAKE(external, 2)
-        TAKE(bodies, 2)
-        TAKE(spring, 2)
-        TAKE(gains, 4)
-        TAKE(weights, 2)
-        status[i_] = awiwi_backstepping_nonlinear(state_one, desired_one, external_one, bodies_one, spring_one, gains_one, weights_one, tau_m_one);
-        GIVE(tau_m, 1)
+        double state_in_one[4], desired_in_one[5], external_in_one[2], bodies_in_one[2], spring_in_one[2], gains_in_one[4], weights_in_one[2], tau_m_out_one[1];
+        TAKE(state_in, 4)
+        TAKE(desired_in, 5)
+        TAKE(external_in, 2)
+        TAKE(bodies_in, 2)
+        TAKE(spring_in, 2)
+        TAKE(gains_in, 4)
+        TAKE(weights_in, 2)
+        status[i_] = awiwi_backstepping_nonlinear(state_in_one, desired_in_one, external_in_one, bodies_in_one, spring_in_one, gains_in_one, weights_in_one, tau_m_out_one);
+        GIVE(tau_m_out, 1)
     }
 }
 
-void awiwi_backstepping_nonlinear_batch(ptrdiff_t samples, const double *state, ptrdiff_t state_sample, ptrdiff_t state_element, const double *desired, ptrdiff_t desired_sample, ptrdiff_t desired_element, const double *external, ptrdiff_t external_sample, ptrdiff_t external_element, const double *bodies, ptrdiff_t bodies_sample, ptrdiff_t bodies_element, const double *spring, ptrdiff_t spring_sample, ptrdiff_t spring_element, const double *gains, ptrdiff_t gains_sample, ptrdiff_t gains_element, const double *weights, ptrdiff_t weights_sample, ptrdiff_t weights_element, double *tau_m, ptrdiff_t tau_m_sample, ptrdiff_t tau_m_element, int *status)
+void awiwi_backstepping_nonlinear_batch(ptrdiff_t samples, const double *state_in, ptrdiff_t state_in_sample, ptrdiff_t state_in_element, const double *desired_in, ptrdiff_t desired_in_sample, ptrdiff_t desired_in_element, const double *external_in, ptrdiff_t external_in_sample, ptrdiff_t external_in_element, const double *bodies_in, ptrdiff_t bodies_in_sample, ptrdiff_t bodies_in_element, const double *spring_in, ptrdiff_t spring_in_sample, ptrdiff_t spring_in_element, const double *gains_in, ptrdiff_t gains_in_sample, ptrdiff_t gains_in_element, const double *weights_in, ptrdiff_t weights_in_sample, ptrdiff_t weights_in_element, double *tau_m_out, ptrdiff_t tau_m_out_sample, ptrdiff_t tau_m_out_element, int *status)
 {
-    double state_rows[4*BLOCK], desired_rows[5*BLOCK], external_rows[2*BLOCK], bodies_rows[2*BLOCK], spring_rows[2*BLOCK], gains_rows[4*BLOCK], weights_rows[2*BLOCK], tau_m_rows[1*BLOCK];
+    double state_in_rows[4*BLOCK], desired_in_rows[5*BLOCK], external_in_rows[2*BLOCK], bodies_in_rows[2*BLOCK], spring_in_rows[2*BLOCK], gains_in_rows[4*BLOCK], weights_in_rows[2*BLOCK], tau_m_out_rows[1*BLOCK];
     int status_rows[BLOCK];
     EACH_BLOCK {
-        GATHER(state, 4)
-        GATHER(desired, 5)
-        GATHER(external, 2)
-        GATHER(bodies, 2)
-        GATHER(spring, 2)
-        GATHER(gains, 4)
-        GATHER(weights, 2)
-        block(AT(state), AT(desired), AT(external), AT(bodies), AT(spring), AT(gains), AT(weights), AT(tau_m), status_rows);
-        SCATTER(tau_m, 1)
+        GATHER(state_in, 4)
+        GATHER(desired_in, 5)
+        GATHER(external_in, 2)
+        GATHER(bodies_in, 2)
+        GATHER(spring_in, 2)
+        GATHER(gains_in, 4)
+        GATHER(weights_in, 2)
+        block(AT(state_in), AT(desired_in), AT(external_in), AT(bodies_in), AT(spring_in), AT(gains_in), AT(weights_in), AT(tau_m_out), status_rows);
+        SCATTER(tau_m_out, 1)
         memcpy(status + first_, status_rows, (size_t)COUNT * sizeof *status);
     }
 }

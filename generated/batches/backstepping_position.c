@@ -2,38 +2,39 @@
  *
  * backstepping_position of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED int awiwi_backstepping_position(const double motion[4], const double desired[5], const double plant[3], const double rates[4], const double scales[3], double tau_m[1]);
+INLINED int awiwi_backstepping_position(const double motion_in[4], const double desired_in[5], const double plant_in[3], const double rates_in[4], const double scales_in[3], double tau_m_out[1]);
 #include "../backstepping_position.c"
 
-VECTORS void block(const double *restrict motion_at, ptrdiff_t motion_row, const double *restrict desired_at, ptrdiff_t desired_row, const double *restrict plant_at, ptrdiff_t plant_row, const double *restrict rates_at, ptrdiff_t rates_row, const double *restrict scales_at, ptrdiff_t scales_row, double *restrict tau_m_at, ptrdiff_t tau_m_row, int *restrict status)
+VECTORS void block(const double *restrict motion_in_at, ptrdiff_t motion_in_row, const double *restrict desired_in_at, ptrdiff_t desired_in_row, const double *restrict plant_in_at, ptrdiff_t plant_in_row, const double *restrict rates_in_at, ptrdiff_t rates_in_row, const double *restrict scales_in_at, ptrdiff_t scales_in_row, double *restrict tau_m_out_at, ptrdiff_t tau_m_out_row, int *restrict status)
 {
     EACH_SAMPLE {
-        double motion_one[4], desired_one[5], plant_one[3], rates_one[4], scales_one[3], tau_m_one[1];
-        TAKE(motion, 4)
-        TAKE(desired, 5)
-        TAKE(plant, 3)
-        TAKE(rates, 4)
-        TAKE(scales, 3)
-        status[i_] = awiwi_backstepping_position(motion_one, desired_one, plant_one, rates_one, scales_one, tau_m_one);
-        GIVE(tau_m, 1)
+        double motion_in_one[4], desired_in_one[5], plant_in_one[3], rates_in_one[4], scales_in_one[3], tau_m_out_one[1];
+        TAKE(motion_in, 4)
+        TAKE(desired_in, 5)
+        TAKE(plant_in, 3)
+        TAKE(rates_in, 4)
+        TAKE(scales_in, 3)
+        status[i_] = awiwi_backstepping_position(motion_in_one, desired_in_one, plant_in_one, rates_in_one, scales_in_one, tau_m_out_one);
+        GIVE(tau_m_out, 1)
     }
 }
 
-void awiwi_backstepping_position_batch(ptrdiff_t samples, const double *motion, ptrdiff_t motion_sample, ptrdiff_t motion_element, const double *desired, ptrdiff_t desired_sample, ptrdiff_t desired_element, const double *plant, ptrdiff_t plant_sample, ptrdiff_t plant_element, const double *rates, ptrdiff_t rates_sample, ptrdiff_t rates_element, const double *scales, ptrdiff_t scales_sample, ptrdiff_t scales_element, double *tau_m, ptrdiff_t tau_m_sample, ptrdiff_t tau_m_element, int *status)
+void awiwi_backstepping_position_batch(ptrdiff_t samples, const double *motion_in, ptrdiff_t motion_in_sample, ptrdiff_t motion_in_element, const double *desired_in, ptrdiff_t desired_in_sample, ptrdiff_t desired_in_element, const double *plant_in, ptrdiff_t plant_in_sample, ptrdiff_t plant_in_element, const double *rates_in, ptrdiff_t rates_in_sample, ptrdiff_t rates_in_element, const double *scales_in, ptrdiff_t scales_in_sample, ptrdiff_t scales_in_element, double *tau_m_out, ptrdiff_t tau_m_out_sample, ptrdiff_t tau_m_out_element, int *status)
 {
-    double motion_rows[4*BLOCK], desired_rows[5*BLOCK], plant_rows[3*BLOCK], rates_rows[4*BLOCK], scales_rows[3*BLOCK], tau_m_rows[1*BLOCK];
+    double motion_in_rows[4*BLOCK], desired_in_rows[5*BLOCK], plant_in_rows[3*BLOCK], rates_in_rows[4*BLOCK], scales_in_rows[3*BLOCK], tau_m_out_rows[1*BLOCK];
     int status_rows[BLOCK];
     EACH_BLOCK {
-        GATHER(motion, 4)
-        GATHER(desired, 5)
-        GATHER(plant, 3)
-        GATHER(rates, 4)
-        GATHER(scales, 3)
-        block(AT(motion), AT(desired), AT(plant), AT(rates), AT(scales), AT(tau_m), status_rows);
-        SCATTER(tau_m, 1)
+        GATHER(motion_in, 4)
+        GATHER(desired_in, 5)
+        GATHER(plant_in, 3)
+        GATHER(rates_in, 4)
+        GATHER(scales_in, 3)
+        block(AT(motion_in), AT(desired_in), AT(plant_in), AT(rates_in), AT(scales_in), AT(tau_m_out), status_rows);
+        SCATTER(tau_m_out, 1)
         memcpy(status + first_, status_rows, (size_t)COUNT * sizeof *status);
     }
 }

@@ -2,40 +2,41 @@
  *
  * backstepping_position_lyapunov of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_backstepping_position_lyapunov(const double motion[4], const double desired[5], const double plant[3], const double rates[4], const double scales[3], double V[1], double Vdot[1], double controls[3]);
+INLINED void awiwi_backstepping_position_lyapunov(const double motion_in[4], const double desired_in[5], const double plant_in[3], const double rates_in[4], const double scales_in[3], double V_out[1], double Vdot_out[1], double controls_out[3]);
 #include "../backstepping_position_lyapunov.c"
 
-VECTORS void block(const double *restrict motion_at, ptrdiff_t motion_row, const double *restrict desired_at, ptrdiff_t desired_row, const double *restrict plant_at, ptrdiff_t plant_row, const double *restrict rates_at, ptrdiff_t rates_row, const double *restrict scales_at, ptrdiff_t scales_row, double *restrict V_at, ptrdiff_t V_row, double *restrict Vdot_at, ptrdiff_t Vdot_row, double *restrict controls_at, ptrdiff_t controls_row)
+VECTORS void block(const double *restrict motion_in_at, ptrdiff_t motion_in_row, const double *restrict desired_in_at, ptrdiff_t desired_in_row, const double *restrict plant_in_at, ptrdiff_t plant_in_row, const double *restrict rates_in_at, ptrdiff_t rates_in_row, const double *restrict scales_in_at, ptrdiff_t scales_in_row, double *restrict V_out_at, ptrdiff_t V_out_row, double *restrict Vdot_out_at, ptrdiff_t Vdot_out_row, double *restrict controls_out_at, ptrdiff_t controls_out_row)
 {
     EACH_SAMPLE {
-        double motion_one[4], desired_one[5], plant_one[3], rates_one[4], scales_one[3], V_one[1], Vdot_one[1], controls_one[3];
-        TAKE(motion, 4)
-        TAKE(desired, 5)
-        TAKE(plant, 3)
-        TAKE(rates, 4)
-        TAKE(scales, 3)
-        awiwi_backstepping_position_lyapunov(motion_one, desired_one, plant_one, rates_one, scales_one, V_one, Vdot_one, controls_one);
-        GIVE(V, 1)
-        GIVE(Vdot, 1)
-        GIVE(controls, 3)
+        double motion_in_one[4], desired_in_one[5], plant_in_one[3], rates_in_one[4], scales_in_one[3], V_out_one[1], Vdot_out_one[1], controls_out_one[3];
+        TAKE(motion_in, 4)
+        TAKE(desired_in, 5)
+        TAKE(plant_in, 3)
+        TAKE(rates_in, 4)
+        TAKE(scales_in, 3)
+        awiwi_backstepping_position_lyapunov(motion_in_one, desired_in_one, plant_in_one, rates_in_one, scales_in_one, V_out_one, Vdot_out_one, controls_out_one);
+        GIVE(V_out, 1)
+        GIVE(Vdot_out, 1)
+        GIVE(controls_out, 3)
     }
 }
 
-void awiwi_backstepping_position_lyapunov_batch(ptrdiff_t samples, const double *motion, ptrdiff_t motion_sample, ptrdiff_t motion_element, const double *desired, ptrdiff_t desired_sample, ptrdiff_t desired_element, const double *plant, ptrdiff_t plant_sample, ptrdiff_t plant_element, const double *rates, ptrdiff_t rates_sample, ptrdiff_t rates_element, const double *scales, ptrdiff_t scales_sample, ptrdiff_t scales_element, double *V, ptrdiff_t V_sample, ptrdiff_t V_element, double *Vdot, ptrdiff_t Vdot_sample, ptrdiff_t Vdot_element, double *controls, ptrdiff_t controls_sample, ptrdiff_t controls_element)
+void awiwi_backstepping_position_lyapunov_batch(ptrdiff_t samples, const double *motion_in, ptrdiff_t motion_in_sample, ptrdiff_t motion_in_element, const double *desired_in, ptrdiff_t desired_in_sample, ptrdiff_t desired_in_element, const double *plant_in, ptrdiff_t plant_in_sample, ptrdiff_t plant_in_element, const double *rates_in, ptrdiff_t rates_in_sample, ptrdiff_t rates_in_element, const double *scales_in, ptrdiff_t scales_in_sample, ptrdiff_t scales_in_element, double *V_out, ptrdiff_t V_out_sample, ptrdiff_t V_out_element, double *Vdot_out, ptrdiff_t Vdot_out_sample, ptrdiff_t Vdot_out_element, double *controls_out, ptrdiff_t controls_out_sample, ptrdiff_t controls_out_element)
 {
-    double motion_rows[4*BLOCK], desired_rows[5*BLOCK], plant_rows[3*BLOCK], rates_rows[4*BLOCK], scales_rows[3*BLOCK], V_rows[1*BLOCK], Vdot_rows[1*BLOCK], controls_rows[3*BLOCK];
+    double motion_in_rows[4*BLOCK], desired_in_rows[5*BLOCK], plant_in_rows[3*BLOCK], rates_in_rows[4*BLOCK], scales_in_rows[3*BLOCK], V_out_rows[1*BLOCK], Vdot_out_rows[1*BLOCK], controls_out_rows[3*BLOCK];
     EACH_BLOCK {
-        GATHER(motion, 4)
-        GATHER(desired, 5)
-        GATHER(plant, 3)
-        GATHER(rates, 4)
-        GATHER(scales, 3)
-        block(AT(motion), AT(desired), AT(plant), AT(rates), AT(scales), AT(V), AT(Vdot), AT(controls));
-        SCATTER(V, 1)
-        SCATTER(Vdot, 1)
-        SCATTER(controls, 3)
+        GATHER(motion_in, 4)
+        GATHER(desired_in, 5)
+        GATHER(plant_in, 3)
+        GATHER(rates_in, 4)
+        GATHER(scales_in, 3)
+        block(AT(motion_in), AT(desired_in), AT(plant_in), AT(rates_in), AT(scales_in), AT(V_out), AT(Vdot_out), AT(controls_out));
+        SCATTER(V_out, 1)
+        SCATTER(Vdot_out, 1)
+        SCATTER(controls_out, 3)
     }
 }

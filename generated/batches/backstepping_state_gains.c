@@ -2,36 +2,37 @@
  *
  * backstepping_state_gains of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_backstepping_state_gains(const double plant[3], const double gains[4], const double weights[2], double K[4], double K_cancelled[4], double h[2]);
+INLINED void awiwi_backstepping_state_gains(const double plant_in[3], const double gains_in[4], const double weights_in[2], double K_out[4], double K_cancelled_out[4], double h_out[2]);
 #include "../backstepping_state_gains.c"
 
-VECTORS void block(const double *restrict plant_at, ptrdiff_t plant_row, const double *restrict gains_at, ptrdiff_t gains_row, const double *restrict weights_at, ptrdiff_t weights_row, double *restrict K_at, ptrdiff_t K_row, double *restrict K_cancelled_at, ptrdiff_t K_cancelled_row, double *restrict h_at, ptrdiff_t h_row)
+VECTORS void block(const double *restrict plant_in_at, ptrdiff_t plant_in_row, const double *restrict gains_in_at, ptrdiff_t gains_in_row, const double *restrict weights_in_at, ptrdiff_t weights_in_row, double *restrict K_out_at, ptrdiff_t K_out_row, double *restrict K_cancelled_out_at, ptrdiff_t K_cancelled_out_row, double *restrict h_out_at, ptrdiff_t h_out_row)
 {
     EACH_SAMPLE {
-        double plant_one[3], gains_one[4], weights_one[2], K_one[4], K_cancelled_one[4], h_one[2];
-        TAKE(plant, 3)
-        TAKE(gains, 4)
-        TAKE(weights, 2)
-        awiwi_backstepping_state_gains(plant_one, gains_one, weights_one, K_one, K_cancelled_one, h_one);
-        GIVE(K, 4)
-        GIVE(K_cancelled, 4)
-        GIVE(h, 2)
+        double plant_in_one[3], gains_in_one[4], weights_in_one[2], K_out_one[4], K_cancelled_out_one[4], h_out_one[2];
+        TAKE(plant_in, 3)
+        TAKE(gains_in, 4)
+        TAKE(weights_in, 2)
+        awiwi_backstepping_state_gains(plant_in_one, gains_in_one, weights_in_one, K_out_one, K_cancelled_out_one, h_out_one);
+        GIVE(K_out, 4)
+        GIVE(K_cancelled_out, 4)
+        GIVE(h_out, 2)
     }
 }
 
-void awiwi_backstepping_state_gains_batch(ptrdiff_t samples, const double *plant, ptrdiff_t plant_sample, ptrdiff_t plant_element, const double *gains, ptrdiff_t gains_sample, ptrdiff_t gains_element, const double *weights, ptrdiff_t weights_sample, ptrdiff_t weights_element, double *K, ptrdiff_t K_sample, ptrdiff_t K_element, double *K_cancelled, ptrdiff_t K_cancelled_sample, ptrdiff_t K_cancelled_element, double *h, ptrdiff_t h_sample, ptrdiff_t h_element)
+void awiwi_backstepping_state_gains_batch(ptrdiff_t samples, const double *plant_in, ptrdiff_t plant_in_sample, ptrdiff_t plant_in_element, const double *gains_in, ptrdiff_t gains_in_sample, ptrdiff_t gains_in_element, const double *weights_in, ptrdiff_t weights_in_sample, ptrdiff_t weights_in_element, double *K_out, ptrdiff_t K_out_sample, ptrdiff_t K_out_element, double *K_cancelled_out, ptrdiff_t K_cancelled_out_sample, ptrdiff_t K_cancelled_out_element, double *h_out, ptrdiff_t h_out_sample, ptrdiff_t h_out_element)
 {
-    double plant_rows[3*BLOCK], gains_rows[4*BLOCK], weights_rows[2*BLOCK], K_rows[4*BLOCK], K_cancelled_rows[4*BLOCK], h_rows[2*BLOCK];
+    double plant_in_rows[3*BLOCK], gains_in_rows[4*BLOCK], weights_in_rows[2*BLOCK], K_out_rows[4*BLOCK], K_cancelled_out_rows[4*BLOCK], h_out_rows[2*BLOCK];
     EACH_BLOCK {
-        GATHER(plant, 3)
-        GATHER(gains, 4)
-        GATHER(weights, 2)
-        block(AT(plant), AT(gains), AT(weights), AT(K), AT(K_cancelled), AT(h));
-        SCATTER(K, 4)
-        SCATTER(K_cancelled, 4)
-        SCATTER(h, 2)
+        GATHER(plant_in, 3)
+        GATHER(gains_in, 4)
+        GATHER(weights_in, 2)
+        block(AT(plant_in), AT(gains_in), AT(weights_in), AT(K_out), AT(K_cancelled_out), AT(h_out));
+        SCATTER(K_out, 4)
+        SCATTER(K_cancelled_out, 4)
+        SCATTER(h_out, 2)
     }
 }

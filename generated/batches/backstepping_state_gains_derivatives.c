@@ -2,33 +2,34 @@
  *
  * backstepping_state_gains_derivatives of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_backstepping_state_gains_derivatives(const double plant[3], const double gains[4], const double weights[2], double dK[16]);
+INLINED void awiwi_backstepping_state_gains_derivatives(const double plant_in[3], const double gains_in[4], const double weights_in[2], double dK_out[16]);
 #include "../backstepping_state_gains_derivatives.c"
 
-VECTORS void block(const double *restrict plant_at, ptrdiff_t plant_row, const double *restrict gains_at, ptrdiff_t gains_row, const double *restrict weights_at, ptrdiff_t weights_row, double *restrict dK_at, ptrdiff_t dK_row)
+VECTORS void block(const double *restrict plant_in_at, ptrdiff_t plant_in_row, const double *restrict gains_in_at, ptrdiff_t gains_in_row, const double *restrict weights_in_at, ptrdiff_t weights_in_row, double *restrict dK_out_at, ptrdiff_t dK_out_row)
 {
     EACH_SAMPLE {
-        double plant_one[3], gains_one[4], weights_one[2], dK_one[16];
-        TAKE(plant, 3)
-        TAKE(gains, 4)
-        TAKE(weights, 2)
-        awiwi_backstepping_state_gains_derivatives(plant_one, gains_one, weights_one, dK_one);
-        GIVE(dK, 16)
+        double plant_in_one[3], gains_in_one[4], weights_in_one[2], dK_out_one[16];
+        TAKE(plant_in, 3)
+        TAKE(gains_in, 4)
+        TAKE(weights_in, 2)
+        awiwi_backstepping_state_gains_derivatives(plant_in_one, gains_in_one, weights_in_one, dK_out_one);
+        GIVE(dK_out, 16)
     }
 }
 
-void awiwi_backstepping_state_gains_derivatives_batch(ptrdiff_t samples, const double *plant, ptrdiff_t plant_sample, ptrdiff_t plant_element, const double *gains, ptrdiff_t gains_sample, ptrdiff_t gains_element, const double *weights, ptrdiff_t weights_sample, ptrdiff_t weights_element, double *dK, ptrdiff_t dK_sample, ptrdiff_t dK_element)
+void awiwi_backstepping_state_gains_derivatives_batch(ptrdiff_t samples, const double *plant_in, ptrdiff_t plant_in_sample, ptrdiff_t plant_in_element, const double *gains_in, ptrdiff_t gains_in_sample, ptrdiff_t gains_in_element, const double *weights_in, ptrdiff_t weights_in_sample, ptrdiff_t weights_in_element, double *dK_out, ptrdiff_t dK_out_sample, ptrdiff_t dK_out_element)
 {
-    double plant_rows[3*BLOCK], gains_rows[4*BLOCK], weights_rows[2*BLOCK], dK_rows[16*BLOCK];
+    double plant_in_rows[3*BLOCK], gains_in_rows[4*BLOCK], weights_in_rows[2*BLOCK], dK_out_rows[16*BLOCK];
     EACH_BLOCK {
-        GATHER(plant, 3)
-        GATHER(gains, 4)
-        GATHER(weights, 2)
-        EXPECT(dK, 16)
-        block(AT(plant), AT(gains), AT(weights), AT(dK));
-        SCATTER(dK, 16)
+        GATHER(plant_in, 3)
+        GATHER(gains_in, 4)
+        GATHER(weights_in, 2)
+        PREFETCH_ROWS(dK_out, 16)
+        block(AT(plant_in), AT(gains_in), AT(weights_in), AT(dK_out));
+        SCATTER(dK_out, 16)
     }
 }

@@ -2,42 +2,43 @@
  *
  * calibration_polynomials of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED int awiwi_calibration_polynomials(const double counts[1], const double ends[2], const double length_powers[7], const double force_powers[7], const double stiffness_powers[7], double dL[1], double force[1], double stiffness[1]);
+INLINED int awiwi_calibration_polynomials(const double counts_in[1], const double ends_in[2], const double length_powers_in[7], const double force_powers_in[7], const double stiffness_powers_in[7], double dL_out[1], double force_out[1], double stiffness_out[1]);
 #include "../calibration_polynomials.c"
 
-VECTORS void block(const double *restrict counts_at, ptrdiff_t counts_row, const double *restrict ends_at, ptrdiff_t ends_row, const double *restrict length_powers_at, ptrdiff_t length_powers_row, const double *restrict force_powers_at, ptrdiff_t force_powers_row, const double *restrict stiffness_powers_at, ptrdiff_t stiffness_powers_row, double *restrict dL_at, ptrdiff_t dL_row, double *restrict force_at, ptrdiff_t force_row, double *restrict stiffness_at, ptrdiff_t stiffness_row, int *restrict status)
+VECTORS void block(const double *restrict counts_in_at, ptrdiff_t counts_in_row, const double *restrict ends_in_at, ptrdiff_t ends_in_row, const double *restrict length_powers_in_at, ptrdiff_t length_powers_in_row, const double *restrict force_powers_in_at, ptrdiff_t force_powers_in_row, const double *restrict stiffness_powers_in_at, ptrdiff_t stiffness_powers_in_row, double *restrict dL_out_at, ptrdiff_t dL_out_row, double *restrict force_out_at, ptrdiff_t force_out_row, double *restrict stiffness_out_at, ptrdiff_t stiffness_out_row, int *restrict status)
 {
     EACH_SAMPLE {
-        double counts_one[1], ends_one[2], length_powers_one[7], force_powers_one[7], stiffness_powers_one[7], dL_one[1], force_one[1], stiffness_one[1];
-        TAKE(counts, 1)
-        TAKE(ends, 2)
-        TAKE(length_powers, 7)
-        TAKE(force_powers, 7)
-        TAKE(stiffness_powers, 7)
-        status[i_] = awiwi_calibration_polynomials(counts_one, ends_one, length_powers_one, force_powers_one, stiffness_powers_one, dL_one, force_one, stiffness_one);
-        GIVE(dL, 1)
-        GIVE(force, 1)
-        GIVE(stiffness, 1)
+        double counts_in_one[1], ends_in_one[2], length_powers_in_one[7], force_powers_in_one[7], stiffness_powers_in_one[7], dL_out_one[1], force_out_one[1], stiffness_out_one[1];
+        TAKE(counts_in, 1)
+        TAKE(ends_in, 2)
+        TAKE(length_powers_in, 7)
+        TAKE(force_powers_in, 7)
+        TAKE(stiffness_powers_in, 7)
+        status[i_] = awiwi_calibration_polynomials(counts_in_one, ends_in_one, length_powers_in_one, force_powers_in_one, stiffness_powers_in_one, dL_out_one, force_out_one, stiffness_out_one);
+        GIVE(dL_out, 1)
+        GIVE(force_out, 1)
+        GIVE(stiffness_out, 1)
     }
 }
 
-void awiwi_calibration_polynomials_batch(ptrdiff_t samples, const double *counts, ptrdiff_t counts_sample, ptrdiff_t counts_element, const double *ends, ptrdiff_t ends_sample, ptrdiff_t ends_element, const double *length_powers, ptrdiff_t length_powers_sample, ptrdiff_t length_powers_element, const double *force_powers, ptrdiff_t force_powers_sample, ptrdiff_t force_powers_element, const double *stiffness_powers, ptrdiff_t stiffness_powers_sample, ptrdiff_t stiffness_powers_element, double *dL, ptrdiff_t dL_sample, ptrdiff_t dL_element, double *force, ptrdiff_t force_sample, ptrdiff_t force_element, double *stiffness, ptrdiff_t stiffness_sample, ptrdiff_t stiffness_element, int *status)
+void awiwi_calibration_polynomials_batch(ptrdiff_t samples, const double *counts_in, ptrdiff_t counts_in_sample, ptrdiff_t counts_in_element, const double *ends_in, ptrdiff_t ends_in_sample, ptrdiff_t ends_in_element, const double *length_powers_in, ptrdiff_t length_powers_in_sample, ptrdiff_t length_powers_in_element, const double *force_powers_in, ptrdiff_t force_powers_in_sample, ptrdiff_t force_powers_in_element, const double *stiffness_powers_in, ptrdiff_t stiffness_powers_in_sample, ptrdiff_t stiffness_powers_in_element, double *dL_out, ptrdiff_t dL_out_sample, ptrdiff_t dL_out_element, double *force_out, ptrdiff_t force_out_sample, ptrdiff_t force_out_element, double *stiffness_out, ptrdiff_t stiffness_out_sample, ptrdiff_t stiffness_out_element, int *status)
 {
-    double counts_rows[1*BLOCK], ends_rows[2*BLOCK], length_powers_rows[7*BLOCK], force_powers_rows[7*BLOCK], stiffness_powers_rows[7*BLOCK], dL_rows[1*BLOCK], force_rows[1*BLOCK], stiffness_rows[1*BLOCK];
+    double counts_in_rows[1*BLOCK], ends_in_rows[2*BLOCK], length_powers_in_rows[7*BLOCK], force_powers_in_rows[7*BLOCK], stiffness_powers_in_rows[7*BLOCK], dL_out_rows[1*BLOCK], force_out_rows[1*BLOCK], stiffness_out_rows[1*BLOCK];
     int status_rows[BLOCK];
     EACH_BLOCK {
-        GATHER(counts, 1)
-        GATHER(ends, 2)
-        GATHER(length_powers, 7)
-        GATHER(force_powers, 7)
-        GATHER(stiffness_powers, 7)
-        block(AT(counts), AT(ends), AT(length_powers), AT(force_powers), AT(stiffness_powers), AT(dL), AT(force), AT(stiffness), status_rows);
-        SCATTER(dL, 1)
-        SCATTER(force, 1)
-        SCATTER(stiffness, 1)
+        GATHER(counts_in, 1)
+        GATHER(ends_in, 2)
+        GATHER(length_powers_in, 7)
+        GATHER(force_powers_in, 7)
+        GATHER(stiffness_powers_in, 7)
+        block(AT(counts_in), AT(ends_in), AT(length_powers_in), AT(force_powers_in), AT(stiffness_powers_in), AT(dL_out), AT(force_out), AT(stiffness_out), status_rows);
+        SCATTER(dL_out, 1)
+        SCATTER(force_out, 1)
+        SCATTER(stiffness_out, 1)
         memcpy(status + first_, status_rows, (size_t)COUNT * sizeof *status);
     }
 }

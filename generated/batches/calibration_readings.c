@@ -2,37 +2,38 @@
  *
  * calibration_readings of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED int awiwi_calibration_readings(const double readings[38], double dL[38], double force[38], double stiffness[38]);
+INLINED int awiwi_calibration_readings(const double readings_in[38], double dL_out[38], double force_out[38], double stiffness_out[38]);
 #include "../calibration_readings.c"
 
-VECTORS void block(const double *restrict readings_at, ptrdiff_t readings_row, double *restrict dL_at, ptrdiff_t dL_row, double *restrict force_at, ptrdiff_t force_row, double *restrict stiffness_at, ptrdiff_t stiffness_row, int *restrict status)
+VECTORS void block(const double *restrict readings_in_at, ptrdiff_t readings_in_row, double *restrict dL_out_at, ptrdiff_t dL_out_row, double *restrict force_out_at, ptrdiff_t force_out_row, double *restrict stiffness_out_at, ptrdiff_t stiffness_out_row, int *restrict status)
 {
     EACH_SAMPLE {
-        double readings_one[38], dL_one[38], force_one[38], stiffness_one[38];
-        TAKE(readings, 38)
-        status[i_] = awiwi_calibration_readings(readings_one, dL_one, force_one, stiffness_one);
-        GIVE(dL, 38)
-        GIVE(force, 38)
-        GIVE(stiffness, 38)
+        double readings_in_one[38], dL_out_one[38], force_out_one[38], stiffness_out_one[38];
+        TAKE(readings_in, 38)
+        status[i_] = awiwi_calibration_readings(readings_in_one, dL_out_one, force_out_one, stiffness_out_one);
+        GIVE(dL_out, 38)
+        GIVE(force_out, 38)
+        GIVE(stiffness_out, 38)
     }
 }
 
-void awiwi_calibration_readings_batch(ptrdiff_t samples, const double *readings, ptrdiff_t readings_sample, ptrdiff_t readings_element, double *dL, ptrdiff_t dL_sample, ptrdiff_t dL_element, double *force, ptrdiff_t force_sample, ptrdiff_t force_element, double *stiffness, ptrdiff_t stiffness_sample, ptrdiff_t stiffness_element, int *status)
+void awiwi_calibration_readings_batch(ptrdiff_t samples, const double *readings_in, ptrdiff_t readings_in_sample, ptrdiff_t readings_in_element, double *dL_out, ptrdiff_t dL_out_sample, ptrdiff_t dL_out_element, double *force_out, ptrdiff_t force_out_sample, ptrdiff_t force_out_element, double *stiffness_out, ptrdiff_t stiffness_out_sample, ptrdiff_t stiffness_out_element, int *status)
 {
-    double readings_rows[38*BLOCK], dL_rows[38*BLOCK], force_rows[38*BLOCK], stiffness_rows[38*BLOCK];
+    double readings_in_rows[38*BLOCK], dL_out_rows[38*BLOCK], force_out_rows[38*BLOCK], stiffness_out_rows[38*BLOCK];
     int status_rows[BLOCK];
     EACH_BLOCK {
-        GATHER(readings, 38)
-        EXPECT(dL, 38)
-        EXPECT(force, 38)
-        EXPECT(stiffness, 38)
-        block(AT(readings), AT(dL), AT(force), AT(stiffness), status_rows);
-        SCATTER(dL, 38)
-        SCATTER(force, 38)
-        SCATTER(stiffness, 38)
+        GATHER(readings_in, 38)
+        PREFETCH_ROWS(dL_out, 38)
+        PREFETCH_ROWS(force_out, 38)
+        PREFETCH_ROWS(stiffness_out, 38)
+        block(AT(readings_in), AT(dL_out), AT(force_out), AT(stiffness_out), status_rows);
+        SCATTER(dL_out, 38)
+        SCATTER(force_out, 38)
+        SCATTER(stiffness_out, 38)
         memcpy(status + first_, status_rows, (size_t)COUNT * sizeof *status);
     }
 }

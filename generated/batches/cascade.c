@@ -2,54 +2,55 @@
  *
  * cascade of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED int awiwi_cascade(const double f[1], const double xd[1], const double stiffness[1], const double slope[1], const double hdd[1], const double f_des[1], const double fd_des[1], const double fdd_des[1], const double friction[1], const double r[1], const double B[1], const double force_kp[1], const double force_kd[1], double tau[1]);
+INLINED int awiwi_cascade(const double f_in[1], const double xd_in[1], const double stiffness_in[1], const double slope_in[1], const double hdd_in[1], const double f_des_in[1], const double fd_des_in[1], const double fdd_des_in[1], const double friction_in[1], const double r_in[1], const double B_in[1], const double force_kp_in[1], const double force_kd_in[1], double tau_out[1]);
 #include "../cascade.c"
 
-VECTORS void block(const double *restrict f_at, ptrdiff_t f_row, const double *restrict xd_at, ptrdiff_t xd_row, const double *restrict stiffness_at, ptrdiff_t stiffness_row, const double *restrict slope_at, ptrdiff_t slope_row, const double *restrict hdd_at, ptrdiff_t hdd_row, const double *restrict f_des_at, ptrdiff_t f_des_row, const double *restrict fd_des_at, ptrdiff_t fd_des_row, const double *restrict fdd_des_at, ptrdiff_t fdd_des_row, const double *restrict friction_at, ptrdiff_t friction_row, const double *restrict r_at, ptrdiff_t r_row, const double *restrict B_at, ptrdiff_t B_row, const double *restrict force_kp_at, ptrdiff_t force_kp_row, const double *restrict force_kd_at, ptrdiff_t force_kd_row, double *restrict tau_at, ptrdiff_t tau_row, int *restrict status)
+VECTORS void block(const double *restrict f_in_at, ptrdiff_t f_in_row, const double *restrict xd_in_at, ptrdiff_t xd_in_row, const double *restrict stiffness_in_at, ptrdiff_t stiffness_in_row, const double *restrict slope_in_at, ptrdiff_t slope_in_row, const double *restrict hdd_in_at, ptrdiff_t hdd_in_row, const double *restrict f_des_in_at, ptrdiff_t f_des_in_row, const double *restrict fd_des_in_at, ptrdiff_t fd_des_in_row, const double *restrict fdd_des_in_at, ptrdiff_t fdd_des_in_row, const double *restrict friction_in_at, ptrdiff_t friction_in_row, const double *restrict r_in_at, ptrdiff_t r_in_row, const double *restrict B_in_at, ptrdiff_t B_in_row, const double *restrict force_kp_in_at, ptrdiff_t force_kp_in_row, const double *restrict force_kd_in_at, ptrdiff_t force_kd_in_row, double *restrict tau_out_at, ptrdiff_t tau_out_row, int *restrict status)
 {
     EACH_SAMPLE {
-        double f_one[1], xd_one[1], stiffness_one[1], slope_one[1], hdd_one[1], f_des_one[1], fd_des_one[1], fdd_des_one[1], friction_one[1], r_one[1], B_one[1], force_kp_one[1], force_kd_one[1], tau_one[1];
-        TAKE(f, 1)
-        TAKE(xd, 1)
-        TAKE(stiffness, 1)
-        TAKE(slope, 1)
-        TAKE(hdd, 1)
-        TAKE(f_des, 1)
-        TAKE(fd_des, 1)
-        TAKE(fdd_des, 1)
-        TAKE(friction, 1)
-        TAKE(r, 1)
-        TAKE(B, 1)
-        TAKE(force_kp, 1)
-        TAKE(force_kd, 1)
-        status[i_] = awiwi_cascade(f_one, xd_one, stiffness_one, slope_one, hdd_one, f_des_one, fd_des_one, fdd_des_one, friction_one, r_one, B_one, force_kp_one, force_kd_one, tau_one);
-        GIVE(tau, 1)
+        double f_in_one[1], xd_in_one[1], stiffness_in_one[1], slope_in_one[1], hdd_in_one[1], f_des_in_one[1], fd_des_in_one[1], fdd_des_in_one[1], friction_in_one[1], r_in_one[1], B_in_one[1], force_kp_in_one[1], force_kd_in_one[1], tau_out_one[1];
+        TAKE(f_in, 1)
+        TAKE(xd_in, 1)
+        TAKE(stiffness_in, 1)
+        TAKE(slope_in, 1)
+        TAKE(hdd_in, 1)
+        TAKE(f_des_in, 1)
+        TAKE(fd_des_in, 1)
+        TAKE(fdd_des_in, 1)
+        TAKE(friction_in, 1)
+        TAKE(r_in, 1)
+        TAKE(B_in, 1)
+        TAKE(force_kp_in, 1)
+        TAKE(force_kd_in, 1)
+        status[i_] = awiwi_cascade(f_in_one, xd_in_one, stiffness_in_one, slope_in_one, hdd_in_one, f_des_in_one, fd_des_in_one, fdd_des_in_one, friction_in_one, r_in_one, B_in_one, force_kp_in_one, force_kd_in_one, tau_out_one);
+        GIVE(tau_out, 1)
     }
 }
 
-void awiwi_cascade_batch(ptrdiff_t samples, const double *f, ptrdiff_t f_sample, ptrdiff_t f_element, const double *xd, ptrdiff_t xd_sample, ptrdiff_t xd_element, const double *stiffness, ptrdiff_t stiffness_sample, ptrdiff_t stiffness_element, const double *slope, ptrdiff_t slope_sample, ptrdiff_t slope_element, const double *hdd, ptrdiff_t hdd_sample, ptrdiff_t hdd_element, const double *f_des, ptrdiff_t f_des_sample, ptrdiff_t f_des_element, const double *fd_des, ptrdiff_t fd_des_sample, ptrdiff_t fd_des_element, const double *fdd_des, ptrdiff_t fdd_des_sample, ptrdiff_t fdd_des_element, const double *friction, ptrdiff_t friction_sample, ptrdiff_t friction_element, const double *r, ptrdiff_t r_sample, ptrdiff_t r_element, const double *B, ptrdiff_t B_sample, ptrdiff_t B_element, const double *force_kp, ptrdiff_t force_kp_sample, ptrdiff_t force_kp_element, const double *force_kd, ptrdiff_t force_kd_sample, ptrdiff_t force_kd_element, double *tau, ptrdiff_t tau_sample, ptrdiff_t tau_element, int *status)
+void awiwi_cascade_batch(ptrdiff_t samples, const double *f_in, ptrdiff_t f_in_sample, ptrdiff_t f_in_element, const double *xd_in, ptrdiff_t xd_in_sample, ptrdiff_t xd_in_element, const double *stiffness_in, ptrdiff_t stiffness_in_sample, ptrdiff_t stiffness_in_element, const double *slope_in, ptrdiff_t slope_in_sample, ptrdiff_t slope_in_element, const double *hdd_in, ptrdiff_t hdd_in_sample, ptrdiff_t hdd_in_element, const double *f_des_in, ptrdiff_t f_des_in_sample, ptrdiff_t f_des_in_element, const double *fd_des_in, ptrdiff_t fd_des_in_sample, ptrdiff_t fd_des_in_element, const double *fdd_des_in, ptrdiff_t fdd_des_in_sample, ptrdiff_t fdd_des_in_element, const double *friction_in, ptrdiff_t friction_in_sample, ptrdiff_t friction_in_element, const double *r_in, ptrdiff_t r_in_sample, ptrdiff_t r_in_element, const double *B_in, ptrdiff_t B_in_sample, ptrdiff_t B_in_element, const double *force_kp_in, ptrdiff_t force_kp_in_sample, ptrdiff_t force_kp_in_element, const double *force_kd_in, ptrdiff_t force_kd_in_sample, ptrdiff_t force_kd_in_element, double *tau_out, ptrdiff_t tau_out_sample, ptrdiff_t tau_out_element, int *status)
 {
-    double f_rows[1*BLOCK], xd_rows[1*BLOCK], stiffness_rows[1*BLOCK], slope_rows[1*BLOCK], hdd_rows[1*BLOCK], f_des_rows[1*BLOCK], fd_des_rows[1*BLOCK], fdd_des_rows[1*BLOCK], friction_rows[1*BLOCK], r_rows[1*BLOCK], B_rows[1*BLOCK], force_kp_rows[1*BLOCK], force_kd_rows[1*BLOCK], tau_rows[1*BLOCK];
+    double f_in_rows[1*BLOCK], xd_in_rows[1*BLOCK], stiffness_in_rows[1*BLOCK], slope_in_rows[1*BLOCK], hdd_in_rows[1*BLOCK], f_des_in_rows[1*BLOCK], fd_des_in_rows[1*BLOCK], fdd_des_in_rows[1*BLOCK], friction_in_rows[1*BLOCK], r_in_rows[1*BLOCK], B_in_rows[1*BLOCK], force_kp_in_rows[1*BLOCK], force_kd_in_rows[1*BLOCK], tau_out_rows[1*BLOCK];
     int status_rows[BLOCK];
     EACH_BLOCK {
-        GATHER(f, 1)
-        GATHER(xd, 1)
-        GATHER(stiffness, 1)
-        GATHER(slope, 1)
-        GATHER(hdd, 1)
-        GATHER(f_des, 1)
-        GATHER(fd_des, 1)
-        GATHER(fdd_des, 1)
-        GATHER(friction, 1)
-        GATHER(r, 1)
-        GATHER(B, 1)
-        GATHER(force_kp, 1)
-        GATHER(force_kd, 1)
-        block(AT(f), AT(xd), AT(stiffness), AT(slope), AT(hdd), AT(f_des), AT(fd_des), AT(fdd_des), AT(friction), AT(r), AT(B), AT(force_kp), AT(force_kd), AT(tau), status_rows);
-        SCATTER(tau, 1)
+        GATHER(f_in, 1)
+        GATHER(xd_in, 1)
+        GATHER(stiffness_in, 1)
+        GATHER(slope_in, 1)
+        GATHER(hdd_in, 1)
+        GATHER(f_des_in, 1)
+        GATHER(fd_des_in, 1)
+        GATHER(fdd_des_in, 1)
+        GATHER(friction_in, 1)
+        GATHER(r_in, 1)
+        GATHER(B_in, 1)
+        GATHER(force_kp_in, 1)
+        GATHER(force_kd_in, 1)
+        block(AT(f_in), AT(xd_in), AT(stiffness_in), AT(slope_in), AT(hdd_in), AT(f_des_in), AT(fd_des_in), AT(fdd_des_in), AT(friction_in), AT(r_in), AT(B_in), AT(force_kp_in), AT(force_kd_in), AT(tau_out), status_rows);
+        SCATTER(tau_out, 1)
         memcpy(status + first_, status_rows, (size_t)COUNT * sizeof *status);
     }
 }

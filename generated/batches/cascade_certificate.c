@@ -2,43 +2,44 @@
  *
  * cascade_certificate of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED int awiwi_cascade_certificate(const double D[16], const double P[32], const double kp[8], const double kd[8], const double weight[1], const double omega[1], double margin[1], double S[24]);
+INLINED int awiwi_cascade_certificate(const double D_in[16], const double P_in[32], const double kp_in[8], const double kd_in[8], const double weight_in[1], const double omega_in[1], double margin_out[1], double S_out[24]);
 #include "../cascade_certificate.c"
 
-VECTORS void block(const double *restrict D_at, ptrdiff_t D_row, const double *restrict P_at, ptrdiff_t P_row, const double *restrict kp_at, ptrdiff_t kp_row, const double *restrict kd_at, ptrdiff_t kd_row, const double *restrict weight_at, ptrdiff_t weight_row, const double *restrict omega_at, ptrdiff_t omega_row, double *restrict margin_at, ptrdiff_t margin_row, double *restrict S_at, ptrdiff_t S_row, int *restrict status)
+VECTORS void block(const double *restrict D_in_at, ptrdiff_t D_in_row, const double *restrict P_in_at, ptrdiff_t P_in_row, const double *restrict kp_in_at, ptrdiff_t kp_in_row, const double *restrict kd_in_at, ptrdiff_t kd_in_row, const double *restrict weight_in_at, ptrdiff_t weight_in_row, const double *restrict omega_in_at, ptrdiff_t omega_in_row, double *restrict margin_out_at, ptrdiff_t margin_out_row, double *restrict S_out_at, ptrdiff_t S_out_row, int *restrict status)
 {
     EACH_SAMPLE {
-        double D_one[16], P_one[32], kp_one[8], kd_one[8], weight_one[1], omega_one[1], margin_one[1], S_one[24];
-        TAKE(D, 16)
-        TAKE(P, 32)
-        TAKE(kp, 8)
-        TAKE(kd, 8)
-        TAKE(weight, 1)
-        TAKE(omega, 1)
-        status[i_] = awiwi_cascade_certificate(D_one, P_one, kp_one, kd_one, weight_one, omega_one, margin_one, S_one);
-        GIVE(margin, 1)
-        GIVE(S, 24)
+        double D_in_one[16], P_in_one[32], kp_in_one[8], kd_in_one[8], weight_in_one[1], omega_in_one[1], margin_out_one[1], S_out_one[24];
+        TAKE(D_in, 16)
+        TAKE(P_in, 32)
+        TAKE(kp_in, 8)
+        TAKE(kd_in, 8)
+        TAKE(weight_in, 1)
+        TAKE(omega_in, 1)
+        status[i_] = awiwi_cascade_certificate(D_in_one, P_in_one, kp_in_one, kd_in_one, weight_in_one, omega_in_one, margin_out_one, S_out_one);
+        GIVE(margin_out, 1)
+        GIVE(S_out, 24)
     }
 }
 
-void awiwi_cascade_certificate_batch(ptrdiff_t samples, const double *D, ptrdiff_t D_sample, ptrdiff_t D_element, const double *P, ptrdiff_t P_sample, ptrdiff_t P_element, const double *kp, ptrdiff_t kp_sample, ptrdiff_t kp_element, const double *kd, ptrdiff_t kd_sample, ptrdiff_t kd_element, const double *weight, ptrdiff_t weight_sample, ptrdiff_t weight_element, const double *omega, ptrdiff_t omega_sample, ptrdiff_t omega_element, double *margin, ptrdiff_t margin_sample, ptrdiff_t margin_element, double *S, ptrdiff_t S_sample, ptrdiff_t S_element, int *status)
+void awiwi_cascade_certificate_batch(ptrdiff_t samples, const double *D_in, ptrdiff_t D_in_sample, ptrdiff_t D_in_element, const double *P_in, ptrdiff_t P_in_sample, ptrdiff_t P_in_element, const double *kp_in, ptrdiff_t kp_in_sample, ptrdiff_t kp_in_element, const double *kd_in, ptrdiff_t kd_in_sample, ptrdiff_t kd_in_element, const double *weight_in, ptrdiff_t weight_in_sample, ptrdiff_t weight_in_element, const double *omega_in, ptrdiff_t omega_in_sample, ptrdiff_t omega_in_element, double *margin_out, ptrdiff_t margin_out_sample, ptrdiff_t margin_out_element, double *S_out, ptrdiff_t S_out_sample, ptrdiff_t S_out_element, int *status)
 {
-    double D_rows[16*BLOCK], P_rows[32*BLOCK], kp_rows[8*BLOCK], kd_rows[8*BLOCK], weight_rows[1*BLOCK], omega_rows[1*BLOCK], margin_rows[1*BLOCK], S_rows[24*BLOCK];
+    double D_in_rows[16*BLOCK], P_in_rows[32*BLOCK], kp_in_rows[8*BLOCK], kd_in_rows[8*BLOCK], weight_in_rows[1*BLOCK], omega_in_rows[1*BLOCK], margin_out_rows[1*BLOCK], S_out_rows[24*BLOCK];
     int status_rows[BLOCK];
     EACH_BLOCK {
-        GATHER(D, 16)
-        GATHER(P, 32)
-        GATHER(kp, 8)
-        GATHER(kd, 8)
-        GATHER(weight, 1)
-        GATHER(omega, 1)
-        EXPECT(S, 24)
-        block(AT(D), AT(P), AT(kp), AT(kd), AT(weight), AT(omega), AT(margin), AT(S), status_rows);
-        SCATTER(margin, 1)
-        SCATTER(S, 24)
+        GATHER(D_in, 16)
+        GATHER(P_in, 32)
+        GATHER(kp_in, 8)
+        GATHER(kd_in, 8)
+        GATHER(weight_in, 1)
+        GATHER(omega_in, 1)
+        PREFETCH_ROWS(S_out, 24)
+        block(AT(D_in), AT(P_in), AT(kp_in), AT(kd_in), AT(weight_in), AT(omega_in), AT(margin_out), AT(S_out), status_rows);
+        SCATTER(margin_out, 1)
+        SCATTER(S_out, 24)
         memcpy(status + first_, status_rows, (size_t)COUNT * sizeof *status);
     }
 }

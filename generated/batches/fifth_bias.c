@@ -2,32 +2,33 @@
  *
  * fifth_bias of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_fifth_bias(const double q[4], const double qd[4], const double g[3], double bias[4]);
+INLINED void awiwi_fifth_bias(const double q_in[4], const double qd_in[4], const double g_in[3], double bias_out[4]);
 #include "../fifth_bias.c"
 
-VECTORS void block(const double *restrict q_at, ptrdiff_t q_row, const double *restrict qd_at, ptrdiff_t qd_row, const double *restrict g_at, ptrdiff_t g_row, double *restrict bias_at, ptrdiff_t bias_row)
+VECTORS void block(const double *restrict q_in_at, ptrdiff_t q_in_row, const double *restrict qd_in_at, ptrdiff_t qd_in_row, const double *restrict g_in_at, ptrdiff_t g_in_row, double *restrict bias_out_at, ptrdiff_t bias_out_row)
 {
     EACH_SAMPLE {
-        double q_one[4], qd_one[4], g_one[3], bias_one[4];
-        TAKE(q, 4)
-        TAKE(qd, 4)
-        TAKE(g, 3)
-        awiwi_fifth_bias(q_one, qd_one, g_one, bias_one);
-        GIVE(bias, 4)
+        double q_in_one[4], qd_in_one[4], g_in_one[3], bias_out_one[4];
+        TAKE(q_in, 4)
+        TAKE(qd_in, 4)
+        TAKE(g_in, 3)
+        awiwi_fifth_bias(q_in_one, qd_in_one, g_in_one, bias_out_one);
+        GIVE(bias_out, 4)
     }
 }
 
-void awiwi_fifth_bias_batch(ptrdiff_t samples, const double *q, ptrdiff_t q_sample, ptrdiff_t q_element, const double *qd, ptrdiff_t qd_sample, ptrdiff_t qd_element, const double *g, ptrdiff_t g_sample, ptrdiff_t g_element, double *bias, ptrdiff_t bias_sample, ptrdiff_t bias_element)
+void awiwi_fifth_bias_batch(ptrdiff_t samples, const double *q_in, ptrdiff_t q_in_sample, ptrdiff_t q_in_element, const double *qd_in, ptrdiff_t qd_in_sample, ptrdiff_t qd_in_element, const double *g_in, ptrdiff_t g_in_sample, ptrdiff_t g_in_element, double *bias_out, ptrdiff_t bias_out_sample, ptrdiff_t bias_out_element)
 {
-    double q_rows[4*BLOCK], qd_rows[4*BLOCK], g_rows[3*BLOCK], bias_rows[4*BLOCK];
+    double q_in_rows[4*BLOCK], qd_in_rows[4*BLOCK], g_in_rows[3*BLOCK], bias_out_rows[4*BLOCK];
     EACH_BLOCK {
-        GATHER(q, 4)
-        GATHER(qd, 4)
-        GATHER(g, 3)
-        block(AT(q), AT(qd), AT(g), AT(bias));
-        SCATTER(bias, 4)
+        GATHER(q_in, 4)
+        GATHER(qd_in, 4)
+        GATHER(g_in, 3)
+        block(AT(q_in), AT(qd_in), AT(g_in), AT(bias_out));
+        SCATTER(bias_out, 4)
     }
 }

@@ -2,38 +2,39 @@
  *
  * fifth_hmc_four_bar of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED int awiwi_fifth_hmc_four_bar(const double q[1], double coupler[1], double rocker[1], double coupler_ratio[1], double rocker_ratio[1], double transmission[1]);
+INLINED int awiwi_fifth_hmc_four_bar(const double q_in[1], double coupler_out[1], double rocker_out[1], double coupler_ratio_out[1], double rocker_ratio_out[1], double transmission_out[1]);
 #include "../fifth_hmc_four_bar.c"
 
-VECTORS void block(const double *restrict q_at, ptrdiff_t q_row, double *restrict coupler_at, ptrdiff_t coupler_row, double *restrict rocker_at, ptrdiff_t rocker_row, double *restrict coupler_ratio_at, ptrdiff_t coupler_ratio_row, double *restrict rocker_ratio_at, ptrdiff_t rocker_ratio_row, double *restrict transmission_at, ptrdiff_t transmission_row, int *restrict status)
+VECTORS void block(const double *restrict q_in_at, ptrdiff_t q_in_row, double *restrict coupler_out_at, ptrdiff_t coupler_out_row, double *restrict rocker_out_at, ptrdiff_t rocker_out_row, double *restrict coupler_ratio_out_at, ptrdiff_t coupler_ratio_out_row, double *restrict rocker_ratio_out_at, ptrdiff_t rocker_ratio_out_row, double *restrict transmission_out_at, ptrdiff_t transmission_out_row, int *restrict status)
 {
     EACH_SAMPLE {
-        double q_one[1], coupler_one[1], rocker_one[1], coupler_ratio_one[1], rocker_ratio_one[1], transmission_one[1];
-        TAKE(q, 1)
-        status[i_] = awiwi_fifth_hmc_four_bar(q_one, coupler_one, rocker_one, coupler_ratio_one, rocker_ratio_one, transmission_one);
-        GIVE(coupler, 1)
-        GIVE(rocker, 1)
-        GIVE(coupler_ratio, 1)
-        GIVE(rocker_ratio, 1)
-        GIVE(transmission, 1)
+        double q_in_one[1], coupler_out_one[1], rocker_out_one[1], coupler_ratio_out_one[1], rocker_ratio_out_one[1], transmission_out_one[1];
+        TAKE(q_in, 1)
+        status[i_] = awiwi_fifth_hmc_four_bar(q_in_one, coupler_out_one, rocker_out_one, coupler_ratio_out_one, rocker_ratio_out_one, transmission_out_one);
+        GIVE(coupler_out, 1)
+        GIVE(rocker_out, 1)
+        GIVE(coupler_ratio_out, 1)
+        GIVE(rocker_ratio_out, 1)
+        GIVE(transmission_out, 1)
     }
 }
 
-void awiwi_fifth_hmc_four_bar_batch(ptrdiff_t samples, const double *q, ptrdiff_t q_sample, ptrdiff_t q_element, double *coupler, ptrdiff_t coupler_sample, ptrdiff_t coupler_element, double *rocker, ptrdiff_t rocker_sample, ptrdiff_t rocker_element, double *coupler_ratio, ptrdiff_t coupler_ratio_sample, ptrdiff_t coupler_ratio_element, double *rocker_ratio, ptrdiff_t rocker_ratio_sample, ptrdiff_t rocker_ratio_element, double *transmission, ptrdiff_t transmission_sample, ptrdiff_t transmission_element, int *status)
+void awiwi_fifth_hmc_four_bar_batch(ptrdiff_t samples, const double *q_in, ptrdiff_t q_in_sample, ptrdiff_t q_in_element, double *coupler_out, ptrdiff_t coupler_out_sample, ptrdiff_t coupler_out_element, double *rocker_out, ptrdiff_t rocker_out_sample, ptrdiff_t rocker_out_element, double *coupler_ratio_out, ptrdiff_t coupler_ratio_out_sample, ptrdiff_t coupler_ratio_out_element, double *rocker_ratio_out, ptrdiff_t rocker_ratio_out_sample, ptrdiff_t rocker_ratio_out_element, double *transmission_out, ptrdiff_t transmission_out_sample, ptrdiff_t transmission_out_element, int *status)
 {
-    double q_rows[1*BLOCK], coupler_rows[1*BLOCK], rocker_rows[1*BLOCK], coupler_ratio_rows[1*BLOCK], rocker_ratio_rows[1*BLOCK], transmission_rows[1*BLOCK];
+    double q_in_rows[1*BLOCK], coupler_out_rows[1*BLOCK], rocker_out_rows[1*BLOCK], coupler_ratio_out_rows[1*BLOCK], rocker_ratio_out_rows[1*BLOCK], transmission_out_rows[1*BLOCK];
     int status_rows[BLOCK];
     EACH_BLOCK {
-        GATHER(q, 1)
-        block(AT(q), AT(coupler), AT(rocker), AT(coupler_ratio), AT(rocker_ratio), AT(transmission), status_rows);
-        SCATTER(coupler, 1)
-        SCATTER(rocker, 1)
-        SCATTER(coupler_ratio, 1)
-        SCATTER(rocker_ratio, 1)
-        SCATTER(transmission, 1)
+        GATHER(q_in, 1)
+        block(AT(q_in), AT(coupler_out), AT(rocker_out), AT(coupler_ratio_out), AT(rocker_ratio_out), AT(transmission_out), status_rows);
+        SCATTER(coupler_out, 1)
+        SCATTER(rocker_out, 1)
+        SCATTER(coupler_ratio_out, 1)
+        SCATTER(rocker_ratio_out, 1)
+        SCATTER(transmission_out, 1)
         memcpy(status + first_, status_rows, (size_t)COUNT * sizeof *status);
     }
 }

@@ -2,29 +2,30 @@
  *
  * fifth_jacobian of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_fifth_jacobian(const double q[4], double J[24]);
+INLINED void awiwi_fifth_jacobian(const double q_in[4], double J_out[24]);
 #include "../fifth_jacobian.c"
 
-VECTORS void block(const double *restrict q_at, ptrdiff_t q_row, double *restrict J_at, ptrdiff_t J_row)
+VECTORS void block(const double *restrict q_in_at, ptrdiff_t q_in_row, double *restrict J_out_at, ptrdiff_t J_out_row)
 {
     EACH_SAMPLE {
-        double q_one[4], J_one[24];
-        TAKE(q, 4)
-        awiwi_fifth_jacobian(q_one, J_one);
-        GIVE(J, 24)
+        double q_in_one[4], J_out_one[24];
+        TAKE(q_in, 4)
+        awiwi_fifth_jacobian(q_in_one, J_out_one);
+        GIVE(J_out, 24)
     }
 }
 
-void awiwi_fifth_jacobian_batch(ptrdiff_t samples, const double *q, ptrdiff_t q_sample, ptrdiff_t q_element, double *J, ptrdiff_t J_sample, ptrdiff_t J_element)
+void awiwi_fifth_jacobian_batch(ptrdiff_t samples, const double *q_in, ptrdiff_t q_in_sample, ptrdiff_t q_in_element, double *J_out, ptrdiff_t J_out_sample, ptrdiff_t J_out_element)
 {
-    double q_rows[4*BLOCK], J_rows[24*BLOCK];
+    double q_in_rows[4*BLOCK], J_out_rows[24*BLOCK];
     EACH_BLOCK {
-        GATHER(q, 4)
-        EXPECT(J, 24)
-        block(AT(q), AT(J));
-        SCATTER(J, 24)
+        GATHER(q_in, 4)
+        PREFETCH_ROWS(J_out, 24)
+        block(AT(q_in), AT(J_out));
+        SCATTER(J_out, 24)
     }
 }

@@ -2,30 +2,31 @@
  *
  * fifth_joint_torque of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_fifth_joint_torque(const double q[4], const double f[8], double tau[4]);
+INLINED void awiwi_fifth_joint_torque(const double q_in[4], const double f_in[8], double tau_out[4]);
 #include "../fifth_joint_torque.c"
 
-VECTORS void block(const double *restrict q_at, ptrdiff_t q_row, const double *restrict f_at, ptrdiff_t f_row, double *restrict tau_at, ptrdiff_t tau_row)
+VECTORS void block(const double *restrict q_in_at, ptrdiff_t q_in_row, const double *restrict f_in_at, ptrdiff_t f_in_row, double *restrict tau_out_at, ptrdiff_t tau_out_row)
 {
     EACH_SAMPLE {
-        double q_one[4], f_one[8], tau_one[4];
-        TAKE(q, 4)
-        TAKE(f, 8)
-        awiwi_fifth_joint_torque(q_one, f_one, tau_one);
-        GIVE(tau, 4)
+        double q_in_one[4], f_in_one[8], tau_out_one[4];
+        TAKE(q_in, 4)
+        TAKE(f_in, 8)
+        awiwi_fifth_joint_torque(q_in_one, f_in_one, tau_out_one);
+        GIVE(tau_out, 4)
     }
 }
 
-void awiwi_fifth_joint_torque_batch(ptrdiff_t samples, const double *q, ptrdiff_t q_sample, ptrdiff_t q_element, const double *f, ptrdiff_t f_sample, ptrdiff_t f_element, double *tau, ptrdiff_t tau_sample, ptrdiff_t tau_element)
+void awiwi_fifth_joint_torque_batch(ptrdiff_t samples, const double *q_in, ptrdiff_t q_in_sample, ptrdiff_t q_in_element, const double *f_in, ptrdiff_t f_in_sample, ptrdiff_t f_in_element, double *tau_out, ptrdiff_t tau_out_sample, ptrdiff_t tau_out_element)
 {
-    double q_rows[4*BLOCK], f_rows[8*BLOCK], tau_rows[4*BLOCK];
+    double q_in_rows[4*BLOCK], f_in_rows[8*BLOCK], tau_out_rows[4*BLOCK];
     EACH_BLOCK {
-        GATHER(q, 4)
-        GATHER(f, 8)
-        block(AT(q), AT(f), AT(tau));
-        SCATTER(tau, 4)
+        GATHER(q_in, 4)
+        GATHER(f_in, 8)
+        block(AT(q_in), AT(f_in), AT(tau_out));
+        SCATTER(tau_out, 4)
     }
 }

@@ -2,28 +2,29 @@
  *
  * fifth_tendon_lengths of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_fifth_tendon_lengths(const double q[4], double h[8]);
+INLINED void awiwi_fifth_tendon_lengths(const double q_in[4], double h_out[8]);
 #include "../fifth_tendon_lengths.c"
 
-VECTORS void block(const double *restrict q_at, ptrdiff_t q_row, double *restrict h_at, ptrdiff_t h_row)
+VECTORS void block(const double *restrict q_in_at, ptrdiff_t q_in_row, double *restrict h_out_at, ptrdiff_t h_out_row)
 {
     EACH_SAMPLE {
-        double q_one[4], h_one[8];
-        TAKE(q, 4)
-        awiwi_fifth_tendon_lengths(q_one, h_one);
-        GIVE(h, 8)
+        double q_in_one[4], h_out_one[8];
+        TAKE(q_in, 4)
+        awiwi_fifth_tendon_lengths(q_in_one, h_out_one);
+        GIVE(h_out, 8)
     }
 }
 
-void awiwi_fifth_tendon_lengths_batch(ptrdiff_t samples, const double *q, ptrdiff_t q_sample, ptrdiff_t q_element, double *h, ptrdiff_t h_sample, ptrdiff_t h_element)
+void awiwi_fifth_tendon_lengths_batch(ptrdiff_t samples, const double *q_in, ptrdiff_t q_in_sample, ptrdiff_t q_in_element, double *h_out, ptrdiff_t h_out_sample, ptrdiff_t h_out_element)
 {
-    double q_rows[4*BLOCK], h_rows[8*BLOCK];
+    double q_in_rows[4*BLOCK], h_out_rows[8*BLOCK];
     EACH_BLOCK {
-        GATHER(q, 4)
-        block(AT(q), AT(h));
-        SCATTER(h, 8)
+        GATHER(q_in, 4)
+        block(AT(q_in), AT(h_out));
+        SCATTER(h_out, 8)
     }
 }

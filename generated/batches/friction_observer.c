@@ -2,44 +2,45 @@
  *
  * friction_observer of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED int awiwi_friction_observer(const double momentum[1], const double u[1], const double tau[1], const double thd[1], const double B[1], const double gain[1], const double period[1], double momentum_next[1], double friction[1]);
+INLINED int awiwi_friction_observer(const double momentum_in[1], const double u_in[1], const double tau_in[1], const double thd_in[1], const double B_in[1], const double gain_in[1], const double period_in[1], double momentum_next_out[1], double friction_out[1]);
 #include "../friction_observer.c"
 
-VECTORS void block(const double *restrict momentum_at, ptrdiff_t momentum_row, const double *restrict u_at, ptrdiff_t u_row, const double *restrict tau_at, ptrdiff_t tau_row, const double *restrict thd_at, ptrdiff_t thd_row, const double *restrict B_at, ptrdiff_t B_row, const double *restrict gain_at, ptrdiff_t gain_row, const double *restrict period_at, ptrdiff_t period_row, double *restrict momentum_next_at, ptrdiff_t momentum_next_row, double *restrict friction_at, ptrdiff_t friction_row, int *restrict status)
+VECTORS void block(const double *restrict momentum_in_at, ptrdiff_t momentum_in_row, const double *restrict u_in_at, ptrdiff_t u_in_row, const double *restrict tau_in_at, ptrdiff_t tau_in_row, const double *restrict thd_in_at, ptrdiff_t thd_in_row, const double *restrict B_in_at, ptrdiff_t B_in_row, const double *restrict gain_in_at, ptrdiff_t gain_in_row, const double *restrict period_in_at, ptrdiff_t period_in_row, double *restrict momentum_next_out_at, ptrdiff_t momentum_next_out_row, double *restrict friction_out_at, ptrdiff_t friction_out_row, int *restrict status)
 {
     EACH_SAMPLE {
-        double momentum_one[1], u_one[1], tau_one[1], thd_one[1], B_one[1], gain_one[1], period_one[1], momentum_next_one[1], friction_one[1];
-        TAKE(momentum, 1)
-        TAKE(u, 1)
-        TAKE(tau, 1)
-        TAKE(thd, 1)
-        TAKE(B, 1)
-        TAKE(gain, 1)
-        TAKE(period, 1)
-        status[i_] = awiwi_friction_observer(momentum_one, u_one, tau_one, thd_one, B_one, gain_one, period_one, momentum_next_one, friction_one);
-        GIVE(momentum_next, 1)
-        GIVE(friction, 1)
+        double momentum_in_one[1], u_in_one[1], tau_in_one[1], thd_in_one[1], B_in_one[1], gain_in_one[1], period_in_one[1], momentum_next_out_one[1], friction_out_one[1];
+        TAKE(momentum_in, 1)
+        TAKE(u_in, 1)
+        TAKE(tau_in, 1)
+        TAKE(thd_in, 1)
+        TAKE(B_in, 1)
+        TAKE(gain_in, 1)
+        TAKE(period_in, 1)
+        status[i_] = awiwi_friction_observer(momentum_in_one, u_in_one, tau_in_one, thd_in_one, B_in_one, gain_in_one, period_in_one, momentum_next_out_one, friction_out_one);
+        GIVE(momentum_next_out, 1)
+        GIVE(friction_out, 1)
     }
 }
 
-void awiwi_friction_observer_batch(ptrdiff_t samples, const double *momentum, ptrdiff_t momentum_sample, ptrdiff_t momentum_element, const double *u, ptrdiff_t u_sample, ptrdiff_t u_element, const double *tau, ptrdiff_t tau_sample, ptrdiff_t tau_element, const double *thd, ptrdiff_t thd_sample, ptrdiff_t thd_element, const double *B, ptrdiff_t B_sample, ptrdiff_t B_element, const double *gain, ptrdiff_t gain_sample, ptrdiff_t gain_element, const double *period, ptrdiff_t period_sample, ptrdiff_t period_element, double *momentum_next, ptrdiff_t momentum_next_sample, ptrdiff_t momentum_next_element, double *friction, ptrdiff_t friction_sample, ptrdiff_t friction_element, int *status)
+void awiwi_friction_observer_batch(ptrdiff_t samples, const double *momentum_in, ptrdiff_t momentum_in_sample, ptrdiff_t momentum_in_element, const double *u_in, ptrdiff_t u_in_sample, ptrdiff_t u_in_element, const double *tau_in, ptrdiff_t tau_in_sample, ptrdiff_t tau_in_element, const double *thd_in, ptrdiff_t thd_in_sample, ptrdiff_t thd_in_element, const double *B_in, ptrdiff_t B_in_sample, ptrdiff_t B_in_element, const double *gain_in, ptrdiff_t gain_in_sample, ptrdiff_t gain_in_element, const double *period_in, ptrdiff_t period_in_sample, ptrdiff_t period_in_element, double *momentum_next_out, ptrdiff_t momentum_next_out_sample, ptrdiff_t momentum_next_out_element, double *friction_out, ptrdiff_t friction_out_sample, ptrdiff_t friction_out_element, int *status)
 {
-    double momentum_rows[1*BLOCK], u_rows[1*BLOCK], tau_rows[1*BLOCK], thd_rows[1*BLOCK], B_rows[1*BLOCK], gain_rows[1*BLOCK], period_rows[1*BLOCK], momentum_next_rows[1*BLOCK], friction_rows[1*BLOCK];
+    double momentum_in_rows[1*BLOCK], u_in_rows[1*BLOCK], tau_in_rows[1*BLOCK], thd_in_rows[1*BLOCK], B_in_rows[1*BLOCK], gain_in_rows[1*BLOCK], period_in_rows[1*BLOCK], momentum_next_out_rows[1*BLOCK], friction_out_rows[1*BLOCK];
     int status_rows[BLOCK];
     EACH_BLOCK {
-        GATHER(momentum, 1)
-        GATHER(u, 1)
-        GATHER(tau, 1)
-        GATHER(thd, 1)
-        GATHER(B, 1)
-        GATHER(gain, 1)
-        GATHER(period, 1)
-        block(AT(momentum), AT(u), AT(tau), AT(thd), AT(B), AT(gain), AT(period), AT(momentum_next), AT(friction), status_rows);
-        SCATTER(momentum_next, 1)
-        SCATTER(friction, 1)
+        GATHER(momentum_in, 1)
+        GATHER(u_in, 1)
+        GATHER(tau_in, 1)
+        GATHER(thd_in, 1)
+        GATHER(B_in, 1)
+        GATHER(gain_in, 1)
+        GATHER(period_in, 1)
+        block(AT(momentum_in), AT(u_in), AT(tau_in), AT(thd_in), AT(B_in), AT(gain_in), AT(period_in), AT(momentum_next_out), AT(friction_out), status_rows);
+        SCATTER(momentum_next_out, 1)
+        SCATTER(friction_out, 1)
         memcpy(status + first_, status_rows, (size_t)COUNT * sizeof *status);
     }
 }

@@ -2,30 +2,31 @@
  *
  * guiding_friction of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_guiding_friction(const double f[1], const double bend[1], double loss[1]);
+INLINED void awiwi_guiding_friction(const double f_in[1], const double bend_in[1], double loss_out[1]);
 #include "../guiding_friction.c"
 
-VECTORS void block(const double *restrict f_at, ptrdiff_t f_row, const double *restrict bend_at, ptrdiff_t bend_row, double *restrict loss_at, ptrdiff_t loss_row)
+VECTORS void block(const double *restrict f_in_at, ptrdiff_t f_in_row, const double *restrict bend_in_at, ptrdiff_t bend_in_row, double *restrict loss_out_at, ptrdiff_t loss_out_row)
 {
     EACH_SAMPLE {
-        double f_one[1], bend_one[1], loss_one[1];
-        TAKE(f, 1)
-        TAKE(bend, 1)
-        awiwi_guiding_friction(f_one, bend_one, loss_one);
-        GIVE(loss, 1)
+        double f_in_one[1], bend_in_one[1], loss_out_one[1];
+        TAKE(f_in, 1)
+        TAKE(bend_in, 1)
+        awiwi_guiding_friction(f_in_one, bend_in_one, loss_out_one);
+        GIVE(loss_out, 1)
     }
 }
 
-void awiwi_guiding_friction_batch(ptrdiff_t samples, const double *f, ptrdiff_t f_sample, ptrdiff_t f_element, const double *bend, ptrdiff_t bend_sample, ptrdiff_t bend_element, double *loss, ptrdiff_t loss_sample, ptrdiff_t loss_element)
+void awiwi_guiding_friction_batch(ptrdiff_t samples, const double *f_in, ptrdiff_t f_in_sample, ptrdiff_t f_in_element, const double *bend_in, ptrdiff_t bend_in_sample, ptrdiff_t bend_in_element, double *loss_out, ptrdiff_t loss_out_sample, ptrdiff_t loss_out_element)
 {
-    double f_rows[1*BLOCK], bend_rows[1*BLOCK], loss_rows[1*BLOCK];
+    double f_in_rows[1*BLOCK], bend_in_rows[1*BLOCK], loss_out_rows[1*BLOCK];
     EACH_BLOCK {
-        GATHER(f, 1)
-        GATHER(bend, 1)
-        block(AT(f), AT(bend), AT(loss));
-        SCATTER(loss, 1)
+        GATHER(f_in, 1)
+        GATHER(bend_in, 1)
+        block(AT(f_in), AT(bend_in), AT(loss_out));
+        SCATTER(loss_out, 1)
     }
 }

@@ -2,29 +2,30 @@
  *
  * hand_coupling of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_hand_coupling(const double q[19], double P[722]);
+INLINED void awiwi_hand_coupling(const double q_in[19], double P_out[722]);
 #include "../hand_coupling.c"
 
-VECTORS void block(const double *restrict q_at, ptrdiff_t q_row, double *restrict P_at, ptrdiff_t P_row)
+VECTORS void block(const double *restrict q_in_at, ptrdiff_t q_in_row, double *restrict P_out_at, ptrdiff_t P_out_row)
 {
     EACH_SAMPLE {
-        double q_one[19], P_one[722];
-        TAKE(q, 19)
-        awiwi_hand_coupling(q_one, P_one);
-        GIVE(P, 722)
+        double q_in_one[19], P_out_one[722];
+        TAKE(q_in, 19)
+        awiwi_hand_coupling(q_in_one, P_out_one);
+        GIVE(P_out, 722)
     }
 }
 
-void awiwi_hand_coupling_batch(ptrdiff_t samples, const double *q, ptrdiff_t q_sample, ptrdiff_t q_element, double *P, ptrdiff_t P_sample, ptrdiff_t P_element)
+void awiwi_hand_coupling_batch(ptrdiff_t samples, const double *q_in, ptrdiff_t q_in_sample, ptrdiff_t q_in_element, double *P_out, ptrdiff_t P_out_sample, ptrdiff_t P_out_element)
 {
-    double q_rows[19*BLOCK], P_rows[722*BLOCK];
+    double q_in_rows[19*BLOCK], P_out_rows[722*BLOCK];
     EACH_BLOCK {
-        GATHER(q, 19)
-        EXPECT(P, 722)
-        block(AT(q), AT(P));
-        SCATTER(P, 722)
+        GATHER(q_in, 19)
+        PREFETCH_ROWS(P_out, 722)
+        block(AT(q_in), AT(P_out));
+        SCATTER(P_out, 722)
     }
 }

@@ -2,31 +2,32 @@
  *
  * hand_joint_torque of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_hand_joint_torque(const double q[19], const double f[38], double tau[19]);
+INLINED void awiwi_hand_joint_torque(const double q_in[19], const double f_in[38], double tau_out[19]);
 #include "../hand_joint_torque.c"
 
-VECTORS void block(const double *restrict q_at, ptrdiff_t q_row, const double *restrict f_at, ptrdiff_t f_row, double *restrict tau_at, ptrdiff_t tau_row)
+VECTORS void block(const double *restrict q_in_at, ptrdiff_t q_in_row, const double *restrict f_in_at, ptrdiff_t f_in_row, double *restrict tau_out_at, ptrdiff_t tau_out_row)
 {
     EACH_SAMPLE {
-        double q_one[19], f_one[38], tau_one[19];
-        TAKE(q, 19)
-        TAKE(f, 38)
-        awiwi_hand_joint_torque(q_one, f_one, tau_one);
-        GIVE(tau, 19)
+        double q_in_one[19], f_in_one[38], tau_out_one[19];
+        TAKE(q_in, 19)
+        TAKE(f_in, 38)
+        awiwi_hand_joint_torque(q_in_one, f_in_one, tau_out_one);
+        GIVE(tau_out, 19)
     }
 }
 
-void awiwi_hand_joint_torque_batch(ptrdiff_t samples, const double *q, ptrdiff_t q_sample, ptrdiff_t q_element, const double *f, ptrdiff_t f_sample, ptrdiff_t f_element, double *tau, ptrdiff_t tau_sample, ptrdiff_t tau_element)
+void awiwi_hand_joint_torque_batch(ptrdiff_t samples, const double *q_in, ptrdiff_t q_in_sample, ptrdiff_t q_in_element, const double *f_in, ptrdiff_t f_in_sample, ptrdiff_t f_in_element, double *tau_out, ptrdiff_t tau_out_sample, ptrdiff_t tau_out_element)
 {
-    double q_rows[19*BLOCK], f_rows[38*BLOCK], tau_rows[19*BLOCK];
+    double q_in_rows[19*BLOCK], f_in_rows[38*BLOCK], tau_out_rows[19*BLOCK];
     EACH_BLOCK {
-        GATHER(q, 19)
-        GATHER(f, 38)
-        EXPECT(tau, 19)
-        block(AT(q), AT(f), AT(tau));
-        SCATTER(tau, 19)
+        GATHER(q_in, 19)
+        GATHER(f_in, 38)
+        PREFETCH_ROWS(tau_out, 19)
+        block(AT(q_in), AT(f_in), AT(tau_out));
+        SCATTER(tau_out, 19)
     }
 }

@@ -2,33 +2,34 @@
  *
  * hand_tendon_lengths of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED int awiwi_hand_tendon_lengths(const double q[19], const double wrist[2], double h[38]);
+INLINED int awiwi_hand_tendon_lengths(const double q_in[19], const double wrist_in[2], double h_out[38]);
 #include "../hand_tendon_lengths.c"
 
-VECTORS void block(const double *restrict q_at, ptrdiff_t q_row, const double *restrict wrist_at, ptrdiff_t wrist_row, double *restrict h_at, ptrdiff_t h_row, int *restrict status)
+VECTORS void block(const double *restrict q_in_at, ptrdiff_t q_in_row, const double *restrict wrist_in_at, ptrdiff_t wrist_in_row, double *restrict h_out_at, ptrdiff_t h_out_row, int *restrict status)
 {
     EACH_SAMPLE {
-        double q_one[19], wrist_one[2], h_one[38];
-        TAKE(q, 19)
-        TAKE(wrist, 2)
-        status[i_] = awiwi_hand_tendon_lengths(q_one, wrist_one, h_one);
-        GIVE(h, 38)
+        double q_in_one[19], wrist_in_one[2], h_out_one[38];
+        TAKE(q_in, 19)
+        TAKE(wrist_in, 2)
+        status[i_] = awiwi_hand_tendon_lengths(q_in_one, wrist_in_one, h_out_one);
+        GIVE(h_out, 38)
     }
 }
 
-void awiwi_hand_tendon_lengths_batch(ptrdiff_t samples, const double *q, ptrdiff_t q_sample, ptrdiff_t q_element, const double *wrist, ptrdiff_t wrist_sample, ptrdiff_t wrist_element, double *h, ptrdiff_t h_sample, ptrdiff_t h_element, int *status)
+void awiwi_hand_tendon_lengths_batch(ptrdiff_t samples, const double *q_in, ptrdiff_t q_in_sample, ptrdiff_t q_in_element, const double *wrist_in, ptrdiff_t wrist_in_sample, ptrdiff_t wrist_in_element, double *h_out, ptrdiff_t h_out_sample, ptrdiff_t h_out_element, int *status)
 {
-    double q_rows[19*BLOCK], wrist_rows[2*BLOCK], h_rows[38*BLOCK];
+    double q_in_rows[19*BLOCK], wrist_in_rows[2*BLOCK], h_out_rows[38*BLOCK];
     int status_rows[BLOCK];
     EACH_BLOCK {
-        GATHER(q, 19)
-        GATHER(wrist, 2)
-        EXPECT(h, 38)
-        block(AT(q), AT(wrist), AT(h), status_rows);
-        SCATTER(h, 38)
+        GATHER(q_in, 19)
+        GATHER(wrist_in, 2)
+        PREFETCH_ROWS(h_out, 38)
+        block(AT(q_in), AT(wrist_in), AT(h_out), status_rows);
+        SCATTER(h_out, 38)
         memcpy(status + first_, status_rows, (size_t)COUNT * sizeof *status);
     }
 }

@@ -2,31 +2,32 @@
  *
  * index_coriolis_matrix of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_index_coriolis_matrix(const double q[4], const double qd[4], double C[16]);
+INLINED void awiwi_index_coriolis_matrix(const double q_in[4], const double qd_in[4], double C_out[16]);
 #include "../index_coriolis_matrix.c"
 
-VECTORS void block(const double *restrict q_at, ptrdiff_t q_row, const double *restrict qd_at, ptrdiff_t qd_row, double *restrict C_at, ptrdiff_t C_row)
+VECTORS void block(const double *restrict q_in_at, ptrdiff_t q_in_row, const double *restrict qd_in_at, ptrdiff_t qd_in_row, double *restrict C_out_at, ptrdiff_t C_out_row)
 {
     EACH_SAMPLE {
-        double q_one[4], qd_one[4], C_one[16];
-        TAKE(q, 4)
-        TAKE(qd, 4)
-        awiwi_index_coriolis_matrix(q_one, qd_one, C_one);
-        GIVE(C, 16)
+        double q_in_one[4], qd_in_one[4], C_out_one[16];
+        TAKE(q_in, 4)
+        TAKE(qd_in, 4)
+        awiwi_index_coriolis_matrix(q_in_one, qd_in_one, C_out_one);
+        GIVE(C_out, 16)
     }
 }
 
-void awiwi_index_coriolis_matrix_batch(ptrdiff_t samples, const double *q, ptrdiff_t q_sample, ptrdiff_t q_element, const double *qd, ptrdiff_t qd_sample, ptrdiff_t qd_element, double *C, ptrdiff_t C_sample, ptrdiff_t C_element)
+void awiwi_index_coriolis_matrix_batch(ptrdiff_t samples, const double *q_in, ptrdiff_t q_in_sample, ptrdiff_t q_in_element, const double *qd_in, ptrdiff_t qd_in_sample, ptrdiff_t qd_in_element, double *C_out, ptrdiff_t C_out_sample, ptrdiff_t C_out_element)
 {
-    double q_rows[4*BLOCK], qd_rows[4*BLOCK], C_rows[16*BLOCK];
+    double q_in_rows[4*BLOCK], qd_in_rows[4*BLOCK], C_out_rows[16*BLOCK];
     EACH_BLOCK {
-        GATHER(q, 4)
-        GATHER(qd, 4)
-        EXPECT(C, 16)
-        block(AT(q), AT(qd), AT(C));
-        SCATTER(C, 16)
+        GATHER(q_in, 4)
+        GATHER(qd_in, 4)
+        PREFETCH_ROWS(C_out, 16)
+        block(AT(q_in), AT(qd_in), AT(C_out));
+        SCATTER(C_out, 16)
     }
 }

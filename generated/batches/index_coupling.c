@@ -2,29 +2,30 @@
  *
  * index_coupling of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_index_coupling(const double q[4], double P[32]);
+INLINED void awiwi_index_coupling(const double q_in[4], double P_out[32]);
 #include "../index_coupling.c"
 
-VECTORS void block(const double *restrict q_at, ptrdiff_t q_row, double *restrict P_at, ptrdiff_t P_row)
+VECTORS void block(const double *restrict q_in_at, ptrdiff_t q_in_row, double *restrict P_out_at, ptrdiff_t P_out_row)
 {
     EACH_SAMPLE {
-        double q_one[4], P_one[32];
-        TAKE(q, 4)
-        awiwi_index_coupling(q_one, P_one);
-        GIVE(P, 32)
+        double q_in_one[4], P_out_one[32];
+        TAKE(q_in, 4)
+        awiwi_index_coupling(q_in_one, P_out_one);
+        GIVE(P_out, 32)
     }
 }
 
-void awiwi_index_coupling_batch(ptrdiff_t samples, const double *q, ptrdiff_t q_sample, ptrdiff_t q_element, double *P, ptrdiff_t P_sample, ptrdiff_t P_element)
+void awiwi_index_coupling_batch(ptrdiff_t samples, const double *q_in, ptrdiff_t q_in_sample, ptrdiff_t q_in_element, double *P_out, ptrdiff_t P_out_sample, ptrdiff_t P_out_element)
 {
-    double q_rows[4*BLOCK], P_rows[32*BLOCK];
+    double q_in_rows[4*BLOCK], P_out_rows[32*BLOCK];
     EACH_BLOCK {
-        GATHER(q, 4)
-        EXPECT(P, 32)
-        block(AT(q), AT(P));
-        SCATTER(P, 32)
+        GATHER(q_in, 4)
+        PREFETCH_ROWS(P_out, 32)
+        block(AT(q_in), AT(P_out));
+        SCATTER(P_out, 32)
     }
 }

@@ -2,29 +2,30 @@
  *
  * index_fingertip_pose of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_index_fingertip_pose(const double q[4], double T[16]);
+INLINED void awiwi_index_fingertip_pose(const double q_in[4], double T_out[16]);
 #include "../index_fingertip_pose.c"
 
-VECTORS void block(const double *restrict q_at, ptrdiff_t q_row, double *restrict T_at, ptrdiff_t T_row)
+VECTORS void block(const double *restrict q_in_at, ptrdiff_t q_in_row, double *restrict T_out_at, ptrdiff_t T_out_row)
 {
     EACH_SAMPLE {
-        double q_one[4], T_one[16];
-        TAKE(q, 4)
-        awiwi_index_fingertip_pose(q_one, T_one);
-        GIVE(T, 16)
+        double q_in_one[4], T_out_one[16];
+        TAKE(q_in, 4)
+        awiwi_index_fingertip_pose(q_in_one, T_out_one);
+        GIVE(T_out, 16)
     }
 }
 
-void awiwi_index_fingertip_pose_batch(ptrdiff_t samples, const double *q, ptrdiff_t q_sample, ptrdiff_t q_element, double *T, ptrdiff_t T_sample, ptrdiff_t T_element)
+void awiwi_index_fingertip_pose_batch(ptrdiff_t samples, const double *q_in, ptrdiff_t q_in_sample, ptrdiff_t q_in_element, double *T_out, ptrdiff_t T_out_sample, ptrdiff_t T_out_element)
 {
-    double q_rows[4*BLOCK], T_rows[16*BLOCK];
+    double q_in_rows[4*BLOCK], T_out_rows[16*BLOCK];
     EACH_BLOCK {
-        GATHER(q, 4)
-        EXPECT(T, 16)
-        block(AT(q), AT(T));
-        SCATTER(T, 16)
+        GATHER(q_in, 4)
+        PREFETCH_ROWS(T_out, 16)
+        block(AT(q_in), AT(T_out));
+        SCATTER(T_out, 16)
     }
 }

@@ -2,30 +2,31 @@
  *
  * index_joint_estimate of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_index_joint_estimate(const double h[8], const double start[4], double q[4]);
+INLINED void awiwi_index_joint_estimate(const double h_in[8], const double start_in[4], double q_out[4]);
 #include "../index_joint_estimate.c"
 
-VECTORS void block(const double *restrict h_at, ptrdiff_t h_row, const double *restrict start_at, ptrdiff_t start_row, double *restrict q_at, ptrdiff_t q_row)
+VECTORS void block(const double *restrict h_in_at, ptrdiff_t h_in_row, const double *restrict start_in_at, ptrdiff_t start_in_row, double *restrict q_out_at, ptrdiff_t q_out_row)
 {
     EACH_SAMPLE {
-        double h_one[8], start_one[4], q_one[4];
-        TAKE(h, 8)
-        TAKE(start, 4)
-        awiwi_index_joint_estimate(h_one, start_one, q_one);
-        GIVE(q, 4)
+        double h_in_one[8], start_in_one[4], q_out_one[4];
+        TAKE(h_in, 8)
+        TAKE(start_in, 4)
+        awiwi_index_joint_estimate(h_in_one, start_in_one, q_out_one);
+        GIVE(q_out, 4)
     }
 }
 
-void awiwi_index_joint_estimate_batch(ptrdiff_t samples, const double *h, ptrdiff_t h_sample, ptrdiff_t h_element, const double *start, ptrdiff_t start_sample, ptrdiff_t start_element, double *q, ptrdiff_t q_sample, ptrdiff_t q_element)
+void awiwi_index_joint_estimate_batch(ptrdiff_t samples, const double *h_in, ptrdiff_t h_in_sample, ptrdiff_t h_in_element, const double *start_in, ptrdiff_t start_in_sample, ptrdiff_t start_in_element, double *q_out, ptrdiff_t q_out_sample, ptrdiff_t q_out_element)
 {
-    double h_rows[8*BLOCK], start_rows[4*BLOCK], q_rows[4*BLOCK];
+    double h_in_rows[8*BLOCK], start_in_rows[4*BLOCK], q_out_rows[4*BLOCK];
     EACH_BLOCK {
-        GATHER(h, 8)
-        GATHER(start, 4)
-        block(AT(h), AT(start), AT(q));
-        SCATTER(q, 4)
+        GATHER(h_in, 8)
+        GATHER(start_in, 4)
+        block(AT(h_in), AT(start_in), AT(q_out));
+        SCATTER(q_out, 4)
     }
 }

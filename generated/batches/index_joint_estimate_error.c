@@ -2,33 +2,34 @@
  *
  * index_joint_estimate_error of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_index_joint_estimate_error(const double q[4], const double noise[1], double covariance[16], double worst[4]);
+INLINED void awiwi_index_joint_estimate_error(const double q_in[4], const double noise_in[1], double covariance_out[16], double worst_out[4]);
 #include "../index_joint_estimate_error.c"
 
-VECTORS void block(const double *restrict q_at, ptrdiff_t q_row, const double *restrict noise_at, ptrdiff_t noise_row, double *restrict covariance_at, ptrdiff_t covariance_row, double *restrict worst_at, ptrdiff_t worst_row)
+VECTORS void block(const double *restrict q_in_at, ptrdiff_t q_in_row, const double *restrict noise_in_at, ptrdiff_t noise_in_row, double *restrict covariance_out_at, ptrdiff_t covariance_out_row, double *restrict worst_out_at, ptrdiff_t worst_out_row)
 {
     EACH_SAMPLE {
-        double q_one[4], noise_one[1], covariance_one[16], worst_one[4];
-        TAKE(q, 4)
-        TAKE(noise, 1)
-        awiwi_index_joint_estimate_error(q_one, noise_one, covariance_one, worst_one);
-        GIVE(covariance, 16)
-        GIVE(worst, 4)
+        double q_in_one[4], noise_in_one[1], covariance_out_one[16], worst_out_one[4];
+        TAKE(q_in, 4)
+        TAKE(noise_in, 1)
+        awiwi_index_joint_estimate_error(q_in_one, noise_in_one, covariance_out_one, worst_out_one);
+        GIVE(covariance_out, 16)
+        GIVE(worst_out, 4)
     }
 }
 
-void awiwi_index_joint_estimate_error_batch(ptrdiff_t samples, const double *q, ptrdiff_t q_sample, ptrdiff_t q_element, const double *noise, ptrdiff_t noise_sample, ptrdiff_t noise_element, double *covariance, ptrdiff_t covariance_sample, ptrdiff_t covariance_element, double *worst, ptrdiff_t worst_sample, ptrdiff_t worst_element)
+void awiwi_index_joint_estimate_error_batch(ptrdiff_t samples, const double *q_in, ptrdiff_t q_in_sample, ptrdiff_t q_in_element, const double *noise_in, ptrdiff_t noise_in_sample, ptrdiff_t noise_in_element, double *covariance_out, ptrdiff_t covariance_out_sample, ptrdiff_t covariance_out_element, double *worst_out, ptrdiff_t worst_out_sample, ptrdiff_t worst_out_element)
 {
-    double q_rows[4*BLOCK], noise_rows[1*BLOCK], covariance_rows[16*BLOCK], worst_rows[4*BLOCK];
+    double q_in_rows[4*BLOCK], noise_in_rows[1*BLOCK], covariance_out_rows[16*BLOCK], worst_out_rows[4*BLOCK];
     EACH_BLOCK {
-        GATHER(q, 4)
-        GATHER(noise, 1)
-        EXPECT(covariance, 16)
-        block(AT(q), AT(noise), AT(covariance), AT(worst));
-        SCATTER(covariance, 16)
-        SCATTER(worst, 4)
+        GATHER(q_in, 4)
+        GATHER(noise_in, 1)
+        PREFETCH_ROWS(covariance_out, 16)
+        block(AT(q_in), AT(noise_in), AT(covariance_out), AT(worst_out));
+        SCATTER(covariance_out, 16)
+        SCATTER(worst_out, 4)
     }
 }

@@ -2,33 +2,34 @@
  *
  * index_joint_stiffness of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_index_joint_stiffness(const double q[4], const double f[8], const double k[8], double K[16]);
+INLINED void awiwi_index_joint_stiffness(const double q_in[4], const double f_in[8], const double k_in[8], double K_out[16]);
 #include "../index_joint_stiffness.c"
 
-VECTORS void block(const double *restrict q_at, ptrdiff_t q_row, const double *restrict f_at, ptrdiff_t f_row, const double *restrict k_at, ptrdiff_t k_row, double *restrict K_at, ptrdiff_t K_row)
+VECTORS void block(const double *restrict q_in_at, ptrdiff_t q_in_row, const double *restrict f_in_at, ptrdiff_t f_in_row, const double *restrict k_in_at, ptrdiff_t k_in_row, double *restrict K_out_at, ptrdiff_t K_out_row)
 {
     EACH_SAMPLE {
-        double q_one[4], f_one[8], k_one[8], K_one[16];
-        TAKE(q, 4)
-        TAKE(f, 8)
-        TAKE(k, 8)
-        awiwi_index_joint_stiffness(q_one, f_one, k_one, K_one);
-        GIVE(K, 16)
+        double q_in_one[4], f_in_one[8], k_in_one[8], K_out_one[16];
+        TAKE(q_in, 4)
+        TAKE(f_in, 8)
+        TAKE(k_in, 8)
+        awiwi_index_joint_stiffness(q_in_one, f_in_one, k_in_one, K_out_one);
+        GIVE(K_out, 16)
     }
 }
 
-void awiwi_index_joint_stiffness_batch(ptrdiff_t samples, const double *q, ptrdiff_t q_sample, ptrdiff_t q_element, const double *f, ptrdiff_t f_sample, ptrdiff_t f_element, const double *k, ptrdiff_t k_sample, ptrdiff_t k_element, double *K, ptrdiff_t K_sample, ptrdiff_t K_element)
+void awiwi_index_joint_stiffness_batch(ptrdiff_t samples, const double *q_in, ptrdiff_t q_in_sample, ptrdiff_t q_in_element, const double *f_in, ptrdiff_t f_in_sample, ptrdiff_t f_in_element, const double *k_in, ptrdiff_t k_in_sample, ptrdiff_t k_in_element, double *K_out, ptrdiff_t K_out_sample, ptrdiff_t K_out_element)
 {
-    double q_rows[4*BLOCK], f_rows[8*BLOCK], k_rows[8*BLOCK], K_rows[16*BLOCK];
+    double q_in_rows[4*BLOCK], f_in_rows[8*BLOCK], k_in_rows[8*BLOCK], K_out_rows[16*BLOCK];
     EACH_BLOCK {
-        GATHER(q, 4)
-        GATHER(f, 8)
-        GATHER(k, 8)
-        EXPECT(K, 16)
-        block(AT(q), AT(f), AT(k), AT(K));
-        SCATTER(K, 16)
+        GATHER(q_in, 4)
+        GATHER(f_in, 8)
+        GATHER(k_in, 8)
+        PREFETCH_ROWS(K_out, 16)
+        block(AT(q_in), AT(f_in), AT(k_in), AT(K_out));
+        SCATTER(K_out, 16)
     }
 }

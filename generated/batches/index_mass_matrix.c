@@ -2,29 +2,30 @@
  *
  * index_mass_matrix of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_index_mass_matrix(const double q[4], double M[16]);
+INLINED void awiwi_index_mass_matrix(const double q_in[4], double M_out[16]);
 #include "../index_mass_matrix.c"
 
-VECTORS void block(const double *restrict q_at, ptrdiff_t q_row, double *restrict M_at, ptrdiff_t M_row)
+VECTORS void block(const double *restrict q_in_at, ptrdiff_t q_in_row, double *restrict M_out_at, ptrdiff_t M_out_row)
 {
     EACH_SAMPLE {
-        double q_one[4], M_one[16];
-        TAKE(q, 4)
-        awiwi_index_mass_matrix(q_one, M_one);
-        GIVE(M, 16)
+        double q_in_one[4], M_out_one[16];
+        TAKE(q_in, 4)
+        awiwi_index_mass_matrix(q_in_one, M_out_one);
+        GIVE(M_out, 16)
     }
 }
 
-void awiwi_index_mass_matrix_batch(ptrdiff_t samples, const double *q, ptrdiff_t q_sample, ptrdiff_t q_element, double *M, ptrdiff_t M_sample, ptrdiff_t M_element)
+void awiwi_index_mass_matrix_batch(ptrdiff_t samples, const double *q_in, ptrdiff_t q_in_sample, ptrdiff_t q_in_element, double *M_out, ptrdiff_t M_out_sample, ptrdiff_t M_out_element)
 {
-    double q_rows[4*BLOCK], M_rows[16*BLOCK];
+    double q_in_rows[4*BLOCK], M_out_rows[16*BLOCK];
     EACH_BLOCK {
-        GATHER(q, 4)
-        EXPECT(M, 16)
-        block(AT(q), AT(M));
-        SCATTER(M, 16)
+        GATHER(q_in, 4)
+        PREFETCH_ROWS(M_out, 16)
+        block(AT(q_in), AT(M_out));
+        SCATTER(M_out, 16)
     }
 }

@@ -2,32 +2,33 @@
  *
  * index_measured_lengths of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_index_measured_lengths(const double theta[8], const double x[8], const double w[8], double h[8]);
+INLINED void awiwi_index_measured_lengths(const double theta_in[8], const double x_in[8], const double w_in[8], double h_out[8]);
 #include "../index_measured_lengths.c"
 
-VECTORS void block(const double *restrict theta_at, ptrdiff_t theta_row, const double *restrict x_at, ptrdiff_t x_row, const double *restrict w_at, ptrdiff_t w_row, double *restrict h_at, ptrdiff_t h_row)
+VECTORS void block(const double *restrict theta_in_at, ptrdiff_t theta_in_row, const double *restrict x_in_at, ptrdiff_t x_in_row, const double *restrict w_in_at, ptrdiff_t w_in_row, double *restrict h_out_at, ptrdiff_t h_out_row)
 {
     EACH_SAMPLE {
-        double theta_one[8], x_one[8], w_one[8], h_one[8];
-        TAKE(theta, 8)
-        TAKE(x, 8)
-        TAKE(w, 8)
-        awiwi_index_measured_lengths(theta_one, x_one, w_one, h_one);
-        GIVE(h, 8)
+        double theta_in_one[8], x_in_one[8], w_in_one[8], h_out_one[8];
+        TAKE(theta_in, 8)
+        TAKE(x_in, 8)
+        TAKE(w_in, 8)
+        awiwi_index_measured_lengths(theta_in_one, x_in_one, w_in_one, h_out_one);
+        GIVE(h_out, 8)
     }
 }
 
-void awiwi_index_measured_lengths_batch(ptrdiff_t samples, const double *theta, ptrdiff_t theta_sample, ptrdiff_t theta_element, const double *x, ptrdiff_t x_sample, ptrdiff_t x_element, const double *w, ptrdiff_t w_sample, ptrdiff_t w_element, double *h, ptrdiff_t h_sample, ptrdiff_t h_element)
+void awiwi_index_measured_lengths_batch(ptrdiff_t samples, const double *theta_in, ptrdiff_t theta_in_sample, ptrdiff_t theta_in_element, const double *x_in, ptrdiff_t x_in_sample, ptrdiff_t x_in_element, const double *w_in, ptrdiff_t w_in_sample, ptrdiff_t w_in_element, double *h_out, ptrdiff_t h_out_sample, ptrdiff_t h_out_element)
 {
-    double theta_rows[8*BLOCK], x_rows[8*BLOCK], w_rows[8*BLOCK], h_rows[8*BLOCK];
+    double theta_in_rows[8*BLOCK], x_in_rows[8*BLOCK], w_in_rows[8*BLOCK], h_out_rows[8*BLOCK];
     EACH_BLOCK {
-        GATHER(theta, 8)
-        GATHER(x, 8)
-        GATHER(w, 8)
-        block(AT(theta), AT(x), AT(w), AT(h));
-        SCATTER(h, 8)
+        GATHER(theta_in, 8)
+        GATHER(x_in, 8)
+        GATHER(w_in, 8)
+        block(AT(theta_in), AT(x_in), AT(w_in), AT(h_out));
+        SCATTER(h_out, 8)
     }
 }

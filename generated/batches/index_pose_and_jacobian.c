@@ -2,32 +2,33 @@
  *
  * index_pose_and_jacobian of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_index_pose_and_jacobian(const double q[4], double T[16], double J[24]);
+INLINED void awiwi_index_pose_and_jacobian(const double q_in[4], double T_out[16], double J_out[24]);
 #include "../index_pose_and_jacobian.c"
 
-VECTORS void block(const double *restrict q_at, ptrdiff_t q_row, double *restrict T_at, ptrdiff_t T_row, double *restrict J_at, ptrdiff_t J_row)
+VECTORS void block(const double *restrict q_in_at, ptrdiff_t q_in_row, double *restrict T_out_at, ptrdiff_t T_out_row, double *restrict J_out_at, ptrdiff_t J_out_row)
 {
     EACH_SAMPLE {
-        double q_one[4], T_one[16], J_one[24];
-        TAKE(q, 4)
-        awiwi_index_pose_and_jacobian(q_one, T_one, J_one);
-        GIVE(T, 16)
-        GIVE(J, 24)
+        double q_in_one[4], T_out_one[16], J_out_one[24];
+        TAKE(q_in, 4)
+        awiwi_index_pose_and_jacobian(q_in_one, T_out_one, J_out_one);
+        GIVE(T_out, 16)
+        GIVE(J_out, 24)
     }
 }
 
-void awiwi_index_pose_and_jacobian_batch(ptrdiff_t samples, const double *q, ptrdiff_t q_sample, ptrdiff_t q_element, double *T, ptrdiff_t T_sample, ptrdiff_t T_element, double *J, ptrdiff_t J_sample, ptrdiff_t J_element)
+void awiwi_index_pose_and_jacobian_batch(ptrdiff_t samples, const double *q_in, ptrdiff_t q_in_sample, ptrdiff_t q_in_element, double *T_out, ptrdiff_t T_out_sample, ptrdiff_t T_out_element, double *J_out, ptrdiff_t J_out_sample, ptrdiff_t J_out_element)
 {
-    double q_rows[4*BLOCK], T_rows[16*BLOCK], J_rows[24*BLOCK];
+    double q_in_rows[4*BLOCK], T_out_rows[16*BLOCK], J_out_rows[24*BLOCK];
     EACH_BLOCK {
-        GATHER(q, 4)
-        EXPECT(T, 16)
-        EXPECT(J, 24)
-        block(AT(q), AT(T), AT(J));
-        SCATTER(T, 16)
-        SCATTER(J, 24)
+        GATHER(q_in, 4)
+        PREFETCH_ROWS(T_out, 16)
+        PREFETCH_ROWS(J_out, 24)
+        block(AT(q_in), AT(T_out), AT(J_out));
+        SCATTER(T_out, 16)
+        SCATTER(J_out, 24)
     }
 }

@@ -2,34 +2,35 @@
  *
  * index_tendon_stiffness of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED int awiwi_index_tendon_stiffness(const double tension[8], double k[8], double slope[8], double curvature[8]);
+INLINED int awiwi_index_tendon_stiffness(const double tension_in[8], double k_out[8], double slope_out[8], double curvature_out[8]);
 #include "../index_tendon_stiffness.c"
 
-VECTORS void block(const double *restrict tension_at, ptrdiff_t tension_row, double *restrict k_at, ptrdiff_t k_row, double *restrict slope_at, ptrdiff_t slope_row, double *restrict curvature_at, ptrdiff_t curvature_row, int *restrict status)
+VECTORS void block(const double *restrict tension_in_at, ptrdiff_t tension_in_row, double *restrict k_out_at, ptrdiff_t k_out_row, double *restrict slope_out_at, ptrdiff_t slope_out_row, double *restrict curvature_out_at, ptrdiff_t curvature_out_row, int *restrict status)
 {
     EACH_SAMPLE {
-        double tension_one[8], k_one[8], slope_one[8], curvature_one[8];
-        TAKE(tension, 8)
-        status[i_] = awiwi_index_tendon_stiffness(tension_one, k_one, slope_one, curvature_one);
-        GIVE(k, 8)
-        GIVE(slope, 8)
-        GIVE(curvature, 8)
+        double tension_in_one[8], k_out_one[8], slope_out_one[8], curvature_out_one[8];
+        TAKE(tension_in, 8)
+        status[i_] = awiwi_index_tendon_stiffness(tension_in_one, k_out_one, slope_out_one, curvature_out_one);
+        GIVE(k_out, 8)
+        GIVE(slope_out, 8)
+        GIVE(curvature_out, 8)
     }
 }
 
-void awiwi_index_tendon_stiffness_batch(ptrdiff_t samples, const double *tension, ptrdiff_t tension_sample, ptrdiff_t tension_element, double *k, ptrdiff_t k_sample, ptrdiff_t k_element, double *slope, ptrdiff_t slope_sample, ptrdiff_t slope_element, double *curvature, ptrdiff_t curvature_sample, ptrdiff_t curvature_element, int *status)
+void awiwi_index_tendon_stiffness_batch(ptrdiff_t samples, const double *tension_in, ptrdiff_t tension_in_sample, ptrdiff_t tension_in_element, double *k_out, ptrdiff_t k_out_sample, ptrdiff_t k_out_element, double *slope_out, ptrdiff_t slope_out_sample, ptrdiff_t slope_out_element, double *curvature_out, ptrdiff_t curvature_out_sample, ptrdiff_t curvature_out_element, int *status)
 {
-    double tension_rows[8*BLOCK], k_rows[8*BLOCK], slope_rows[8*BLOCK], curvature_rows[8*BLOCK];
+    double tension_in_rows[8*BLOCK], k_out_rows[8*BLOCK], slope_out_rows[8*BLOCK], curvature_out_rows[8*BLOCK];
     int status_rows[BLOCK];
     EACH_BLOCK {
-        GATHER(tension, 8)
-        block(AT(tension), AT(k), AT(slope), AT(curvature), status_rows);
-        SCATTER(k, 8)
-        SCATTER(slope, 8)
-        SCATTER(curvature, 8)
+        GATHER(tension_in, 8)
+        block(AT(tension_in), AT(k_out), AT(slope_out), AT(curvature_out), status_rows);
+        SCATTER(k_out, 8)
+        SCATTER(slope_out, 8)
+        SCATTER(curvature_out, 8)
         memcpy(status + first_, status_rows, (size_t)COUNT * sizeof *status);
     }
 }

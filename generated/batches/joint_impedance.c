@@ -2,46 +2,47 @@
  *
  * joint_impedance of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_joint_impedance(const double M[16], const double C[16], const double gravity[4], const double q[4], const double qd[4], const double q_des[4], const double qd_des[4], const double qdd_des[4], const double K[16], const double D[16], double tau[4]);
+INLINED void awiwi_joint_impedance(const double M_in[16], const double C_in[16], const double gravity_in[4], const double q_in[4], const double qd_in[4], const double q_des_in[4], const double qd_des_in[4], const double qdd_des_in[4], const double K_in[16], const double D_in[16], double tau_out[4]);
 #include "../joint_impedance.c"
 
-VECTORS void block(const double *restrict M_at, ptrdiff_t M_row, const double *restrict C_at, ptrdiff_t C_row, const double *restrict gravity_at, ptrdiff_t gravity_row, const double *restrict q_at, ptrdiff_t q_row, const double *restrict qd_at, ptrdiff_t qd_row, const double *restrict q_des_at, ptrdiff_t q_des_row, const double *restrict qd_des_at, ptrdiff_t qd_des_row, const double *restrict qdd_des_at, ptrdiff_t qdd_des_row, const double *restrict K_at, ptrdiff_t K_row, const double *restrict D_at, ptrdiff_t D_row, double *restrict tau_at, ptrdiff_t tau_row)
+VECTORS void block(const double *restrict M_in_at, ptrdiff_t M_in_row, const double *restrict C_in_at, ptrdiff_t C_in_row, const double *restrict gravity_in_at, ptrdiff_t gravity_in_row, const double *restrict q_in_at, ptrdiff_t q_in_row, const double *restrict qd_in_at, ptrdiff_t qd_in_row, const double *restrict q_des_in_at, ptrdiff_t q_des_in_row, const double *restrict qd_des_in_at, ptrdiff_t qd_des_in_row, const double *restrict qdd_des_in_at, ptrdiff_t qdd_des_in_row, const double *restrict K_in_at, ptrdiff_t K_in_row, const double *restrict D_in_at, ptrdiff_t D_in_row, double *restrict tau_out_at, ptrdiff_t tau_out_row)
 {
     EACH_SAMPLE {
-        double M_one[16], C_one[16], gravity_one[4], q_one[4], qd_one[4], q_des_one[4], qd_des_one[4], qdd_des_one[4], K_one[16], D_one[16], tau_one[4];
-        TAKE(M, 16)
-        TAKE(C, 16)
-        TAKE(gravity, 4)
-        TAKE(q, 4)
-        TAKE(qd, 4)
-        TAKE(q_des, 4)
-        TAKE(qd_des, 4)
-        TAKE(qdd_des, 4)
-        TAKE(K, 16)
-        TAKE(D, 16)
-        awiwi_joint_impedance(M_one, C_one, gravity_one, q_one, qd_one, q_des_one, qd_des_one, qdd_des_one, K_one, D_one, tau_one);
-        GIVE(tau, 4)
+        double M_in_one[16], C_in_one[16], gravity_in_one[4], q_in_one[4], qd_in_one[4], q_des_in_one[4], qd_des_in_one[4], qdd_des_in_one[4], K_in_one[16], D_in_one[16], tau_out_one[4];
+        TAKE(M_in, 16)
+        TAKE(C_in, 16)
+        TAKE(gravity_in, 4)
+        TAKE(q_in, 4)
+        TAKE(qd_in, 4)
+        TAKE(q_des_in, 4)
+        TAKE(qd_des_in, 4)
+        TAKE(qdd_des_in, 4)
+        TAKE(K_in, 16)
+        TAKE(D_in, 16)
+        awiwi_joint_impedance(M_in_one, C_in_one, gravity_in_one, q_in_one, qd_in_one, q_des_in_one, qd_des_in_one, qdd_des_in_one, K_in_one, D_in_one, tau_out_one);
+        GIVE(tau_out, 4)
     }
 }
 
-void awiwi_joint_impedance_batch(ptrdiff_t samples, const double *M, ptrdiff_t M_sample, ptrdiff_t M_element, const double *C, ptrdiff_t C_sample, ptrdiff_t C_element, const double *gravity, ptrdiff_t gravity_sample, ptrdiff_t gravity_element, const double *q, ptrdiff_t q_sample, ptrdiff_t q_element, const double *qd, ptrdiff_t qd_sample, ptrdiff_t qd_element, const double *q_des, ptrdiff_t q_des_sample, ptrdiff_t q_des_element, const double *qd_des, ptrdiff_t qd_des_sample, ptrdiff_t qd_des_element, const double *qdd_des, ptrdiff_t qdd_des_sample, ptrdiff_t qdd_des_element, const double *K, ptrdiff_t K_sample, ptrdiff_t K_element, const double *D, ptrdiff_t D_sample, ptrdiff_t D_element, double *tau, ptrdiff_t tau_sample, ptrdiff_t tau_element)
+void awiwi_joint_impedance_batch(ptrdiff_t samples, const double *M_in, ptrdiff_t M_in_sample, ptrdiff_t M_in_element, const double *C_in, ptrdiff_t C_in_sample, ptrdiff_t C_in_element, const double *gravity_in, ptrdiff_t gravity_in_sample, ptrdiff_t gravity_in_element, const double *q_in, ptrdiff_t q_in_sample, ptrdiff_t q_in_element, const double *qd_in, ptrdiff_t qd_in_sample, ptrdiff_t qd_in_element, const double *q_des_in, ptrdiff_t q_des_in_sample, ptrdiff_t q_des_in_element, const double *qd_des_in, ptrdiff_t qd_des_in_sample, ptrdiff_t qd_des_in_element, const double *qdd_des_in, ptrdiff_t qdd_des_in_sample, ptrdiff_t qdd_des_in_element, const double *K_in, ptrdiff_t K_in_sample, ptrdiff_t K_in_element, const double *D_in, ptrdiff_t D_in_sample, ptrdiff_t D_in_element, double *tau_out, ptrdiff_t tau_out_sample, ptrdiff_t tau_out_element)
 {
-    double M_rows[16*BLOCK], C_rows[16*BLOCK], gravity_rows[4*BLOCK], q_rows[4*BLOCK], qd_rows[4*BLOCK], q_des_rows[4*BLOCK], qd_des_rows[4*BLOCK], qdd_des_rows[4*BLOCK], K_rows[16*BLOCK], D_rows[16*BLOCK], tau_rows[4*BLOCK];
+    double M_in_rows[16*BLOCK], C_in_rows[16*BLOCK], gravity_in_rows[4*BLOCK], q_in_rows[4*BLOCK], qd_in_rows[4*BLOCK], q_des_in_rows[4*BLOCK], qd_des_in_rows[4*BLOCK], qdd_des_in_rows[4*BLOCK], K_in_rows[16*BLOCK], D_in_rows[16*BLOCK], tau_out_rows[4*BLOCK];
     EACH_BLOCK {
-        GATHER(M, 16)
-        GATHER(C, 16)
-        GATHER(gravity, 4)
-        GATHER(q, 4)
-        GATHER(qd, 4)
-        GATHER(q_des, 4)
-        GATHER(qd_des, 4)
-        GATHER(qdd_des, 4)
-        GATHER(K, 16)
-        GATHER(D, 16)
-        block(AT(M), AT(C), AT(gravity), AT(q), AT(qd), AT(q_des), AT(qd_des), AT(qdd_des), AT(K), AT(D), AT(tau));
-        SCATTER(tau, 4)
+        GATHER(M_in, 16)
+        GATHER(C_in, 16)
+        GATHER(gravity_in, 4)
+        GATHER(q_in, 4)
+        GATHER(qd_in, 4)
+        GATHER(q_des_in, 4)
+        GATHER(qd_des_in, 4)
+        GATHER(qdd_des_in, 4)
+        GATHER(K_in, 16)
+        GATHER(D_in, 16)
+        block(AT(M_in), AT(C_in), AT(gravity_in), AT(q_in), AT(qd_in), AT(q_des_in), AT(qd_des_in), AT(qdd_des_in), AT(K_in), AT(D_in), AT(tau_out));
+        SCATTER(tau_out, 4)
     }
 }

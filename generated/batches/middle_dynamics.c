@@ -2,38 +2,39 @@
  *
  * middle_dynamics of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_middle_dynamics(const double q[4], const double qd[4], const double g[3], double M[16], double C[16], double gravity[4]);
+INLINED void awiwi_middle_dynamics(const double q_in[4], const double qd_in[4], const double g_in[3], double M_out[16], double C_out[16], double gravity_out[4]);
 #include "../middle_dynamics.c"
 
-VECTORS void block(const double *restrict q_at, ptrdiff_t q_row, const double *restrict qd_at, ptrdiff_t qd_row, const double *restrict g_at, ptrdiff_t g_row, double *restrict M_at, ptrdiff_t M_row, double *restrict C_at, ptrdiff_t C_row, double *restrict gravity_at, ptrdiff_t gravity_row)
+VECTORS void block(const double *restrict q_in_at, ptrdiff_t q_in_row, const double *restrict qd_in_at, ptrdiff_t qd_in_row, const double *restrict g_in_at, ptrdiff_t g_in_row, double *restrict M_out_at, ptrdiff_t M_out_row, double *restrict C_out_at, ptrdiff_t C_out_row, double *restrict gravity_out_at, ptrdiff_t gravity_out_row)
 {
     EACH_SAMPLE {
-        double q_one[4], qd_one[4], g_one[3], M_one[16], C_one[16], gravity_one[4];
-        TAKE(q, 4)
-        TAKE(qd, 4)
-        TAKE(g, 3)
-        awiwi_middle_dynamics(q_one, qd_one, g_one, M_one, C_one, gravity_one);
-        GIVE(M, 16)
-        GIVE(C, 16)
-        GIVE(gravity, 4)
+        double q_in_one[4], qd_in_one[4], g_in_one[3], M_out_one[16], C_out_one[16], gravity_out_one[4];
+        TAKE(q_in, 4)
+        TAKE(qd_in, 4)
+        TAKE(g_in, 3)
+        awiwi_middle_dynamics(q_in_one, qd_in_one, g_in_one, M_out_one, C_out_one, gravity_out_one);
+        GIVE(M_out, 16)
+        GIVE(C_out, 16)
+        GIVE(gravity_out, 4)
     }
 }
 
-void awiwi_middle_dynamics_batch(ptrdiff_t samples, const double *q, ptrdiff_t q_sample, ptrdiff_t q_element, const double *qd, ptrdiff_t qd_sample, ptrdiff_t qd_element, const double *g, ptrdiff_t g_sample, ptrdiff_t g_element, double *M, ptrdiff_t M_sample, ptrdiff_t M_element, double *C, ptrdiff_t C_sample, ptrdiff_t C_element, double *gravity, ptrdiff_t gravity_sample, ptrdiff_t gravity_element)
+void awiwi_middle_dynamics_batch(ptrdiff_t samples, const double *q_in, ptrdiff_t q_in_sample, ptrdiff_t q_in_element, const double *qd_in, ptrdiff_t qd_in_sample, ptrdiff_t qd_in_element, const double *g_in, ptrdiff_t g_in_sample, ptrdiff_t g_in_element, double *M_out, ptrdiff_t M_out_sample, ptrdiff_t M_out_element, double *C_out, ptrdiff_t C_out_sample, ptrdiff_t C_out_element, double *gravity_out, ptrdiff_t gravity_out_sample, ptrdiff_t gravity_out_element)
 {
-    double q_rows[4*BLOCK], qd_rows[4*BLOCK], g_rows[3*BLOCK], M_rows[16*BLOCK], C_rows[16*BLOCK], gravity_rows[4*BLOCK];
+    double q_in_rows[4*BLOCK], qd_in_rows[4*BLOCK], g_in_rows[3*BLOCK], M_out_rows[16*BLOCK], C_out_rows[16*BLOCK], gravity_out_rows[4*BLOCK];
     EACH_BLOCK {
-        GATHER(q, 4)
-        GATHER(qd, 4)
-        GATHER(g, 3)
-        EXPECT(M, 16)
-        EXPECT(C, 16)
-        block(AT(q), AT(qd), AT(g), AT(M), AT(C), AT(gravity));
-        SCATTER(M, 16)
-        SCATTER(C, 16)
-        SCATTER(gravity, 4)
+        GATHER(q_in, 4)
+        GATHER(qd_in, 4)
+        GATHER(g_in, 3)
+        PREFETCH_ROWS(M_out, 16)
+        PREFETCH_ROWS(C_out, 16)
+        block(AT(q_in), AT(qd_in), AT(g_in), AT(M_out), AT(C_out), AT(gravity_out));
+        SCATTER(M_out, 16)
+        SCATTER(C_out, 16)
+        SCATTER(gravity_out, 4)
     }
 }

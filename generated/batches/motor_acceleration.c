@@ -2,34 +2,35 @@
  *
  * motor_acceleration of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_motor_acceleration(const double theta[1], const double thd[1], const double tau[1], const double f[1], double thdd[1]);
+INLINED void awiwi_motor_acceleration(const double theta_in[1], const double thd_in[1], const double tau_in[1], const double f_in[1], double thdd_out[1]);
 #include "../motor_acceleration.c"
 
-VECTORS void block(const double *restrict theta_at, ptrdiff_t theta_row, const double *restrict thd_at, ptrdiff_t thd_row, const double *restrict tau_at, ptrdiff_t tau_row, const double *restrict f_at, ptrdiff_t f_row, double *restrict thdd_at, ptrdiff_t thdd_row)
+VECTORS void block(const double *restrict theta_in_at, ptrdiff_t theta_in_row, const double *restrict thd_in_at, ptrdiff_t thd_in_row, const double *restrict tau_in_at, ptrdiff_t tau_in_row, const double *restrict f_in_at, ptrdiff_t f_in_row, double *restrict thdd_out_at, ptrdiff_t thdd_out_row)
 {
     EACH_SAMPLE {
-        double theta_one[1], thd_one[1], tau_one[1], f_one[1], thdd_one[1];
-        TAKE(theta, 1)
-        TAKE(thd, 1)
-        TAKE(tau, 1)
-        TAKE(f, 1)
-        awiwi_motor_acceleration(theta_one, thd_one, tau_one, f_one, thdd_one);
-        GIVE(thdd, 1)
+        double theta_in_one[1], thd_in_one[1], tau_in_one[1], f_in_one[1], thdd_out_one[1];
+        TAKE(theta_in, 1)
+        TAKE(thd_in, 1)
+        TAKE(tau_in, 1)
+        TAKE(f_in, 1)
+        awiwi_motor_acceleration(theta_in_one, thd_in_one, tau_in_one, f_in_one, thdd_out_one);
+        GIVE(thdd_out, 1)
     }
 }
 
-void awiwi_motor_acceleration_batch(ptrdiff_t samples, const double *theta, ptrdiff_t theta_sample, ptrdiff_t theta_element, const double *thd, ptrdiff_t thd_sample, ptrdiff_t thd_element, const double *tau, ptrdiff_t tau_sample, ptrdiff_t tau_element, const double *f, ptrdiff_t f_sample, ptrdiff_t f_element, double *thdd, ptrdiff_t thdd_sample, ptrdiff_t thdd_element)
+void awiwi_motor_acceleration_batch(ptrdiff_t samples, const double *theta_in, ptrdiff_t theta_in_sample, ptrdiff_t theta_in_element, const double *thd_in, ptrdiff_t thd_in_sample, ptrdiff_t thd_in_element, const double *tau_in, ptrdiff_t tau_in_sample, ptrdiff_t tau_in_element, const double *f_in, ptrdiff_t f_in_sample, ptrdiff_t f_in_element, double *thdd_out, ptrdiff_t thdd_out_sample, ptrdiff_t thdd_out_element)
 {
-    double theta_rows[1*BLOCK], thd_rows[1*BLOCK], tau_rows[1*BLOCK], f_rows[1*BLOCK], thdd_rows[1*BLOCK];
+    double theta_in_rows[1*BLOCK], thd_in_rows[1*BLOCK], tau_in_rows[1*BLOCK], f_in_rows[1*BLOCK], thdd_out_rows[1*BLOCK];
     EACH_BLOCK {
-        GATHER(theta, 1)
-        GATHER(thd, 1)
-        GATHER(tau, 1)
-        GATHER(f, 1)
-        block(AT(theta), AT(thd), AT(tau), AT(f), AT(thdd));
-        SCATTER(thdd, 1)
+        GATHER(theta_in, 1)
+        GATHER(thd_in, 1)
+        GATHER(tau_in, 1)
+        GATHER(f_in, 1)
+        block(AT(theta_in), AT(thd_in), AT(tau_in), AT(f_in), AT(thdd_out));
+        SCATTER(thdd_out, 1)
     }
 }

@@ -2,30 +2,31 @@
  *
  * motor_compensation of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_motor_compensation(const double theta[1], const double thd[1], double tau[1]);
+INLINED void awiwi_motor_compensation(const double theta_in[1], const double thd_in[1], double tau_out[1]);
 #include "../motor_compensation.c"
 
-VECTORS void block(const double *restrict theta_at, ptrdiff_t theta_row, const double *restrict thd_at, ptrdiff_t thd_row, double *restrict tau_at, ptrdiff_t tau_row)
+VECTORS void block(const double *restrict theta_in_at, ptrdiff_t theta_in_row, const double *restrict thd_in_at, ptrdiff_t thd_in_row, double *restrict tau_out_at, ptrdiff_t tau_out_row)
 {
     EACH_SAMPLE {
-        double theta_one[1], thd_one[1], tau_one[1];
-        TAKE(theta, 1)
-        TAKE(thd, 1)
-        awiwi_motor_compensation(theta_one, thd_one, tau_one);
-        GIVE(tau, 1)
+        double theta_in_one[1], thd_in_one[1], tau_out_one[1];
+        TAKE(theta_in, 1)
+        TAKE(thd_in, 1)
+        awiwi_motor_compensation(theta_in_one, thd_in_one, tau_out_one);
+        GIVE(tau_out, 1)
     }
 }
 
-void awiwi_motor_compensation_batch(ptrdiff_t samples, const double *theta, ptrdiff_t theta_sample, ptrdiff_t theta_element, const double *thd, ptrdiff_t thd_sample, ptrdiff_t thd_element, double *tau, ptrdiff_t tau_sample, ptrdiff_t tau_element)
+void awiwi_motor_compensation_batch(ptrdiff_t samples, const double *theta_in, ptrdiff_t theta_in_sample, ptrdiff_t theta_in_element, const double *thd_in, ptrdiff_t thd_in_sample, ptrdiff_t thd_in_element, double *tau_out, ptrdiff_t tau_out_sample, ptrdiff_t tau_out_element)
 {
-    double theta_rows[1*BLOCK], thd_rows[1*BLOCK], tau_rows[1*BLOCK];
+    double theta_in_rows[1*BLOCK], thd_in_rows[1*BLOCK], tau_out_rows[1*BLOCK];
     EACH_BLOCK {
-        GATHER(theta, 1)
-        GATHER(thd, 1)
-        block(AT(theta), AT(thd), AT(tau));
-        SCATTER(tau, 1)
+        GATHER(theta_in, 1)
+        GATHER(thd_in, 1)
+        block(AT(theta_in), AT(thd_in), AT(tau_out));
+        SCATTER(tau_out, 1)
     }
 }

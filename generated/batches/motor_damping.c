@@ -2,28 +2,29 @@
  *
  * motor_damping of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_motor_damping(const double thd[1], double damping[1]);
+INLINED void awiwi_motor_damping(const double thd_in[1], double damping_out[1]);
 #include "../motor_damping.c"
 
-VECTORS void block(const double *restrict thd_at, ptrdiff_t thd_row, double *restrict damping_at, ptrdiff_t damping_row)
+VECTORS void block(const double *restrict thd_in_at, ptrdiff_t thd_in_row, double *restrict damping_out_at, ptrdiff_t damping_out_row)
 {
     EACH_SAMPLE {
-        double thd_one[1], damping_one[1];
-        TAKE(thd, 1)
-        awiwi_motor_damping(thd_one, damping_one);
-        GIVE(damping, 1)
+        double thd_in_one[1], damping_out_one[1];
+        TAKE(thd_in, 1)
+        awiwi_motor_damping(thd_in_one, damping_out_one);
+        GIVE(damping_out, 1)
     }
 }
 
-void awiwi_motor_damping_batch(ptrdiff_t samples, const double *thd, ptrdiff_t thd_sample, ptrdiff_t thd_element, double *damping, ptrdiff_t damping_sample, ptrdiff_t damping_element)
+void awiwi_motor_damping_batch(ptrdiff_t samples, const double *thd_in, ptrdiff_t thd_in_sample, ptrdiff_t thd_in_element, double *damping_out, ptrdiff_t damping_out_sample, ptrdiff_t damping_out_element)
 {
-    double thd_rows[1*BLOCK], damping_rows[1*BLOCK];
+    double thd_in_rows[1*BLOCK], damping_out_rows[1*BLOCK];
     EACH_BLOCK {
-        GATHER(thd, 1)
-        block(AT(thd), AT(damping));
-        SCATTER(damping, 1)
+        GATHER(thd_in, 1)
+        block(AT(thd_in), AT(damping_out));
+        SCATTER(damping_out, 1)
     }
 }

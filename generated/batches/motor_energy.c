@@ -2,28 +2,29 @@
  *
  * motor_energy of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_motor_energy(const double thd[1], double energy[1]);
+INLINED void awiwi_motor_energy(const double thd_in[1], double energy_out[1]);
 #include "../motor_energy.c"
 
-VECTORS void block(const double *restrict thd_at, ptrdiff_t thd_row, double *restrict energy_at, ptrdiff_t energy_row)
+VECTORS void block(const double *restrict thd_in_at, ptrdiff_t thd_in_row, double *restrict energy_out_at, ptrdiff_t energy_out_row)
 {
     EACH_SAMPLE {
-        double thd_one[1], energy_one[1];
-        TAKE(thd, 1)
-        awiwi_motor_energy(thd_one, energy_one);
-        GIVE(energy, 1)
+        double thd_in_one[1], energy_out_one[1];
+        TAKE(thd_in, 1)
+        awiwi_motor_energy(thd_in_one, energy_out_one);
+        GIVE(energy_out, 1)
     }
 }
 
-void awiwi_motor_energy_batch(ptrdiff_t samples, const double *thd, ptrdiff_t thd_sample, ptrdiff_t thd_element, double *energy, ptrdiff_t energy_sample, ptrdiff_t energy_element)
+void awiwi_motor_energy_batch(ptrdiff_t samples, const double *thd_in, ptrdiff_t thd_in_sample, ptrdiff_t thd_in_element, double *energy_out, ptrdiff_t energy_out_sample, ptrdiff_t energy_out_element)
 {
-    double thd_rows[1*BLOCK], energy_rows[1*BLOCK];
+    double thd_in_rows[1*BLOCK], energy_out_rows[1*BLOCK];
     EACH_BLOCK {
-        GATHER(thd, 1)
-        block(AT(thd), AT(energy));
-        SCATTER(energy, 1)
+        GATHER(thd_in, 1)
+        block(AT(thd_in), AT(energy_out));
+        SCATTER(energy_out, 1)
     }
 }

@@ -2,28 +2,29 @@
  *
  * motor_friction of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_motor_friction(const double thd[1], double tau[1]);
+INLINED void awiwi_motor_friction(const double thd_in[1], double tau_out[1]);
 #include "../motor_friction.c"
 
-VECTORS void block(const double *restrict thd_at, ptrdiff_t thd_row, double *restrict tau_at, ptrdiff_t tau_row)
+VECTORS void block(const double *restrict thd_in_at, ptrdiff_t thd_in_row, double *restrict tau_out_at, ptrdiff_t tau_out_row)
 {
     EACH_SAMPLE {
-        double thd_one[1], tau_one[1];
-        TAKE(thd, 1)
-        awiwi_motor_friction(thd_one, tau_one);
-        GIVE(tau, 1)
+        double thd_in_one[1], tau_out_one[1];
+        TAKE(thd_in, 1)
+        awiwi_motor_friction(thd_in_one, tau_out_one);
+        GIVE(tau_out, 1)
     }
 }
 
-void awiwi_motor_friction_batch(ptrdiff_t samples, const double *thd, ptrdiff_t thd_sample, ptrdiff_t thd_element, double *tau, ptrdiff_t tau_sample, ptrdiff_t tau_element)
+void awiwi_motor_friction_batch(ptrdiff_t samples, const double *thd_in, ptrdiff_t thd_in_sample, ptrdiff_t thd_in_element, double *tau_out, ptrdiff_t tau_out_sample, ptrdiff_t tau_out_element)
 {
-    double thd_rows[1*BLOCK], tau_rows[1*BLOCK];
+    double thd_in_rows[1*BLOCK], tau_out_rows[1*BLOCK];
     EACH_BLOCK {
-        GATHER(thd, 1)
-        block(AT(thd), AT(tau));
-        SCATTER(tau, 1)
+        GATHER(thd_in, 1)
+        block(AT(thd_in), AT(tau_out));
+        SCATTER(tau_out, 1)
     }
 }

@@ -2,44 +2,45 @@
  *
  * motor_impedance of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED int awiwi_motor_impedance(const double theta[1], const double thd[1], const double theta_des[1], const double f_des[1], const double friction[1], const double r[1], const double motor_kp[1], const double motor_kd[1], double tau[1]);
+INLINED int awiwi_motor_impedance(const double theta_in[1], const double thd_in[1], const double theta_des_in[1], const double f_des_in[1], const double friction_in[1], const double r_in[1], const double motor_kp_in[1], const double motor_kd_in[1], double tau_out[1]);
 #include "../motor_impedance.c"
 
-VECTORS void block(const double *restrict theta_at, ptrdiff_t theta_row, const double *restrict thd_at, ptrdiff_t thd_row, const double *restrict theta_des_at, ptrdiff_t theta_des_row, const double *restrict f_des_at, ptrdiff_t f_des_row, const double *restrict friction_at, ptrdiff_t friction_row, const double *restrict r_at, ptrdiff_t r_row, const double *restrict motor_kp_at, ptrdiff_t motor_kp_row, const double *restrict motor_kd_at, ptrdiff_t motor_kd_row, double *restrict tau_at, ptrdiff_t tau_row, int *restrict status)
+VECTORS void block(const double *restrict theta_in_at, ptrdiff_t theta_in_row, const double *restrict thd_in_at, ptrdiff_t thd_in_row, const double *restrict theta_des_in_at, ptrdiff_t theta_des_in_row, const double *restrict f_des_in_at, ptrdiff_t f_des_in_row, const double *restrict friction_in_at, ptrdiff_t friction_in_row, const double *restrict r_in_at, ptrdiff_t r_in_row, const double *restrict motor_kp_in_at, ptrdiff_t motor_kp_in_row, const double *restrict motor_kd_in_at, ptrdiff_t motor_kd_in_row, double *restrict tau_out_at, ptrdiff_t tau_out_row, int *restrict status)
 {
     EACH_SAMPLE {
-        double theta_one[1], thd_one[1], theta_des_one[1], f_des_one[1], friction_one[1], r_one[1], motor_kp_one[1], motor_kd_one[1], tau_one[1];
-        TAKE(theta, 1)
-        TAKE(thd, 1)
-        TAKE(theta_des, 1)
-        TAKE(f_des, 1)
-        TAKE(friction, 1)
-        TAKE(r, 1)
-        TAKE(motor_kp, 1)
-        TAKE(motor_kd, 1)
-        status[i_] = awiwi_motor_impedance(theta_one, thd_one, theta_des_one, f_des_one, friction_one, r_one, motor_kp_one, motor_kd_one, tau_one);
-        GIVE(tau, 1)
+        double theta_in_one[1], thd_in_one[1], theta_des_in_one[1], f_des_in_one[1], friction_in_one[1], r_in_one[1], motor_kp_in_one[1], motor_kd_in_one[1], tau_out_one[1];
+        TAKE(theta_in, 1)
+        TAKE(thd_in, 1)
+        TAKE(theta_des_in, 1)
+        TAKE(f_des_in, 1)
+        TAKE(friction_in, 1)
+        TAKE(r_in, 1)
+        TAKE(motor_kp_in, 1)
+        TAKE(motor_kd_in, 1)
+        status[i_] = awiwi_motor_impedance(theta_in_one, thd_in_one, theta_des_in_one, f_des_in_one, friction_in_one, r_in_one, motor_kp_in_one, motor_kd_in_one, tau_out_one);
+        GIVE(tau_out, 1)
     }
 }
 
-void awiwi_motor_impedance_batch(ptrdiff_t samples, const double *theta, ptrdiff_t theta_sample, ptrdiff_t theta_element, const double *thd, ptrdiff_t thd_sample, ptrdiff_t thd_element, const double *theta_des, ptrdiff_t theta_des_sample, ptrdiff_t theta_des_element, const double *f_des, ptrdiff_t f_des_sample, ptrdiff_t f_des_element, const double *friction, ptrdiff_t friction_sample, ptrdiff_t friction_element, const double *r, ptrdiff_t r_sample, ptrdiff_t r_element, const double *motor_kp, ptrdiff_t motor_kp_sample, ptrdiff_t motor_kp_element, const double *motor_kd, ptrdiff_t motor_kd_sample, ptrdiff_t motor_kd_element, double *tau, ptrdiff_t tau_sample, ptrdiff_t tau_element, int *status)
+void awiwi_motor_impedance_batch(ptrdiff_t samples, const double *theta_in, ptrdiff_t theta_in_sample, ptrdiff_t theta_in_element, const double *thd_in, ptrdiff_t thd_in_sample, ptrdiff_t thd_in_element, const double *theta_des_in, ptrdiff_t theta_des_in_sample, ptrdiff_t theta_des_in_element, const double *f_des_in, ptrdiff_t f_des_in_sample, ptrdiff_t f_des_in_element, const double *friction_in, ptrdiff_t friction_in_sample, ptrdiff_t friction_in_element, const double *r_in, ptrdiff_t r_in_sample, ptrdiff_t r_in_element, const double *motor_kp_in, ptrdiff_t motor_kp_in_sample, ptrdiff_t motor_kp_in_element, const double *motor_kd_in, ptrdiff_t motor_kd_in_sample, ptrdiff_t motor_kd_in_element, double *tau_out, ptrdiff_t tau_out_sample, ptrdiff_t tau_out_element, int *status)
 {
-    double theta_rows[1*BLOCK], thd_rows[1*BLOCK], theta_des_rows[1*BLOCK], f_des_rows[1*BLOCK], friction_rows[1*BLOCK], r_rows[1*BLOCK], motor_kp_rows[1*BLOCK], motor_kd_rows[1*BLOCK], tau_rows[1*BLOCK];
+    double theta_in_rows[1*BLOCK], thd_in_rows[1*BLOCK], theta_des_in_rows[1*BLOCK], f_des_in_rows[1*BLOCK], friction_in_rows[1*BLOCK], r_in_rows[1*BLOCK], motor_kp_in_rows[1*BLOCK], motor_kd_in_rows[1*BLOCK], tau_out_rows[1*BLOCK];
     int status_rows[BLOCK];
     EACH_BLOCK {
-        GATHER(theta, 1)
-        GATHER(thd, 1)
-        GATHER(theta_des, 1)
-        GATHER(f_des, 1)
-        GATHER(friction, 1)
-        GATHER(r, 1)
-        GATHER(motor_kp, 1)
-        GATHER(motor_kd, 1)
-        block(AT(theta), AT(thd), AT(theta_des), AT(f_des), AT(friction), AT(r), AT(motor_kp), AT(motor_kd), AT(tau), status_rows);
-        SCATTER(tau, 1)
+        GATHER(theta_in, 1)
+        GATHER(thd_in, 1)
+        GATHER(theta_des_in, 1)
+        GATHER(f_des_in, 1)
+        GATHER(friction_in, 1)
+        GATHER(r_in, 1)
+        GATHER(motor_kp_in, 1)
+        GATHER(motor_kd_in, 1)
+        block(AT(theta_in), AT(thd_in), AT(theta_des_in), AT(f_des_in), AT(friction_in), AT(r_in), AT(motor_kp_in), AT(motor_kd_in), AT(tau_out), status_rows);
+        SCATTER(tau_out, 1)
         memcpy(status + first_, status_rows, (size_t)COUNT * sizeof *status);
     }
 }

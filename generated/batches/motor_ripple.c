@@ -2,28 +2,29 @@
  *
  * motor_ripple of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_motor_ripple(const double theta[1], double tau[1]);
+INLINED void awiwi_motor_ripple(const double theta_in[1], double tau_out[1]);
 #include "../motor_ripple.c"
 
-VECTORS void block(const double *restrict theta_at, ptrdiff_t theta_row, double *restrict tau_at, ptrdiff_t tau_row)
+VECTORS void block(const double *restrict theta_in_at, ptrdiff_t theta_in_row, double *restrict tau_out_at, ptrdiff_t tau_out_row)
 {
     EACH_SAMPLE {
-        double theta_one[1], tau_one[1];
-        TAKE(theta, 1)
-        awiwi_motor_ripple(theta_one, tau_one);
-        GIVE(tau, 1)
+        double theta_in_one[1], tau_out_one[1];
+        TAKE(theta_in, 1)
+        awiwi_motor_ripple(theta_in_one, tau_out_one);
+        GIVE(tau_out, 1)
     }
 }
 
-void awiwi_motor_ripple_batch(ptrdiff_t samples, const double *theta, ptrdiff_t theta_sample, ptrdiff_t theta_element, double *tau, ptrdiff_t tau_sample, ptrdiff_t tau_element)
+void awiwi_motor_ripple_batch(ptrdiff_t samples, const double *theta_in, ptrdiff_t theta_in_sample, ptrdiff_t theta_in_element, double *tau_out, ptrdiff_t tau_out_sample, ptrdiff_t tau_out_element)
 {
-    double theta_rows[1*BLOCK], tau_rows[1*BLOCK];
+    double theta_in_rows[1*BLOCK], tau_out_rows[1*BLOCK];
     EACH_BLOCK {
-        GATHER(theta, 1)
-        block(AT(theta), AT(tau));
-        SCATTER(tau, 1)
+        GATHER(theta_in, 1)
+        block(AT(theta_in), AT(tau_out));
+        SCATTER(tau_out, 1)
     }
 }

@@ -2,36 +2,37 @@
  *
  * optimal_backstepping_rates of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED int awiwi_optimal_backstepping_rates(const double K_opt[4], const double plant[3], const double impedance[2], const double weights[2], double rates[2]);
+INLINED int awiwi_optimal_backstepping_rates(const double K_opt_in[4], const double plant_in[3], const double impedance_in[2], const double weights_in[2], double rates_out[2]);
 #include "../optimal_backstepping_rates.c"
 
-VECTORS void block(const double *restrict K_opt_at, ptrdiff_t K_opt_row, const double *restrict plant_at, ptrdiff_t plant_row, const double *restrict impedance_at, ptrdiff_t impedance_row, const double *restrict weights_at, ptrdiff_t weights_row, double *restrict rates_at, ptrdiff_t rates_row, int *restrict status)
+VECTORS void block(const double *restrict K_opt_in_at, ptrdiff_t K_opt_in_row, const double *restrict plant_in_at, ptrdiff_t plant_in_row, const double *restrict impedance_in_at, ptrdiff_t impedance_in_row, const double *restrict weights_in_at, ptrdiff_t weights_in_row, double *restrict rates_out_at, ptrdiff_t rates_out_row, int *restrict status)
 {
     EACH_SAMPLE {
-        double K_opt_one[4], plant_one[3], impedance_one[2], weights_one[2], rates_one[2];
-        TAKE(K_opt, 4)
-        TAKE(plant, 3)
-        TAKE(impedance, 2)
-        TAKE(weights, 2)
-        status[i_] = awiwi_optimal_backstepping_rates(K_opt_one, plant_one, impedance_one, weights_one, rates_one);
-        GIVE(rates, 2)
+        double K_opt_in_one[4], plant_in_one[3], impedance_in_one[2], weights_in_one[2], rates_out_one[2];
+        TAKE(K_opt_in, 4)
+        TAKE(plant_in, 3)
+        TAKE(impedance_in, 2)
+        TAKE(weights_in, 2)
+        status[i_] = awiwi_optimal_backstepping_rates(K_opt_in_one, plant_in_one, impedance_in_one, weights_in_one, rates_out_one);
+        GIVE(rates_out, 2)
     }
 }
 
-void awiwi_optimal_backstepping_rates_batch(ptrdiff_t samples, const double *K_opt, ptrdiff_t K_opt_sample, ptrdiff_t K_opt_element, const double *plant, ptrdiff_t plant_sample, ptrdiff_t plant_element, const double *impedance, ptrdiff_t impedance_sample, ptrdiff_t impedance_element, const double *weights, ptrdiff_t weights_sample, ptrdiff_t weights_element, double *rates, ptrdiff_t rates_sample, ptrdiff_t rates_element, int *status)
+void awiwi_optimal_backstepping_rates_batch(ptrdiff_t samples, const double *K_opt_in, ptrdiff_t K_opt_in_sample, ptrdiff_t K_opt_in_element, const double *plant_in, ptrdiff_t plant_in_sample, ptrdiff_t plant_in_element, const double *impedance_in, ptrdiff_t impedance_in_sample, ptrdiff_t impedance_in_element, const double *weights_in, ptrdiff_t weights_in_sample, ptrdiff_t weights_in_element, double *rates_out, ptrdiff_t rates_out_sample, ptrdiff_t rates_out_element, int *status)
 {
-    double K_opt_rows[4*BLOCK], plant_rows[3*BLOCK], impedance_rows[2*BLOCK], weights_rows[2*BLOCK], rates_rows[2*BLOCK];
+    double K_opt_in_rows[4*BLOCK], plant_in_rows[3*BLOCK], impedance_in_rows[2*BLOCK], weights_in_rows[2*BLOCK], rates_out_rows[2*BLOCK];
     int status_rows[BLOCK];
     EACH_BLOCK {
-        GATHER(K_opt, 4)
-        GATHER(plant, 3)
-        GATHER(impedance, 2)
-        GATHER(weights, 2)
-        block(AT(K_opt), AT(plant), AT(impedance), AT(weights), AT(rates), status_rows);
-        SCATTER(rates, 2)
+        GATHER(K_opt_in, 4)
+        GATHER(plant_in, 3)
+        GATHER(impedance_in, 2)
+        GATHER(weights_in, 2)
+        block(AT(K_opt_in), AT(plant_in), AT(impedance_in), AT(weights_in), AT(rates_out), status_rows);
+        SCATTER(rates_out, 2)
         memcpy(status + first_, status_rows, (size_t)COUNT * sizeof *status);
     }
 }

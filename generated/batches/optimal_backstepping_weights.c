@@ -2,36 +2,37 @@
  *
  * optimal_backstepping_weights of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED int awiwi_optimal_backstepping_weights(const double K_opt[4], const double plant[3], const double impedance[2], double rates[2], double weights[2]);
+INLINED int awiwi_optimal_backstepping_weights(const double K_opt_in[4], const double plant_in[3], const double impedance_in[2], double rates_out[2], double weights_out[2]);
 #include "../optimal_backstepping_weights.c"
 
-VECTORS void block(const double *restrict K_opt_at, ptrdiff_t K_opt_row, const double *restrict plant_at, ptrdiff_t plant_row, const double *restrict impedance_at, ptrdiff_t impedance_row, double *restrict rates_at, ptrdiff_t rates_row, double *restrict weights_at, ptrdiff_t weights_row, int *restrict status)
+VECTORS void block(const double *restrict K_opt_in_at, ptrdiff_t K_opt_in_row, const double *restrict plant_in_at, ptrdiff_t plant_in_row, const double *restrict impedance_in_at, ptrdiff_t impedance_in_row, double *restrict rates_out_at, ptrdiff_t rates_out_row, double *restrict weights_out_at, ptrdiff_t weights_out_row, int *restrict status)
 {
     EACH_SAMPLE {
-        double K_opt_one[4], plant_one[3], impedance_one[2], rates_one[2], weights_one[2];
-        TAKE(K_opt, 4)
-        TAKE(plant, 3)
-        TAKE(impedance, 2)
-        status[i_] = awiwi_optimal_backstepping_weights(K_opt_one, plant_one, impedance_one, rates_one, weights_one);
-        GIVE(rates, 2)
-        GIVE(weights, 2)
+        double K_opt_in_one[4], plant_in_one[3], impedance_in_one[2], rates_out_one[2], weights_out_one[2];
+        TAKE(K_opt_in, 4)
+        TAKE(plant_in, 3)
+        TAKE(impedance_in, 2)
+        status[i_] = awiwi_optimal_backstepping_weights(K_opt_in_one, plant_in_one, impedance_in_one, rates_out_one, weights_out_one);
+        GIVE(rates_out, 2)
+        GIVE(weights_out, 2)
     }
 }
 
-void awiwi_optimal_backstepping_weights_batch(ptrdiff_t samples, const double *K_opt, ptrdiff_t K_opt_sample, ptrdiff_t K_opt_element, const double *plant, ptrdiff_t plant_sample, ptrdiff_t plant_element, const double *impedance, ptrdiff_t impedance_sample, ptrdiff_t impedance_element, double *rates, ptrdiff_t rates_sample, ptrdiff_t rates_element, double *weights, ptrdiff_t weights_sample, ptrdiff_t weights_element, int *status)
+void awiwi_optimal_backstepping_weights_batch(ptrdiff_t samples, const double *K_opt_in, ptrdiff_t K_opt_in_sample, ptrdiff_t K_opt_in_element, const double *plant_in, ptrdiff_t plant_in_sample, ptrdiff_t plant_in_element, const double *impedance_in, ptrdiff_t impedance_in_sample, ptrdiff_t impedance_in_element, double *rates_out, ptrdiff_t rates_out_sample, ptrdiff_t rates_out_element, double *weights_out, ptrdiff_t weights_out_sample, ptrdiff_t weights_out_element, int *status)
 {
-    double K_opt_rows[4*BLOCK], plant_rows[3*BLOCK], impedance_rows[2*BLOCK], rates_rows[2*BLOCK], weights_rows[2*BLOCK];
+    double K_opt_in_rows[4*BLOCK], plant_in_rows[3*BLOCK], impedance_in_rows[2*BLOCK], rates_out_rows[2*BLOCK], weights_out_rows[2*BLOCK];
     int status_rows[BLOCK];
     EACH_BLOCK {
-        GATHER(K_opt, 4)
-        GATHER(plant, 3)
-        GATHER(impedance, 2)
-        block(AT(K_opt), AT(plant), AT(impedance), AT(rates), AT(weights), status_rows);
-        SCATTER(rates, 2)
-        SCATTER(weights, 2)
+        GATHER(K_opt_in, 4)
+        GATHER(plant_in, 3)
+        GATHER(impedance_in, 2)
+        block(AT(K_opt_in), AT(plant_in), AT(impedance_in), AT(rates_out), AT(weights_out), status_rows);
+        SCATTER(rates_out, 2)
+        SCATTER(weights_out, 2)
         memcpy(status + first_, status_rows, (size_t)COUNT * sizeof *status);
     }
 }

@@ -2,44 +2,45 @@
  *
  * plant_antagonistic of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_plant_antagonistic(const double x[6], const double u[2], const double load[1], const double inertias[3], const double tendons[6], const double damping[1], const double friction[3], double xd[6], double stretches[2], double tau[2]);
+INLINED void awiwi_plant_antagonistic(const double x_in[6], const double u_in[2], const double load_in[1], const double inertias_in[3], const double tendons_in[6], const double damping_in[1], const double friction_in[3], double xd_out[6], double stretches_out[2], double tau_out[2]);
 #include "../plant_antagonistic.c"
 
-VECTORS void block(const double *restrict x_at, ptrdiff_t x_row, const double *restrict u_at, ptrdiff_t u_row, const double *restrict load_at, ptrdiff_t load_row, const double *restrict inertias_at, ptrdiff_t inertias_row, const double *restrict tendons_at, ptrdiff_t tendons_row, const double *restrict damping_at, ptrdiff_t damping_row, const double *restrict friction_at, ptrdiff_t friction_row, double *restrict xd_at, ptrdiff_t xd_row, double *restrict stretches_at, ptrdiff_t stretches_row, double *restrict tau_at, ptrdiff_t tau_row)
+VECTORS void block(const double *restrict x_in_at, ptrdiff_t x_in_row, const double *restrict u_in_at, ptrdiff_t u_in_row, const double *restrict load_in_at, ptrdiff_t load_in_row, const double *restrict inertias_in_at, ptrdiff_t inertias_in_row, const double *restrict tendons_in_at, ptrdiff_t tendons_in_row, const double *restrict damping_in_at, ptrdiff_t damping_in_row, const double *restrict friction_in_at, ptrdiff_t friction_in_row, double *restrict xd_out_at, ptrdiff_t xd_out_row, double *restrict stretches_out_at, ptrdiff_t stretches_out_row, double *restrict tau_out_at, ptrdiff_t tau_out_row)
 {
     EACH_SAMPLE {
-        double x_one[6], u_one[2], load_one[1], inertias_one[3], tendons_one[6], damping_one[1], friction_one[3], xd_one[6], stretches_one[2], tau_one[2];
-        TAKE(x, 6)
-        TAKE(u, 2)
-        TAKE(load, 1)
-        TAKE(inertias, 3)
-        TAKE(tendons, 6)
-        TAKE(damping, 1)
-        TAKE(friction, 3)
-        awiwi_plant_antagonistic(x_one, u_one, load_one, inertias_one, tendons_one, damping_one, friction_one, xd_one, stretches_one, tau_one);
-        GIVE(xd, 6)
-        GIVE(stretches, 2)
-        GIVE(tau, 2)
+        double x_in_one[6], u_in_one[2], load_in_one[1], inertias_in_one[3], tendons_in_one[6], damping_in_one[1], friction_in_one[3], xd_out_one[6], stretches_out_one[2], tau_out_one[2];
+        TAKE(x_in, 6)
+        TAKE(u_in, 2)
+        TAKE(load_in, 1)
+        TAKE(inertias_in, 3)
+        TAKE(tendons_in, 6)
+        TAKE(damping_in, 1)
+        TAKE(friction_in, 3)
+        awiwi_plant_antagonistic(x_in_one, u_in_one, load_in_one, inertias_in_one, tendons_in_one, damping_in_one, friction_in_one, xd_out_one, stretches_out_one, tau_out_one);
+        GIVE(xd_out, 6)
+        GIVE(stretches_out, 2)
+        GIVE(tau_out, 2)
     }
 }
 
-void awiwi_plant_antagonistic_batch(ptrdiff_t samples, const double *x, ptrdiff_t x_sample, ptrdiff_t x_element, const double *u, ptrdiff_t u_sample, ptrdiff_t u_element, const double *load, ptrdiff_t load_sample, ptrdiff_t load_element, const double *inertias, ptrdiff_t inertias_sample, ptrdiff_t inertias_element, const double *tendons, ptrdiff_t tendons_sample, ptrdiff_t tendons_element, const double *damping, ptrdiff_t damping_sample, ptrdiff_t damping_element, const double *friction, ptrdiff_t friction_sample, ptrdiff_t friction_element, double *xd, ptrdiff_t xd_sample, ptrdiff_t xd_element, double *stretches, ptrdiff_t stretches_sample, ptrdiff_t stretches_element, double *tau, ptrdiff_t tau_sample, ptrdiff_t tau_element)
+void awiwi_plant_antagonistic_batch(ptrdiff_t samples, const double *x_in, ptrdiff_t x_in_sample, ptrdiff_t x_in_element, const double *u_in, ptrdiff_t u_in_sample, ptrdiff_t u_in_element, const double *load_in, ptrdiff_t load_in_sample, ptrdiff_t load_in_element, const double *inertias_in, ptrdiff_t inertias_in_sample, ptrdiff_t inertias_in_element, const double *tendons_in, ptrdiff_t tendons_in_sample, ptrdiff_t tendons_in_element, const double *damping_in, ptrdiff_t damping_in_sample, ptrdiff_t damping_in_element, const double *friction_in, ptrdiff_t friction_in_sample, ptrdiff_t friction_in_element, double *xd_out, ptrdiff_t xd_out_sample, ptrdiff_t xd_out_element, double *stretches_out, ptrdiff_t stretches_out_sample, ptrdiff_t stretches_out_element, double *tau_out, ptrdiff_t tau_out_sample, ptrdiff_t tau_out_element)
 {
-    double x_rows[6*BLOCK], u_rows[2*BLOCK], load_rows[1*BLOCK], inertias_rows[3*BLOCK], tendons_rows[6*BLOCK], damping_rows[1*BLOCK], friction_rows[3*BLOCK], xd_rows[6*BLOCK], stretches_rows[2*BLOCK], tau_rows[2*BLOCK];
+    double x_in_rows[6*BLOCK], u_in_rows[2*BLOCK], load_in_rows[1*BLOCK], inertias_in_rows[3*BLOCK], tendons_in_rows[6*BLOCK], damping_in_rows[1*BLOCK], friction_in_rows[3*BLOCK], xd_out_rows[6*BLOCK], stretches_out_rows[2*BLOCK], tau_out_rows[2*BLOCK];
     EACH_BLOCK {
-        GATHER(x, 6)
-        GATHER(u, 2)
-        GATHER(load, 1)
-        GATHER(inertias, 3)
-        GATHER(tendons, 6)
-        GATHER(damping, 1)
-        GATHER(friction, 3)
-        block(AT(x), AT(u), AT(load), AT(inertias), AT(tendons), AT(damping), AT(friction), AT(xd), AT(stretches), AT(tau));
-        SCATTER(xd, 6)
-        SCATTER(stretches, 2)
-        SCATTER(tau, 2)
+        GATHER(x_in, 6)
+        GATHER(u_in, 2)
+        GATHER(load_in, 1)
+        GATHER(inertias_in, 3)
+        GATHER(tendons_in, 6)
+        GATHER(damping_in, 1)
+        GATHER(friction_in, 3)
+        block(AT(x_in), AT(u_in), AT(load_in), AT(inertias_in), AT(tendons_in), AT(damping_in), AT(friction_in), AT(xd_out), AT(stretches_out), AT(tau_out));
+        SCATTER(xd_out, 6)
+        SCATTER(stretches_out, 2)
+        SCATTER(tau_out, 2)
     }
 }

@@ -2,41 +2,42 @@
  *
  * plant_finger of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_plant_finger(const double qd[4], const double qdd[4], const double thds[8], const double f[8], const double u[8], const double motor[2], const double friction[3], double xd[24]);
+INLINED void awiwi_plant_finger(const double qd_in[4], const double qdd_in[4], const double thds_in[8], const double f_in[8], const double u_in[8], const double motor_in[2], const double friction_in[3], double xd_out[24]);
 #include "../plant_finger.c"
 
-VECTORS void block(const double *restrict qd_at, ptrdiff_t qd_row, const double *restrict qdd_at, ptrdiff_t qdd_row, const double *restrict thds_at, ptrdiff_t thds_row, const double *restrict f_at, ptrdiff_t f_row, const double *restrict u_at, ptrdiff_t u_row, const double *restrict motor_at, ptrdiff_t motor_row, const double *restrict friction_at, ptrdiff_t friction_row, double *restrict xd_at, ptrdiff_t xd_row)
+VECTORS void block(const double *restrict qd_in_at, ptrdiff_t qd_in_row, const double *restrict qdd_in_at, ptrdiff_t qdd_in_row, const double *restrict thds_in_at, ptrdiff_t thds_in_row, const double *restrict f_in_at, ptrdiff_t f_in_row, const double *restrict u_in_at, ptrdiff_t u_in_row, const double *restrict motor_in_at, ptrdiff_t motor_in_row, const double *restrict friction_in_at, ptrdiff_t friction_in_row, double *restrict xd_out_at, ptrdiff_t xd_out_row)
 {
     EACH_SAMPLE {
-        double qd_one[4], qdd_one[4], thds_one[8], f_one[8], u_one[8], motor_one[2], friction_one[3], xd_one[24];
-        TAKE(qd, 4)
-        TAKE(qdd, 4)
-        TAKE(thds, 8)
-        TAKE(f, 8)
-        TAKE(u, 8)
-        TAKE(motor, 2)
-        TAKE(friction, 3)
-        awiwi_plant_finger(qd_one, qdd_one, thds_one, f_one, u_one, motor_one, friction_one, xd_one);
-        GIVE(xd, 24)
+        double qd_in_one[4], qdd_in_one[4], thds_in_one[8], f_in_one[8], u_in_one[8], motor_in_one[2], friction_in_one[3], xd_out_one[24];
+        TAKE(qd_in, 4)
+        TAKE(qdd_in, 4)
+        TAKE(thds_in, 8)
+        TAKE(f_in, 8)
+        TAKE(u_in, 8)
+        TAKE(motor_in, 2)
+        TAKE(friction_in, 3)
+        awiwi_plant_finger(qd_in_one, qdd_in_one, thds_in_one, f_in_one, u_in_one, motor_in_one, friction_in_one, xd_out_one);
+        GIVE(xd_out, 24)
     }
 }
 
-void awiwi_plant_finger_batch(ptrdiff_t samples, const double *qd, ptrdiff_t qd_sample, ptrdiff_t qd_element, const double *qdd, ptrdiff_t qdd_sample, ptrdiff_t qdd_element, const double *thds, ptrdiff_t thds_sample, ptrdiff_t thds_element, const double *f, ptrdiff_t f_sample, ptrdiff_t f_element, const double *u, ptrdiff_t u_sample, ptrdiff_t u_element, const double *motor, ptrdiff_t motor_sample, ptrdiff_t motor_element, const double *friction, ptrdiff_t friction_sample, ptrdiff_t friction_element, double *xd, ptrdiff_t xd_sample, ptrdiff_t xd_element)
+void awiwi_plant_finger_batch(ptrdiff_t samples, const double *qd_in, ptrdiff_t qd_in_sample, ptrdiff_t qd_in_element, const double *qdd_in, ptrdiff_t qdd_in_sample, ptrdiff_t qdd_in_element, const double *thds_in, ptrdiff_t thds_in_sample, ptrdiff_t thds_in_element, const double *f_in, ptrdiff_t f_in_sample, ptrdiff_t f_in_element, const double *u_in, ptrdiff_t u_in_sample, ptrdiff_t u_in_element, const double *motor_in, ptrdiff_t motor_in_sample, ptrdiff_t motor_in_element, const double *friction_in, ptrdiff_t friction_in_sample, ptrdiff_t friction_in_element, double *xd_out, ptrdiff_t xd_out_sample, ptrdiff_t xd_out_element)
 {
-    double qd_rows[4*BLOCK], qdd_rows[4*BLOCK], thds_rows[8*BLOCK], f_rows[8*BLOCK], u_rows[8*BLOCK], motor_rows[2*BLOCK], friction_rows[3*BLOCK], xd_rows[24*BLOCK];
+    double qd_in_rows[4*BLOCK], qdd_in_rows[4*BLOCK], thds_in_rows[8*BLOCK], f_in_rows[8*BLOCK], u_in_rows[8*BLOCK], motor_in_rows[2*BLOCK], friction_in_rows[3*BLOCK], xd_out_rows[24*BLOCK];
     EACH_BLOCK {
-        GATHER(qd, 4)
-        GATHER(qdd, 4)
-        GATHER(thds, 8)
-        GATHER(f, 8)
-        GATHER(u, 8)
-        GATHER(motor, 2)
-        GATHER(friction, 3)
-        EXPECT(xd, 24)
-        block(AT(qd), AT(qdd), AT(thds), AT(f), AT(u), AT(motor), AT(friction), AT(xd));
-        SCATTER(xd, 24)
+        GATHER(qd_in, 4)
+        GATHER(qdd_in, 4)
+        GATHER(thds_in, 8)
+        GATHER(f_in, 8)
+        GATHER(u_in, 8)
+        GATHER(motor_in, 2)
+        GATHER(friction_in, 3)
+        PREFETCH_ROWS(xd_out, 24)
+        block(AT(qd_in), AT(qdd_in), AT(thds_in), AT(f_in), AT(u_in), AT(motor_in), AT(friction_in), AT(xd_out));
+        SCATTER(xd_out, 24)
     }
 }

@@ -2,36 +2,37 @@
  *
  * plant_finger_forces of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_plant_finger_forces(const double thetas[8], const double path[8], const double slack[8], const double motor[2], const double line[3], double f[8]);
+INLINED void awiwi_plant_finger_forces(const double thetas_in[8], const double path_in[8], const double slack_in[8], const double motor_in[2], const double line_in[3], double f_out[8]);
 #include "../plant_finger_forces.c"
 
-VECTORS void block(const double *restrict thetas_at, ptrdiff_t thetas_row, const double *restrict path_at, ptrdiff_t path_row, const double *restrict slack_at, ptrdiff_t slack_row, const double *restrict motor_at, ptrdiff_t motor_row, const double *restrict line_at, ptrdiff_t line_row, double *restrict f_at, ptrdiff_t f_row)
+VECTORS void block(const double *restrict thetas_in_at, ptrdiff_t thetas_in_row, const double *restrict path_in_at, ptrdiff_t path_in_row, const double *restrict slack_in_at, ptrdiff_t slack_in_row, const double *restrict motor_in_at, ptrdiff_t motor_in_row, const double *restrict line_in_at, ptrdiff_t line_in_row, double *restrict f_out_at, ptrdiff_t f_out_row)
 {
     EACH_SAMPLE {
-        double thetas_one[8], path_one[8], slack_one[8], motor_one[2], line_one[3], f_one[8];
-        TAKE(thetas, 8)
-        TAKE(path, 8)
-        TAKE(slack, 8)
-        TAKE(motor, 2)
-        TAKE(line, 3)
-        awiwi_plant_finger_forces(thetas_one, path_one, slack_one, motor_one, line_one, f_one);
-        GIVE(f, 8)
+        double thetas_in_one[8], path_in_one[8], slack_in_one[8], motor_in_one[2], line_in_one[3], f_out_one[8];
+        TAKE(thetas_in, 8)
+        TAKE(path_in, 8)
+        TAKE(slack_in, 8)
+        TAKE(motor_in, 2)
+        TAKE(line_in, 3)
+        awiwi_plant_finger_forces(thetas_in_one, path_in_one, slack_in_one, motor_in_one, line_in_one, f_out_one);
+        GIVE(f_out, 8)
     }
 }
 
-void awiwi_plant_finger_forces_batch(ptrdiff_t samples, const double *thetas, ptrdiff_t thetas_sample, ptrdiff_t thetas_element, const double *path, ptrdiff_t path_sample, ptrdiff_t path_element, const double *slack, ptrdiff_t slack_sample, ptrdiff_t slack_element, const double *motor, ptrdiff_t motor_sample, ptrdiff_t motor_element, const double *line, ptrdiff_t line_sample, ptrdiff_t line_element, double *f, ptrdiff_t f_sample, ptrdiff_t f_element)
+void awiwi_plant_finger_forces_batch(ptrdiff_t samples, const double *thetas_in, ptrdiff_t thetas_in_sample, ptrdiff_t thetas_in_element, const double *path_in, ptrdiff_t path_in_sample, ptrdiff_t path_in_element, const double *slack_in, ptrdiff_t slack_in_sample, ptrdiff_t slack_in_element, const double *motor_in, ptrdiff_t motor_in_sample, ptrdiff_t motor_in_element, const double *line_in, ptrdiff_t line_in_sample, ptrdiff_t line_in_element, double *f_out, ptrdiff_t f_out_sample, ptrdiff_t f_out_element)
 {
-    double thetas_rows[8*BLOCK], path_rows[8*BLOCK], slack_rows[8*BLOCK], motor_rows[2*BLOCK], line_rows[3*BLOCK], f_rows[8*BLOCK];
+    double thetas_in_rows[8*BLOCK], path_in_rows[8*BLOCK], slack_in_rows[8*BLOCK], motor_in_rows[2*BLOCK], line_in_rows[3*BLOCK], f_out_rows[8*BLOCK];
     EACH_BLOCK {
-        GATHER(thetas, 8)
-        GATHER(path, 8)
-        GATHER(slack, 8)
-        GATHER(motor, 2)
-        GATHER(line, 3)
-        block(AT(thetas), AT(path), AT(slack), AT(motor), AT(line), AT(f));
-        SCATTER(f, 8)
+        GATHER(thetas_in, 8)
+        GATHER(path_in, 8)
+        GATHER(slack_in, 8)
+        GATHER(motor_in, 2)
+        GATHER(line_in, 3)
+        block(AT(thetas_in), AT(path_in), AT(slack_in), AT(motor_in), AT(line_in), AT(f_out));
+        SCATTER(f_out, 8)
     }
 }

@@ -2,38 +2,39 @@
  *
  * plant_joint_linear of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_plant_joint_linear(const double x[4], const double u[1], const double load[1], const double plant[3], const double damping[2], double xd[4], double tau[2]);
+INLINED void awiwi_plant_joint_linear(const double x_in[4], const double u_in[1], const double load_in[1], const double plant_in[3], const double damping_in[2], double xd_out[4], double tau_out[2]);
 #include "../plant_joint_linear.c"
 
-VECTORS void block(const double *restrict x_at, ptrdiff_t x_row, const double *restrict u_at, ptrdiff_t u_row, const double *restrict load_at, ptrdiff_t load_row, const double *restrict plant_at, ptrdiff_t plant_row, const double *restrict damping_at, ptrdiff_t damping_row, double *restrict xd_at, ptrdiff_t xd_row, double *restrict tau_at, ptrdiff_t tau_row)
+VECTORS void block(const double *restrict x_in_at, ptrdiff_t x_in_row, const double *restrict u_in_at, ptrdiff_t u_in_row, const double *restrict load_in_at, ptrdiff_t load_in_row, const double *restrict plant_in_at, ptrdiff_t plant_in_row, const double *restrict damping_in_at, ptrdiff_t damping_in_row, double *restrict xd_out_at, ptrdiff_t xd_out_row, double *restrict tau_out_at, ptrdiff_t tau_out_row)
 {
     EACH_SAMPLE {
-        double x_one[4], u_one[1], load_one[1], plant_one[3], damping_one[2], xd_one[4], tau_one[2];
-        TAKE(x, 4)
-        TAKE(u, 1)
-        TAKE(load, 1)
-        TAKE(plant, 3)
-        TAKE(damping, 2)
-        awiwi_plant_joint_linear(x_one, u_one, load_one, plant_one, damping_one, xd_one, tau_one);
-        GIVE(xd, 4)
-        GIVE(tau, 2)
+        double x_in_one[4], u_in_one[1], load_in_one[1], plant_in_one[3], damping_in_one[2], xd_out_one[4], tau_out_one[2];
+        TAKE(x_in, 4)
+        TAKE(u_in, 1)
+        TAKE(load_in, 1)
+        TAKE(plant_in, 3)
+        TAKE(damping_in, 2)
+        awiwi_plant_joint_linear(x_in_one, u_in_one, load_in_one, plant_in_one, damping_in_one, xd_out_one, tau_out_one);
+        GIVE(xd_out, 4)
+        GIVE(tau_out, 2)
     }
 }
 
-void awiwi_plant_joint_linear_batch(ptrdiff_t samples, const double *x, ptrdiff_t x_sample, ptrdiff_t x_element, const double *u, ptrdiff_t u_sample, ptrdiff_t u_element, const double *load, ptrdiff_t load_sample, ptrdiff_t load_element, const double *plant, ptrdiff_t plant_sample, ptrdiff_t plant_element, const double *damping, ptrdiff_t damping_sample, ptrdiff_t damping_element, double *xd, ptrdiff_t xd_sample, ptrdiff_t xd_element, double *tau, ptrdiff_t tau_sample, ptrdiff_t tau_element)
+void awiwi_plant_joint_linear_batch(ptrdiff_t samples, const double *x_in, ptrdiff_t x_in_sample, ptrdiff_t x_in_element, const double *u_in, ptrdiff_t u_in_sample, ptrdiff_t u_in_element, const double *load_in, ptrdiff_t load_in_sample, ptrdiff_t load_in_element, const double *plant_in, ptrdiff_t plant_in_sample, ptrdiff_t plant_in_element, const double *damping_in, ptrdiff_t damping_in_sample, ptrdiff_t damping_in_element, double *xd_out, ptrdiff_t xd_out_sample, ptrdiff_t xd_out_element, double *tau_out, ptrdiff_t tau_out_sample, ptrdiff_t tau_out_element)
 {
-    double x_rows[4*BLOCK], u_rows[1*BLOCK], load_rows[1*BLOCK], plant_rows[3*BLOCK], damping_rows[2*BLOCK], xd_rows[4*BLOCK], tau_rows[2*BLOCK];
+    double x_in_rows[4*BLOCK], u_in_rows[1*BLOCK], load_in_rows[1*BLOCK], plant_in_rows[3*BLOCK], damping_in_rows[2*BLOCK], xd_out_rows[4*BLOCK], tau_out_rows[2*BLOCK];
     EACH_BLOCK {
-        GATHER(x, 4)
-        GATHER(u, 1)
-        GATHER(load, 1)
-        GATHER(plant, 3)
-        GATHER(damping, 2)
-        block(AT(x), AT(u), AT(load), AT(plant), AT(damping), AT(xd), AT(tau));
-        SCATTER(xd, 4)
-        SCATTER(tau, 2)
+        GATHER(x_in, 4)
+        GATHER(u_in, 1)
+        GATHER(load_in, 1)
+        GATHER(plant_in, 3)
+        GATHER(damping_in, 2)
+        block(AT(x_in), AT(u_in), AT(load_in), AT(plant_in), AT(damping_in), AT(xd_out), AT(tau_out));
+        SCATTER(xd_out, 4)
+        SCATTER(tau_out, 2)
     }
 }

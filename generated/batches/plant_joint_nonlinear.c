@@ -2,42 +2,43 @@
  *
  * plant_joint_nonlinear of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_plant_joint_nonlinear(const double x[4], const double u[1], const double load[1], const double bodies[2], const double curve[2], const double damping[2], double xd[4], double tau[2], double spring[2]);
+INLINED void awiwi_plant_joint_nonlinear(const double x_in[4], const double u_in[1], const double load_in[1], const double bodies_in[2], const double curve_in[2], const double damping_in[2], double xd_out[4], double tau_out[2], double spring_out[2]);
 #include "../plant_joint_nonlinear.c"
 
-VECTORS void block(const double *restrict x_at, ptrdiff_t x_row, const double *restrict u_at, ptrdiff_t u_row, const double *restrict load_at, ptrdiff_t load_row, const double *restrict bodies_at, ptrdiff_t bodies_row, const double *restrict curve_at, ptrdiff_t curve_row, const double *restrict damping_at, ptrdiff_t damping_row, double *restrict xd_at, ptrdiff_t xd_row, double *restrict tau_at, ptrdiff_t tau_row, double *restrict spring_at, ptrdiff_t spring_row)
+VECTORS void block(const double *restrict x_in_at, ptrdiff_t x_in_row, const double *restrict u_in_at, ptrdiff_t u_in_row, const double *restrict load_in_at, ptrdiff_t load_in_row, const double *restrict bodies_in_at, ptrdiff_t bodies_in_row, const double *restrict curve_in_at, ptrdiff_t curve_in_row, const double *restrict damping_in_at, ptrdiff_t damping_in_row, double *restrict xd_out_at, ptrdiff_t xd_out_row, double *restrict tau_out_at, ptrdiff_t tau_out_row, double *restrict spring_out_at, ptrdiff_t spring_out_row)
 {
     EACH_SAMPLE {
-        double x_one[4], u_one[1], load_one[1], bodies_one[2], curve_one[2], damping_one[2], xd_one[4], tau_one[2], spring_one[2];
-        TAKE(x, 4)
-        TAKE(u, 1)
-        TAKE(load, 1)
-        TAKE(bodies, 2)
-        TAKE(curve, 2)
-        TAKE(damping, 2)
-        awiwi_plant_joint_nonlinear(x_one, u_one, load_one, bodies_one, curve_one, damping_one, xd_one, tau_one, spring_one);
-        GIVE(xd, 4)
-        GIVE(tau, 2)
-        GIVE(spring, 2)
+        double x_in_one[4], u_in_one[1], load_in_one[1], bodies_in_one[2], curve_in_one[2], damping_in_one[2], xd_out_one[4], tau_out_one[2], spring_out_one[2];
+        TAKE(x_in, 4)
+        TAKE(u_in, 1)
+        TAKE(load_in, 1)
+        TAKE(bodies_in, 2)
+        TAKE(curve_in, 2)
+        TAKE(damping_in, 2)
+        awiwi_plant_joint_nonlinear(x_in_one, u_in_one, load_in_one, bodies_in_one, curve_in_one, damping_in_one, xd_out_one, tau_out_one, spring_out_one);
+        GIVE(xd_out, 4)
+        GIVE(tau_out, 2)
+        GIVE(spring_out, 2)
     }
 }
 
-void awiwi_plant_joint_nonlinear_batch(ptrdiff_t samples, const double *x, ptrdiff_t x_sample, ptrdiff_t x_element, const double *u, ptrdiff_t u_sample, ptrdiff_t u_element, const double *load, ptrdiff_t load_sample, ptrdiff_t load_element, const double *bodies, ptrdiff_t bodies_sample, ptrdiff_t bodies_element, const double *curve, ptrdiff_t curve_sample, ptrdiff_t curve_element, const double *damping, ptrdiff_t damping_sample, ptrdiff_t damping_element, double *xd, ptrdiff_t xd_sample, ptrdiff_t xd_element, double *tau, ptrdiff_t tau_sample, ptrdiff_t tau_element, double *spring, ptrdiff_t spring_sample, ptrdiff_t spring_element)
+void awiwi_plant_joint_nonlinear_batch(ptrdiff_t samples, const double *x_in, ptrdiff_t x_in_sample, ptrdiff_t x_in_element, const double *u_in, ptrdiff_t u_in_sample, ptrdiff_t u_in_element, const double *load_in, ptrdiff_t load_in_sample, ptrdiff_t load_in_element, const double *bodies_in, ptrdiff_t bodies_in_sample, ptrdiff_t bodies_in_element, const double *curve_in, ptrdiff_t curve_in_sample, ptrdiff_t curve_in_element, const double *damping_in, ptrdiff_t damping_in_sample, ptrdiff_t damping_in_element, double *xd_out, ptrdiff_t xd_out_sample, ptrdiff_t xd_out_element, double *tau_out, ptrdiff_t tau_out_sample, ptrdiff_t tau_out_element, double *spring_out, ptrdiff_t spring_out_sample, ptrdiff_t spring_out_element)
 {
-    double x_rows[4*BLOCK], u_rows[1*BLOCK], load_rows[1*BLOCK], bodies_rows[2*BLOCK], curve_rows[2*BLOCK], damping_rows[2*BLOCK], xd_rows[4*BLOCK], tau_rows[2*BLOCK], spring_rows[2*BLOCK];
+    double x_in_rows[4*BLOCK], u_in_rows[1*BLOCK], load_in_rows[1*BLOCK], bodies_in_rows[2*BLOCK], curve_in_rows[2*BLOCK], damping_in_rows[2*BLOCK], xd_out_rows[4*BLOCK], tau_out_rows[2*BLOCK], spring_out_rows[2*BLOCK];
     EACH_BLOCK {
-        GATHER(x, 4)
-        GATHER(u, 1)
-        GATHER(load, 1)
-        GATHER(bodies, 2)
-        GATHER(curve, 2)
-        GATHER(damping, 2)
-        block(AT(x), AT(u), AT(load), AT(bodies), AT(curve), AT(damping), AT(xd), AT(tau), AT(spring));
-        SCATTER(xd, 4)
-        SCATTER(tau, 2)
-        SCATTER(spring, 2)
+        GATHER(x_in, 4)
+        GATHER(u_in, 1)
+        GATHER(load_in, 1)
+        GATHER(bodies_in, 2)
+        GATHER(curve_in, 2)
+        GATHER(damping_in, 2)
+        block(AT(x_in), AT(u_in), AT(load_in), AT(bodies_in), AT(curve_in), AT(damping_in), AT(xd_out), AT(tau_out), AT(spring_out));
+        SCATTER(xd_out, 4)
+        SCATTER(tau_out, 2)
+        SCATTER(spring_out, 2)
     }
 }

@@ -2,40 +2,41 @@
  *
  * plant_tendon of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_plant_tendon(const double x[2], const double u[1], const double path[1], const double motor[2], const double line[3], const double friction[3], double xd[2], double f[1]);
+INLINED void awiwi_plant_tendon(const double x_in[2], const double u_in[1], const double path_in[1], const double motor_in[2], const double line_in[3], const double friction_in[3], double xd_out[2], double f_out[1]);
 #include "../plant_tendon.c"
 
-VECTORS void block(const double *restrict x_at, ptrdiff_t x_row, const double *restrict u_at, ptrdiff_t u_row, const double *restrict path_at, ptrdiff_t path_row, const double *restrict motor_at, ptrdiff_t motor_row, const double *restrict line_at, ptrdiff_t line_row, const double *restrict friction_at, ptrdiff_t friction_row, double *restrict xd_at, ptrdiff_t xd_row, double *restrict f_at, ptrdiff_t f_row)
+VECTORS void block(const double *restrict x_in_at, ptrdiff_t x_in_row, const double *restrict u_in_at, ptrdiff_t u_in_row, const double *restrict path_in_at, ptrdiff_t path_in_row, const double *restrict motor_in_at, ptrdiff_t motor_in_row, const double *restrict line_in_at, ptrdiff_t line_in_row, const double *restrict friction_in_at, ptrdiff_t friction_in_row, double *restrict xd_out_at, ptrdiff_t xd_out_row, double *restrict f_out_at, ptrdiff_t f_out_row)
 {
     EACH_SAMPLE {
-        double x_one[2], u_one[1], path_one[1], motor_one[2], line_one[3], friction_one[3], xd_one[2], f_one[1];
-        TAKE(x, 2)
-        TAKE(u, 1)
-        TAKE(path, 1)
-        TAKE(motor, 2)
-        TAKE(line, 3)
-        TAKE(friction, 3)
-        awiwi_plant_tendon(x_one, u_one, path_one, motor_one, line_one, friction_one, xd_one, f_one);
-        GIVE(xd, 2)
-        GIVE(f, 1)
+        double x_in_one[2], u_in_one[1], path_in_one[1], motor_in_one[2], line_in_one[3], friction_in_one[3], xd_out_one[2], f_out_one[1];
+        TAKE(x_in, 2)
+        TAKE(u_in, 1)
+        TAKE(path_in, 1)
+        TAKE(motor_in, 2)
+        TAKE(line_in, 3)
+        TAKE(friction_in, 3)
+        awiwi_plant_tendon(x_in_one, u_in_one, path_in_one, motor_in_one, line_in_one, friction_in_one, xd_out_one, f_out_one);
+        GIVE(xd_out, 2)
+        GIVE(f_out, 1)
     }
 }
 
-void awiwi_plant_tendon_batch(ptrdiff_t samples, const double *x, ptrdiff_t x_sample, ptrdiff_t x_element, const double *u, ptrdiff_t u_sample, ptrdiff_t u_element, const double *path, ptrdiff_t path_sample, ptrdiff_t path_element, const double *motor, ptrdiff_t motor_sample, ptrdiff_t motor_element, const double *line, ptrdiff_t line_sample, ptrdiff_t line_element, const double *friction, ptrdiff_t friction_sample, ptrdiff_t friction_element, double *xd, ptrdiff_t xd_sample, ptrdiff_t xd_element, double *f, ptrdiff_t f_sample, ptrdiff_t f_element)
+void awiwi_plant_tendon_batch(ptrdiff_t samples, const double *x_in, ptrdiff_t x_in_sample, ptrdiff_t x_in_element, const double *u_in, ptrdiff_t u_in_sample, ptrdiff_t u_in_element, const double *path_in, ptrdiff_t path_in_sample, ptrdiff_t path_in_element, const double *motor_in, ptrdiff_t motor_in_sample, ptrdiff_t motor_in_element, const double *line_in, ptrdiff_t line_in_sample, ptrdiff_t line_in_element, const double *friction_in, ptrdiff_t friction_in_sample, ptrdiff_t friction_in_element, double *xd_out, ptrdiff_t xd_out_sample, ptrdiff_t xd_out_element, double *f_out, ptrdiff_t f_out_sample, ptrdiff_t f_out_element)
 {
-    double x_rows[2*BLOCK], u_rows[1*BLOCK], path_rows[1*BLOCK], motor_rows[2*BLOCK], line_rows[3*BLOCK], friction_rows[3*BLOCK], xd_rows[2*BLOCK], f_rows[1*BLOCK];
+    double x_in_rows[2*BLOCK], u_in_rows[1*BLOCK], path_in_rows[1*BLOCK], motor_in_rows[2*BLOCK], line_in_rows[3*BLOCK], friction_in_rows[3*BLOCK], xd_out_rows[2*BLOCK], f_out_rows[1*BLOCK];
     EACH_BLOCK {
-        GATHER(x, 2)
-        GATHER(u, 1)
-        GATHER(path, 1)
-        GATHER(motor, 2)
-        GATHER(line, 3)
-        GATHER(friction, 3)
-        block(AT(x), AT(u), AT(path), AT(motor), AT(line), AT(friction), AT(xd), AT(f));
-        SCATTER(xd, 2)
-        SCATTER(f, 1)
+        GATHER(x_in, 2)
+        GATHER(u_in, 1)
+        GATHER(path_in, 1)
+        GATHER(motor_in, 2)
+        GATHER(line_in, 3)
+        GATHER(friction_in, 3)
+        block(AT(x_in), AT(u_in), AT(path_in), AT(motor_in), AT(line_in), AT(friction_in), AT(xd_out), AT(f_out));
+        SCATTER(xd_out, 2)
+        SCATTER(f_out, 1)
     }
 }

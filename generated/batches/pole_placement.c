@@ -2,42 +2,43 @@
  *
  * pole_placement of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED int awiwi_pole_placement(const double m[1], const double b[1], const double k[1], const double dq[1], const double dtheta[1], const double omega[2], const double xi[2], double K[4]);
+INLINED int awiwi_pole_placement(const double m_in[1], const double b_in[1], const double k_in[1], const double dq_in[1], const double dtheta_in[1], const double omega_in[2], const double xi_in[2], double K_out[4]);
 #include "../pole_placement.c"
 
-VECTORS void block(const double *restrict m_at, ptrdiff_t m_row, const double *restrict b_at, ptrdiff_t b_row, const double *restrict k_at, ptrdiff_t k_row, const double *restrict dq_at, ptrdiff_t dq_row, const double *restrict dtheta_at, ptrdiff_t dtheta_row, const double *restrict omega_at, ptrdiff_t omega_row, const double *restrict xi_at, ptrdiff_t xi_row, double *restrict K_at, ptrdiff_t K_row, int *restrict status)
+VECTORS void block(const double *restrict m_in_at, ptrdiff_t m_in_row, const double *restrict b_in_at, ptrdiff_t b_in_row, const double *restrict k_in_at, ptrdiff_t k_in_row, const double *restrict dq_in_at, ptrdiff_t dq_in_row, const double *restrict dtheta_in_at, ptrdiff_t dtheta_in_row, const double *restrict omega_in_at, ptrdiff_t omega_in_row, const double *restrict xi_in_at, ptrdiff_t xi_in_row, double *restrict K_out_at, ptrdiff_t K_out_row, int *restrict status)
 {
     EACH_SAMPLE {
-        double m_one[1], b_one[1], k_one[1], dq_one[1], dtheta_one[1], omega_one[2], xi_one[2], K_one[4];
-        TAKE(m, 1)
-        TAKE(b, 1)
-        TAKE(k, 1)
-        TAKE(dq, 1)
-        TAKE(dtheta, 1)
-        TAKE(omega, 2)
-        TAKE(xi, 2)
-        status[i_] = awiwi_pole_placement(m_one, b_one, k_one, dq_one, dtheta_one, omega_one, xi_one, K_one);
-        GIVE(K, 4)
+        double m_in_one[1], b_in_one[1], k_in_one[1], dq_in_one[1], dtheta_in_one[1], omega_in_one[2], xi_in_one[2], K_out_one[4];
+        TAKE(m_in, 1)
+        TAKE(b_in, 1)
+        TAKE(k_in, 1)
+        TAKE(dq_in, 1)
+        TAKE(dtheta_in, 1)
+        TAKE(omega_in, 2)
+        TAKE(xi_in, 2)
+        status[i_] = awiwi_pole_placement(m_in_one, b_in_one, k_in_one, dq_in_one, dtheta_in_one, omega_in_one, xi_in_one, K_out_one);
+        GIVE(K_out, 4)
     }
 }
 
-void awiwi_pole_placement_batch(ptrdiff_t samples, const double *m, ptrdiff_t m_sample, ptrdiff_t m_element, const double *b, ptrdiff_t b_sample, ptrdiff_t b_element, const double *k, ptrdiff_t k_sample, ptrdiff_t k_element, const double *dq, ptrdiff_t dq_sample, ptrdiff_t dq_element, const double *dtheta, ptrdiff_t dtheta_sample, ptrdiff_t dtheta_element, const double *omega, ptrdiff_t omega_sample, ptrdiff_t omega_element, const double *xi, ptrdiff_t xi_sample, ptrdiff_t xi_element, double *K, ptrdiff_t K_sample, ptrdiff_t K_element, int *status)
+void awiwi_pole_placement_batch(ptrdiff_t samples, const double *m_in, ptrdiff_t m_in_sample, ptrdiff_t m_in_element, const double *b_in, ptrdiff_t b_in_sample, ptrdiff_t b_in_element, const double *k_in, ptrdiff_t k_in_sample, ptrdiff_t k_in_element, const double *dq_in, ptrdiff_t dq_in_sample, ptrdiff_t dq_in_element, const double *dtheta_in, ptrdiff_t dtheta_in_sample, ptrdiff_t dtheta_in_element, const double *omega_in, ptrdiff_t omega_in_sample, ptrdiff_t omega_in_element, const double *xi_in, ptrdiff_t xi_in_sample, ptrdiff_t xi_in_element, double *K_out, ptrdiff_t K_out_sample, ptrdiff_t K_out_element, int *status)
 {
-    double m_rows[1*BLOCK], b_rows[1*BLOCK], k_rows[1*BLOCK], dq_rows[1*BLOCK], dtheta_rows[1*BLOCK], omega_rows[2*BLOCK], xi_rows[2*BLOCK], K_rows[4*BLOCK];
+    double m_in_rows[1*BLOCK], b_in_rows[1*BLOCK], k_in_rows[1*BLOCK], dq_in_rows[1*BLOCK], dtheta_in_rows[1*BLOCK], omega_in_rows[2*BLOCK], xi_in_rows[2*BLOCK], K_out_rows[4*BLOCK];
     int status_rows[BLOCK];
     EACH_BLOCK {
-        GATHER(m, 1)
-        GATHER(b, 1)
-        GATHER(k, 1)
-        GATHER(dq, 1)
-        GATHER(dtheta, 1)
-        GATHER(omega, 2)
-        GATHER(xi, 2)
-        block(AT(m), AT(b), AT(k), AT(dq), AT(dtheta), AT(omega), AT(xi), AT(K), status_rows);
-        SCATTER(K, 4)
+        GATHER(m_in, 1)
+        GATHER(b_in, 1)
+        GATHER(k_in, 1)
+        GATHER(dq_in, 1)
+        GATHER(dtheta_in, 1)
+        GATHER(omega_in, 2)
+        GATHER(xi_in, 2)
+        block(AT(m_in), AT(b_in), AT(k_in), AT(dq_in), AT(dtheta_in), AT(omega_in), AT(xi_in), AT(K_out), status_rows);
+        SCATTER(K_out, 4)
         memcpy(status + first_, status_rows, (size_t)COUNT * sizeof *status);
     }
 }

@@ -2,34 +2,35 @@
  *
  * pole_placement_law of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_pole_placement_law(const double K[4], const double x[4], const double x_des[4], const double u_des[1], double u[1]);
+INLINED void awiwi_pole_placement_law(const double K_in[4], const double x_in[4], const double x_des_in[4], const double u_des_in[1], double u_out[1]);
 #include "../pole_placement_law.c"
 
-VECTORS void block(const double *restrict K_at, ptrdiff_t K_row, const double *restrict x_at, ptrdiff_t x_row, const double *restrict x_des_at, ptrdiff_t x_des_row, const double *restrict u_des_at, ptrdiff_t u_des_row, double *restrict u_at, ptrdiff_t u_row)
+VECTORS void block(const double *restrict K_in_at, ptrdiff_t K_in_row, const double *restrict x_in_at, ptrdiff_t x_in_row, const double *restrict x_des_in_at, ptrdiff_t x_des_in_row, const double *restrict u_des_in_at, ptrdiff_t u_des_in_row, double *restrict u_out_at, ptrdiff_t u_out_row)
 {
     EACH_SAMPLE {
-        double K_one[4], x_one[4], x_des_one[4], u_des_one[1], u_one[1];
-        TAKE(K, 4)
-        TAKE(x, 4)
-        TAKE(x_des, 4)
-        TAKE(u_des, 1)
-        awiwi_pole_placement_law(K_one, x_one, x_des_one, u_des_one, u_one);
-        GIVE(u, 1)
+        double K_in_one[4], x_in_one[4], x_des_in_one[4], u_des_in_one[1], u_out_one[1];
+        TAKE(K_in, 4)
+        TAKE(x_in, 4)
+        TAKE(x_des_in, 4)
+        TAKE(u_des_in, 1)
+        awiwi_pole_placement_law(K_in_one, x_in_one, x_des_in_one, u_des_in_one, u_out_one);
+        GIVE(u_out, 1)
     }
 }
 
-void awiwi_pole_placement_law_batch(ptrdiff_t samples, const double *K, ptrdiff_t K_sample, ptrdiff_t K_element, const double *x, ptrdiff_t x_sample, ptrdiff_t x_element, const double *x_des, ptrdiff_t x_des_sample, ptrdiff_t x_des_element, const double *u_des, ptrdiff_t u_des_sample, ptrdiff_t u_des_element, double *u, ptrdiff_t u_sample, ptrdiff_t u_element)
+void awiwi_pole_placement_law_batch(ptrdiff_t samples, const double *K_in, ptrdiff_t K_in_sample, ptrdiff_t K_in_element, const double *x_in, ptrdiff_t x_in_sample, ptrdiff_t x_in_element, const double *x_des_in, ptrdiff_t x_des_in_sample, ptrdiff_t x_des_in_element, const double *u_des_in, ptrdiff_t u_des_in_sample, ptrdiff_t u_des_in_element, double *u_out, ptrdiff_t u_out_sample, ptrdiff_t u_out_element)
 {
-    double K_rows[4*BLOCK], x_rows[4*BLOCK], x_des_rows[4*BLOCK], u_des_rows[1*BLOCK], u_rows[1*BLOCK];
+    double K_in_rows[4*BLOCK], x_in_rows[4*BLOCK], x_des_in_rows[4*BLOCK], u_des_in_rows[1*BLOCK], u_out_rows[1*BLOCK];
     EACH_BLOCK {
-        GATHER(K, 4)
-        GATHER(x, 4)
-        GATHER(x_des, 4)
-        GATHER(u_des, 1)
-        block(AT(K), AT(x), AT(x_des), AT(u_des), AT(u));
-        SCATTER(u, 1)
+        GATHER(K_in, 4)
+        GATHER(x_in, 4)
+        GATHER(x_des_in, 4)
+        GATHER(u_des_in, 1)
+        block(AT(K_in), AT(x_in), AT(x_des_in), AT(u_des_in), AT(u_out));
+        SCATTER(u_out, 1)
     }
 }

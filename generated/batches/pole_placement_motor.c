@@ -2,38 +2,39 @@
  *
  * pole_placement_motor of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED int awiwi_pole_placement_motor(const double b[1], const double dtheta[1], const double k[1], const double omega0[1], const double xi0[1], double K[2]);
+INLINED int awiwi_pole_placement_motor(const double b_in[1], const double dtheta_in[1], const double k_in[1], const double omega0_in[1], const double xi0_in[1], double K_out[2]);
 #include "../pole_placement_motor.c"
 
-VECTORS void block(const double *restrict b_at, ptrdiff_t b_row, const double *restrict dtheta_at, ptrdiff_t dtheta_row, const double *restrict k_at, ptrdiff_t k_row, const double *restrict omega0_at, ptrdiff_t omega0_row, const double *restrict xi0_at, ptrdiff_t xi0_row, double *restrict K_at, ptrdiff_t K_row, int *restrict status)
+VECTORS void block(const double *restrict b_in_at, ptrdiff_t b_in_row, const double *restrict dtheta_in_at, ptrdiff_t dtheta_in_row, const double *restrict k_in_at, ptrdiff_t k_in_row, const double *restrict omega0_in_at, ptrdiff_t omega0_in_row, const double *restrict xi0_in_at, ptrdiff_t xi0_in_row, double *restrict K_out_at, ptrdiff_t K_out_row, int *restrict status)
 {
     EACH_SAMPLE {
-        double b_one[1], dtheta_one[1], k_one[1], omega0_one[1], xi0_one[1], K_one[2];
-        TAKE(b, 1)
-        TAKE(dtheta, 1)
-        TAKE(k, 1)
-        TAKE(omega0, 1)
-        TAKE(xi0, 1)
-        status[i_] = awiwi_pole_placement_motor(b_one, dtheta_one, k_one, omega0_one, xi0_one, K_one);
-        GIVE(K, 2)
+        double b_in_one[1], dtheta_in_one[1], k_in_one[1], omega0_in_one[1], xi0_in_one[1], K_out_one[2];
+        TAKE(b_in, 1)
+        TAKE(dtheta_in, 1)
+        TAKE(k_in, 1)
+        TAKE(omega0_in, 1)
+        TAKE(xi0_in, 1)
+        status[i_] = awiwi_pole_placement_motor(b_in_one, dtheta_in_one, k_in_one, omega0_in_one, xi0_in_one, K_out_one);
+        GIVE(K_out, 2)
     }
 }
 
-void awiwi_pole_placement_motor_batch(ptrdiff_t samples, const double *b, ptrdiff_t b_sample, ptrdiff_t b_element, const double *dtheta, ptrdiff_t dtheta_sample, ptrdiff_t dtheta_element, const double *k, ptrdiff_t k_sample, ptrdiff_t k_element, const double *omega0, ptrdiff_t omega0_sample, ptrdiff_t omega0_element, const double *xi0, ptrdiff_t xi0_sample, ptrdiff_t xi0_element, double *K, ptrdiff_t K_sample, ptrdiff_t K_element, int *status)
+void awiwi_pole_placement_motor_batch(ptrdiff_t samples, const double *b_in, ptrdiff_t b_in_sample, ptrdiff_t b_in_element, const double *dtheta_in, ptrdiff_t dtheta_in_sample, ptrdiff_t dtheta_in_element, const double *k_in, ptrdiff_t k_in_sample, ptrdiff_t k_in_element, const double *omega0_in, ptrdiff_t omega0_in_sample, ptrdiff_t omega0_in_element, const double *xi0_in, ptrdiff_t xi0_in_sample, ptrdiff_t xi0_in_element, double *K_out, ptrdiff_t K_out_sample, ptrdiff_t K_out_element, int *status)
 {
-    double b_rows[1*BLOCK], dtheta_rows[1*BLOCK], k_rows[1*BLOCK], omega0_rows[1*BLOCK], xi0_rows[1*BLOCK], K_rows[2*BLOCK];
+    double b_in_rows[1*BLOCK], dtheta_in_rows[1*BLOCK], k_in_rows[1*BLOCK], omega0_in_rows[1*BLOCK], xi0_in_rows[1*BLOCK], K_out_rows[2*BLOCK];
     int status_rows[BLOCK];
     EACH_BLOCK {
-        GATHER(b, 1)
-        GATHER(dtheta, 1)
-        GATHER(k, 1)
-        GATHER(omega0, 1)
-        GATHER(xi0, 1)
-        block(AT(b), AT(dtheta), AT(k), AT(omega0), AT(xi0), AT(K), status_rows);
-        SCATTER(K, 2)
+        GATHER(b_in, 1)
+        GATHER(dtheta_in, 1)
+        GATHER(k_in, 1)
+        GATHER(omega0_in, 1)
+        GATHER(xi0_in, 1)
+        block(AT(b_in), AT(dtheta_in), AT(k_in), AT(omega0_in), AT(xi0_in), AT(K_out), status_rows);
+        SCATTER(K_out, 2)
         memcpy(status + first_, status_rows, (size_t)COUNT * sizeof *status);
     }
 }

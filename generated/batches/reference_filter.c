@@ -2,36 +2,37 @@
  *
  * reference_filter of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED int awiwi_reference_filter(const double motion[5], const double desired[5], const double delay[1], const double period[1], double motion_next[5]);
+INLINED int awiwi_reference_filter(const double motion_in[5], const double desired_in[5], const double delay_in[1], const double period_in[1], double motion_next_out[5]);
 #include "../reference_filter.c"
 
-VECTORS void block(const double *restrict motion_at, ptrdiff_t motion_row, const double *restrict desired_at, ptrdiff_t desired_row, const double *restrict delay_at, ptrdiff_t delay_row, const double *restrict period_at, ptrdiff_t period_row, double *restrict motion_next_at, ptrdiff_t motion_next_row, int *restrict status)
+VECTORS void block(const double *restrict motion_in_at, ptrdiff_t motion_in_row, const double *restrict desired_in_at, ptrdiff_t desired_in_row, const double *restrict delay_in_at, ptrdiff_t delay_in_row, const double *restrict period_in_at, ptrdiff_t period_in_row, double *restrict motion_next_out_at, ptrdiff_t motion_next_out_row, int *restrict status)
 {
     EACH_SAMPLE {
-        double motion_one[5], desired_one[5], delay_one[1], period_one[1], motion_next_one[5];
-        TAKE(motion, 5)
-        TAKE(desired, 5)
-        TAKE(delay, 1)
-        TAKE(period, 1)
-        status[i_] = awiwi_reference_filter(motion_one, desired_one, delay_one, period_one, motion_next_one);
-        GIVE(motion_next, 5)
+        double motion_in_one[5], desired_in_one[5], delay_in_one[1], period_in_one[1], motion_next_out_one[5];
+        TAKE(motion_in, 5)
+        TAKE(desired_in, 5)
+        TAKE(delay_in, 1)
+        TAKE(period_in, 1)
+        status[i_] = awiwi_reference_filter(motion_in_one, desired_in_one, delay_in_one, period_in_one, motion_next_out_one);
+        GIVE(motion_next_out, 5)
     }
 }
 
-void awiwi_reference_filter_batch(ptrdiff_t samples, const double *motion, ptrdiff_t motion_sample, ptrdiff_t motion_element, const double *desired, ptrdiff_t desired_sample, ptrdiff_t desired_element, const double *delay, ptrdiff_t delay_sample, ptrdiff_t delay_element, const double *period, ptrdiff_t period_sample, ptrdiff_t period_element, double *motion_next, ptrdiff_t motion_next_sample, ptrdiff_t motion_next_element, int *status)
+void awiwi_reference_filter_batch(ptrdiff_t samples, const double *motion_in, ptrdiff_t motion_in_sample, ptrdiff_t motion_in_element, const double *desired_in, ptrdiff_t desired_in_sample, ptrdiff_t desired_in_element, const double *delay_in, ptrdiff_t delay_in_sample, ptrdiff_t delay_in_element, const double *period_in, ptrdiff_t period_in_sample, ptrdiff_t period_in_element, double *motion_next_out, ptrdiff_t motion_next_out_sample, ptrdiff_t motion_next_out_element, int *status)
 {
-    double motion_rows[5*BLOCK], desired_rows[5*BLOCK], delay_rows[1*BLOCK], period_rows[1*BLOCK], motion_next_rows[5*BLOCK];
+    double motion_in_rows[5*BLOCK], desired_in_rows[5*BLOCK], delay_in_rows[1*BLOCK], period_in_rows[1*BLOCK], motion_next_out_rows[5*BLOCK];
     int status_rows[BLOCK];
     EACH_BLOCK {
-        GATHER(motion, 5)
-        GATHER(desired, 5)
-        GATHER(delay, 1)
-        GATHER(period, 1)
-        block(AT(motion), AT(desired), AT(delay), AT(period), AT(motion_next), status_rows);
-        SCATTER(motion_next, 5)
+        GATHER(motion_in, 5)
+        GATHER(desired_in, 5)
+        GATHER(delay_in, 1)
+        GATHER(period_in, 1)
+        block(AT(motion_in), AT(desired_in), AT(delay_in), AT(period_in), AT(motion_next_out), status_rows);
+        SCATTER(motion_next_out, 5)
         memcpy(status + first_, status_rows, (size_t)COUNT * sizeof *status);
     }
 }

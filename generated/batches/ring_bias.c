@@ -2,32 +2,33 @@
  *
  * ring_bias of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_ring_bias(const double q[3], const double qd[3], const double g[3], double bias[3]);
+INLINED void awiwi_ring_bias(const double q_in[3], const double qd_in[3], const double g_in[3], double bias_out[3]);
 #include "../ring_bias.c"
 
-VECTORS void block(const double *restrict q_at, ptrdiff_t q_row, const double *restrict qd_at, ptrdiff_t qd_row, const double *restrict g_at, ptrdiff_t g_row, double *restrict bias_at, ptrdiff_t bias_row)
+VECTORS void block(const double *restrict q_in_at, ptrdiff_t q_in_row, const double *restrict qd_in_at, ptrdiff_t qd_in_row, const double *restrict g_in_at, ptrdiff_t g_in_row, double *restrict bias_out_at, ptrdiff_t bias_out_row)
 {
     EACH_SAMPLE {
-        double q_one[3], qd_one[3], g_one[3], bias_one[3];
-        TAKE(q, 3)
-        TAKE(qd, 3)
-        TAKE(g, 3)
-        awiwi_ring_bias(q_one, qd_one, g_one, bias_one);
-        GIVE(bias, 3)
+        double q_in_one[3], qd_in_one[3], g_in_one[3], bias_out_one[3];
+        TAKE(q_in, 3)
+        TAKE(qd_in, 3)
+        TAKE(g_in, 3)
+        awiwi_ring_bias(q_in_one, qd_in_one, g_in_one, bias_out_one);
+        GIVE(bias_out, 3)
     }
 }
 
-void awiwi_ring_bias_batch(ptrdiff_t samples, const double *q, ptrdiff_t q_sample, ptrdiff_t q_element, const double *qd, ptrdiff_t qd_sample, ptrdiff_t qd_element, const double *g, ptrdiff_t g_sample, ptrdiff_t g_element, double *bias, ptrdiff_t bias_sample, ptrdiff_t bias_element)
+void awiwi_ring_bias_batch(ptrdiff_t samples, const double *q_in, ptrdiff_t q_in_sample, ptrdiff_t q_in_element, const double *qd_in, ptrdiff_t qd_in_sample, ptrdiff_t qd_in_element, const double *g_in, ptrdiff_t g_in_sample, ptrdiff_t g_in_element, double *bias_out, ptrdiff_t bias_out_sample, ptrdiff_t bias_out_element)
 {
-    double q_rows[3*BLOCK], qd_rows[3*BLOCK], g_rows[3*BLOCK], bias_rows[3*BLOCK];
+    double q_in_rows[3*BLOCK], qd_in_rows[3*BLOCK], g_in_rows[3*BLOCK], bias_out_rows[3*BLOCK];
     EACH_BLOCK {
-        GATHER(q, 3)
-        GATHER(qd, 3)
-        GATHER(g, 3)
-        block(AT(q), AT(qd), AT(g), AT(bias));
-        SCATTER(bias, 3)
+        GATHER(q_in, 3)
+        GATHER(qd_in, 3)
+        GATHER(g_in, 3)
+        block(AT(q_in), AT(qd_in), AT(g_in), AT(bias_out));
+        SCATTER(bias_out, 3)
     }
 }

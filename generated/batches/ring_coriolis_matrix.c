@@ -2,31 +2,32 @@
  *
  * ring_coriolis_matrix of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_ring_coriolis_matrix(const double q[3], const double qd[3], double C[9]);
+INLINED void awiwi_ring_coriolis_matrix(const double q_in[3], const double qd_in[3], double C_out[9]);
 #include "../ring_coriolis_matrix.c"
 
-VECTORS void block(const double *restrict q_at, ptrdiff_t q_row, const double *restrict qd_at, ptrdiff_t qd_row, double *restrict C_at, ptrdiff_t C_row)
+VECTORS void block(const double *restrict q_in_at, ptrdiff_t q_in_row, const double *restrict qd_in_at, ptrdiff_t qd_in_row, double *restrict C_out_at, ptrdiff_t C_out_row)
 {
     EACH_SAMPLE {
-        double q_one[3], qd_one[3], C_one[9];
-        TAKE(q, 3)
-        TAKE(qd, 3)
-        awiwi_ring_coriolis_matrix(q_one, qd_one, C_one);
-        GIVE(C, 9)
+        double q_in_one[3], qd_in_one[3], C_out_one[9];
+        TAKE(q_in, 3)
+        TAKE(qd_in, 3)
+        awiwi_ring_coriolis_matrix(q_in_one, qd_in_one, C_out_one);
+        GIVE(C_out, 9)
     }
 }
 
-void awiwi_ring_coriolis_matrix_batch(ptrdiff_t samples, const double *q, ptrdiff_t q_sample, ptrdiff_t q_element, const double *qd, ptrdiff_t qd_sample, ptrdiff_t qd_element, double *C, ptrdiff_t C_sample, ptrdiff_t C_element)
+void awiwi_ring_coriolis_matrix_batch(ptrdiff_t samples, const double *q_in, ptrdiff_t q_in_sample, ptrdiff_t q_in_element, const double *qd_in, ptrdiff_t qd_in_sample, ptrdiff_t qd_in_element, double *C_out, ptrdiff_t C_out_sample, ptrdiff_t C_out_element)
 {
-    double q_rows[3*BLOCK], qd_rows[3*BLOCK], C_rows[9*BLOCK];
+    double q_in_rows[3*BLOCK], qd_in_rows[3*BLOCK], C_out_rows[9*BLOCK];
     EACH_BLOCK {
-        GATHER(q, 3)
-        GATHER(qd, 3)
-        EXPECT(C, 9)
-        block(AT(q), AT(qd), AT(C));
-        SCATTER(C, 9)
+        GATHER(q_in, 3)
+        GATHER(qd_in, 3)
+        PREFETCH_ROWS(C_out, 9)
+        block(AT(q_in), AT(qd_in), AT(C_out));
+        SCATTER(C_out, 9)
     }
 }

@@ -2,29 +2,30 @@
  *
  * ring_coupling_derivative of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_ring_coupling_derivative(const double q[3], double dP[54]);
+INLINED void awiwi_ring_coupling_derivative(const double q_in[3], double dP_out[54]);
 #include "../ring_coupling_derivative.c"
 
-VECTORS void block(const double *restrict q_at, ptrdiff_t q_row, double *restrict dP_at, ptrdiff_t dP_row)
+VECTORS void block(const double *restrict q_in_at, ptrdiff_t q_in_row, double *restrict dP_out_at, ptrdiff_t dP_out_row)
 {
     EACH_SAMPLE {
-        double q_one[3], dP_one[54];
-        TAKE(q, 3)
-        awiwi_ring_coupling_derivative(q_one, dP_one);
-        GIVE(dP, 54)
+        double q_in_one[3], dP_out_one[54];
+        TAKE(q_in, 3)
+        awiwi_ring_coupling_derivative(q_in_one, dP_out_one);
+        GIVE(dP_out, 54)
     }
 }
 
-void awiwi_ring_coupling_derivative_batch(ptrdiff_t samples, const double *q, ptrdiff_t q_sample, ptrdiff_t q_element, double *dP, ptrdiff_t dP_sample, ptrdiff_t dP_element)
+void awiwi_ring_coupling_derivative_batch(ptrdiff_t samples, const double *q_in, ptrdiff_t q_in_sample, ptrdiff_t q_in_element, double *dP_out, ptrdiff_t dP_out_sample, ptrdiff_t dP_out_element)
 {
-    double q_rows[3*BLOCK], dP_rows[54*BLOCK];
+    double q_in_rows[3*BLOCK], dP_out_rows[54*BLOCK];
     EACH_BLOCK {
-        GATHER(q, 3)
-        EXPECT(dP, 54)
-        block(AT(q), AT(dP));
-        SCATTER(dP, 54)
+        GATHER(q_in, 3)
+        PREFETCH_ROWS(dP_out, 54)
+        block(AT(q_in), AT(dP_out));
+        SCATTER(dP_out, 54)
     }
 }

@@ -2,30 +2,31 @@
  *
  * ring_gravity of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_ring_gravity(const double q[3], const double g[3], double gravity[3]);
+INLINED void awiwi_ring_gravity(const double q_in[3], const double g_in[3], double gravity_out[3]);
 #include "../ring_gravity.c"
 
-VECTORS void block(const double *restrict q_at, ptrdiff_t q_row, const double *restrict g_at, ptrdiff_t g_row, double *restrict gravity_at, ptrdiff_t gravity_row)
+VECTORS void block(const double *restrict q_in_at, ptrdiff_t q_in_row, const double *restrict g_in_at, ptrdiff_t g_in_row, double *restrict gravity_out_at, ptrdiff_t gravity_out_row)
 {
     EACH_SAMPLE {
-        double q_one[3], g_one[3], gravity_one[3];
-        TAKE(q, 3)
-        TAKE(g, 3)
-        awiwi_ring_gravity(q_one, g_one, gravity_one);
-        GIVE(gravity, 3)
+        double q_in_one[3], g_in_one[3], gravity_out_one[3];
+        TAKE(q_in, 3)
+        TAKE(g_in, 3)
+        awiwi_ring_gravity(q_in_one, g_in_one, gravity_out_one);
+        GIVE(gravity_out, 3)
     }
 }
 
-void awiwi_ring_gravity_batch(ptrdiff_t samples, const double *q, ptrdiff_t q_sample, ptrdiff_t q_element, const double *g, ptrdiff_t g_sample, ptrdiff_t g_element, double *gravity, ptrdiff_t gravity_sample, ptrdiff_t gravity_element)
+void awiwi_ring_gravity_batch(ptrdiff_t samples, const double *q_in, ptrdiff_t q_in_sample, ptrdiff_t q_in_element, const double *g_in, ptrdiff_t g_in_sample, ptrdiff_t g_in_element, double *gravity_out, ptrdiff_t gravity_out_sample, ptrdiff_t gravity_out_element)
 {
-    double q_rows[3*BLOCK], g_rows[3*BLOCK], gravity_rows[3*BLOCK];
+    double q_in_rows[3*BLOCK], g_in_rows[3*BLOCK], gravity_out_rows[3*BLOCK];
     EACH_BLOCK {
-        GATHER(q, 3)
-        GATHER(g, 3)
-        block(AT(q), AT(g), AT(gravity));
-        SCATTER(gravity, 3)
+        GATHER(q_in, 3)
+        GATHER(g_in, 3)
+        block(AT(q_in), AT(g_in), AT(gravity_out));
+        SCATTER(gravity_out, 3)
     }
 }

@@ -2,29 +2,30 @@
  *
  * ring_jacobian of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_ring_jacobian(const double q[3], double J[18]);
+INLINED void awiwi_ring_jacobian(const double q_in[3], double J_out[18]);
 #include "../ring_jacobian.c"
 
-VECTORS void block(const double *restrict q_at, ptrdiff_t q_row, double *restrict J_at, ptrdiff_t J_row)
+VECTORS void block(const double *restrict q_in_at, ptrdiff_t q_in_row, double *restrict J_out_at, ptrdiff_t J_out_row)
 {
     EACH_SAMPLE {
-        double q_one[3], J_one[18];
-        TAKE(q, 3)
-        awiwi_ring_jacobian(q_one, J_one);
-        GIVE(J, 18)
+        double q_in_one[3], J_out_one[18];
+        TAKE(q_in, 3)
+        awiwi_ring_jacobian(q_in_one, J_out_one);
+        GIVE(J_out, 18)
     }
 }
 
-void awiwi_ring_jacobian_batch(ptrdiff_t samples, const double *q, ptrdiff_t q_sample, ptrdiff_t q_element, double *J, ptrdiff_t J_sample, ptrdiff_t J_element)
+void awiwi_ring_jacobian_batch(ptrdiff_t samples, const double *q_in, ptrdiff_t q_in_sample, ptrdiff_t q_in_element, double *J_out, ptrdiff_t J_out_sample, ptrdiff_t J_out_element)
 {
-    double q_rows[3*BLOCK], J_rows[18*BLOCK];
+    double q_in_rows[3*BLOCK], J_out_rows[18*BLOCK];
     EACH_BLOCK {
-        GATHER(q, 3)
-        EXPECT(J, 18)
-        block(AT(q), AT(J));
-        SCATTER(J, 18)
+        GATHER(q_in, 3)
+        PREFETCH_ROWS(J_out, 18)
+        block(AT(q_in), AT(J_out));
+        SCATTER(J_out, 18)
     }
 }

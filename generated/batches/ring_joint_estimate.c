@@ -2,30 +2,31 @@
  *
  * ring_joint_estimate of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_ring_joint_estimate(const double h[6], const double start[3], double q[3]);
+INLINED void awiwi_ring_joint_estimate(const double h_in[6], const double start_in[3], double q_out[3]);
 #include "../ring_joint_estimate.c"
 
-VECTORS void block(const double *restrict h_at, ptrdiff_t h_row, const double *restrict start_at, ptrdiff_t start_row, double *restrict q_at, ptrdiff_t q_row)
+VECTORS void block(const double *restrict h_in_at, ptrdiff_t h_in_row, const double *restrict start_in_at, ptrdiff_t start_in_row, double *restrict q_out_at, ptrdiff_t q_out_row)
 {
     EACH_SAMPLE {
-        double h_one[6], start_one[3], q_one[3];
-        TAKE(h, 6)
-        TAKE(start, 3)
-        awiwi_ring_joint_estimate(h_one, start_one, q_one);
-        GIVE(q, 3)
+        double h_in_one[6], start_in_one[3], q_out_one[3];
+        TAKE(h_in, 6)
+        TAKE(start_in, 3)
+        awiwi_ring_joint_estimate(h_in_one, start_in_one, q_out_one);
+        GIVE(q_out, 3)
     }
 }
 
-void awiwi_ring_joint_estimate_batch(ptrdiff_t samples, const double *h, ptrdiff_t h_sample, ptrdiff_t h_element, const double *start, ptrdiff_t start_sample, ptrdiff_t start_element, double *q, ptrdiff_t q_sample, ptrdiff_t q_element)
+void awiwi_ring_joint_estimate_batch(ptrdiff_t samples, const double *h_in, ptrdiff_t h_in_sample, ptrdiff_t h_in_element, const double *start_in, ptrdiff_t start_in_sample, ptrdiff_t start_in_element, double *q_out, ptrdiff_t q_out_sample, ptrdiff_t q_out_element)
 {
-    double h_rows[6*BLOCK], start_rows[3*BLOCK], q_rows[3*BLOCK];
+    double h_in_rows[6*BLOCK], start_in_rows[3*BLOCK], q_out_rows[3*BLOCK];
     EACH_BLOCK {
-        GATHER(h, 6)
-        GATHER(start, 3)
-        block(AT(h), AT(start), AT(q));
-        SCATTER(q, 3)
+        GATHER(h_in, 6)
+        GATHER(start_in, 3)
+        block(AT(h_in), AT(start_in), AT(q_out));
+        SCATTER(q_out, 3)
     }
 }

@@ -2,30 +2,31 @@
  *
  * ring_joint_torque of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_ring_joint_torque(const double q[3], const double f[6], double tau[3]);
+INLINED void awiwi_ring_joint_torque(const double q_in[3], const double f_in[6], double tau_out[3]);
 #include "../ring_joint_torque.c"
 
-VECTORS void block(const double *restrict q_at, ptrdiff_t q_row, const double *restrict f_at, ptrdiff_t f_row, double *restrict tau_at, ptrdiff_t tau_row)
+VECTORS void block(const double *restrict q_in_at, ptrdiff_t q_in_row, const double *restrict f_in_at, ptrdiff_t f_in_row, double *restrict tau_out_at, ptrdiff_t tau_out_row)
 {
     EACH_SAMPLE {
-        double q_one[3], f_one[6], tau_one[3];
-        TAKE(q, 3)
-        TAKE(f, 6)
-        awiwi_ring_joint_torque(q_one, f_one, tau_one);
-        GIVE(tau, 3)
+        double q_in_one[3], f_in_one[6], tau_out_one[3];
+        TAKE(q_in, 3)
+        TAKE(f_in, 6)
+        awiwi_ring_joint_torque(q_in_one, f_in_one, tau_out_one);
+        GIVE(tau_out, 3)
     }
 }
 
-void awiwi_ring_joint_torque_batch(ptrdiff_t samples, const double *q, ptrdiff_t q_sample, ptrdiff_t q_element, const double *f, ptrdiff_t f_sample, ptrdiff_t f_element, double *tau, ptrdiff_t tau_sample, ptrdiff_t tau_element)
+void awiwi_ring_joint_torque_batch(ptrdiff_t samples, const double *q_in, ptrdiff_t q_in_sample, ptrdiff_t q_in_element, const double *f_in, ptrdiff_t f_in_sample, ptrdiff_t f_in_element, double *tau_out, ptrdiff_t tau_out_sample, ptrdiff_t tau_out_element)
 {
-    double q_rows[3*BLOCK], f_rows[6*BLOCK], tau_rows[3*BLOCK];
+    double q_in_rows[3*BLOCK], f_in_rows[6*BLOCK], tau_out_rows[3*BLOCK];
     EACH_BLOCK {
-        GATHER(q, 3)
-        GATHER(f, 6)
-        block(AT(q), AT(f), AT(tau));
-        SCATTER(tau, 3)
+        GATHER(q_in, 3)
+        GATHER(f_in, 6)
+        block(AT(q_in), AT(f_in), AT(tau_out));
+        SCATTER(tau_out, 3)
     }
 }

@@ -2,35 +2,36 @@
  *
  * ring_joint_torque_and_stiffness of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_ring_joint_torque_and_stiffness(const double q[3], const double f[6], const double k[6], double tau[3], double K[9]);
+INLINED void awiwi_ring_joint_torque_and_stiffness(const double q_in[3], const double f_in[6], const double k_in[6], double tau_out[3], double K_out[9]);
 #include "../ring_joint_torque_and_stiffness.c"
 
-VECTORS void block(const double *restrict q_at, ptrdiff_t q_row, const double *restrict f_at, ptrdiff_t f_row, const double *restrict k_at, ptrdiff_t k_row, double *restrict tau_at, ptrdiff_t tau_row, double *restrict K_at, ptrdiff_t K_row)
+VECTORS void block(const double *restrict q_in_at, ptrdiff_t q_in_row, const double *restrict f_in_at, ptrdiff_t f_in_row, const double *restrict k_in_at, ptrdiff_t k_in_row, double *restrict tau_out_at, ptrdiff_t tau_out_row, double *restrict K_out_at, ptrdiff_t K_out_row)
 {
     EACH_SAMPLE {
-        double q_one[3], f_one[6], k_one[6], tau_one[3], K_one[9];
-        TAKE(q, 3)
-        TAKE(f, 6)
-        TAKE(k, 6)
-        awiwi_ring_joint_torque_and_stiffness(q_one, f_one, k_one, tau_one, K_one);
-        GIVE(tau, 3)
-        GIVE(K, 9)
+        double q_in_one[3], f_in_one[6], k_in_one[6], tau_out_one[3], K_out_one[9];
+        TAKE(q_in, 3)
+        TAKE(f_in, 6)
+        TAKE(k_in, 6)
+        awiwi_ring_joint_torque_and_stiffness(q_in_one, f_in_one, k_in_one, tau_out_one, K_out_one);
+        GIVE(tau_out, 3)
+        GIVE(K_out, 9)
     }
 }
 
-void awiwi_ring_joint_torque_and_stiffness_batch(ptrdiff_t samples, const double *q, ptrdiff_t q_sample, ptrdiff_t q_element, const double *f, ptrdiff_t f_sample, ptrdiff_t f_element, const double *k, ptrdiff_t k_sample, ptrdiff_t k_element, double *tau, ptrdiff_t tau_sample, ptrdiff_t tau_element, double *K, ptrdiff_t K_sample, ptrdiff_t K_element)
+void awiwi_ring_joint_torque_and_stiffness_batch(ptrdiff_t samples, const double *q_in, ptrdiff_t q_in_sample, ptrdiff_t q_in_element, const double *f_in, ptrdiff_t f_in_sample, ptrdiff_t f_in_element, const double *k_in, ptrdiff_t k_in_sample, ptrdiff_t k_in_element, double *tau_out, ptrdiff_t tau_out_sample, ptrdiff_t tau_out_element, double *K_out, ptrdiff_t K_out_sample, ptrdiff_t K_out_element)
 {
-    double q_rows[3*BLOCK], f_rows[6*BLOCK], k_rows[6*BLOCK], tau_rows[3*BLOCK], K_rows[9*BLOCK];
+    double q_in_rows[3*BLOCK], f_in_rows[6*BLOCK], k_in_rows[6*BLOCK], tau_out_rows[3*BLOCK], K_out_rows[9*BLOCK];
     EACH_BLOCK {
-        GATHER(q, 3)
-        GATHER(f, 6)
-        GATHER(k, 6)
-        EXPECT(K, 9)
-        block(AT(q), AT(f), AT(k), AT(tau), AT(K));
-        SCATTER(tau, 3)
-        SCATTER(K, 9)
+        GATHER(q_in, 3)
+        GATHER(f_in, 6)
+        GATHER(k_in, 6)
+        PREFETCH_ROWS(K_out, 9)
+        block(AT(q_in), AT(f_in), AT(k_in), AT(tau_out), AT(K_out));
+        SCATTER(tau_out, 3)
+        SCATTER(K_out, 9)
     }
 }

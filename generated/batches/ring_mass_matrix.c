@@ -2,29 +2,30 @@
  *
  * ring_mass_matrix of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_ring_mass_matrix(const double q[3], double M[9]);
+INLINED void awiwi_ring_mass_matrix(const double q_in[3], double M_out[9]);
 #include "../ring_mass_matrix.c"
 
-VECTORS void block(const double *restrict q_at, ptrdiff_t q_row, double *restrict M_at, ptrdiff_t M_row)
+VECTORS void block(const double *restrict q_in_at, ptrdiff_t q_in_row, double *restrict M_out_at, ptrdiff_t M_out_row)
 {
     EACH_SAMPLE {
-        double q_one[3], M_one[9];
-        TAKE(q, 3)
-        awiwi_ring_mass_matrix(q_one, M_one);
-        GIVE(M, 9)
+        double q_in_one[3], M_out_one[9];
+        TAKE(q_in, 3)
+        awiwi_ring_mass_matrix(q_in_one, M_out_one);
+        GIVE(M_out, 9)
     }
 }
 
-void awiwi_ring_mass_matrix_batch(ptrdiff_t samples, const double *q, ptrdiff_t q_sample, ptrdiff_t q_element, double *M, ptrdiff_t M_sample, ptrdiff_t M_element)
+void awiwi_ring_mass_matrix_batch(ptrdiff_t samples, const double *q_in, ptrdiff_t q_in_sample, ptrdiff_t q_in_element, double *M_out, ptrdiff_t M_out_sample, ptrdiff_t M_out_element)
 {
-    double q_rows[3*BLOCK], M_rows[9*BLOCK];
+    double q_in_rows[3*BLOCK], M_out_rows[9*BLOCK];
     EACH_BLOCK {
-        GATHER(q, 3)
-        EXPECT(M, 9)
-        block(AT(q), AT(M));
-        SCATTER(M, 9)
+        GATHER(q_in, 3)
+        PREFETCH_ROWS(M_out, 9)
+        block(AT(q_in), AT(M_out));
+        SCATTER(M_out, 9)
     }
 }

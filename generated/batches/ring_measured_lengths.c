@@ -2,32 +2,33 @@
  *
  * ring_measured_lengths of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_ring_measured_lengths(const double theta[6], const double x[6], const double w[6], double h[6]);
+INLINED void awiwi_ring_measured_lengths(const double theta_in[6], const double x_in[6], const double w_in[6], double h_out[6]);
 #include "../ring_measured_lengths.c"
 
-VECTORS void block(const double *restrict theta_at, ptrdiff_t theta_row, const double *restrict x_at, ptrdiff_t x_row, const double *restrict w_at, ptrdiff_t w_row, double *restrict h_at, ptrdiff_t h_row)
+VECTORS void block(const double *restrict theta_in_at, ptrdiff_t theta_in_row, const double *restrict x_in_at, ptrdiff_t x_in_row, const double *restrict w_in_at, ptrdiff_t w_in_row, double *restrict h_out_at, ptrdiff_t h_out_row)
 {
     EACH_SAMPLE {
-        double theta_one[6], x_one[6], w_one[6], h_one[6];
-        TAKE(theta, 6)
-        TAKE(x, 6)
-        TAKE(w, 6)
-        awiwi_ring_measured_lengths(theta_one, x_one, w_one, h_one);
-        GIVE(h, 6)
+        double theta_in_one[6], x_in_one[6], w_in_one[6], h_out_one[6];
+        TAKE(theta_in, 6)
+        TAKE(x_in, 6)
+        TAKE(w_in, 6)
+        awiwi_ring_measured_lengths(theta_in_one, x_in_one, w_in_one, h_out_one);
+        GIVE(h_out, 6)
     }
 }
 
-void awiwi_ring_measured_lengths_batch(ptrdiff_t samples, const double *theta, ptrdiff_t theta_sample, ptrdiff_t theta_element, const double *x, ptrdiff_t x_sample, ptrdiff_t x_element, const double *w, ptrdiff_t w_sample, ptrdiff_t w_element, double *h, ptrdiff_t h_sample, ptrdiff_t h_element)
+void awiwi_ring_measured_lengths_batch(ptrdiff_t samples, const double *theta_in, ptrdiff_t theta_in_sample, ptrdiff_t theta_in_element, const double *x_in, ptrdiff_t x_in_sample, ptrdiff_t x_in_element, const double *w_in, ptrdiff_t w_in_sample, ptrdiff_t w_in_element, double *h_out, ptrdiff_t h_out_sample, ptrdiff_t h_out_element)
 {
-    double theta_rows[6*BLOCK], x_rows[6*BLOCK], w_rows[6*BLOCK], h_rows[6*BLOCK];
+    double theta_in_rows[6*BLOCK], x_in_rows[6*BLOCK], w_in_rows[6*BLOCK], h_out_rows[6*BLOCK];
     EACH_BLOCK {
-        GATHER(theta, 6)
-        GATHER(x, 6)
-        GATHER(w, 6)
-        block(AT(theta), AT(x), AT(w), AT(h));
-        SCATTER(h, 6)
+        GATHER(theta_in, 6)
+        GATHER(x_in, 6)
+        GATHER(w_in, 6)
+        block(AT(theta_in), AT(x_in), AT(w_in), AT(h_out));
+        SCATTER(h_out, 6)
     }
 }

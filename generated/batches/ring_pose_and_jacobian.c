@@ -2,32 +2,33 @@
  *
  * ring_pose_and_jacobian of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_ring_pose_and_jacobian(const double q[3], double T[16], double J[18]);
+INLINED void awiwi_ring_pose_and_jacobian(const double q_in[3], double T_out[16], double J_out[18]);
 #include "../ring_pose_and_jacobian.c"
 
-VECTORS void block(const double *restrict q_at, ptrdiff_t q_row, double *restrict T_at, ptrdiff_t T_row, double *restrict J_at, ptrdiff_t J_row)
+VECTORS void block(const double *restrict q_in_at, ptrdiff_t q_in_row, double *restrict T_out_at, ptrdiff_t T_out_row, double *restrict J_out_at, ptrdiff_t J_out_row)
 {
     EACH_SAMPLE {
-        double q_one[3], T_one[16], J_one[18];
-        TAKE(q, 3)
-        awiwi_ring_pose_and_jacobian(q_one, T_one, J_one);
-        GIVE(T, 16)
-        GIVE(J, 18)
+        double q_in_one[3], T_out_one[16], J_out_one[18];
+        TAKE(q_in, 3)
+        awiwi_ring_pose_and_jacobian(q_in_one, T_out_one, J_out_one);
+        GIVE(T_out, 16)
+        GIVE(J_out, 18)
     }
 }
 
-void awiwi_ring_pose_and_jacobian_batch(ptrdiff_t samples, const double *q, ptrdiff_t q_sample, ptrdiff_t q_element, double *T, ptrdiff_t T_sample, ptrdiff_t T_element, double *J, ptrdiff_t J_sample, ptrdiff_t J_element)
+void awiwi_ring_pose_and_jacobian_batch(ptrdiff_t samples, const double *q_in, ptrdiff_t q_in_sample, ptrdiff_t q_in_element, double *T_out, ptrdiff_t T_out_sample, ptrdiff_t T_out_element, double *J_out, ptrdiff_t J_out_sample, ptrdiff_t J_out_element)
 {
-    double q_rows[3*BLOCK], T_rows[16*BLOCK], J_rows[18*BLOCK];
+    double q_in_rows[3*BLOCK], T_out_rows[16*BLOCK], J_out_rows[18*BLOCK];
     EACH_BLOCK {
-        GATHER(q, 3)
-        EXPECT(T, 16)
-        EXPECT(J, 18)
-        block(AT(q), AT(T), AT(J));
-        SCATTER(T, 16)
-        SCATTER(J, 18)
+        GATHER(q_in, 3)
+        PREFETCH_ROWS(T_out, 16)
+        PREFETCH_ROWS(J_out, 18)
+        block(AT(q_in), AT(T_out), AT(J_out));
+        SCATTER(T_out, 16)
+        SCATTER(J_out, 18)
     }
 }

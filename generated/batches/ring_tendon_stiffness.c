@@ -2,34 +2,35 @@
  *
  * ring_tendon_stiffness of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED int awiwi_ring_tendon_stiffness(const double tension[6], double k[6], double slope[6], double curvature[6]);
+INLINED int awiwi_ring_tendon_stiffness(const double tension_in[6], double k_out[6], double slope_out[6], double curvature_out[6]);
 #include "../ring_tendon_stiffness.c"
 
-VECTORS void block(const double *restrict tension_at, ptrdiff_t tension_row, double *restrict k_at, ptrdiff_t k_row, double *restrict slope_at, ptrdiff_t slope_row, double *restrict curvature_at, ptrdiff_t curvature_row, int *restrict status)
+VECTORS void block(const double *restrict tension_in_at, ptrdiff_t tension_in_row, double *restrict k_out_at, ptrdiff_t k_out_row, double *restrict slope_out_at, ptrdiff_t slope_out_row, double *restrict curvature_out_at, ptrdiff_t curvature_out_row, int *restrict status)
 {
     EACH_SAMPLE {
-        double tension_one[6], k_one[6], slope_one[6], curvature_one[6];
-        TAKE(tension, 6)
-        status[i_] = awiwi_ring_tendon_stiffness(tension_one, k_one, slope_one, curvature_one);
-        GIVE(k, 6)
-        GIVE(slope, 6)
-        GIVE(curvature, 6)
+        double tension_in_one[6], k_out_one[6], slope_out_one[6], curvature_out_one[6];
+        TAKE(tension_in, 6)
+        status[i_] = awiwi_ring_tendon_stiffness(tension_in_one, k_out_one, slope_out_one, curvature_out_one);
+        GIVE(k_out, 6)
+        GIVE(slope_out, 6)
+        GIVE(curvature_out, 6)
     }
 }
 
-void awiwi_ring_tendon_stiffness_batch(ptrdiff_t samples, const double *tension, ptrdiff_t tension_sample, ptrdiff_t tension_element, double *k, ptrdiff_t k_sample, ptrdiff_t k_element, double *slope, ptrdiff_t slope_sample, ptrdiff_t slope_element, double *curvature, ptrdiff_t curvature_sample, ptrdiff_t curvature_element, int *status)
+void awiwi_ring_tendon_stiffness_batch(ptrdiff_t samples, const double *tension_in, ptrdiff_t tension_in_sample, ptrdiff_t tension_in_element, double *k_out, ptrdiff_t k_out_sample, ptrdiff_t k_out_element, double *slope_out, ptrdiff_t slope_out_sample, ptrdiff_t slope_out_element, double *curvature_out, ptrdiff_t curvature_out_sample, ptrdiff_t curvature_out_element, int *status)
 {
-    double tension_rows[6*BLOCK], k_rows[6*BLOCK], slope_rows[6*BLOCK], curvature_rows[6*BLOCK];
+    double tension_in_rows[6*BLOCK], k_out_rows[6*BLOCK], slope_out_rows[6*BLOCK], curvature_out_rows[6*BLOCK];
     int status_rows[BLOCK];
     EACH_BLOCK {
-        GATHER(tension, 6)
-        block(AT(tension), AT(k), AT(slope), AT(curvature), status_rows);
-        SCATTER(k, 6)
-        SCATTER(slope, 6)
-        SCATTER(curvature, 6)
+        GATHER(tension_in, 6)
+        block(AT(tension_in), AT(k_out), AT(slope_out), AT(curvature_out), status_rows);
+        SCATTER(k_out, 6)
+        SCATTER(slope_out, 6)
+        SCATTER(curvature_out, 6)
         memcpy(status + first_, status_rows, (size_t)COUNT * sizeof *status);
     }
 }

@@ -2,46 +2,47 @@
  *
  * sdre_tendon of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED int awiwi_sdre_tendon(const double theta[1], const double thd[1], const double theta_des[1], const double b[1], const double dtheta[1], const double spring[3], const double weights[2], const double R[1], double K[2], double u[1]);
+INLINED int awiwi_sdre_tendon(const double theta_in[1], const double thd_in[1], const double theta_des_in[1], const double b_in[1], const double dtheta_in[1], const double spring_in[3], const double weights_in[2], const double R_in[1], double K_out[2], double u_out[1]);
 #include "../sdre_tendon.c"
 
-VECTORS void block(const double *restrict theta_at, ptrdiff_t theta_row, const double *restrict thd_at, ptrdiff_t thd_row, const double *restrict theta_des_at, ptrdiff_t theta_des_row, const double *restrict b_at, ptrdiff_t b_row, const double *restrict dtheta_at, ptrdiff_t dtheta_row, const double *restrict spring_at, ptrdiff_t spring_row, const double *restrict weights_at, ptrdiff_t weights_row, const double *restrict R_at, ptrdiff_t R_row, double *restrict K_at, ptrdiff_t K_row, double *restrict u_at, ptrdiff_t u_row, int *restrict status)
+VECTORS void block(const double *restrict theta_in_at, ptrdiff_t theta_in_row, const double *restrict thd_in_at, ptrdiff_t thd_in_row, const double *restrict theta_des_in_at, ptrdiff_t theta_des_in_row, const double *restrict b_in_at, ptrdiff_t b_in_row, const double *restrict dtheta_in_at, ptrdiff_t dtheta_in_row, const double *restrict spring_in_at, ptrdiff_t spring_in_row, const double *restrict weights_in_at, ptrdiff_t weights_in_row, const double *restrict R_in_at, ptrdiff_t R_in_row, double *restrict K_out_at, ptrdiff_t K_out_row, double *restrict u_out_at, ptrdiff_t u_out_row, int *restrict status)
 {
     EACH_SAMPLE {
-        double theta_one[1], thd_one[1], theta_des_one[1], b_one[1], dtheta_one[1], spring_one[3], weights_one[2], R_one[1], K_one[2], u_one[1];
-        TAKE(theta, 1)
-        TAKE(thd, 1)
-        TAKE(theta_des, 1)
-        TAKE(b, 1)
-        TAKE(dtheta, 1)
-        TAKE(spring, 3)
-        TAKE(weights, 2)
-        TAKE(R, 1)
-        status[i_] = awiwi_sdre_tendon(theta_one, thd_one, theta_des_one, b_one, dtheta_one, spring_one, weights_one, R_one, K_one, u_one);
-        GIVE(K, 2)
-        GIVE(u, 1)
+        double theta_in_one[1], thd_in_one[1], theta_des_in_one[1], b_in_one[1], dtheta_in_one[1], spring_in_one[3], weights_in_one[2], R_in_one[1], K_out_one[2], u_out_one[1];
+        TAKE(theta_in, 1)
+        TAKE(thd_in, 1)
+        TAKE(theta_des_in, 1)
+        TAKE(b_in, 1)
+        TAKE(dtheta_in, 1)
+        TAKE(spring_in, 3)
+        TAKE(weights_in, 2)
+        TAKE(R_in, 1)
+        status[i_] = awiwi_sdre_tendon(theta_in_one, thd_in_one, theta_des_in_one, b_in_one, dtheta_in_one, spring_in_one, weights_in_one, R_in_one, K_out_one, u_out_one);
+        GIVE(K_out, 2)
+        GIVE(u_out, 1)
     }
 }
 
-void awiwi_sdre_tendon_batch(ptrdiff_t samples, const double *theta, ptrdiff_t theta_sample, ptrdiff_t theta_element, const double *thd, ptrdiff_t thd_sample, ptrdiff_t thd_element, const double *theta_des, ptrdiff_t theta_des_sample, ptrdiff_t theta_des_element, const double *b, ptrdiff_t b_sample, ptrdiff_t b_element, const double *dtheta, ptrdiff_t dtheta_sample, ptrdiff_t dtheta_element, const double *spring, ptrdiff_t spring_sample, ptrdiff_t spring_element, const double *weights, ptrdiff_t weights_sample, ptrdiff_t weights_element, const double *R, ptrdiff_t R_sample, ptrdiff_t R_element, double *K, ptrdiff_t K_sample, ptrdiff_t K_element, double *u, ptrdiff_t u_sample, ptrdiff_t u_element, int *status)
+void awiwi_sdre_tendon_batch(ptrdiff_t samples, const double *theta_in, ptrdiff_t theta_in_sample, ptrdiff_t theta_in_element, const double *thd_in, ptrdiff_t thd_in_sample, ptrdiff_t thd_in_element, const double *theta_des_in, ptrdiff_t theta_des_in_sample, ptrdiff_t theta_des_in_element, const double *b_in, ptrdiff_t b_in_sample, ptrdiff_t b_in_element, const double *dtheta_in, ptrdiff_t dtheta_in_sample, ptrdiff_t dtheta_in_element, const double *spring_in, ptrdiff_t spring_in_sample, ptrdiff_t spring_in_element, const double *weights_in, ptrdiff_t weights_in_sample, ptrdiff_t weights_in_element, const double *R_in, ptrdiff_t R_in_sample, ptrdiff_t R_in_element, double *K_out, ptrdiff_t K_out_sample, ptrdiff_t K_out_element, double *u_out, ptrdiff_t u_out_sample, ptrdiff_t u_out_element, int *status)
 {
-    double theta_rows[1*BLOCK], thd_rows[1*BLOCK], theta_des_rows[1*BLOCK], b_rows[1*BLOCK], dtheta_rows[1*BLOCK], spring_rows[3*BLOCK], weights_rows[2*BLOCK], R_rows[1*BLOCK], K_rows[2*BLOCK], u_rows[1*BLOCK];
+    double theta_in_rows[1*BLOCK], thd_in_rows[1*BLOCK], theta_des_in_rows[1*BLOCK], b_in_rows[1*BLOCK], dtheta_in_rows[1*BLOCK], spring_in_rows[3*BLOCK], weights_in_rows[2*BLOCK], R_in_rows[1*BLOCK], K_out_rows[2*BLOCK], u_out_rows[1*BLOCK];
     int status_rows[BLOCK];
     EACH_BLOCK {
-        GATHER(theta, 1)
-        GATHER(thd, 1)
-        GATHER(theta_des, 1)
-        GATHER(b, 1)
-        GATHER(dtheta, 1)
-        GATHER(spring, 3)
-        GATHER(weights, 2)
-        GATHER(R, 1)
-        block(AT(theta), AT(thd), AT(theta_des), AT(b), AT(dtheta), AT(spring), AT(weights), AT(R), AT(K), AT(u), status_rows);
-        SCATTER(K, 2)
-        SCATTER(u, 1)
+        GATHER(theta_in, 1)
+        GATHER(thd_in, 1)
+        GATHER(theta_des_in, 1)
+        GATHER(b_in, 1)
+        GATHER(dtheta_in, 1)
+        GATHER(spring_in, 3)
+        GATHER(weights_in, 2)
+        GATHER(R_in, 1)
+        block(AT(theta_in), AT(thd_in), AT(theta_des_in), AT(b_in), AT(dtheta_in), AT(spring_in), AT(weights_in), AT(R_in), AT(K_out), AT(u_out), status_rows);
+        SCATTER(K_out, 2)
+        SCATTER(u_out, 1)
         memcpy(status + first_, status_rows, (size_t)COUNT * sizeof *status);
     }
 }

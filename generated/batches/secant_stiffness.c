@@ -2,34 +2,35 @@
  *
  * secant_stiffness of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_secant_stiffness(const double spring[3], const double deflexion[1], const double deflexion_des[1], double k[1], double torque[1]);
+INLINED void awiwi_secant_stiffness(const double spring_in[3], const double deflexion_in[1], const double deflexion_des_in[1], double k_out[1], double torque_out[1]);
 #include "../secant_stiffness.c"
 
-VECTORS void block(const double *restrict spring_at, ptrdiff_t spring_row, const double *restrict deflexion_at, ptrdiff_t deflexion_row, const double *restrict deflexion_des_at, ptrdiff_t deflexion_des_row, double *restrict k_at, ptrdiff_t k_row, double *restrict torque_at, ptrdiff_t torque_row)
+VECTORS void block(const double *restrict spring_in_at, ptrdiff_t spring_in_row, const double *restrict deflexion_in_at, ptrdiff_t deflexion_in_row, const double *restrict deflexion_des_in_at, ptrdiff_t deflexion_des_in_row, double *restrict k_out_at, ptrdiff_t k_out_row, double *restrict torque_out_at, ptrdiff_t torque_out_row)
 {
     EACH_SAMPLE {
-        double spring_one[3], deflexion_one[1], deflexion_des_one[1], k_one[1], torque_one[1];
-        TAKE(spring, 3)
-        TAKE(deflexion, 1)
-        TAKE(deflexion_des, 1)
-        awiwi_secant_stiffness(spring_one, deflexion_one, deflexion_des_one, k_one, torque_one);
-        GIVE(k, 1)
-        GIVE(torque, 1)
+        double spring_in_one[3], deflexion_in_one[1], deflexion_des_in_one[1], k_out_one[1], torque_out_one[1];
+        TAKE(spring_in, 3)
+        TAKE(deflexion_in, 1)
+        TAKE(deflexion_des_in, 1)
+        awiwi_secant_stiffness(spring_in_one, deflexion_in_one, deflexion_des_in_one, k_out_one, torque_out_one);
+        GIVE(k_out, 1)
+        GIVE(torque_out, 1)
     }
 }
 
-void awiwi_secant_stiffness_batch(ptrdiff_t samples, const double *spring, ptrdiff_t spring_sample, ptrdiff_t spring_element, const double *deflexion, ptrdiff_t deflexion_sample, ptrdiff_t deflexion_element, const double *deflexion_des, ptrdiff_t deflexion_des_sample, ptrdiff_t deflexion_des_element, double *k, ptrdiff_t k_sample, ptrdiff_t k_element, double *torque, ptrdiff_t torque_sample, ptrdiff_t torque_element)
+void awiwi_secant_stiffness_batch(ptrdiff_t samples, const double *spring_in, ptrdiff_t spring_in_sample, ptrdiff_t spring_in_element, const double *deflexion_in, ptrdiff_t deflexion_in_sample, ptrdiff_t deflexion_in_element, const double *deflexion_des_in, ptrdiff_t deflexion_des_in_sample, ptrdiff_t deflexion_des_in_element, double *k_out, ptrdiff_t k_out_sample, ptrdiff_t k_out_element, double *torque_out, ptrdiff_t torque_out_sample, ptrdiff_t torque_out_element)
 {
-    double spring_rows[3*BLOCK], deflexion_rows[1*BLOCK], deflexion_des_rows[1*BLOCK], k_rows[1*BLOCK], torque_rows[1*BLOCK];
+    double spring_in_rows[3*BLOCK], deflexion_in_rows[1*BLOCK], deflexion_des_in_rows[1*BLOCK], k_out_rows[1*BLOCK], torque_out_rows[1*BLOCK];
     EACH_BLOCK {
-        GATHER(spring, 3)
-        GATHER(deflexion, 1)
-        GATHER(deflexion_des, 1)
-        block(AT(spring), AT(deflexion), AT(deflexion_des), AT(k), AT(torque));
-        SCATTER(k, 1)
-        SCATTER(torque, 1)
+        GATHER(spring_in, 3)
+        GATHER(deflexion_in, 1)
+        GATHER(deflexion_des_in, 1)
+        block(AT(spring_in), AT(deflexion_in), AT(deflexion_des_in), AT(k_out), AT(torque_out));
+        SCATTER(k_out, 1)
+        SCATTER(torque_out, 1)
     }
 }

@@ -2,30 +2,31 @@
  *
  * spring_elongation of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED int awiwi_spring_elongation(const double f[1], double x[1]);
+INLINED int awiwi_spring_elongation(const double f_in[1], double x_out[1]);
 #include "../spring_elongation.c"
 
-VECTORS void block(const double *restrict f_at, ptrdiff_t f_row, double *restrict x_at, ptrdiff_t x_row, int *restrict status)
+VECTORS void block(const double *restrict f_in_at, ptrdiff_t f_in_row, double *restrict x_out_at, ptrdiff_t x_out_row, int *restrict status)
 {
     EACH_SAMPLE {
-        double f_one[1], x_one[1];
-        TAKE(f, 1)
-        status[i_] = awiwi_spring_elongation(f_one, x_one);
-        GIVE(x, 1)
+        double f_in_one[1], x_out_one[1];
+        TAKE(f_in, 1)
+        status[i_] = awiwi_spring_elongation(f_in_one, x_out_one);
+        GIVE(x_out, 1)
     }
 }
 
-void awiwi_spring_elongation_batch(ptrdiff_t samples, const double *f, ptrdiff_t f_sample, ptrdiff_t f_element, double *x, ptrdiff_t x_sample, ptrdiff_t x_element, int *status)
+void awiwi_spring_elongation_batch(ptrdiff_t samples, const double *f_in, ptrdiff_t f_in_sample, ptrdiff_t f_in_element, double *x_out, ptrdiff_t x_out_sample, ptrdiff_t x_out_element, int *status)
 {
-    double f_rows[1*BLOCK], x_rows[1*BLOCK];
+    double f_in_rows[1*BLOCK], x_out_rows[1*BLOCK];
     int status_rows[BLOCK];
     EACH_BLOCK {
-        GATHER(f, 1)
-        block(AT(f), AT(x), status_rows);
-        SCATTER(x, 1)
+        GATHER(f_in, 1)
+        block(AT(f_in), AT(x_out), status_rows);
+        SCATTER(x_out, 1)
         memcpy(status + first_, status_rows, (size_t)COUNT * sizeof *status);
     }
 }

@@ -2,30 +2,31 @@
  *
  * spring_force of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED int awiwi_spring_force(const double x[1], double f[1]);
+INLINED int awiwi_spring_force(const double x_in[1], double f_out[1]);
 #include "../spring_force.c"
 
-VECTORS void block(const double *restrict x_at, ptrdiff_t x_row, double *restrict f_at, ptrdiff_t f_row, int *restrict status)
+VECTORS void block(const double *restrict x_in_at, ptrdiff_t x_in_row, double *restrict f_out_at, ptrdiff_t f_out_row, int *restrict status)
 {
     EACH_SAMPLE {
-        double x_one[1], f_one[1];
-        TAKE(x, 1)
-        status[i_] = awiwi_spring_force(x_one, f_one);
-        GIVE(f, 1)
+        double x_in_one[1], f_out_one[1];
+        TAKE(x_in, 1)
+        status[i_] = awiwi_spring_force(x_in_one, f_out_one);
+        GIVE(f_out, 1)
     }
 }
 
-void awiwi_spring_force_batch(ptrdiff_t samples, const double *x, ptrdiff_t x_sample, ptrdiff_t x_element, double *f, ptrdiff_t f_sample, ptrdiff_t f_element, int *status)
+void awiwi_spring_force_batch(ptrdiff_t samples, const double *x_in, ptrdiff_t x_in_sample, ptrdiff_t x_in_element, double *f_out, ptrdiff_t f_out_sample, ptrdiff_t f_out_element, int *status)
 {
-    double x_rows[1*BLOCK], f_rows[1*BLOCK];
+    double x_in_rows[1*BLOCK], f_out_rows[1*BLOCK];
     int status_rows[BLOCK];
     EACH_BLOCK {
-        GATHER(x, 1)
-        block(AT(x), AT(f), status_rows);
-        SCATTER(f, 1)
+        GATHER(x_in, 1)
+        block(AT(x_in), AT(f_out), status_rows);
+        SCATTER(f_out, 1)
         memcpy(status + first_, status_rows, (size_t)COUNT * sizeof *status);
     }
 }

@@ -2,34 +2,35 @@
  *
  * spring_lever of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED int awiwi_spring_lever(const double theta[1], double dL[1], double force[1], double stiffness[1]);
+INLINED int awiwi_spring_lever(const double theta_in[1], double dL_out[1], double force_out[1], double stiffness_out[1]);
 #include "../spring_lever.c"
 
-VECTORS void block(const double *restrict theta_at, ptrdiff_t theta_row, double *restrict dL_at, ptrdiff_t dL_row, double *restrict force_at, ptrdiff_t force_row, double *restrict stiffness_at, ptrdiff_t stiffness_row, int *restrict status)
+VECTORS void block(const double *restrict theta_in_at, ptrdiff_t theta_in_row, double *restrict dL_out_at, ptrdiff_t dL_out_row, double *restrict force_out_at, ptrdiff_t force_out_row, double *restrict stiffness_out_at, ptrdiff_t stiffness_out_row, int *restrict status)
 {
     EACH_SAMPLE {
-        double theta_one[1], dL_one[1], force_one[1], stiffness_one[1];
-        TAKE(theta, 1)
-        status[i_] = awiwi_spring_lever(theta_one, dL_one, force_one, stiffness_one);
-        GIVE(dL, 1)
-        GIVE(force, 1)
-        GIVE(stiffness, 1)
+        double theta_in_one[1], dL_out_one[1], force_out_one[1], stiffness_out_one[1];
+        TAKE(theta_in, 1)
+        status[i_] = awiwi_spring_lever(theta_in_one, dL_out_one, force_out_one, stiffness_out_one);
+        GIVE(dL_out, 1)
+        GIVE(force_out, 1)
+        GIVE(stiffness_out, 1)
     }
 }
 
-void awiwi_spring_lever_batch(ptrdiff_t samples, const double *theta, ptrdiff_t theta_sample, ptrdiff_t theta_element, double *dL, ptrdiff_t dL_sample, ptrdiff_t dL_element, double *force, ptrdiff_t force_sample, ptrdiff_t force_element, double *stiffness, ptrdiff_t stiffness_sample, ptrdiff_t stiffness_element, int *status)
+void awiwi_spring_lever_batch(ptrdiff_t samples, const double *theta_in, ptrdiff_t theta_in_sample, ptrdiff_t theta_in_element, double *dL_out, ptrdiff_t dL_out_sample, ptrdiff_t dL_out_element, double *force_out, ptrdiff_t force_out_sample, ptrdiff_t force_out_element, double *stiffness_out, ptrdiff_t stiffness_out_sample, ptrdiff_t stiffness_out_element, int *status)
 {
-    double theta_rows[1*BLOCK], dL_rows[1*BLOCK], force_rows[1*BLOCK], stiffness_rows[1*BLOCK];
+    double theta_in_rows[1*BLOCK], dL_out_rows[1*BLOCK], force_out_rows[1*BLOCK], stiffness_out_rows[1*BLOCK];
     int status_rows[BLOCK];
     EACH_BLOCK {
-        GATHER(theta, 1)
-        block(AT(theta), AT(dL), AT(force), AT(stiffness), status_rows);
-        SCATTER(dL, 1)
-        SCATTER(force, 1)
-        SCATTER(stiffness, 1)
+        GATHER(theta_in, 1)
+        block(AT(theta_in), AT(dL_out), AT(force_out), AT(stiffness_out), status_rows);
+        SCATTER(dL_out, 1)
+        SCATTER(force_out, 1)
+        SCATTER(stiffness_out, 1)
         memcpy(status + first_, status_rows, (size_t)COUNT * sizeof *status);
     }
 }

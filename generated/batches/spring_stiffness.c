@@ -2,30 +2,31 @@
  *
  * spring_stiffness of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED int awiwi_spring_stiffness(const double x[1], double k[1]);
+INLINED int awiwi_spring_stiffness(const double x_in[1], double k_out[1]);
 #include "../spring_stiffness.c"
 
-VECTORS void block(const double *restrict x_at, ptrdiff_t x_row, double *restrict k_at, ptrdiff_t k_row, int *restrict status)
+VECTORS void block(const double *restrict x_in_at, ptrdiff_t x_in_row, double *restrict k_out_at, ptrdiff_t k_out_row, int *restrict status)
 {
     EACH_SAMPLE {
-        double x_one[1], k_one[1];
-        TAKE(x, 1)
-        status[i_] = awiwi_spring_stiffness(x_one, k_one);
-        GIVE(k, 1)
+        double x_in_one[1], k_out_one[1];
+        TAKE(x_in, 1)
+        status[i_] = awiwi_spring_stiffness(x_in_one, k_out_one);
+        GIVE(k_out, 1)
     }
 }
 
-void awiwi_spring_stiffness_batch(ptrdiff_t samples, const double *x, ptrdiff_t x_sample, ptrdiff_t x_element, double *k, ptrdiff_t k_sample, ptrdiff_t k_element, int *status)
+void awiwi_spring_stiffness_batch(ptrdiff_t samples, const double *x_in, ptrdiff_t x_in_sample, ptrdiff_t x_in_element, double *k_out, ptrdiff_t k_out_sample, ptrdiff_t k_out_element, int *status)
 {
-    double x_rows[1*BLOCK], k_rows[1*BLOCK];
+    double x_in_rows[1*BLOCK], k_out_rows[1*BLOCK];
     int status_rows[BLOCK];
     EACH_BLOCK {
-        GATHER(x, 1)
-        block(AT(x), AT(k), status_rows);
-        SCATTER(k, 1)
+        GATHER(x_in, 1)
+        block(AT(x_in), AT(k_out), status_rows);
+        SCATTER(k_out, 1)
         memcpy(status + first_, status_rows, (size_t)COUNT * sizeof *status);
     }
 }

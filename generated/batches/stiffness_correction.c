@@ -2,33 +2,34 @@
  *
  * stiffness_correction of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED int awiwi_stiffness_correction(const double K_eff[16], const double K_mech[16], double K_imp[16]);
+INLINED int awiwi_stiffness_correction(const double K_eff_in[16], const double K_mech_in[16], double K_imp_out[16]);
 #include "../stiffness_correction.c"
 
-VECTORS void block(const double *restrict K_eff_at, ptrdiff_t K_eff_row, const double *restrict K_mech_at, ptrdiff_t K_mech_row, double *restrict K_imp_at, ptrdiff_t K_imp_row, int *restrict status)
+VECTORS void block(const double *restrict K_eff_in_at, ptrdiff_t K_eff_in_row, const double *restrict K_mech_in_at, ptrdiff_t K_mech_in_row, double *restrict K_imp_out_at, ptrdiff_t K_imp_out_row, int *restrict status)
 {
     EACH_SAMPLE {
-        double K_eff_one[16], K_mech_one[16], K_imp_one[16];
-        TAKE(K_eff, 16)
-        TAKE(K_mech, 16)
-        status[i_] = awiwi_stiffness_correction(K_eff_one, K_mech_one, K_imp_one);
-        GIVE(K_imp, 16)
+        double K_eff_in_one[16], K_mech_in_one[16], K_imp_out_one[16];
+        TAKE(K_eff_in, 16)
+        TAKE(K_mech_in, 16)
+        status[i_] = awiwi_stiffness_correction(K_eff_in_one, K_mech_in_one, K_imp_out_one);
+        GIVE(K_imp_out, 16)
     }
 }
 
-void awiwi_stiffness_correction_batch(ptrdiff_t samples, const double *K_eff, ptrdiff_t K_eff_sample, ptrdiff_t K_eff_element, const double *K_mech, ptrdiff_t K_mech_sample, ptrdiff_t K_mech_element, double *K_imp, ptrdiff_t K_imp_sample, ptrdiff_t K_imp_element, int *status)
+void awiwi_stiffness_correction_batch(ptrdiff_t samples, const double *K_eff_in, ptrdiff_t K_eff_in_sample, ptrdiff_t K_eff_in_element, const double *K_mech_in, ptrdiff_t K_mech_in_sample, ptrdiff_t K_mech_in_element, double *K_imp_out, ptrdiff_t K_imp_out_sample, ptrdiff_t K_imp_out_element, int *status)
 {
-    double K_eff_rows[16*BLOCK], K_mech_rows[16*BLOCK], K_imp_rows[16*BLOCK];
+    double K_eff_in_rows[16*BLOCK], K_mech_in_rows[16*BLOCK], K_imp_out_rows[16*BLOCK];
     int status_rows[BLOCK];
     EACH_BLOCK {
-        GATHER(K_eff, 16)
-        GATHER(K_mech, 16)
-        EXPECT(K_imp, 16)
-        block(AT(K_eff), AT(K_mech), AT(K_imp), status_rows);
-        SCATTER(K_imp, 16)
+        GATHER(K_eff_in, 16)
+        GATHER(K_mech_in, 16)
+        PREFETCH_ROWS(K_imp_out, 16)
+        block(AT(K_eff_in), AT(K_mech_in), AT(K_imp_out), status_rows);
+        SCATTER(K_imp_out, 16)
         memcpy(status + first_, status_rows, (size_t)COUNT * sizeof *status);
     }
 }

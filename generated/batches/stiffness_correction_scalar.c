@@ -2,34 +2,35 @@
  *
  * stiffness_correction_scalar of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED int awiwi_stiffness_correction_scalar(const double k_eff[1], const double k_mech[1], double k_imp[1], double sensitivity[1]);
+INLINED int awiwi_stiffness_correction_scalar(const double k_eff_in[1], const double k_mech_in[1], double k_imp_out[1], double sensitivity_out[1]);
 #include "../stiffness_correction_scalar.c"
 
-VECTORS void block(const double *restrict k_eff_at, ptrdiff_t k_eff_row, const double *restrict k_mech_at, ptrdiff_t k_mech_row, double *restrict k_imp_at, ptrdiff_t k_imp_row, double *restrict sensitivity_at, ptrdiff_t sensitivity_row, int *restrict status)
+VECTORS void block(const double *restrict k_eff_in_at, ptrdiff_t k_eff_in_row, const double *restrict k_mech_in_at, ptrdiff_t k_mech_in_row, double *restrict k_imp_out_at, ptrdiff_t k_imp_out_row, double *restrict sensitivity_out_at, ptrdiff_t sensitivity_out_row, int *restrict status)
 {
     EACH_SAMPLE {
-        double k_eff_one[1], k_mech_one[1], k_imp_one[1], sensitivity_one[1];
-        TAKE(k_eff, 1)
-        TAKE(k_mech, 1)
-        status[i_] = awiwi_stiffness_correction_scalar(k_eff_one, k_mech_one, k_imp_one, sensitivity_one);
-        GIVE(k_imp, 1)
-        GIVE(sensitivity, 1)
+        double k_eff_in_one[1], k_mech_in_one[1], k_imp_out_one[1], sensitivity_out_one[1];
+        TAKE(k_eff_in, 1)
+        TAKE(k_mech_in, 1)
+        status[i_] = awiwi_stiffness_correction_scalar(k_eff_in_one, k_mech_in_one, k_imp_out_one, sensitivity_out_one);
+        GIVE(k_imp_out, 1)
+        GIVE(sensitivity_out, 1)
     }
 }
 
-void awiwi_stiffness_correction_scalar_batch(ptrdiff_t samples, const double *k_eff, ptrdiff_t k_eff_sample, ptrdiff_t k_eff_element, const double *k_mech, ptrdiff_t k_mech_sample, ptrdiff_t k_mech_element, double *k_imp, ptrdiff_t k_imp_sample, ptrdiff_t k_imp_element, double *sensitivity, ptrdiff_t sensitivity_sample, ptrdiff_t sensitivity_element, int *status)
+void awiwi_stiffness_correction_scalar_batch(ptrdiff_t samples, const double *k_eff_in, ptrdiff_t k_eff_in_sample, ptrdiff_t k_eff_in_element, const double *k_mech_in, ptrdiff_t k_mech_in_sample, ptrdiff_t k_mech_in_element, double *k_imp_out, ptrdiff_t k_imp_out_sample, ptrdiff_t k_imp_out_element, double *sensitivity_out, ptrdiff_t sensitivity_out_sample, ptrdiff_t sensitivity_out_element, int *status)
 {
-    double k_eff_rows[1*BLOCK], k_mech_rows[1*BLOCK], k_imp_rows[1*BLOCK], sensitivity_rows[1*BLOCK];
+    double k_eff_in_rows[1*BLOCK], k_mech_in_rows[1*BLOCK], k_imp_out_rows[1*BLOCK], sensitivity_out_rows[1*BLOCK];
     int status_rows[BLOCK];
     EACH_BLOCK {
-        GATHER(k_eff, 1)
-        GATHER(k_mech, 1)
-        block(AT(k_eff), AT(k_mech), AT(k_imp), AT(sensitivity), status_rows);
-        SCATTER(k_imp, 1)
-        SCATTER(sensitivity, 1)
+        GATHER(k_eff_in, 1)
+        GATHER(k_mech_in, 1)
+        block(AT(k_eff_in), AT(k_mech_in), AT(k_imp_out), AT(sensitivity_out), status_rows);
+        SCATTER(k_imp_out, 1)
+        SCATTER(sensitivity_out, 1)
         memcpy(status + first_, status_rows, (size_t)COUNT * sizeof *status);
     }
 }

@@ -2,46 +2,47 @@
  *
  * tendon_force_pd of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED int awiwi_tendon_force_pd(const double f[1], const double fd[1], const double f_des[1], const double fd_des[1], const double f_hat[1], const double friction[1], const double r[1], const double kp[1], const double kd[1], double tau[1]);
+INLINED int awiwi_tendon_force_pd(const double f_in[1], const double fd_in[1], const double f_des_in[1], const double fd_des_in[1], const double f_hat_in[1], const double friction_in[1], const double r_in[1], const double kp_in[1], const double kd_in[1], double tau_out[1]);
 #include "../tendon_force_pd.c"
 
-VECTORS void block(const double *restrict f_at, ptrdiff_t f_row, const double *restrict fd_at, ptrdiff_t fd_row, const double *restrict f_des_at, ptrdiff_t f_des_row, const double *restrict fd_des_at, ptrdiff_t fd_des_row, const double *restrict f_hat_at, ptrdiff_t f_hat_row, const double *restrict friction_at, ptrdiff_t friction_row, const double *restrict r_at, ptrdiff_t r_row, const double *restrict kp_at, ptrdiff_t kp_row, const double *restrict kd_at, ptrdiff_t kd_row, double *restrict tau_at, ptrdiff_t tau_row, int *restrict status)
+VECTORS void block(const double *restrict f_in_at, ptrdiff_t f_in_row, const double *restrict fd_in_at, ptrdiff_t fd_in_row, const double *restrict f_des_in_at, ptrdiff_t f_des_in_row, const double *restrict fd_des_in_at, ptrdiff_t fd_des_in_row, const double *restrict f_hat_in_at, ptrdiff_t f_hat_in_row, const double *restrict friction_in_at, ptrdiff_t friction_in_row, const double *restrict r_in_at, ptrdiff_t r_in_row, const double *restrict kp_in_at, ptrdiff_t kp_in_row, const double *restrict kd_in_at, ptrdiff_t kd_in_row, double *restrict tau_out_at, ptrdiff_t tau_out_row, int *restrict status)
 {
     EACH_SAMPLE {
-        double f_one[1], fd_one[1], f_des_one[1], fd_des_one[1], f_hat_one[1], friction_one[1], r_one[1], kp_one[1], kd_one[1], tau_one[1];
-        TAKE(f, 1)
-        TAKE(fd, 1)
-        TAKE(f_des, 1)
-        TAKE(fd_des, 1)
-        TAKE(f_hat, 1)
-        TAKE(friction, 1)
-        TAKE(r, 1)
-        TAKE(kp, 1)
-        TAKE(kd, 1)
-        status[i_] = awiwi_tendon_force_pd(f_one, fd_one, f_des_one, fd_des_one, f_hat_one, friction_one, r_one, kp_one, kd_one, tau_one);
-        GIVE(tau, 1)
+        double f_in_one[1], fd_in_one[1], f_des_in_one[1], fd_des_in_one[1], f_hat_in_one[1], friction_in_one[1], r_in_one[1], kp_in_one[1], kd_in_one[1], tau_out_one[1];
+        TAKE(f_in, 1)
+        TAKE(fd_in, 1)
+        TAKE(f_des_in, 1)
+        TAKE(fd_des_in, 1)
+        TAKE(f_hat_in, 1)
+        TAKE(friction_in, 1)
+        TAKE(r_in, 1)
+        TAKE(kp_in, 1)
+        TAKE(kd_in, 1)
+        status[i_] = awiwi_tendon_force_pd(f_in_one, fd_in_one, f_des_in_one, fd_des_in_one, f_hat_in_one, friction_in_one, r_in_one, kp_in_one, kd_in_one, tau_out_one);
+        GIVE(tau_out, 1)
     }
 }
 
-void awiwi_tendon_force_pd_batch(ptrdiff_t samples, const double *f, ptrdiff_t f_sample, ptrdiff_t f_element, const double *fd, ptrdiff_t fd_sample, ptrdiff_t fd_element, const double *f_des, ptrdiff_t f_des_sample, ptrdiff_t f_des_element, const double *fd_des, ptrdiff_t fd_des_sample, ptrdiff_t fd_des_element, const double *f_hat, ptrdiff_t f_hat_sample, ptrdiff_t f_hat_element, const double *friction, ptrdiff_t friction_sample, ptrdiff_t friction_element, const double *r, ptrdiff_t r_sample, ptrdiff_t r_element, const double *kp, ptrdiff_t kp_sample, ptrdiff_t kp_element, const double *kd, ptrdiff_t kd_sample, ptrdiff_t kd_element, double *tau, ptrdiff_t tau_sample, ptrdiff_t tau_element, int *status)
+void awiwi_tendon_force_pd_batch(ptrdiff_t samples, const double *f_in, ptrdiff_t f_in_sample, ptrdiff_t f_in_element, const double *fd_in, ptrdiff_t fd_in_sample, ptrdiff_t fd_in_element, const double *f_des_in, ptrdiff_t f_des_in_sample, ptrdiff_t f_des_in_element, const double *fd_des_in, ptrdiff_t fd_des_in_sample, ptrdiff_t fd_des_in_element, const double *f_hat_in, ptrdiff_t f_hat_in_sample, ptrdiff_t f_hat_in_element, const double *friction_in, ptrdiff_t friction_in_sample, ptrdiff_t friction_in_element, const double *r_in, ptrdiff_t r_in_sample, ptrdiff_t r_in_element, const double *kp_in, ptrdiff_t kp_in_sample, ptrdiff_t kp_in_element, const double *kd_in, ptrdiff_t kd_in_sample, ptrdiff_t kd_in_element, double *tau_out, ptrdiff_t tau_out_sample, ptrdiff_t tau_out_element, int *status)
 {
-    double f_rows[1*BLOCK], fd_rows[1*BLOCK], f_des_rows[1*BLOCK], fd_des_rows[1*BLOCK], f_hat_rows[1*BLOCK], friction_rows[1*BLOCK], r_rows[1*BLOCK], kp_rows[1*BLOCK], kd_rows[1*BLOCK], tau_rows[1*BLOCK];
+    double f_in_rows[1*BLOCK], fd_in_rows[1*BLOCK], f_des_in_rows[1*BLOCK], fd_des_in_rows[1*BLOCK], f_hat_in_rows[1*BLOCK], friction_in_rows[1*BLOCK], r_in_rows[1*BLOCK], kp_in_rows[1*BLOCK], kd_in_rows[1*BLOCK], tau_out_rows[1*BLOCK];
     int status_rows[BLOCK];
     EACH_BLOCK {
-        GATHER(f, 1)
-        GATHER(fd, 1)
-        GATHER(f_des, 1)
-        GATHER(fd_des, 1)
-        GATHER(f_hat, 1)
-        GATHER(friction, 1)
-        GATHER(r, 1)
-        GATHER(kp, 1)
-        GATHER(kd, 1)
-        block(AT(f), AT(fd), AT(f_des), AT(fd_des), AT(f_hat), AT(friction), AT(r), AT(kp), AT(kd), AT(tau), status_rows);
-        SCATTER(tau, 1)
+        GATHER(f_in, 1)
+        GATHER(fd_in, 1)
+        GATHER(f_des_in, 1)
+        GATHER(fd_des_in, 1)
+        GATHER(f_hat_in, 1)
+        GATHER(friction_in, 1)
+        GATHER(r_in, 1)
+        GATHER(kp_in, 1)
+        GATHER(kd_in, 1)
+        block(AT(f_in), AT(fd_in), AT(f_des_in), AT(fd_des_in), AT(f_hat_in), AT(friction_in), AT(r_in), AT(kp_in), AT(kd_in), AT(tau_out), status_rows);
+        SCATTER(tau_out, 1)
         memcpy(status + first_, status_rows, (size_t)COUNT * sizeof *status);
     }
 }

@@ -2,54 +2,55 @@
  *
  * tendon_force_scheduled of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED int awiwi_tendon_force_scheduled(const double f[1], const double fd[1], const double f_des[1], const double fd_des[1], const double f_hat[1], const double friction[1], const double r[1], const double b[1], const double stiffness[1], const double stiffness_rate[1], const double omega0[1], const double xi0[1], double tau[1], double gains[2]);
+INLINED int awiwi_tendon_force_scheduled(const double f_in[1], const double fd_in[1], const double f_des_in[1], const double fd_des_in[1], const double f_hat_in[1], const double friction_in[1], const double r_in[1], const double b_in[1], const double stiffness_in[1], const double stiffness_rate_in[1], const double omega0_in[1], const double xi0_in[1], double tau_out[1], double gains_out[2]);
 #include "../tendon_force_scheduled.c"
 
-VECTORS void block(const double *restrict f_at, ptrdiff_t f_row, const double *restrict fd_at, ptrdiff_t fd_row, const double *restrict f_des_at, ptrdiff_t f_des_row, const double *restrict fd_des_at, ptrdiff_t fd_des_row, const double *restrict f_hat_at, ptrdiff_t f_hat_row, const double *restrict friction_at, ptrdiff_t friction_row, const double *restrict r_at, ptrdiff_t r_row, const double *restrict b_at, ptrdiff_t b_row, const double *restrict stiffness_at, ptrdiff_t stiffness_row, const double *restrict stiffness_rate_at, ptrdiff_t stiffness_rate_row, const double *restrict omega0_at, ptrdiff_t omega0_row, const double *restrict xi0_at, ptrdiff_t xi0_row, double *restrict tau_at, ptrdiff_t tau_row, double *restrict gains_at, ptrdiff_t gains_row, int *restrict status)
+VECTORS void block(const double *restrict f_in_at, ptrdiff_t f_in_row, const double *restrict fd_in_at, ptrdiff_t fd_in_row, const double *restrict f_des_in_at, ptrdiff_t f_des_in_row, const double *restrict fd_des_in_at, ptrdiff_t fd_des_in_row, const double *restrict f_hat_in_at, ptrdiff_t f_hat_in_row, const double *restrict friction_in_at, ptrdiff_t friction_in_row, const double *restrict r_in_at, ptrdiff_t r_in_row, const double *restrict b_in_at, ptrdiff_t b_in_row, const double *restrict stiffness_in_at, ptrdiff_t stiffness_in_row, const double *restrict stiffness_rate_in_at, ptrdiff_t stiffness_rate_in_row, const double *restrict omega0_in_at, ptrdiff_t omega0_in_row, const double *restrict xi0_in_at, ptrdiff_t xi0_in_row, double *restrict tau_out_at, ptrdiff_t tau_out_row, double *restrict gains_out_at, ptrdiff_t gains_out_row, int *restrict status)
 {
     EACH_SAMPLE {
-        double f_one[1], fd_one[1], f_des_one[1], fd_des_one[1], f_hat_one[1], friction_one[1], r_one[1], b_one[1], stiffness_one[1], stiffness_rate_one[1], omega0_one[1], xi0_one[1], tau_one[1], gains_one[2];
-        TAKE(f, 1)
-        TAKE(fd, 1)
-        TAKE(f_des, 1)
-        TAKE(fd_des, 1)
-        TAKE(f_hat, 1)
-        TAKE(friction, 1)
-        TAKE(r, 1)
-        TAKE(b, 1)
-        TAKE(stiffness, 1)
-        TAKE(stiffness_rate, 1)
-        TAKE(omega0, 1)
-        TAKE(xi0, 1)
-        status[i_] = awiwi_tendon_force_scheduled(f_one, fd_one, f_des_one, fd_des_one, f_hat_one, friction_one, r_one, b_one, stiffness_one, stiffness_rate_one, omega0_one, xi0_one, tau_one, gains_one);
-        GIVE(tau, 1)
-        GIVE(gains, 2)
+        double f_in_one[1], fd_in_one[1], f_des_in_one[1], fd_des_in_one[1], f_hat_in_one[1], friction_in_one[1], r_in_one[1], b_in_one[1], stiffness_in_one[1], stiffness_rate_in_one[1], omega0_in_one[1], xi0_in_one[1], tau_out_one[1], gains_out_one[2];
+        TAKE(f_in, 1)
+        TAKE(fd_in, 1)
+        TAKE(f_des_in, 1)
+        TAKE(fd_des_in, 1)
+        TAKE(f_hat_in, 1)
+        TAKE(friction_in, 1)
+        TAKE(r_in, 1)
+        TAKE(b_in, 1)
+        TAKE(stiffness_in, 1)
+        TAKE(stiffness_rate_in, 1)
+        TAKE(omega0_in, 1)
+        TAKE(xi0_in, 1)
+        status[i_] = awiwi_tendon_force_scheduled(f_in_one, fd_in_one, f_des_in_one, fd_des_in_one, f_hat_in_one, friction_in_one, r_in_one, b_in_one, stiffness_in_one, stiffness_rate_in_one, omega0_in_one, xi0_in_one, tau_out_one, gains_out_one);
+        GIVE(tau_out, 1)
+        GIVE(gains_out, 2)
     }
 }
 
-void awiwi_tendon_force_scheduled_batch(ptrdiff_t samples, const double *f, ptrdiff_t f_sample, ptrdiff_t f_element, const double *fd, ptrdiff_t fd_sample, ptrdiff_t fd_element, const double *f_des, ptrdiff_t f_des_sample, ptrdiff_t f_des_element, const double *fd_des, ptrdiff_t fd_des_sample, ptrdiff_t fd_des_element, const double *f_hat, ptrdiff_t f_hat_sample, ptrdiff_t f_hat_element, const double *friction, ptrdiff_t friction_sample, ptrdiff_t friction_element, const double *r, ptrdiff_t r_sample, ptrdiff_t r_element, const double *b, ptrdiff_t b_sample, ptrdiff_t b_element, const double *stiffness, ptrdiff_t stiffness_sample, ptrdiff_t stiffness_element, const double *stiffness_rate, ptrdiff_t stiffness_rate_sample, ptrdiff_t stiffness_rate_element, const double *omega0, ptrdiff_t omega0_sample, ptrdiff_t omega0_element, const double *xi0, ptrdiff_t xi0_sample, ptrdiff_t xi0_element, double *tau, ptrdiff_t tau_sample, ptrdiff_t tau_element, double *gains, ptrdiff_t gains_sample, ptrdiff_t gains_element, int *status)
+void awiwi_tendon_force_scheduled_batch(ptrdiff_t samples, const double *f_in, ptrdiff_t f_in_sample, ptrdiff_t f_in_element, const double *fd_in, ptrdiff_t fd_in_sample, ptrdiff_t fd_in_element, const double *f_des_in, ptrdiff_t f_des_in_sample, ptrdiff_t f_des_in_element, const double *fd_des_in, ptrdiff_t fd_des_in_sample, ptrdiff_t fd_des_in_element, const double *f_hat_in, ptrdiff_t f_hat_in_sample, ptrdiff_t f_hat_in_element, const double *friction_in, ptrdiff_t friction_in_sample, ptrdiff_t friction_in_element, const double *r_in, ptrdiff_t r_in_sample, ptrdiff_t r_in_element, const double *b_in, ptrdiff_t b_in_sample, ptrdiff_t b_in_element, const double *stiffness_in, ptrdiff_t stiffness_in_sample, ptrdiff_t stiffness_in_element, const double *stiffness_rate_in, ptrdiff_t stiffness_rate_in_sample, ptrdiff_t stiffness_rate_in_element, const double *omega0_in, ptrdiff_t omega0_in_sample, ptrdiff_t omega0_in_element, const double *xi0_in, ptrdiff_t xi0_in_sample, ptrdiff_t xi0_in_element, double *tau_out, ptrdiff_t tau_out_sample, ptrdiff_t tau_out_element, double *gains_out, ptrdiff_t gains_out_sample, ptrdiff_t gains_out_element, int *status)
 {
-    double f_rows[1*BLOCK], fd_rows[1*BLOCK], f_des_rows[1*BLOCK], fd_des_rows[1*BLOCK], f_hat_rows[1*BLOCK], friction_rows[1*BLOCK], r_rows[1*BLOCK], b_rows[1*BLOCK], stiffness_rows[1*BLOCK], stiffness_rate_rows[1*BLOCK], omega0_rows[1*BLOCK], xi0_rows[1*BLOCK], tau_rows[1*BLOCK], gains_rows[2*BLOCK];
+    double f_in_rows[1*BLOCK], fd_in_rows[1*BLOCK], f_des_in_rows[1*BLOCK], fd_des_in_rows[1*BLOCK], f_hat_in_rows[1*BLOCK], friction_in_rows[1*BLOCK], r_in_rows[1*BLOCK], b_in_rows[1*BLOCK], stiffness_in_rows[1*BLOCK], stiffness_rate_in_rows[1*BLOCK], omega0_in_rows[1*BLOCK], xi0_in_rows[1*BLOCK], tau_out_rows[1*BLOCK], gains_out_rows[2*BLOCK];
     int status_rows[BLOCK];
     EACH_BLOCK {
-        GATHER(f, 1)
-        GATHER(fd, 1)
-        GATHER(f_des, 1)
-        GATHER(fd_des, 1)
-        GATHER(f_hat, 1)
-        GATHER(friction, 1)
-        GATHER(r, 1)
-        GATHER(b, 1)
-        GATHER(stiffness, 1)
-        GATHER(stiffness_rate, 1)
-        GATHER(omega0, 1)
-        GATHER(xi0, 1)
-        block(AT(f), AT(fd), AT(f_des), AT(fd_des), AT(f_hat), AT(friction), AT(r), AT(b), AT(stiffness), AT(stiffness_rate), AT(omega0), AT(xi0), AT(tau), AT(gains), status_rows);
-        SCATTER(tau, 1)
-        SCATTER(gains, 2)
+        GATHER(f_in, 1)
+        GATHER(fd_in, 1)
+        GATHER(f_des_in, 1)
+        GATHER(fd_des_in, 1)
+        GATHER(f_hat_in, 1)
+        GATHER(friction_in, 1)
+        GATHER(r_in, 1)
+        GATHER(b_in, 1)
+        GATHER(stiffness_in, 1)
+        GATHER(stiffness_rate_in, 1)
+        GATHER(omega0_in, 1)
+        GATHER(xi0_in, 1)
+        block(AT(f_in), AT(fd_in), AT(f_des_in), AT(fd_des_in), AT(f_hat_in), AT(friction_in), AT(r_in), AT(b_in), AT(stiffness_in), AT(stiffness_rate_in), AT(omega0_in), AT(xi0_in), AT(tau_out), AT(gains_out), status_rows);
+        SCATTER(tau_out, 1)
+        SCATTER(gains_out, 2)
         memcpy(status + first_, status_rows, (size_t)COUNT * sizeof *status);
     }
 }

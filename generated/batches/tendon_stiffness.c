@@ -2,28 +2,29 @@
  *
  * tendon_stiffness of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_tendon_stiffness(const double k[1], double stiffness[1]);
+INLINED void awiwi_tendon_stiffness(const double k_in[1], double stiffness_out[1]);
 #include "../tendon_stiffness.c"
 
-VECTORS void block(const double *restrict k_at, ptrdiff_t k_row, double *restrict stiffness_at, ptrdiff_t stiffness_row)
+VECTORS void block(const double *restrict k_in_at, ptrdiff_t k_in_row, double *restrict stiffness_out_at, ptrdiff_t stiffness_out_row)
 {
     EACH_SAMPLE {
-        double k_one[1], stiffness_one[1];
-        TAKE(k, 1)
-        awiwi_tendon_stiffness(k_one, stiffness_one);
-        GIVE(stiffness, 1)
+        double k_in_one[1], stiffness_out_one[1];
+        TAKE(k_in, 1)
+        awiwi_tendon_stiffness(k_in_one, stiffness_out_one);
+        GIVE(stiffness_out, 1)
     }
 }
 
-void awiwi_tendon_stiffness_batch(ptrdiff_t samples, const double *k, ptrdiff_t k_sample, ptrdiff_t k_element, double *stiffness, ptrdiff_t stiffness_sample, ptrdiff_t stiffness_element)
+void awiwi_tendon_stiffness_batch(ptrdiff_t samples, const double *k_in, ptrdiff_t k_in_sample, ptrdiff_t k_in_element, double *stiffness_out, ptrdiff_t stiffness_out_sample, ptrdiff_t stiffness_out_element)
 {
-    double k_rows[1*BLOCK], stiffness_rows[1*BLOCK];
+    double k_in_rows[1*BLOCK], stiffness_out_rows[1*BLOCK];
     EACH_BLOCK {
-        GATHER(k, 1)
-        block(AT(k), AT(stiffness));
-        SCATTER(stiffness, 1)
+        GATHER(k_in, 1)
+        block(AT(k_in), AT(stiffness_out));
+        SCATTER(stiffness_out, 1)
     }
 }

@@ -2,34 +2,35 @@
  *
  * thumb_energy of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_thumb_energy(const double q[4], const double qd[4], const double g[3], double kinetic[1], double potential[1]);
+INLINED void awiwi_thumb_energy(const double q_in[4], const double qd_in[4], const double g_in[3], double kinetic_out[1], double potential_out[1]);
 #include "../thumb_energy.c"
 
-VECTORS void block(const double *restrict q_at, ptrdiff_t q_row, const double *restrict qd_at, ptrdiff_t qd_row, const double *restrict g_at, ptrdiff_t g_row, double *restrict kinetic_at, ptrdiff_t kinetic_row, double *restrict potential_at, ptrdiff_t potential_row)
+VECTORS void block(const double *restrict q_in_at, ptrdiff_t q_in_row, const double *restrict qd_in_at, ptrdiff_t qd_in_row, const double *restrict g_in_at, ptrdiff_t g_in_row, double *restrict kinetic_out_at, ptrdiff_t kinetic_out_row, double *restrict potential_out_at, ptrdiff_t potential_out_row)
 {
     EACH_SAMPLE {
-        double q_one[4], qd_one[4], g_one[3], kinetic_one[1], potential_one[1];
-        TAKE(q, 4)
-        TAKE(qd, 4)
-        TAKE(g, 3)
-        awiwi_thumb_energy(q_one, qd_one, g_one, kinetic_one, potential_one);
-        GIVE(kinetic, 1)
-        GIVE(potential, 1)
+        double q_in_one[4], qd_in_one[4], g_in_one[3], kinetic_out_one[1], potential_out_one[1];
+        TAKE(q_in, 4)
+        TAKE(qd_in, 4)
+        TAKE(g_in, 3)
+        awiwi_thumb_energy(q_in_one, qd_in_one, g_in_one, kinetic_out_one, potential_out_one);
+        GIVE(kinetic_out, 1)
+        GIVE(potential_out, 1)
     }
 }
 
-void awiwi_thumb_energy_batch(ptrdiff_t samples, const double *q, ptrdiff_t q_sample, ptrdiff_t q_element, const double *qd, ptrdiff_t qd_sample, ptrdiff_t qd_element, const double *g, ptrdiff_t g_sample, ptrdiff_t g_element, double *kinetic, ptrdiff_t kinetic_sample, ptrdiff_t kinetic_element, double *potential, ptrdiff_t potential_sample, ptrdiff_t potential_element)
+void awiwi_thumb_energy_batch(ptrdiff_t samples, const double *q_in, ptrdiff_t q_in_sample, ptrdiff_t q_in_element, const double *qd_in, ptrdiff_t qd_in_sample, ptrdiff_t qd_in_element, const double *g_in, ptrdiff_t g_in_sample, ptrdiff_t g_in_element, double *kinetic_out, ptrdiff_t kinetic_out_sample, ptrdiff_t kinetic_out_element, double *potential_out, ptrdiff_t potential_out_sample, ptrdiff_t potential_out_element)
 {
-    double q_rows[4*BLOCK], qd_rows[4*BLOCK], g_rows[3*BLOCK], kinetic_rows[1*BLOCK], potential_rows[1*BLOCK];
+    double q_in_rows[4*BLOCK], qd_in_rows[4*BLOCK], g_in_rows[3*BLOCK], kinetic_out_rows[1*BLOCK], potential_out_rows[1*BLOCK];
     EACH_BLOCK {
-        GATHER(q, 4)
-        GATHER(qd, 4)
-        GATHER(g, 3)
-        block(AT(q), AT(qd), AT(g), AT(kinetic), AT(potential));
-        SCATTER(kinetic, 1)
-        SCATTER(potential, 1)
+        GATHER(q_in, 4)
+        GATHER(qd_in, 4)
+        GATHER(g_in, 3)
+        block(AT(q_in), AT(qd_in), AT(g_in), AT(kinetic_out), AT(potential_out));
+        SCATTER(kinetic_out, 1)
+        SCATTER(potential_out, 1)
     }
 }

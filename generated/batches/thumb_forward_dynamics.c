@@ -2,34 +2,35 @@
  *
  * thumb_forward_dynamics of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_thumb_forward_dynamics(const double q[4], const double qd[4], const double tau[4], const double g[3], double qdd[4]);
+INLINED void awiwi_thumb_forward_dynamics(const double q_in[4], const double qd_in[4], const double tau_in[4], const double g_in[3], double qdd_out[4]);
 #include "../thumb_forward_dynamics.c"
 
-VECTORS void block(const double *restrict q_at, ptrdiff_t q_row, const double *restrict qd_at, ptrdiff_t qd_row, const double *restrict tau_at, ptrdiff_t tau_row, const double *restrict g_at, ptrdiff_t g_row, double *restrict qdd_at, ptrdiff_t qdd_row)
+VECTORS void block(const double *restrict q_in_at, ptrdiff_t q_in_row, const double *restrict qd_in_at, ptrdiff_t qd_in_row, const double *restrict tau_in_at, ptrdiff_t tau_in_row, const double *restrict g_in_at, ptrdiff_t g_in_row, double *restrict qdd_out_at, ptrdiff_t qdd_out_row)
 {
     EACH_SAMPLE {
-        double q_one[4], qd_one[4], tau_one[4], g_one[3], qdd_one[4];
-        TAKE(q, 4)
-        TAKE(qd, 4)
-        TAKE(tau, 4)
-        TAKE(g, 3)
-        awiwi_thumb_forward_dynamics(q_one, qd_one, tau_one, g_one, qdd_one);
-        GIVE(qdd, 4)
+        double q_in_one[4], qd_in_one[4], tau_in_one[4], g_in_one[3], qdd_out_one[4];
+        TAKE(q_in, 4)
+        TAKE(qd_in, 4)
+        TAKE(tau_in, 4)
+        TAKE(g_in, 3)
+        awiwi_thumb_forward_dynamics(q_in_one, qd_in_one, tau_in_one, g_in_one, qdd_out_one);
+        GIVE(qdd_out, 4)
     }
 }
 
-void awiwi_thumb_forward_dynamics_batch(ptrdiff_t samples, const double *q, ptrdiff_t q_sample, ptrdiff_t q_element, const double *qd, ptrdiff_t qd_sample, ptrdiff_t qd_element, const double *tau, ptrdiff_t tau_sample, ptrdiff_t tau_element, const double *g, ptrdiff_t g_sample, ptrdiff_t g_element, double *qdd, ptrdiff_t qdd_sample, ptrdiff_t qdd_element)
+void awiwi_thumb_forward_dynamics_batch(ptrdiff_t samples, const double *q_in, ptrdiff_t q_in_sample, ptrdiff_t q_in_element, const double *qd_in, ptrdiff_t qd_in_sample, ptrdiff_t qd_in_element, const double *tau_in, ptrdiff_t tau_in_sample, ptrdiff_t tau_in_element, const double *g_in, ptrdiff_t g_in_sample, ptrdiff_t g_in_element, double *qdd_out, ptrdiff_t qdd_out_sample, ptrdiff_t qdd_out_element)
 {
-    double q_rows[4*BLOCK], qd_rows[4*BLOCK], tau_rows[4*BLOCK], g_rows[3*BLOCK], qdd_rows[4*BLOCK];
+    double q_in_rows[4*BLOCK], qd_in_rows[4*BLOCK], tau_in_rows[4*BLOCK], g_in_rows[3*BLOCK], qdd_out_rows[4*BLOCK];
     EACH_BLOCK {
-        GATHER(q, 4)
-        GATHER(qd, 4)
-        GATHER(tau, 4)
-        GATHER(g, 3)
-        block(AT(q), AT(qd), AT(tau), AT(g), AT(qdd));
-        SCATTER(qdd, 4)
+        GATHER(q_in, 4)
+        GATHER(qd_in, 4)
+        GATHER(tau_in, 4)
+        GATHER(g_in, 3)
+        block(AT(q_in), AT(qd_in), AT(tau_in), AT(g_in), AT(qdd_out));
+        SCATTER(qdd_out, 4)
     }
 }

@@ -2,38 +2,39 @@
  *
  * thumb_inverse_dynamics_derivatives of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_thumb_inverse_dynamics_derivatives(const double q[4], const double qd[4], const double qdd[4], const double g[3], double dtau_dq[16], double dtau_dqd[16]);
+INLINED void awiwi_thumb_inverse_dynamics_derivatives(const double q_in[4], const double qd_in[4], const double qdd_in[4], const double g_in[3], double dtau_dq_out[16], double dtau_dqd_out[16]);
 #include "../thumb_inverse_dynamics_derivatives.c"
 
-VECTORS void block(const double *restrict q_at, ptrdiff_t q_row, const double *restrict qd_at, ptrdiff_t qd_row, const double *restrict qdd_at, ptrdiff_t qdd_row, const double *restrict g_at, ptrdiff_t g_row, double *restrict dtau_dq_at, ptrdiff_t dtau_dq_row, double *restrict dtau_dqd_at, ptrdiff_t dtau_dqd_row)
+VECTORS void block(const double *restrict q_in_at, ptrdiff_t q_in_row, const double *restrict qd_in_at, ptrdiff_t qd_in_row, const double *restrict qdd_in_at, ptrdiff_t qdd_in_row, const double *restrict g_in_at, ptrdiff_t g_in_row, double *restrict dtau_dq_out_at, ptrdiff_t dtau_dq_out_row, double *restrict dtau_dqd_out_at, ptrdiff_t dtau_dqd_out_row)
 {
     EACH_SAMPLE {
-        double q_one[4], qd_one[4], qdd_one[4], g_one[3], dtau_dq_one[16], dtau_dqd_one[16];
-        TAKE(q, 4)
-        TAKE(qd, 4)
-        TAKE(qdd, 4)
-        TAKE(g, 3)
-        awiwi_thumb_inverse_dynamics_derivatives(q_one, qd_one, qdd_one, g_one, dtau_dq_one, dtau_dqd_one);
-        GIVE(dtau_dq, 16)
-        GIVE(dtau_dqd, 16)
+        double q_in_one[4], qd_in_one[4], qdd_in_one[4], g_in_one[3], dtau_dq_out_one[16], dtau_dqd_out_one[16];
+        TAKE(q_in, 4)
+        TAKE(qd_in, 4)
+        TAKE(qdd_in, 4)
+        TAKE(g_in, 3)
+        awiwi_thumb_inverse_dynamics_derivatives(q_in_one, qd_in_one, qdd_in_one, g_in_one, dtau_dq_out_one, dtau_dqd_out_one);
+        GIVE(dtau_dq_out, 16)
+        GIVE(dtau_dqd_out, 16)
     }
 }
 
-void awiwi_thumb_inverse_dynamics_derivatives_batch(ptrdiff_t samples, const double *q, ptrdiff_t q_sample, ptrdiff_t q_element, const double *qd, ptrdiff_t qd_sample, ptrdiff_t qd_element, const double *qdd, ptrdiff_t qdd_sample, ptrdiff_t qdd_element, const double *g, ptrdiff_t g_sample, ptrdiff_t g_element, double *dtau_dq, ptrdiff_t dtau_dq_sample, ptrdiff_t dtau_dq_element, double *dtau_dqd, ptrdiff_t dtau_dqd_sample, ptrdiff_t dtau_dqd_element)
+void awiwi_thumb_inverse_dynamics_derivatives_batch(ptrdiff_t samples, const double *q_in, ptrdiff_t q_in_sample, ptrdiff_t q_in_element, const double *qd_in, ptrdiff_t qd_in_sample, ptrdiff_t qd_in_element, const double *qdd_in, ptrdiff_t qdd_in_sample, ptrdiff_t qdd_in_element, const double *g_in, ptrdiff_t g_in_sample, ptrdiff_t g_in_element, double *dtau_dq_out, ptrdiff_t dtau_dq_out_sample, ptrdiff_t dtau_dq_out_element, double *dtau_dqd_out, ptrdiff_t dtau_dqd_out_sample, ptrdiff_t dtau_dqd_out_element)
 {
-    double q_rows[4*BLOCK], qd_rows[4*BLOCK], qdd_rows[4*BLOCK], g_rows[3*BLOCK], dtau_dq_rows[16*BLOCK], dtau_dqd_rows[16*BLOCK];
+    double q_in_rows[4*BLOCK], qd_in_rows[4*BLOCK], qdd_in_rows[4*BLOCK], g_in_rows[3*BLOCK], dtau_dq_out_rows[16*BLOCK], dtau_dqd_out_rows[16*BLOCK];
     EACH_BLOCK {
-        GATHER(q, 4)
-        GATHER(qd, 4)
-        GATHER(qdd, 4)
-        GATHER(g, 3)
-        EXPECT(dtau_dq, 16)
-        EXPECT(dtau_dqd, 16)
-        block(AT(q), AT(qd), AT(qdd), AT(g), AT(dtau_dq), AT(dtau_dqd));
-        SCATTER(dtau_dq, 16)
-        SCATTER(dtau_dqd, 16)
+        GATHER(q_in, 4)
+        GATHER(qd_in, 4)
+        GATHER(qdd_in, 4)
+        GATHER(g_in, 3)
+        PREFETCH_ROWS(dtau_dq_out, 16)
+        PREFETCH_ROWS(dtau_dqd_out, 16)
+        block(AT(q_in), AT(qd_in), AT(qdd_in), AT(g_in), AT(dtau_dq_out), AT(dtau_dqd_out));
+        SCATTER(dtau_dq_out, 16)
+        SCATTER(dtau_dqd_out, 16)
     }
 }

@@ -2,33 +2,34 @@
  *
  * wrist_coupling of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED int awiwi_wrist_coupling(const double q71[1], const double q73[1], double dh[76]);
+INLINED int awiwi_wrist_coupling(const double q71_in[1], const double q73_in[1], double dh_out[76]);
 #include "../wrist_coupling.c"
 
-VECTORS void block(const double *restrict q71_at, ptrdiff_t q71_row, const double *restrict q73_at, ptrdiff_t q73_row, double *restrict dh_at, ptrdiff_t dh_row, int *restrict status)
+VECTORS void block(const double *restrict q71_in_at, ptrdiff_t q71_in_row, const double *restrict q73_in_at, ptrdiff_t q73_in_row, double *restrict dh_out_at, ptrdiff_t dh_out_row, int *restrict status)
 {
     EACH_SAMPLE {
-        double q71_one[1], q73_one[1], dh_one[76];
-        TAKE(q71, 1)
-        TAKE(q73, 1)
-        status[i_] = awiwi_wrist_coupling(q71_one, q73_one, dh_one);
-        GIVE(dh, 76)
+        double q71_in_one[1], q73_in_one[1], dh_out_one[76];
+        TAKE(q71_in, 1)
+        TAKE(q73_in, 1)
+        status[i_] = awiwi_wrist_coupling(q71_in_one, q73_in_one, dh_out_one);
+        GIVE(dh_out, 76)
     }
 }
 
-void awiwi_wrist_coupling_batch(ptrdiff_t samples, const double *q71, ptrdiff_t q71_sample, ptrdiff_t q71_element, const double *q73, ptrdiff_t q73_sample, ptrdiff_t q73_element, double *dh, ptrdiff_t dh_sample, ptrdiff_t dh_element, int *status)
+void awiwi_wrist_coupling_batch(ptrdiff_t samples, const double *q71_in, ptrdiff_t q71_in_sample, ptrdiff_t q71_in_element, const double *q73_in, ptrdiff_t q73_in_sample, ptrdiff_t q73_in_element, double *dh_out, ptrdiff_t dh_out_sample, ptrdiff_t dh_out_element, int *status)
 {
-    double q71_rows[1*BLOCK], q73_rows[1*BLOCK], dh_rows[76*BLOCK];
+    double q71_in_rows[1*BLOCK], q73_in_rows[1*BLOCK], dh_out_rows[76*BLOCK];
     int status_rows[BLOCK];
     EACH_BLOCK {
-        GATHER(q71, 1)
-        GATHER(q73, 1)
-        EXPECT(dh, 76)
-        block(AT(q71), AT(q73), AT(dh), status_rows);
-        SCATTER(dh, 76)
+        GATHER(q71_in, 1)
+        GATHER(q73_in, 1)
+        PREFETCH_ROWS(dh_out, 76)
+        block(AT(q71_in), AT(q73_in), AT(dh_out), status_rows);
+        SCATTER(dh_out, 76)
         memcpy(status + first_, status_rows, (size_t)COUNT * sizeof *status);
     }
 }

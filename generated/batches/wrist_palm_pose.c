@@ -2,33 +2,34 @@
  *
  * wrist_palm_pose of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED int awiwi_wrist_palm_pose(const double q71[1], const double q73[1], double T[16]);
+INLINED int awiwi_wrist_palm_pose(const double q71_in[1], const double q73_in[1], double T_out[16]);
 #include "../wrist_palm_pose.c"
 
-VECTORS void block(const double *restrict q71_at, ptrdiff_t q71_row, const double *restrict q73_at, ptrdiff_t q73_row, double *restrict T_at, ptrdiff_t T_row, int *restrict status)
+VECTORS void block(const double *restrict q71_in_at, ptrdiff_t q71_in_row, const double *restrict q73_in_at, ptrdiff_t q73_in_row, double *restrict T_out_at, ptrdiff_t T_out_row, int *restrict status)
 {
     EACH_SAMPLE {
-        double q71_one[1], q73_one[1], T_one[16];
-        TAKE(q71, 1)
-        TAKE(q73, 1)
-        status[i_] = awiwi_wrist_palm_pose(q71_one, q73_one, T_one);
-        GIVE(T, 16)
+        double q71_in_one[1], q73_in_one[1], T_out_one[16];
+        TAKE(q71_in, 1)
+        TAKE(q73_in, 1)
+        status[i_] = awiwi_wrist_palm_pose(q71_in_one, q73_in_one, T_out_one);
+        GIVE(T_out, 16)
     }
 }
 
-void awiwi_wrist_palm_pose_batch(ptrdiff_t samples, const double *q71, ptrdiff_t q71_sample, ptrdiff_t q71_element, const double *q73, ptrdiff_t q73_sample, ptrdiff_t q73_element, double *T, ptrdiff_t T_sample, ptrdiff_t T_element, int *status)
+void awiwi_wrist_palm_pose_batch(ptrdiff_t samples, const double *q71_in, ptrdiff_t q71_in_sample, ptrdiff_t q71_in_element, const double *q73_in, ptrdiff_t q73_in_sample, ptrdiff_t q73_in_element, double *T_out, ptrdiff_t T_out_sample, ptrdiff_t T_out_element, int *status)
 {
-    double q71_rows[1*BLOCK], q73_rows[1*BLOCK], T_rows[16*BLOCK];
+    double q71_in_rows[1*BLOCK], q73_in_rows[1*BLOCK], T_out_rows[16*BLOCK];
     int status_rows[BLOCK];
     EACH_BLOCK {
-        GATHER(q71, 1)
-        GATHER(q73, 1)
-        EXPECT(T, 16)
-        block(AT(q71), AT(q73), AT(T), status_rows);
-        SCATTER(T, 16)
+        GATHER(q71_in, 1)
+        GATHER(q73_in, 1)
+        PREFETCH_ROWS(T_out, 16)
+        block(AT(q71_in), AT(q73_in), AT(T_out), status_rows);
+        SCATTER(T_out, 16)
         memcpy(status + first_, status_rows, (size_t)COUNT * sizeof *status);
     }
 }

@@ -2,36 +2,37 @@
  *
  * wrist_points of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED int awiwi_wrist_points(const double q71[1], const double q73[1], double A[3], double B[3], double C[3]);
+INLINED int awiwi_wrist_points(const double q71_in[1], const double q73_in[1], double A_out[3], double B_out[3], double C_out[3]);
 #include "../wrist_points.c"
 
-VECTORS void block(const double *restrict q71_at, ptrdiff_t q71_row, const double *restrict q73_at, ptrdiff_t q73_row, double *restrict A_at, ptrdiff_t A_row, double *restrict B_at, ptrdiff_t B_row, double *restrict C_at, ptrdiff_t C_row, int *restrict status)
+VECTORS void block(const double *restrict q71_in_at, ptrdiff_t q71_in_row, const double *restrict q73_in_at, ptrdiff_t q73_in_row, double *restrict A_out_at, ptrdiff_t A_out_row, double *restrict B_out_at, ptrdiff_t B_out_row, double *restrict C_out_at, ptrdiff_t C_out_row, int *restrict status)
 {
     EACH_SAMPLE {
-        double q71_one[1], q73_one[1], A_one[3], B_one[3], C_one[3];
-        TAKE(q71, 1)
-        TAKE(q73, 1)
-        status[i_] = awiwi_wrist_points(q71_one, q73_one, A_one, B_one, C_one);
-        GIVE(A, 3)
-        GIVE(B, 3)
-        GIVE(C, 3)
+        double q71_in_one[1], q73_in_one[1], A_out_one[3], B_out_one[3], C_out_one[3];
+        TAKE(q71_in, 1)
+        TAKE(q73_in, 1)
+        status[i_] = awiwi_wrist_points(q71_in_one, q73_in_one, A_out_one, B_out_one, C_out_one);
+        GIVE(A_out, 3)
+        GIVE(B_out, 3)
+        GIVE(C_out, 3)
     }
 }
 
-void awiwi_wrist_points_batch(ptrdiff_t samples, const double *q71, ptrdiff_t q71_sample, ptrdiff_t q71_element, const double *q73, ptrdiff_t q73_sample, ptrdiff_t q73_element, double *A, ptrdiff_t A_sample, ptrdiff_t A_element, double *B, ptrdiff_t B_sample, ptrdiff_t B_element, double *C, ptrdiff_t C_sample, ptrdiff_t C_element, int *status)
+void awiwi_wrist_points_batch(ptrdiff_t samples, const double *q71_in, ptrdiff_t q71_in_sample, ptrdiff_t q71_in_element, const double *q73_in, ptrdiff_t q73_in_sample, ptrdiff_t q73_in_element, double *A_out, ptrdiff_t A_out_sample, ptrdiff_t A_out_element, double *B_out, ptrdiff_t B_out_sample, ptrdiff_t B_out_element, double *C_out, ptrdiff_t C_out_sample, ptrdiff_t C_out_element, int *status)
 {
-    double q71_rows[1*BLOCK], q73_rows[1*BLOCK], A_rows[3*BLOCK], B_rows[3*BLOCK], C_rows[3*BLOCK];
+    double q71_in_rows[1*BLOCK], q73_in_rows[1*BLOCK], A_out_rows[3*BLOCK], B_out_rows[3*BLOCK], C_out_rows[3*BLOCK];
     int status_rows[BLOCK];
     EACH_BLOCK {
-        GATHER(q71, 1)
-        GATHER(q73, 1)
-        block(AT(q71), AT(q73), AT(A), AT(B), AT(C), status_rows);
-        SCATTER(A, 3)
-        SCATTER(B, 3)
-        SCATTER(C, 3)
+        GATHER(q71_in, 1)
+        GATHER(q73_in, 1)
+        block(AT(q71_in), AT(q73_in), AT(A_out), AT(B_out), AT(C_out), status_rows);
+        SCATTER(A_out, 3)
+        SCATTER(B_out, 3)
+        SCATTER(C_out, 3)
         memcpy(status + first_, status_rows, (size_t)COUNT * sizeof *status);
     }
 }

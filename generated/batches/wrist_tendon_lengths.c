@@ -2,33 +2,34 @@
  *
  * wrist_tendon_lengths of many samples; see batches.h.
  */
+#include "numerics.h"
 #include "batches.h"
 #include "samples.h"
 
-INLINED int awiwi_wrist_tendon_lengths(const double q71[1], const double q73[1], double h[38]);
+INLINED int awiwi_wrist_tendon_lengths(const double q71_in[1], const double q73_in[1], double h_out[38]);
 #include "../wrist_tendon_lengths.c"
 
-VECTORS void block(const double *restrict q71_at, ptrdiff_t q71_row, const double *restrict q73_at, ptrdiff_t q73_row, double *restrict h_at, ptrdiff_t h_row, int *restrict status)
+VECTORS void block(const double *restrict q71_in_at, ptrdiff_t q71_in_row, const double *restrict q73_in_at, ptrdiff_t q73_in_row, double *restrict h_out_at, ptrdiff_t h_out_row, int *restrict status)
 {
     EACH_SAMPLE {
-        double q71_one[1], q73_one[1], h_one[38];
-        TAKE(q71, 1)
-        TAKE(q73, 1)
-        status[i_] = awiwi_wrist_tendon_lengths(q71_one, q73_one, h_one);
-        GIVE(h, 38)
+        double q71_in_one[1], q73_in_one[1], h_out_one[38];
+        TAKE(q71_in, 1)
+        TAKE(q73_in, 1)
+        status[i_] = awiwi_wrist_tendon_lengths(q71_in_one, q73_in_one, h_out_one);
+        GIVE(h_out, 38)
     }
 }
 
-void awiwi_wrist_tendon_lengths_batch(ptrdiff_t samples, const double *q71, ptrdiff_t q71_sample, ptrdiff_t q71_element, const double *q73, ptrdiff_t q73_sample, ptrdiff_t q73_element, double *h, ptrdiff_t h_sample, ptrdiff_t h_element, int *status)
+void awiwi_wrist_tendon_lengths_batch(ptrdiff_t samples, const double *q71_in, ptrdiff_t q71_in_sample, ptrdiff_t q71_in_element, const double *q73_in, ptrdiff_t q73_in_sample, ptrdiff_t q73_in_element, double *h_out, ptrdiff_t h_out_sample, ptrdiff_t h_out_element, int *status)
 {
-    double q71_rows[1*BLOCK], q73_rows[1*BLOCK], h_rows[38*BLOCK];
+    double q71_in_rows[1*BLOCK], q73_in_rows[1*BLOCK], h_out_rows[38*BLOCK];
     int status_rows[BLOCK];
     EACH_BLOCK {
-        GATHER(q71, 1)
-        GATHER(q73, 1)
-        EXPECT(h, 38)
-        block(AT(q71), AT(q73), AT(h), status_rows);
-        SCATTER(h, 38)
+        GATHER(q71_in, 1)
+        GATHER(q73_in, 1)
+        PREFETCH_ROWS(h_out, 38)
+        block(AT(q71_in), AT(q73_in), AT(h_out), status_rows);
+        SCATTER(h_out, 38)
         memcpy(status + first_, status_rows, (size_t)COUNT * sizeof *status);
     }
 }

@@ -9,64 +9,64 @@ from awiwi_gen.ir.graph import Graph
 from awiwi_gen.ir.passes.factor import factor
 from awiwi_gen.ir.passes.finish import orient, quotients
 from awiwi_gen.ir.passes.flatten import flatten
+from awiwi_gen.ir.passes.phase import phase
 from awiwi_gen.ir.passes.scale import scale, units
 from awiwi_gen.ir.passes.schedule import schedule
 from awiwi_gen.ir.passes.share import share_products, share_sums
 from awiwi_gen.ir.passes.shift import shift
 from awiwi_gen.ir.passes.signs import signs
-from awiwi_gen.ir.passes.turn import turn
 
 Pass = Callable[[Graph], Graph]
 
-# Tried in turn, and nothing but the end; the cheapest result wins: whether brackets pay depends on what products share.
-BEGINNINGS: tuple[tuple[Pass, ...], ...] = (
-    (flatten, turn, share_products, share_sums, factor, scale),
-    (flatten, share_products, turn, factor, share_products, share_sums, scale),
-    (flatten, turn, factor, scale, share_products, share_sums),
+# Orders that are all tried, as whether factoring pays depends on what products share; the cheapest result wins.
+ORDERS: tuple[tuple[Pass, ...], ...] = (
+    (flatten, phase, share_products, share_sums, factor, scale),
+    (flatten, share_products, phase, factor, share_products, share_sums, scale),
+    (flatten, phase, factor, scale, share_products, share_sums),
 )
-AGAIN: tuple[Pass, ...] = (flatten, share_products, share_sums, factor, shift, scale)  # as long as it helps
-ONCE: tuple[Pass, ...] = (units, *AGAIN)  # if it helps
-END: tuple[Pass, ...] = (quotients, orient, signs, schedule)
+REPEATED: tuple[Pass, ...] = (flatten, share_products, share_sums, factor, shift, scale)  # as long as it helps
+ONCE: tuple[Pass, ...] = (units, *REPEATED)  # if it helps
+FINAL: tuple[Pass, ...] = (quotients, orient, signs, schedule)
 
 Stages = list[tuple[str, Graph]]
-Known = dict[tuple[Pass, Graph], Graph]  # what a pass made of a graph: different ways often meet
+Memo = dict[tuple[Pass, Graph], Graph]  # results of passes: different orders often reach the same graph
 
 
-def stages(graph: Graph, passes: tuple[Pass, ...], known: Known | None = None) -> Stages:
-    """The graph after each pass, with the pass's name; what is `known` is not computed again."""
-    known = {} if known is None else known
+def stages(graph: Graph, passes: tuple[Pass, ...], memo: Memo | None = None) -> Stages:
+    """The graph after each pass, with the pass's name; results in the memo are not computed again."""
+    memo = {} if memo is None else memo
     result = []
     for apply in passes:
         step = apply, graph
-        found = known.get(step)
+        found = memo.get(step)
         if found is None:
-            found = known[step] = apply(graph)
+            found = memo[step] = apply(graph)
         graph = found
         result.append((apply.__name__, graph))
     return result
 
 
 def optimise(graph: Graph) -> Stages:
-    """The stages of the cheapest way; the last one is what is emitted."""
-    known: Known = {}
-    ways = [stages(graph, passes, known) for passes in BEGINNINGS]
-    rough, way = min(((_rough(way[-1][1], known).weight, way) for way in ways), key=lambda found: found[0])
+    """The stages of the cheapest order of passes; the last one is emitted."""
+    memo: Memo = {}
+    candidates = [stages(graph, passes, memo) for passes in ORDERS]
+    weight, best = min(((_rough(c[-1][1], memo).weight, c) for c in candidates), key=lambda pair: pair[0])
     while True:
-        further = [*way, *stages(way[-1][1], AGAIN, known)]
-        weight = _rough(further[-1][1], known).weight
-        if weight >= rough:
+        further = [*best, *stages(best[-1][1], REPEATED, memo)]
+        lighter = _rough(further[-1][1], memo).weight
+        if lighter >= weight:
             break
-        rough, way = weight, further
-    further += stages(further[-1][1], ONCE, known)
-    if _rough(further[-1][1], known).weight < rough:
-        way = further
-    way = [*way, *stages(way[-1][1], END, known)]
-    plain = _rough(graph, known)
-    if plain.weight - plain.neg > cost(way[-1][1]).weight:  # the end takes away negations, and nothing else
-        return way
-    return min(stages(graph, END, known), way, key=lambda ended: cost(ended[-1][1]).weight)
+        weight, best = lighter, further
+    further += stages(further[-1][1], ONCE, memo)
+    if _rough(further[-1][1], memo).weight < weight:
+        best = further
+    best = [*best, *stages(best[-1][1], FINAL, memo)]
+    plain = _rough(graph, memo)
+    if plain.weight - plain.neg > cost(best[-1][1]).weight:  # the final passes save negations only
+        return best
+    return min(stages(graph, FINAL, memo), best, key=lambda result: cost(result[-1][1]).weight)
 
 
-def _rough(graph: Graph, known: Known) -> Cost:
-    """What the end of a way will cost, but for the last few signs."""
-    return cost(stages(graph, (quotients, orient), known)[-1][1])
+def _rough(graph: Graph, memo: Memo) -> Cost:
+    """The cost after the final passes, but for a few negations."""
+    return cost(stages(graph, (quotients, orient), memo)[-1][1])

@@ -1,7 +1,7 @@
-"""What of a graph turns with an angle: its cosine and sine, and other pairs of values that are made of them.
+"""Find the values that rotate with an angle: its cosine and sine, and other pairs that are made of them.
 
-A pair is a*cos + b*sin and a*sin - b*cos for any a and b: the acceleration of a vector that turns, for example. Terms
-of sums that are constants times one of a pair are forms; they keep their form when the angle is measured otherwise.
+A pair is a*cos + b*sin and a*sin - b*cos for any a and b, such as the components of a rotating vector. A form is a term
+of a sum that is a constant times one of a pair. Forms stay forms when a phase is added to the angle.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ Square = tuple[Fraction, Fraction, Fraction]  # of their squares and product: co
 Term = tuple[int, Form] | tuple[int, Square]  # the number of a pair, and a form in it
 Terms = dict[int, Term]
 Part = tuple[int, tuple[int, ...]]  # a sign and factors
-Swing = tuple[Form, Fraction, tuple[int, ...]]  # cosine or sine, a constant, and other factors
+Multiple = tuple[Form, Fraction, tuple[int, ...]]  # cosine or sine, a constant, and other factors
 X, Y = (Fraction(1), Fraction(0)), (Fraction(0), Fraction(1))
 
 
@@ -31,13 +31,13 @@ class Pair:
 
 @dataclass
 class Angle:
-    """What turns with an angle, and the sums of terms in it: of first degree in all pairs, of second in the first."""
+    """The pairs that rotate with an angle, and the sums with forms: linear in all pairs, quadratic in the first."""
 
     argument: Ref
     pairs: list[Pair] = field(default_factory=lambda: [Pair((1, ()))])  # cosine and sine themselves come first
     linear: dict[tuple[int, int], Form] = field(default_factory=dict)  # by sum and pair
     square: dict[int, Square] = field(default_factory=dict)
-    taken: dict[int, set[int]] = field(default_factory=dict)  # the places of these terms in each sum
+    taken: dict[int, set[int]] = field(default_factory=dict)  # positions of these terms in each sum
 
 
 class Reader:
@@ -63,20 +63,20 @@ class Reader:
         angle = Angle(self.nodes[cosine][1])
         sums = self._sums(units | {p: form for p in products if (form := self._linear(p, units))})
         terms: Terms = {leaf: (0, unit) for leaf, unit in units.items()}
-        swings: dict[int, Swing] = {}
+        multiples: dict[int, Multiple] = {}
         for p in products:
             if form := self._linear(p, units):
                 terms[p] = 0, form
             elif square := self._square(p, units | sums):
                 terms[p] = 0, square
-            elif swing := self._swing(p, units):
-                swings[p] = swing
+            elif multiple := self._multiple(p, units):
+                multiples[p] = multiple
             else:
                 return None
         squares = {p for p, (_, form) in terms.items() if len(form) == 3}
         inner = {index for index in sums if index not in self.roots and squares.issuperset(self.parents[index])}
-        self._vectors(angle, terms, swings)
-        self._multiples(angle, terms, swings)
+        self._vectors(angle, terms, multiples)
+        self._multiples(angle, terms, multiples)
         holders = {p for term in terms for p in self.parents[term] if self.nodes[p][0] == "add"} - inner
         for index in sorted(holders):
             _collect(index, self.nodes[index], terms, angle)
@@ -95,11 +95,11 @@ class Reader:
                 sums[index] = sum((x for x, _ in parts), Fraction(0)), sum((y for _, y in parts), Fraction(0))
         return sums
 
-    def _vectors(self, angle: Angle, terms: Terms, swings: dict[int, Swing]) -> None:
-        """Sums a*cos + b*sin beside a*sin - b*cos become a pair; their products are no `swings` any more."""
+    def _vectors(self, angle: Angle, terms: Terms, multiples: dict[int, Multiple]) -> None:
+        """Sums a*cos + b*sin and a*sin - b*cos become a pair; their products leave `multiples`."""
         found = {}
-        for index in sorted({p for product in swings for p in self.parents[product]}):
-            if vector := self._vector(index, swings):
+        for index in sorted({p for product in multiples for p in self.parents[product]}):
+            if vector := self._vector(index, multiples):
                 found[vector] = index
         for ((plus, a), (minus, b)), first in found.items():
             for sign in (1, -1):
@@ -112,26 +112,26 @@ class Reader:
                             if form := self._linear(user, {index: unit}):
                                 terms[user] = len(angle.pairs) - 1, form
                         for ref in self.nodes[index][1:]:
-                            del swings[node_of(ref)]
+                            del multiples[node_of(ref)]
 
-    def _vector(self, index: int, swings: dict[int, Swing]) -> tuple[Part, Part] | None:
+    def _vector(self, index: int, multiples: dict[int, Multiple]) -> tuple[Part, Part] | None:
         """(a, b) if a node is a*cos + b*sin, and is used as a term of sums or with constants only."""
         refs, users = self.nodes[index][1:], self.parents[index]
         if len(refs) != 2 or index in self.roots:
             return None
         parts: dict[Form, Part] = {}
         for ref in refs:
-            unit, factor, others = swings.get(node_of(ref), (X, Fraction(0), ()))
+            unit, factor, others = multiples.get(node_of(ref), (X, Fraction(0), ()))
             if factor == 1 and len(self.parents[node_of(ref)]) == 1:
                 parts[unit] = (1 if ref >= 0 else -1, others)
-        multiples = [user for user in users if self.nodes[user][0] != "add"]
-        scaled = all(self._linear(user, {index: X}) for user in multiples) and self._only_terms(multiples)
+        products = [user for user in users if self.nodes[user][0] != "add"]
+        scaled = all(self._linear(user, {index: X}) for user in products) and self._only_terms(products)
         return (parts[X], parts[Y]) if len(parts) == 2 and scaled else None
 
-    def _multiples(self, angle: Angle, terms: Terms, swings: dict[int, Swing]) -> None:
+    def _multiples(self, angle: Angle, terms: Terms, multiples: dict[int, Multiple]) -> None:
         """Products a*cos and a*sin are pairs for every a."""
         numbers: dict[tuple[int, ...], int] = {}
-        for product, (unit, factor, others) in swings.items():
+        for product, (unit, factor, others) in multiples.items():
             if others not in numbers:
                 numbers[others] = len(angle.pairs)
                 angle.pairs.append(Pair((1, others)))
@@ -152,7 +152,7 @@ class Reader:
         (a, b), (c, d) = forms[refs[0]], forms[refs[1]]
         return factor * a * c, factor * (a * d + b * c), factor * b * d
 
-    def _swing(self, product: int, units: dict[int, Form]) -> Swing | None:
+    def _multiple(self, product: int, units: dict[int, Form]) -> Multiple | None:
         """A product with one unit among its factors."""
         factor, refs = self._factors(product)
         others = tuple(ref for ref in refs if ref not in units)
@@ -174,10 +174,10 @@ def _collect(index: int, node: Node, terms: Terms, angle: Angle) -> None:
     """The part of a sum that an angle's terms make up."""
     totals: dict[tuple[int, int], list[Fraction]] = {}
     angle.taken[index] = set()
-    for place, ref in enumerate(node[1:]):
+    for position, ref in enumerate(node[1:]):
         if node_of(ref) in terms:
             pair, term = terms[node_of(ref)]
-            angle.taken[index].add(place)
+            angle.taken[index].add(position)
             total = totals.setdefault((pair, len(term)), [Fraction(0)] * len(term))
             total[:] = [a + b if ref >= 0 else a - b for a, b in zip(total, term, strict=True)]
     for (pair, degree), total in totals.items():

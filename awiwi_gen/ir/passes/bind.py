@@ -1,4 +1,4 @@
-"""Give the hand's named numbers their values and compute everything that has become constant."""
+"""Bind the hand's named numbers to their values and fold constants."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def bind(graph: Graph, values: Mapping[str, Fraction]) -> Graph:
 
 
 def fill(graph: Graph, values: Mapping[str, Fraction]) -> Graph:
-    """Put values in the places of parameters and change nothing else: it rounds as the C that reads them does."""
+    """Replace parameters by values and simplify nothing: it rounds as the C with run-time parameters does."""
     nodes = (("const", values[node[1]]) if node[0] == "param" else node for node in graph.nodes)
     return Graph(tuple(nodes), graph.outputs)
 

@@ -1,4 +1,4 @@
-"""Put common factors of a sum outside a bracket: ``a*b + a*c`` becomes ``a*(b + c)``.
+"""Factor out: ``a*b + a*c`` becomes ``a*(b + c)``.
 
 Only products that nothing else uses are taken apart. The factor found in most terms goes first.
 """

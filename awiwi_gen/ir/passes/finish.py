@@ -1,4 +1,4 @@
-"""The last steps before C but for the order of evaluation: quotients, and signs that cost nothing.
+"""The last passes before scheduling: quotients, and signs that cost nothing.
 
 These leave the canonical form on purpose: from here on the order of operands is the order of rounding.
 """
@@ -14,11 +14,11 @@ def quotients(graph: Graph) -> Graph:
     nodes: list[Node] = []
     for node in graph.nodes:
         if node[0] == "mul":
-            lone = [r for r in node[1:] if graph.nodes[r][0] == "inv" and uses[r] == 1]
-            if lone:
-                factors = [r for r in node[1:] if r != lone[0]]
+            single = [r for r in node[1:] if graph.nodes[r][0] == "inv" and uses[r] == 1]
+            if single:
+                factors = [r for r in node[1:] if r != single[0]]
                 if len(factors) == 1:
-                    node = ("div", factors[0], graph.nodes[lone[0]][1])
+                    node = ("div", factors[0], graph.nodes[single[0]][1])
         nodes.append(node)
     return prune(Graph(tuple(nodes), graph.outputs))
 
@@ -27,7 +27,7 @@ def orient(graph: Graph) -> Graph:
     """Let minus signs fall where they cost nothing, and start every sum with a positive term.
 
     Walks from the outputs down: a node whose uses would all pay for a minus computes its negative instead,
-    by turning its terms, its constant, or a factor that only it uses.
+    by negating its terms, its constant, or a factor that only it uses.
     """
     nodes = list(graph.nodes)
     uses = graph.uses
@@ -35,20 +35,20 @@ def orient(graph: Graph) -> Graph:
     paid = [0] * len(nodes)  # uses with a minus that would be an operation, less those without
     for ref in graph.roots:
         paid[node_of(ref)] += 1 if ref < 0 else -uses[node_of(ref)]
-    turned = [False] * len(nodes)
+    negated = [False] * len(nodes)
     for index in range(len(nodes) - 1, -1, -1):
         operation, *refs = nodes[index]
         if operation in LEAVES:
             continue
         if paid[index] == uses[index]:
-            turned[index] = _turn(nodes, uses, operation, refs)
+            negated[index] = _negate(nodes, uses, operation, refs)
         for ref in refs:
             free = operation == "add" and nodes[node_of(ref)][0] != "add"
             paid[node_of(ref)] += 1 if ref < 0 and not free else -uses[node_of(ref)]
         nodes[index] = (operation, *refs)
 
     def new(ref: Ref) -> Ref:
-        return ~ref if turned[node_of(ref)] else ref
+        return ~ref if negated[node_of(ref)] else ref
 
     for index, (operation, *refs) in enumerate(nodes):
         if operation not in LEAVES:
@@ -65,16 +65,16 @@ def orient(graph: Graph) -> Graph:
     )
 
 
-def _turn(nodes: list[Node], uses: tuple[int, ...], operation: str, refs: list[Ref]) -> bool:
+def _negate(nodes: list[Node], uses: tuple[int, ...], operation: str, refs: list[Ref]) -> bool:
     """Negate a node in place at no cost; False where that is impossible."""
     if operation == "add":
         refs[:] = [~ref for ref in refs]
         return True
     if operation not in ("mul", "div"):
         return False
-    for place, ref in enumerate(refs):
+    for position, ref in enumerate(refs):
         kind = nodes[node_of(ref)][0]
         if kind == "const" or (kind == "add" and uses[node_of(ref)] == 1):
-            refs[place] = ~ref
+            refs[position] = ~ref
             return True
     return False

@@ -1,4 +1,4 @@
-"""Merge sums into the sums, and products into the products, that alone use them.
+"""Merge a sum (product) into the only sum (product) that reads it.
 
 Products are always merged: what several of them share is found again by `share`, and better so.
 """

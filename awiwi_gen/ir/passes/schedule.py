@@ -1,8 +1,8 @@
-"""The order of evaluation: few values are alive at a time, so that registers can hold them.
+"""The order of evaluation: a list scheduler that keeps few values live, so that registers can hold them.
 
-Work comes in steps: a value of its own is computed, or a sum takes up one more of its terms. C compilers move values
-that are used once to where they are used, but leave an accumulated sum where it is written. Sums are therefore cut
-into partial sums, and take up each term as soon as it is known and lets go of what it was made of.
+A step computes a value, or adds one term to a sum. C compilers move a value that is used once to its use, but leave an
+accumulated sum in place. Sums are therefore cut into partial sums, and each term is added as soon as it is known, which
+frees the registers of its operands.
 """
 
 from __future__ import annotations
@@ -13,13 +13,13 @@ from itertools import groupby
 from typing import NamedTuple
 
 from awiwi_gen.ir.graph import LEAVES, Graph, Node, Output, Ref, node_of, operands, reordered
-from awiwi_gen.ir.passes.rounds import rounds
+from awiwi_gen.ir.passes.sincos_groups import deadlines
 
-AHEAD = 128  # more helps a finger no further, and scatters the many alike tendons of a wrist
+AHEAD = 128  # more gains nothing for a finger and mixes up the tendons of a wrist
 
 
 class Step(NamedTuple):
-    """Computing a node, or adding one term to it, from values that are kept."""
+    """Compute a node, or add one term to it, from values in registers."""
 
     node: int
     term: Ref | None
@@ -27,15 +27,15 @@ class Step(NamedTuple):
 
 
 def schedule(graph: Graph) -> Graph:
-    """The same expressions in the order of the `Agenda`, sums accumulated term by term."""
+    """The same expressions in the order of the `Scheduler`, sums accumulated term by term."""
     graph = depth_first(merged(graph))
-    return accumulate(graph, Agenda(graph, steps(graph)))
+    return accumulate(graph, Scheduler(graph, steps(graph)))
 
 
 def merged(graph: Graph) -> Graph:
-    """Sums that one sum alone reads become part of it: passes after `flatten` leave such.
+    """Merge sums that a single sum reads, which passes after `flatten` leave.
 
-    Angles, which so much waits for, begin with what is there from the start.
+    The sum of an angle starts with leaves: they are known first, and much depends on the angle.
     """
     nodes: list[Node] = []
     angles = {node_of(node[1]) for node in graph.nodes if node[0] in ("sin", "cos")}
@@ -44,8 +44,8 @@ def merged(graph: Graph) -> Graph:
             terms: list[Ref] = []
             for ref in node[1:]:
                 inner = nodes[node_of(ref)]
-                lone = inner[0] == "add" and graph.uses[node_of(ref)] == 1
-                terms += [r if ref >= 0 else ~r for r in inner[1:]] if lone else [ref]
+                merges = inner[0] == "add" and graph.uses[node_of(ref)] == 1
+                terms += [r if ref >= 0 else ~r for r in inner[1:]] if merges else [ref]
             if index in angles:
                 terms.sort(key=lambda ref: nodes[node_of(ref)][0] not in LEAVES)
             node = ("add", *_positive_first(terms))
@@ -54,7 +54,7 @@ def merged(graph: Graph) -> Graph:
 
 
 def _positive_first(terms: list[Ref]) -> list[Ref]:
-    """Negative terms go last where one would be the first: it would need an operation of its own."""
+    """Move negative terms to the end if one is first: a leading minus would cost an operation."""
     return sorted(terms, key=lambda ref: ref < 0 and terms[0] < 0)
 
 
@@ -77,32 +77,32 @@ def depth_first(graph: Graph) -> Graph:
 
 
 def steps(graph: Graph) -> list[Step]:
-    """All steps in the order of the nodes. Numbers, and what is used once and no sum, are no values of their own."""
+    """All steps in the order of the nodes. Constants, and nodes that are used once and are no sums, need no register."""
     roots = {node_of(ref) for ref in graph.roots}
-    needs: list[tuple[int, ...]] = []  # the kept values that reading a node comes to
+    needs: list[tuple[int, ...]] = []  # the values in registers that reading a node reads
     found = []
     for index, node in enumerate(graph.nodes):
         reads = tuple(dict.fromkeys(value for ref in operands(node) for value in needs[node_of(ref)]))
-        kept = node[0] in ("input", "add", "sin", "cos") or graph.uses[index] > 1 or index in roots
+        in_register = node[0] in ("input", "add", "sin", "cos") or graph.uses[index] > 1 or index in roots
         is_number = node[0] in ("const", "param")
-        needs.append((index,) if kept and not is_number else reads)
+        needs.append((index,) if in_register and not is_number else reads)
         if node[0] == "add":
             found += [Step(index, ref, needs[node_of(ref)]) for ref in node[1:]]
-        elif kept and node[0] not in LEAVES:
+        elif in_register and node[0] not in LEAVES:
             found.append(Step(index, None, reads))
     return found
 
 
-class Agenda:
-    """The steps in the order in which they are taken. Of those whose values are known, the first is next that needs no
-    further register; where all do, one that needs fewer may come up to so many steps `AHEAD` of its turn for each.
-    What earlier rounds of angles need goes before all else.
+class Scheduler:
+    """Iterates over the steps in scheduled order. Among the steps whose operands are known, those that an earlier sine or
+    cosine depends on go first, then the first that needs no further register. If all need one, a step that needs fewer
+    may go up to `AHEAD` steps early for each register it saves.
     """
 
     def __init__(self, graph: Graph, steps: list[Step]) -> None:
-        self.steps, self.turn = steps, rounds(graph)
+        self.steps, self.deadline = steps, deadlines(graph)
         self.is_input = [node[0] == "input" for node in graph.nodes]
-        self.begun = [False] * len(graph.nodes)  # in a register, as a whole or in part
+        self.loaded = [False] * len(graph.nodes)  # occupies a register, whole or as a partial sum
         self.of_node: list[list[int]] = [[] for _ in graph.nodes]
         self.readers: list[list[int]] = [[] for _ in graph.nodes]
         for number, step in enumerate(steps):
@@ -113,7 +113,7 @@ class Agenda:
         self.taken = [False] * len(steps)
         self.parts = [len(numbers) for numbers in self.of_node]
         self.unread = [len(numbers) for numbers in self.readers]
-        # Registers a step fills less those it sets free: a result not begun, inputs not loaded, values not read again.
+        # Registers a step occupies less those it frees: a new result, inputs not loaded yet, values read for the last time.
         self.filled = [1 + sum(self.is_input[v] - (self.unread[v] == 1) for v in step.reads) for step in steps]
         self.heap = [self._key(number) for number, count in enumerate(self.missing) if not count]
         heapify(self.heap)
@@ -129,25 +129,25 @@ class Agenda:
 
     def _key(self, number: int) -> tuple[int, bool, int, int]:
         needed = max(self.filled[number], 0)
-        return self.turn[self.steps[number].node], needed > 0, number + AHEAD * needed, number
+        return self.deadline[self.steps[number].node], needed > 0, number + AHEAD * needed, number
 
     def _take(self, step: Step) -> None:
-        """What other steps fill once this one is taken, and which can be taken then."""
+        """Update the register needs of other steps, and offer those that become possible."""
         for value in (step.node, *(v for v in step.reads if self.is_input[v])):
-            if not self.begun[value]:
-                self.begun[value] = True
-                self._cheapen(self.readers[value] if self.is_input[value] else self.of_node[value])
+            if not self.loaded[value]:
+                self.loaded[value] = True
+                self._release(self.readers[value] if self.is_input[value] else self.of_node[value])
         for value in step.reads:
             self.unread[value] -= 1
             if self.unread[value] == 1:
-                self._cheapen(self.readers[value])
+                self._release(self.readers[value])
         self.parts[step.node] -= 1
         if not self.parts[step.node]:
             for reader in self.readers[step.node]:
                 self.missing[reader] -= 1
                 self._offer(reader)
 
-    def _cheapen(self, numbers: list[int]) -> None:
+    def _release(self, numbers: list[int]) -> None:
         for number in numbers:
             self.filled[number] -= 1
             self._offer(number)
@@ -158,7 +158,7 @@ class Agenda:
 
 
 def accumulate(graph: Graph, steps: Iterable[Step]) -> Graph:
-    """The graph as these steps compute it: sums are cut where steps of something else come between."""
+    """The graph as these steps compute it: a sum is cut where other steps interrupt it."""
     writer = Writer(graph)
     for index, leaf in enumerate(graph.nodes):
         if leaf[0] in LEAVES:
@@ -173,18 +173,20 @@ def accumulate(graph: Graph, steps: Iterable[Step]) -> Graph:
 
 
 class Writer:
-    """Writes the nodes of a graph down in the order in which they are asked for."""
+    """Writes the nodes of a graph in the order of the calls."""
 
     def __init__(self, graph: Graph) -> None:
         self.graph = graph
         self.nodes: list[Node] = []
         self.renamed: dict[int, int] = {}
-        self.coming = {i: len(node) - 1 for i, node in enumerate(graph.nodes) if node[0] == "add"}  # terms of sums
-        self.held: dict[int, list[Ref]] = {}  # terms that came before the sum could begin
+        self.coming = {
+            i: len(node) - 1 for i, node in enumerate(graph.nodes) if node[0] == "add"
+        }  # terms not added yet
+        self.held: dict[int, list[Ref]] = {}  # terms that wait until the sum can start
         self.partial: dict[int, int] = {}
 
     def new(self, ref: Ref) -> Ref:
-        """The new reference of an old one; writes down what is not written yet."""
+        """The new reference of an old one; writes the nodes that are missing."""
         index = node_of(ref)
         if index not in self.renamed:
             node = self.graph.nodes[index]
@@ -193,7 +195,7 @@ class Writer:
         return self.renamed[index] if ref >= 0 else ~self.renamed[index]
 
     def add(self, index: int, terms: list[Ref]) -> None:
-        """Take more terms into a sum. It begins with two, and with a positive one where there is any."""
+        """Add terms to a sum. It starts with two terms, and with a positive one if there is any."""
         self.coming[index] -= len(terms)
         terms = self.held.pop(index, []) + terms
         if index not in self.partial and self.coming[index] and (len(terms) < 2 or all(ref < 0 for ref in terms)):

@@ -1,4 +1,4 @@
-"""Find pairs of terms (or of factors) that several sums (products) have in common and compute them once.
+"""Common subexpressions: pairs of terms (factors) that several sums (products) contain are computed once.
 
 Greedy: the pair that most nodes contain is taken out first, until every pair is used once only.
 """
@@ -33,7 +33,7 @@ def _share(graph: Graph, operation: str) -> Graph:
 
 
 def _normal(a: Ref, b: Ref) -> tuple[Pair, bool]:
-    """The pair in sorted order with a positive first member, and whether its sign was turned."""
+    """The pair in sorted order with a positive first member, and whether it was negated."""
     if node_of(a) > node_of(b):
         a, b = b, a
     return ((~a, ~b), True) if a < 0 else ((a, b), False)

@@ -21,7 +21,7 @@ Terms = dict[Factors, Fraction]
 class _Bracket:
     """A term of a sum that is x times a bracket, and by how much x is to be shifted."""
 
-    place: int
+    position: int
     x: int
     inner: Terms
     by: Fraction
@@ -42,7 +42,7 @@ def shift(graph: Graph) -> Graph:
     def rule(builder: Builder, node: Node, refs: tuple[Ref, ...]) -> Ref:
         result = copy_node(builder, node, refs)
         if node in found:
-            result = _completed(builder, found[node], list(refs), node[found[node].place] >= 0, new)
+            result = _completed(builder, found[node], list(refs), node[found[node].position] >= 0, new)
         renamed[node] = result
         return result
 
@@ -56,7 +56,7 @@ def _best(graph: Graph, node: Node, shifted: set[tuple[int, Fraction]]) -> _Brac
     """The shift that saves most operations of a sum."""
     outer = _terms(graph, node)
     best, most = None, 0
-    for place, ref in enumerate(node[1:], 1):
+    for position, ref in enumerate(node[1:], 1):
         product = graph.nodes[node_of(ref)]
         if product[0] != "mul" or len(product) != 3 or graph.uses[node_of(ref)] > 1:
             continue
@@ -69,7 +69,7 @@ def _best(graph: Graph, node: Node, shifted: set[tuple[int, Fraction]]) -> _Brac
                 by = times if ref >= 0 else -times
                 gain = _gain(x, inner, outer, times) - ((x, by) not in shifted)
                 if gain > most and abs(by) <= 1:
-                    best, most = _Bracket(place, x, inner, by), gain
+                    best, most = _Bracket(position, x, inner, by), gain
     return best
 
 
@@ -113,7 +113,7 @@ def _completed(builder: Builder, found: _Bracket, refs: list[Ref], plus: bool, n
     def products(terms: Terms, times: Fraction | int) -> list[Ref]:
         return [builder.mul([builder.const(c * times), *map(new, factors)]) for factors, c in terms.items()]
 
-    del refs[found.place - 1]
+    del refs[found.position - 1]
     product = builder.mul((builder.add((new(x), builder.const(by))), builder.add(products(inner, 1))))
     del inner[x,]
     return builder.add([*refs, product if plus else ~product, *products(inner, -by if plus else by)])

@@ -1,7 +1,7 @@
 """Choose for every value whether it or its negative is computed, so that fewer minus signs are operations of their own.
 
-`orient` decides from the outputs down, once for each node. Here a node turns together with the products made of it
-wherever that helps, until nothing does.
+`orient` decides from the outputs down, once for each node. Here a node is negated together with the
+products that read it wherever that helps, until nothing does.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ class _Signs:
 
     def __init__(self, graph: Graph) -> None:
         self.nodes = graph.nodes
-        self.turned = [False] * len(graph.nodes)
+        self.negated = [False] * len(graph.nodes)
         self.users: list[list[int]] = [[] for _ in graph.nodes]
         for index, node in enumerate(graph.nodes):
             for ref in set(map(node_of, operands(node))):
@@ -27,22 +27,22 @@ class _Signs:
 
     def minus(self, ref: Ref) -> bool:
         """Whether a reference needs the negative of what is computed."""
-        return (ref < 0) != self.turned[node_of(ref)]
+        return (ref < 0) != self.negated[node_of(ref)]
 
     def cost(self, index: int) -> int:
-        """Negations that a node's own computation and the results it is take."""
-        node, turned, results = self.nodes[index], self.turned, self.results[index]
+        """Negations in the computation of a node and in its results."""
+        node, negated, results = self.nodes[index], self.negated, self.results[index]
         own = sum(map(self.minus, results)) if results and node[0] != "const" else 0
         if node[0] in LEAVES or self.constant[index]:
             return own
-        minuses: list[bool] = [(ref < 0) != turned[ref if ref >= 0 else ~ref] for ref in node[1:]]
+        minuses: list[bool] = [(ref < 0) != negated[ref if ref >= 0 else ~ref] for ref in node[1:]]
         if node[0] == "add":
-            return own + int(turned[index] not in minuses)
+            return own + int(negated[index] not in minuses)
         if node[0] in ("mul", "div"):
-            return own + int((sum(minuses) % 2 == 1) != turned[index])
+            return own + int((sum(minuses) % 2 == 1) != negated[index])
         return own + sum(minuses)
 
-    def willing(self, index: int) -> set[int]:
+    def absorbing(self, index: int) -> set[int]:
         """The terms of a sum that take a sign at no cost: products with a constant that nothing else uses."""
         if self.nodes[index][0] != "add":
             return set()
@@ -51,23 +51,23 @@ class _Signs:
         return {term for term in alone if self.nodes[term][0] == "mul" and _constant(self.nodes, self.nodes[term])}
 
     def gain(self, group: set[int]) -> int:
-        """Negations saved by turning these nodes."""
+        """Negations saved by computing the negatives of these nodes."""
         near = group | {user for index in group for user in self.users[index]}
         before = sum([self.spent[index] for index in near])
-        self._turn(group)
+        self._flip(group)
         after = sum(map(self.cost, near))
-        self._turn(group)
+        self._flip(group)
         return before - after
 
-    def turn(self, group: set[int]) -> None:
+    def negate(self, group: set[int]) -> None:
         """Compute the negatives of these nodes instead."""
-        self._turn(group)
+        self._flip(group)
         for near in group | {user for index in group for user in self.users[index]}:
             self.spent[near] = self.cost(near)
 
-    def _turn(self, group: set[int]) -> None:
+    def _flip(self, group: set[int]) -> None:
         for index in group:
-            self.turned[index] = not self.turned[index]
+            self.negated[index] = not self.negated[index]
 
 
 def signs(graph: Graph) -> Graph:
@@ -75,19 +75,19 @@ def signs(graph: Graph) -> Graph:
     choice = _Signs(graph)
     free = [index for index, node in enumerate(graph.nodes) if node[0] in ("add", "mul", "div")]
     while True:
-        turned = 0
+        changed = False
         for index in reversed(free):
             products = {user for user in choice.users[index] if graph.nodes[user][0] in ("mul", "div")}
-            for group in ({index}, {index} | products, {index} | products | choice.willing(index)):
+            for group in ({index}, {index} | products, {index} | products | choice.absorbing(index)):
                 if choice.gain(group) > 0:
-                    choice.turn(group)
-                    turned += 1
-        if not turned:
+                    choice.negate(group)
+                    changed = True
+        if not changed:
             return _rewritten(graph, choice)
 
 
 def _constant(nodes: tuple[Node, ...], node: Node) -> int | None:
-    """The place of a constant among a product's factors, which takes a sign at no cost."""
+    """The position of a constant among a product's factors, which takes a sign at no cost."""
     return next((place for place, ref in enumerate(node[1:], 1) if nodes[node_of(ref)][0] == "const"), None)
 
 
@@ -102,10 +102,10 @@ def _rewritten(graph: Graph, choice: _Signs) -> Graph:
             continue
         refs = [new(ref) for ref in node[1:]]
         if node[0] == "add":
-            refs = [~ref if choice.turned[index] else ref for ref in refs]
+            refs = [~ref if choice.negated[index] else ref for ref in refs]
             refs.sort(key=lambda ref: ref < 0)
         elif node[0] in ("mul", "div"):
-            odd = (sum(ref < 0 for ref in refs) % 2 == 1) != choice.turned[index]
+            odd = (sum(ref < 0 for ref in refs) % 2 == 1) != choice.negated[index]
             place = _constant(graph.nodes, node) or 1
             refs = [node_of(ref) for ref in refs]
             refs[place - 1] = ~refs[place - 1] if odd else refs[place - 1]

@@ -1,8 +1,8 @@
-"""Turn the axes in which an angle is measured: ``a*cos(x) + b*sin(x)`` is ``hypot(a, b)*cos(x + phase)``.
+"""Add a phase to an angle so that most terms vanish: ``a*cos(x) + b*sin(x)`` is ``hypot(a, b)*cos(x + phase)``.
 
-A body's moments are pairs of such sums, (a, b) and (-b, a), so one added constant saves two products and two sums. All
-else that reads this sine and cosine must be terms of sums: of first degree, or of second with constant factors, for
-then it keeps its form in other axes (`angles`); angles of which this is not so are left alone.
+The moments of a body are pairs of such sums, (a, b) and (-b, a), so one added constant saves two products and two sums.
+Every other use of the sine and cosine must be a term of a sum: of first degree, or of second with constant factors. Such
+terms keep their form when the phase changes (`angles`). Angles with other uses stay as they are.
 """
 
 from __future__ import annotations
@@ -20,21 +20,21 @@ from awiwi_gen.ir.graph import Graph, Node, Ref
 from awiwi_gen.ir.passes.angles import Angle, Form, Pair, Part, Reader, Square
 
 BITS = 400
-EXACT = Fraction(1, 1 << 300)  # what is smaller than this part of its form is zero but for rounding
+EXACT = Fraction(1, 1 << 300)  # a coefficient smaller than this part of its form is a rounded zero
 Leaves = tuple[tuple[Ref, ...], tuple[Ref, ...]]  # the factors of the two values of a pair
 
 
-def turn(graph: Graph) -> Graph:
-    """The same graph with angles measured from where most terms vanish."""
+def phase(graph: Graph) -> Graph:
+    """The same graph with the best phase added to every angle."""
     reader = Reader(graph)
     found = {(node[0], node[1]): index for index, node in enumerate(graph.nodes) if node[0] in ("cos", "sin")}
     for (name, argument), cosine in found.items():
         if name == "cos" and ("sin", argument) in found:
             angle = reader.read(cosine, found["sin", argument])
-            phase = _best(angle) if angle else None
-            turned = _turned(graph, angle, phase) if angle and phase else graph
-            if _operations(turned) < _operations(graph):
-                return turn(turned)
+            best = _best_phase(angle) if angle else None
+            changed = _with_phase(graph, angle, best) if angle and best else graph
+            if _operations(changed) < _operations(graph):
+                return phase(changed)
     return graph
 
 
@@ -43,8 +43,8 @@ def _operations(graph: Graph) -> int:
     return spent.add + spent.mul
 
 
-def _best(angle: Angle) -> Form | None:
-    """Cosine and sine of the phase at which most terms vanish, if they are worth one addition."""
+def _best_phase(angle: Angle) -> Form | None:
+    """Cosine and sine of the phase at which most terms vanish, if that saves more than one addition."""
     forms = [(pair, float(a), float(b)) for (_, pair), (a, b) in angle.linear.items()]
     squares = [(float(xx - yy), float(xy)) for xx, xy, yy in angle.square.values()]
     best, least = None, _terms(forms, squares, 1.0, 0.0)
@@ -60,10 +60,10 @@ def _best(angle: Angle) -> Form | None:
 def _terms(
     forms: Iterable[tuple[int, float, float]], squares: Iterable[tuple[float, float]], c: float, s: float
 ) -> int:
-    """Number of terms that are left at a phase with this cosine and sine, forms that are alike counted once."""
-    turned = [(pair, a * c - b * s, a * s + b * c) for pair, a, b in forms]
-    turned += [(0, a * (c * c - s * s) - 2 * b * c * s, 2 * a * c * s + b * (c * c - s * s)) for a, b in squares]
-    left = {(pair, *(f"{x:.9e}" if abs(x) > 1e-12 * hypot(a, b) else "" for x in (a, b))) for pair, a, b in turned}
+    """Number of terms left at a phase with cosine c and sine s; equal forms count once."""
+    rotated = [(pair, a * c - b * s, a * s + b * c) for pair, a, b in forms]
+    rotated += [(0, a * (c * c - s * s) - 2 * b * c * s, 2 * a * c * s + b * (c * c - s * s)) for a, b in squares]
+    left = {(pair, *(f"{x:.9e}" if abs(x) > 1e-12 * hypot(a, b) else "" for x in (a, b))) for pair, a, b in rotated}
     return sum(bool(x) for _, *form in left for x in form)
 
 
@@ -85,7 +85,7 @@ def _key(form: Form) -> tuple[int, int]:
     return tuple(round(x * (1 << 250)) for x in form)  # type: ignore[return-value]
 
 
-def _turn(form: Form, phase: Form) -> Form:
+def _rotated(form: Form, phase: Form) -> Form:
     (a, b), (c, s) = form, phase
     return _clean((a * c - b * s, a * s + b * c))
 
@@ -96,8 +96,8 @@ def _clean(form: Form) -> Form:
     return a, b
 
 
-def _turn_square(square: Square, phase: Form) -> Square:
-    """cos = c*cos' + s*sin' and sin = c*sin' - s*cos', put in."""
+def _rotated_square(square: Square, phase: Form) -> Square:
+    """Substitute cos = c*cos' + s*sin' and sin = c*sin' - s*cos'."""
     (xx, xy, yy), (c, s) = square, phase
     return (
         xx * c * c - xy * c * s + yy * s * s,
@@ -118,8 +118,8 @@ def _other_slope(square: Square) -> Form:
     return _clean((xy, yy - xx))
 
 
-def _turned(graph: Graph, angle: Angle, phase: Form) -> Graph:
-    squares = {index: _turn_square(square, phase) for index, square in angle.square.items()}
+def _with_phase(graph: Graph, angle: Angle, phase: Form) -> Graph:
+    squares = {index: _rotated_square(square, phase) for index, square in angle.square.items()}
     slopes: Counter[tuple[int, int]] = Counter()
     for square in squares.values():
         slopes.update({_key(_slope(square)), _key(_other_slope(square))})
@@ -148,12 +148,12 @@ def _turned(graph: Graph, angle: Angle, phase: Form) -> Graph:
         index = position[node]
         if index not in angle.taken:
             return copy_node(builder, node, refs)
-        turned = builder.add((renamed[angle.argument], builder.const(shift)))
-        own = (builder.call("cos", turned), builder.call("sin", turned))
+        shifted = builder.add((renamed[angle.argument], builder.const(shift)))
+        own = (builder.call("cos", shifted), builder.call("sin", shifted))
         terms = [ref for place, ref in enumerate(refs) if place not in angle.taken[index]]
         for number, pair in enumerate(angle.pairs):
             if (index, number) in angle.linear:
-                terms += form(builder, leaves(builder, own, pair), _turn(angle.linear[index, number], phase))
+                terms += form(builder, leaves(builder, own, pair), _rotated(angle.linear[index, number], phase))
         if index in squares:
             one, other = _slope(squares[index]), _other_slope(squares[index])
             by_sine = slopes[_key(other)] > slopes[_key(one)]
