@@ -14,19 +14,20 @@ from awiwi_gen.units import Quantity, Unit, name_of, parse_quantity
 
 __all__ = ["Measure"]
 
+_LEAST = Fraction(1, 10**40)  # in SI; far below the rounding errors in exported models
+
 
 @dataclass(frozen=True)
 class Measure:
     """The dimension of a number (that of the example) and its plausible range, ends included.
 
     The ranges cover every hand that people build, of a cat's or a crane's size; they catch "6.2 km" and "6.2 fm". A
-    range below zero includes zero, and leaves out numbers nearer to zero than `least` (in SI): nobody measures those.
+    range that begins below zero includes zero, and rounding errors of other programs, but no "1e-30 nm^39/m^38".
     """
 
     example: str
     low: str
     high: str
-    least: Fraction = Fraction(1, 10**12)
 
     @cached_property
     def unit(self) -> Unit:
@@ -64,7 +65,7 @@ class Measure:
         if not low <= quantity.value <= high:
             slip = self._other_angle(value, quantity)
             raise ValueError(f"is not plausible; expected {self.expected}, from {self.low} to {self.high}{slip}")
-        if 0 < abs(quantity.value) < self.least:
+        if 0 < abs(quantity.value) < _LEAST:
             zero = f'"0 {self.example.partition(" ")[2]}"'
             raise ValueError(f"is not plausible; expected zero, written {zero}, or {self.expected}")
         return quantity
