@@ -1,15 +1,15 @@
 """Every exception this package raises on purpose.
 
-    AwiwiError                something a user can read and act on; exit code 1
-    ├── InputError            what was handed in is wrong: a hand file, an argument; exit code 2; lists all its faults
-    │   └── OutputError       the place to write to is missing, locked or somebody else's
-    ├── DimensionError        an expression adds metres to newtons: the physics, not the file, is wrong
+    AwiwiError                an error that a user can read and act on; exit code 1
+    ├── InputError            the input is wrong: a hand file, an argument; exit code 2; lists its faults
+    │   └── OutputError       the output directory is missing, locked or not ours
+    ├── DimensionError        an expression adds metres to newtons: the physics is wrong, not the file
     ├── BuildError            the C compiler refused the generated code
-    │   └── NoCompilerError   there is none that works; exit code 2
-    ├── BudgetError           a kernel costs more than what is committed
-    └── VerificationError     two independent routes to one number disagree
+    │   └── NoCompilerError   there is no working C compiler; exit code 2
+    ├── BudgetError           a kernel costs more than its committed budget
+    └── VerificationError     two independent derivations of one number disagree
 
-Anything else that escapes is a bug of ours.
+Any other exception that escapes is a bug of this package.
 """
 
 from __future__ import annotations
@@ -17,68 +17,82 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 __all__ = [
     "AwiwiError", "BudgetError", "BuildError", "DimensionError", "Fault", "InputError", "NoCompilerError", "OutputError",
-    "VerificationError", "unknown",
+    "VerificationError", "printable", "unknown",
 ]  # fmt: skip
 
-_MOST_SHOWN = 100  # a terminal is not scrolled back farther than that; `faults` has them all
+MOST_FAULTS = 100  # shown in one error; nobody scrolls back further
+
+
+def printable(text: str) -> str:
+    """The text with control characters escaped: safe for a terminal. Line ends and tabs stay."""
+    return "".join(c if c.isprintable() or c in "\n\t" else c.encode("unicode_escape").decode() for c in text)
 
 
 class AwiwiError(Exception):
-    """Root of the tree; the command line prints it and leaves with `exit_code`."""
+    """Root of the tree; the command line prints it and exits with `exit_code`."""
 
     exit_code: ClassVar[int] = 1
 
 
 @dataclass(frozen=True, kw_only=True)
 class Fault:
-    """One thing wrong with an input: where it is, and a predicate that completes the sentence.
+    """An error or a warning about an input: its location, and a predicate that completes the sentence.
 
     >>> print(Fault(file="hand.toml", line=41, key="radius", message='= "6.2 N" is a force; expected a length'))
     hand.toml:41 radius = "6.2 N" is a force; expected a length
+
+    A warning has a `ratio`: the value found over the largest (or smallest) usual one.
     """
 
     message: str
     file: str | None = None
     line: int | None = None
     key: str | None = None
+    ratio: float | None = None
 
     def __str__(self) -> str:
-        place = self.file if self.line is None else f"{self.file or ''}:{self.line}"
-        return " ".join(part for part in (place, self.key, self.message) if part)
+        location = self.file if self.line is None else f"{self.file or ''}:{self.line}"
+        return printable(" ".join(part for part in (location, self.key, self.message) if part))
+
+    def as_dict(self) -> dict[str, Any]:
+        """Everything that is known, ready for JSON."""
+        return {name: value for name, value in vars(self).items() if value is not None}
 
 
 class InputError(AwiwiError, ValueError):
-    """Bad input, with all faults found (at least one), in the order a reader meets them.
+    """Bad input, with its faults (at least one) in the order a reader meets them.
 
-    It is a `ValueError` too, so that a schema library collects it instead of letting it through.
+    `hidden` counts further faults that were found but not worded. It is a `ValueError` too, so that a schema library
+    collects it.
     """
 
     exit_code: ClassVar[int] = 2
 
-    def __init__(self, faults: str | Fault | Iterable[Fault]) -> None:
+    def __init__(self, faults: str | Fault | Iterable[Fault], hidden: int = 0) -> None:
         if isinstance(faults, str):
             faults = Fault(message=faults)
         self.faults: tuple[Fault, ...] = (faults,) if isinstance(faults, Fault) else tuple(faults)
-        super().__init__(self.faults)  # what pickle hands back to this constructor in another process
+        self.hidden = hidden
+        super().__init__(self.faults, hidden)  # the arguments that pickle passes on in another process
 
     def __str__(self) -> str:
-        lines = [str(fault) for fault in self.faults[:_MOST_SHOWN]]
-        more = len(self.faults) - len(lines)
+        lines = [str(fault) for fault in self.faults[:MOST_FAULTS]]
+        more = len(self.faults) - len(lines) + self.hidden
         return "\n".join(lines + [f"... and {more} more"] * (more > 0))
 
 
 def unknown(kind: str, name: str, known: Iterable[str], otherwise: str = "see awiwi-gen list") -> InputError:
-    """The exception for a name that is not known, with those that look like it, or else where to find names."""
+    """The exception for an unknown name; it suggests similar names, or else says where the names are listed."""
     near = difflib.get_close_matches(name, list(known), 3)
     return InputError(f"no {kind} {name!r}; {'did you mean ' + ', '.join(near) if near else otherwise}")
 
 
 class OutputError(InputError):
-    """The output directory cannot be written, or holds files this program did not make."""
+    """The output directory cannot be written, or holds files that this program did not make."""
 
 
 class DimensionError(AwiwiError):
@@ -90,7 +104,7 @@ class BuildError(AwiwiError):
 
 
 class NoCompilerError(BuildError):
-    """There is no C compiler, or none that works: the machine is to be mended, not the code."""
+    """There is no working C compiler: the machine needs a fix, not the code."""
 
     exit_code = 2
 
@@ -100,4 +114,4 @@ class BudgetError(AwiwiError):
 
 
 class VerificationError(AwiwiError):
-    """A witness contradicts another one."""
+    """Two derivations of one number contradict each other."""

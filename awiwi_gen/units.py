@@ -4,13 +4,14 @@ A designer writes `"6.5 mm"` and `"-20 deg"`; a kernel's author writes `N * m / 
 `Fraction`s in SI, so 6.5 mm is 13/2000 m and rounding happens once, when a `float` is asked for.
 
 The radian is dimensionless, as in SI: a pulley's radius times its angle *is* a length. It stays in the label, so that
-"N m/rad" is printed as it was written, and so that the border of the program can tell "20 rad/s" from "20 Hz".
+"N m/rad" is printed as it was written, and so that the reader of a hand file can tell "20 rad/s" from "20 Hz".
 """
 
 from __future__ import annotations
 
 import difflib
 import re
+import unicodedata
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -27,7 +28,7 @@ __all__ = [
 
 
 class Dimension(NamedTuple):
-    """SI exponents; what remains of a unit when its scale and its name are forgotten."""
+    """SI exponents of a unit, without its scale and its name."""
 
     m: Fraction = Fraction(0)
     kg: Fraction = Fraction(0)
@@ -39,8 +40,8 @@ class Dimension(NamedTuple):
 class Unit:
     """An SI unit: a dimension, and the factors it was written with.
 
-    Equality and hash see the dimension only: `N * m` and `J` and `N * m / rad` may be added, and the checker of
-    expressions asks exactly that. The factors serve the label.
+    Equality and hash compare the dimension only: `N * m`, `J` and `N * m / rad` may be added, and that is what the
+    dimension checker asks. The factors serve the label.
     """
 
     dimension: Dimension
@@ -63,7 +64,7 @@ class Unit:
 
     @property
     def radians(self) -> Fraction:
-        """Exponent of the radian, which the dimension does not see: 1 for rad/s, 0 for Hz."""
+        """Exponent of the radian, which the dimension leaves out: 1 for rad/s, 0 for Hz."""
         return dict(self.factors).get("rad", Fraction(0))
 
     @property
@@ -118,7 +119,7 @@ W = _named("W", J / s)
 Pa = _named("Pa", N / m**2)
 V = _named("V", W / A)
 
-# Keyed by the radian too: "20 Hz" where an angular velocity belongs is a factor 2 pi, and must not pass unseen.
+# The radian is part of the key: "20 Hz" for an angular velocity is wrong by a factor 2 pi and must be refused.
 _NAMES: dict[tuple[Dimension, Fraction], str] = {
     (unit.dimension, unit.radians): name
     for unit, name in (
@@ -154,7 +155,7 @@ _NAMES: dict[tuple[Dimension, Fraction], str] = {
 
 
 def name_of(unit: Unit) -> str:
-    """What a quantity of this unit is called, with its article; the SI exponents where English has no noun."""
+    """The noun for a quantity of this unit, with its article; the SI exponents where English has no noun."""
     found = _NAMES.get((unit.dimension, unit.radians)) or _NAMES.get((unit.dimension, Fraction(0)))
     if found:
         return found
@@ -164,7 +165,7 @@ def name_of(unit: Unit) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """An exact value in SI, its unit, and the text it came from (which does not count for equality)."""
+    """An exact value in SI, its unit, and the text it was read from (which equality ignores)."""
 
     value: Fraction
     unit: Unit
@@ -178,7 +179,7 @@ class Quantity:
         return self.text
 
 
-# 100 digits: far beyond the 200 bits at which two derivations are compared.
+# 100 digits: more than the 200 bits at which two derivations are compared.
 _PI = Fraction("3.1415926535897932384626433832795028841971693993751058209749445923078164062862089986280348253421170680")
 _PREFIXES = {"": 0, "n": -9, "u": -6, "µ": -6, "μ": -6, "m": -3, "k": 3, "M": 6, "G": 9}  # micro has two code points
 _SYMBOLS: dict[str, tuple[Fraction, Unit]] = {
@@ -209,13 +210,22 @@ _MOST_TEXT = 80
 _MOST_POWER_OF_TEN = 30  # refused before any arithmetic: Fraction("1e999999999") would fill the memory
 _NUMBER = re.compile(r"(?P<mantissa>[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+))(?:[eE](?P<power>[+-]?[0-9]+))?")
 _FACTOR = re.compile(r"(?P<symbol>[^\W\d_]+|°)(?:\^(?P<power>-?(?:[1-3][0-9]|[1-9])))?")
+_SUPERSCRIPTS = re.compile("[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+")
+# Units that are not read, with their value in one that is.
+_FOREIGN = {
+    "in": ("inches", "25.4", "mm"), "inch": ("inches", "25.4", "mm"), "inches": ("inches", "25.4", "mm"),
+    '"': ("inches", "25.4", "mm"), "mil": ("thousandths of an inch", "0.0254", "mm"), "ft": ("feet", "304.8", "mm"),
+    "lb": ("pounds", "453.59237", "g"), "lbs": ("pounds", "453.59237", "g"), "oz": ("ounces", "28.349523125", "g"),
+    "lbf": ("pounds of force", "4.4482216152605", "N"), "kgf": ("kilograms of force", "9.80665", "N"),
+    "min": ("minutes", "60", "s"), "bar": ("bars", "100", "kPa"), "psi": ("pounds per square inch", "6894.757", "Pa"),
+}  # fmt: skip
 
 
 def parse_quantity(text: str) -> Quantity:
     """Read "6.2 mm", "-20 deg", "35 g mm^2" or "0.5" exactly.
 
-    Raises `InputError` with one fault (key: the text, message: a predicate) for anything that is not a finite number
-    followed by known units.
+    Raises `InputError` with one fault (key: the text, message: a predicate) for any text but a finite number followed
+    by known units.
     """
     text = text.strip()
     if len(text) > _MOST_TEXT:
@@ -224,8 +234,13 @@ def parse_quantity(text: str) -> Quantity:
     if number is None:
         raise _fault(text, 'does not begin with a number; expected something such as "6.2 mm"')
     if abs(int(number["power"] or 0)) > _MOST_POWER_OF_TEN:
-        raise _fault(text, f"is beyond what is measured; powers of ten end at {_MOST_POWER_OF_TEN}")
-    scale, unit = _parse_scaled_unit(text, text[number.end() :].strip())
+        raise _fault(text, f"is too large or too small; powers of ten end at {_MOST_POWER_OF_TEN}")
+    written = text[number.end() :].strip()
+    if written in _FOREIGN:
+        name, factor, known = _FOREIGN[written]
+        value = Fraction(number[0]) * Fraction(factor)
+        raise _fault(text, f'is in {name}, which are not read; did you mean "{_decimal(value)} {known}"?')
+    scale, unit = _parse_scaled_unit(text, written)
     return Quantity(Fraction(number[0]) * scale, unit, text)
 
 
@@ -255,20 +270,27 @@ def _parse_product(whole: str, text: str) -> tuple[Fraction, Unit]:
     for word in text.replace("*", " ").replace("·", " ").split() or [""]:
         factor = _FACTOR.fullmatch(word)
         if factor is None or factor["symbol"] not in _SYMBOLS:
-            hint = _suggestion(factor["symbol"] if factor else word)
-            raise _fault(whole, f'has the unknown unit "{word}"{hint}')
+            raise _fault(whole, f'has the unknown unit "{word}"{_suggestion(word)}')
         symbol_scale, symbol_unit = _SYMBOLS[factor["symbol"]]
         power = int(factor["power"] or 1)
         scale, unit = scale * symbol_scale**power, unit * symbol_unit**power
     return scale, unit
 
 
-def _suggestion(symbol: str) -> str:
-    """A known unit that looks alike; case alone is the likeliest slip, so "MM" gives "mm"."""
-    near = [known for known in _SYMBOLS if known.lower() == symbol.lower()] or difflib.get_close_matches(
-        symbol, _SYMBOLS, n=1, cutoff=0.4
-    )
-    return f'; did you mean "{near[0]}"?' if near else ""
+def _suggestion(word: str) -> str:
+    """A known unit that looks like this one; case is the likeliest slip, so "MM" gives "mm", and "mm²" gives "mm^2"."""
+    plain = _SUPERSCRIPTS.sub(lambda found: "^" + unicodedata.normalize("NFKC", found[0]).replace("\u2212", "-"), word)
+    symbol, *power = re.split(r"(?=\^|\d)", plain, maxsplit=1)
+    near = [symbol] if symbol in _SYMBOLS else [known for known in _SYMBOLS if known.lower() == symbol.lower()]
+    near = near or difflib.get_close_matches(symbol[:_MOST_TEXT], _SYMBOLS, n=1, cutoff=0.4)
+    exponent = "^" + power[0].lstrip("^") if power else ""
+    meant = near[0] + exponent if near else ""
+    return f'; did you mean "{meant}"?' if _FACTOR.fullmatch(meant) else f'; did you mean "{near[0]}"?' if near else ""
+
+
+def _decimal(value: Fraction) -> str:
+    """A number as a designer writes it, to nine digits."""
+    return f"{float(value):.9g}"
 
 
 def _fault(text: str, message: str) -> InputError:

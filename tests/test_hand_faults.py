@@ -80,7 +80,7 @@ SCHEMA = {
     "zero radius": ('"9 mm"', '"0 mm"', JAW + '.pulleys[0].radius = "0 mm" must be above zero'),
     "huge mass": (
         'mass = "5 g"', 'mass = "5e9 kg"',
-        JAW + '.links[0].mass = "5e9 kg" is not plausible; expected a mass such as "1.5 g", from 0 to 10 kg',
+        JAW + '.links[0].mass = "5e9 kg" is not plausible; expected a mass such as "1.5 g", from 1 ng to 10 kg',
     ),
     "metres for millimetres": (
         '"30 mm"', '"30 m"',
@@ -88,7 +88,7 @@ SCHEMA = {
     ),
     "nan": ('mass = "5 g"', 'mass = "nan g"', JAW + '.links[0].mass = "nan g" does not begin with a number'),
     "infinity": ('mass = "5 g"', 'mass = "inf"', JAW + '.links[0].mass = "inf" does not begin with a number'),
-    "absurd exponent": ('"5 g"', '"1e999999 g"', JAW + '.links[0].mass = "1e999999 g" is beyond what is measured'),
+    "absurd exponent": ('"5 g"', '"1e999999 g"', JAW + '.links[0].mass = "1e999999 g" is too large or too small'),
     "unknown turn": ('"y-90"', '"y90"', JAW + ".links[1].turn = \"y90\" is not one of 'none', 'x+90',"),
     "unknown branch": ("branch = 1", "branch = 2", JAW + ".links[0].four_bar.branch = 2 is not one of 1 or -1"),
     "sense without sign": ('"-mid"', '"mid"', JAW + '.tendons[2].over[0] = "mid" is not a sense and a pulley'),
@@ -146,8 +146,8 @@ PHYSICS = {
         'xy = "3 g mm^2"', 'xy = "300 g mm^2"', "xy is probably 10 times too large",
     ),
     "inertia of a cathedral": (
-        'mass = "5 g"', 'mass = "5e-12 g"',
-        JAW.format(35) + ".links[0].inertia is too large for a mass of 5e-12 g: radius of gyration 9.3e+03 m",
+        'mass = "5 g"', 'mass = "5e-6 g"',
+        JAW.format(35) + ".links[0].inertia is too large for a mass of 5e-6 g: radius of gyration 9.3 m",
     ),
     "duplicate joint": (
         'joint = "mid"\nturn', 'joint = "root"\nturn',
@@ -162,7 +162,7 @@ PHYSICS = {
         JAW + '.pulleys[1].joint = "midd" names no joint of this finger; did you mean "mid"?',
     ),
     "tendon over nothing": (
-        'over = ["-mid"]', "over = []", JAW + ".tendons[2] neither winds over a pulley nor has a span",
+        'over = ["-mid"]', "over = []", JAW + ".tendons[2] neither runs over a pulley nor has a span",
     ),
     "unknown pulley": (
         '"-mid"', '"-midd"',
@@ -177,17 +177,7 @@ PHYSICS = {
     "span to the palm": (
         'over = ["-mid"]',
         'over = ["-mid"], span = { from = ["1 mm", "0 mm", "0 mm"], to = ["0 mm", "0 mm", "1 mm"], joint = "root" }',
-        JAW + '.tendons[2].span.joint = "root" stands still in the palm',
-    ),
-    "joint pulled to one side": (
-        '"-root"', '"+root"',
-        JAW.format(28) + '.links[0].joint = "root" has no tendon over "-root"; tendons only pull',
-    ),
-    "joint not pulled": ('["-root", "+mid"]', '["+mid"]', '= "root" has no tendon over "-root"'),
-    "joints pulled together only": (
-        '["-root", "+mid"], source = "assumed" },\n    { rest = "0 mm", over = ["-mid"]',
-        '["-root", "-mid"], source = "assumed" },\n    { rest = "0 mm", over = ["+mid", "+root"]',
-        JAW.format(20) + ".tendons move only 1 of the 2 joints root, mid independently",
+        JAW + '.tendons[2].span.joint = "root" is fixed in the palm',
     ),
     "follower of itself": (
         'leader = "mid"', 'leader = "end"', JAW + '.couplings[0].leader = "end" is its own follower',
@@ -219,7 +209,7 @@ PHYSICS = {
         JAW + '.links[0].source.ofset is the source of no number here; did you mean "offset"?',
     ),
     "source without default": (
-        ', default = "assumed" }', " }", JAW + '.links[0].source says nothing of "low"; add it, or a default',
+        ', default = "assumed" }', " }", JAW + '.links[0].source has no entry for "low"; add it, or a default',
     ),
 }  # fmt: skip
 
@@ -241,7 +231,7 @@ def test_a_fault_is_told_with_line_key_and_remedy(old: str, new: str, expected: 
         ('"\u0456ndex"', r'fingers."\u0456ndex" is not a usable name'),
         ('"\\u001b[2J"', r'fingers."\u001b[2J" is not a usable name'),
         ("int", "fingers.int is a keyword of C or C++"),
-        ("wrist", "fingers.wrist is a name the generated C keeps for itself"),
+        ("wrist", "fingers.wrist is a name that the generated C reserves"),
         ("in_dex", "fingers.in_dex is not a usable name; expected a letter, then a-z and 0-9, at most 16 in all"),
         ("Index", "fingers.Index is not a usable name"),
         ('""', 'fingers."" is not a usable name'),
@@ -349,12 +339,3 @@ def test_a_moment_with_a_slipped_decimal_point_is_told_by_its_name(path: Path, f
                     assert f"{key} is probably {much}" in message
                     told += 1
     assert told > 20  # a slip that leaves a possible body cannot be seen
-
-
-def test_a_span_moves_all_joints_before_its_end() -> None:
-    finger = Hand.load().fingers["thumb"]
-    assert not finger.radii.keys() & {"flexion", "abduction"}
-    spanless = finger.model_copy(update={"tendons": finger.tendons[4:]})
-    told = [message for _, message in complaints(Hand.load().limits, {"thumb": spanless})]
-    assert len(told) == 2
-    assert all("tendons only pull" in message for message in told)

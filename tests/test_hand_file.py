@@ -211,6 +211,7 @@ def test_a_file_without_permission_is_named(tmp_path: Path, monkeypatch: pytest.
     def refuse(*_: object) -> None:
         raise PermissionError(13, "Permission denied")  # what everybody but root gets for mode 000
 
+    (tmp_path / "hand.toml").touch()
     monkeypatch.setattr(Path, "open", refuse)
     assert load_faults(tmp_path / "hand.toml").endswith("hand.toml cannot be read: permission denied")
 

@@ -1,10 +1,11 @@
-"""The hand: a frozen tree of the numbers that CAD gives, read from one file and checked before anyone may use it.
+"""The hand: a frozen tree of the numbers that CAD gives, read from one file and checked.
 
     hand = Hand.load()                            # the Awiwi hand; Hand.load("my_hand.toml") for another one
     float(hand.fingers["index"].radii["pip"])     # 0.006, in metres
-    hand.symbolic(lambda path, _: Symbol(path))   # the same tree, with fingers.index.pulleys[2].radius in its place
+    hand.symbolic(lambda path, _: Symbol(path))   # the same tree, with symbols for numbers
 
-The parts of a hand are in `parts`, reading a file is in `file`, what physics demands is in `lint`.
+The parts of a hand are in `parts`, reading a file is in `file`, what no hand can have is in `lint`, warnings are in
+`plausibility`, and what the tendons of a hand make impossible is in `capability`.
 """
 
 from __future__ import annotations
@@ -14,12 +15,14 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
+from awiwi_gen.errors import Fault
 from awiwi_gen.hand.actuation import Fibre, Motor, Spring
 from awiwi_gen.hand.file import HandFile
 from awiwi_gen.hand.gains import Gains, gains_complaints, with_gains
 from awiwi_gen.hand.lint import complaints
 from awiwi_gen.hand.lint_actuation import actuator_complaints
 from awiwi_gen.hand.parts import Finger, FingerName, Limits, Link, Part, Prefix, Title
+from awiwi_gen.hand.plausibility import remarks
 from awiwi_gen.hand.wrist import Wrist
 from awiwi_gen.resources import DEFAULT_HAND
 
@@ -43,12 +46,12 @@ class Hand(Part):
 
     @property
     def tendons(self) -> int:
-        """How many tendons the fingers have together."""
+        """Number of tendons of all fingers."""
         return sum(len(finger.tendons) for finger in self.fingers.values())
 
     @property
     def blocks(self) -> dict[str, tuple[slice, slice]]:
-        """Finger -> its tendons and its joints in arrays over all tendons and joints of the hand."""
+        """Finger -> slices of its tendons and its joints in arrays over all tendons and joints of the hand."""
         found, row, column = {}, 0, 0
         for name, finger in self.fingers.items():
             tendons, joints = len(finger.tendons), len(finger.joints)
@@ -57,7 +60,7 @@ class Hand(Part):
         return found
 
     def structure(self) -> dict[str, Any]:
-        """What the kernels of the whole hand depend on besides numbers, ready for JSON."""
+        """Everything but the numbers that the kernels of the whole hand depend on, ready for JSON."""
         fingers = {name: finger.structure() for name, finger in self.fingers.items()}
         return {"fingers": [*fingers.items()], "wrist": self.wrist and self.wrist.structure()}
 
@@ -67,19 +70,31 @@ class Hand(Part):
 
         Raises `InputError` with every fault of the first stage that fails: reading, schema, physics.
         """
-        return cls._checked(HandFile.read(path) if path is not None else HandFile.read(DEFAULT_HAND, DEFAULT_HAND.name))
+        return _checked(with_gains(_read(path)))
+
+    @classmethod
+    def review(cls, path: str | os.PathLike[str] | None = None) -> tuple[Hand, list[Fault]]:
+        """Like `load`, with the warnings about the file: possible, but unusual numbers."""
+        file = with_gains(_read(path))
+        hand = _checked(file)
+        warnings = [file.fault(*remark) for remark in remarks(hand.fingers)]
+        return hand, sorted(warnings, key=lambda fault: fault.line or 0)
 
     @classmethod
     def parse(cls, text: str, name: str = "hand.toml") -> Hand:
-        """Like `load`, from text; `name` is what messages call the file."""
-        return cls._checked(HandFile.parse(text, name))
+        """Like `load`, from text; messages call the file `name`."""
+        return _checked(with_gains(HandFile.parse(text, name)))
 
-    @classmethod
-    def _checked(cls, file: HandFile) -> Hand:
-        hand = with_gains(file).validated(cls)
-        found = list(complaints(hand.limits, hand.fingers, hand.wrist))
-        found += actuator_complaints(hand.motor, hand.spring, hand.tendon, hand.tendons)
-        found += gains_complaints(hand.gains, hand.tendons)
-        if found:
-            raise file.error(found)
-        return hand
+
+def _checked(file: HandFile) -> Hand:
+    hand = file.validated(Hand)
+    found = list(complaints(hand.limits, hand.fingers, hand.wrist))
+    found += actuator_complaints(hand.motor, hand.spring, hand.tendon, hand.tendons)
+    found += gains_complaints(hand.gains, hand.tendons)
+    if found:
+        raise file.error(found)
+    return hand
+
+
+def _read(path: str | os.PathLike[str] | None) -> HandFile:
+    return HandFile.read(path) if path is not None else HandFile.read(DEFAULT_HAND, DEFAULT_HAND.name)

@@ -17,7 +17,7 @@ __all__ = ["CalibratedUnit", "Fibre", "Friction", "Motor", "Ripple", "Roller", "
 
 Point2 = Annotated[tuple[Length, Length], Field(strict=False, examples=['["6 mm", "0 mm"]'])]
 Reading = Annotated[Quantity, Measure("410", "-1000000", "1000000")]
-Torque = Annotated[Quantity, Measure("0.5 N m", "0", "1000 N m")]
+Torque = Annotated[Quantity, Measure("0.5 N m", "1e-9 N m", "1000 N m")]
 Winding = Annotated[Literal[1, -1], Field(examples=["1", "-1"])]
 
 
@@ -27,9 +27,9 @@ class Friction(Part):
     What dry friction tends to at speed is level pi/2, not level.
     """
 
-    steepness: Annotated[Quantity, Measure("10 s/rad", "0", "1000000 s/rad")]
+    steepness: Annotated[Quantity, Measure("10 s/rad", "1e-6 s/rad", "1000000 s/rad")]
     level: Torque
-    viscosity: Annotated[Quantity, Measure("0.03 N m s/rad", "0", "1000 N m s/rad")]
+    viscosity: Annotated[Quantity, Measure("0.03 N m s/rad", "1e-12 N m s/rad", "1000 N m s/rad")]
 
 
 class Ripple(Part):
@@ -50,14 +50,14 @@ class Motor(Part):
 
     rotor_inertia: Moment
     gear_inertia: Moment
-    gear_ratio: Annotated[Quantity, Measure("100", "0", "10000")]
+    gear_ratio: Annotated[Quantity, Measure("100", "0.001", "10000")]
     pulley: Size
     friction: Annotated[Friction, Field(examples=['{ steepness = "10 s/rad", ... }'])]
     ripple: Annotated[tuple[Ripple, ...], Field(strict=False, max_length=16, examples=["[[motor.ripple]]"])] = ()
-    compensation: Annotated[Quantity, Measure("0.9", "0", "1")]
-    travel: Annotated[Quantity, Measure("10 rad", "0", "1000 rad")]
-    velocity: Annotated[Quantity, Measure("20 rad/s", "0", "10000 rad/s")]
-    acceleration: Annotated[Quantity, Measure("1000 rad/s^2", "0", "10000000 rad/s^2")]
+    compensation: Annotated[Quantity, Measure("0.9", "0.001", "1")]
+    travel: Annotated[Quantity, Measure("10 rad", "1e-6 rad", "1000 rad")]
+    velocity: Annotated[Quantity, Measure("20 rad/s", "0.001 rad/s", "10000 rad/s")]
+    acceleration: Annotated[Quantity, Measure("1000 rad/s^2", "0.001 rad/s^2", "10000000 rad/s^2")]
     torque: Torque
     source: Source
 
@@ -93,7 +93,7 @@ class CalibratedUnit(Part):
     """
 
     tendon: Annotated[int, Field(ge=0, examples=["11"])]
-    rate: Annotated[Quantity, Measure("7 N/mm", "0", "1000 kN/m")] | None = None
+    rate: Annotated[Quantity, Measure("7 N/mm", "0.001 N/m", "1000 kN/m")] | None = None
     free_length: Size | None = None
     sensor: Sensor | None = None
     source: Source
@@ -122,7 +122,7 @@ class Spring(Part):
     anchor: Point2
     spring_arm: Size
     spring_angle: Angle
-    rate: Annotated[Quantity, Measure("7 N/mm", "0", "1000 kN/m")]
+    rate: Annotated[Quantity, Measure("7 N/mm", "0.001 N/m", "1000 kN/m")]
     free_length: Size
     sensor: Sensor
     units: Annotated[tuple[CalibratedUnit, ...], Field(strict=False, max_length=64, examples=["[[spring.units]]"])] = ()
@@ -147,11 +147,11 @@ class Fibre(Part):
     `guiding` is the friction coefficient of the capstan's law (eq. 4.1), `bend` the most a tendon is bent in all.
     """
 
-    modulus: Annotated[Quantity, Measure("90 GPa", "0", "1000 GPa")]
-    section: Annotated[Quantity, Measure("0.2 mm^2", "0", "1000 mm^2")]
+    modulus: Annotated[Quantity, Measure("90 GPa", "1 kPa", "1000 GPa")]
+    section: Annotated[Quantity, Measure("0.2 mm^2", "1e-6 mm^2", "1000 mm^2")]
     length: Size
-    guiding: Annotated[Quantity, Measure("0.05", "0", "2")]
-    bend: Annotated[Quantity, Measure("6 rad", "0", "100 rad")]
+    guiding: Annotated[Quantity, Measure("0.05", "1e-6", "2")]
+    bend: Annotated[Quantity, Measure("6 rad", "1e-6 rad", "100 rad")]
     source: Source
 
     def structure(self) -> dict[str, Any]:

@@ -1,6 +1,6 @@
 """Gains of the backstepping law as a hand file names them: one table per tendon, written by `awiwi-gen tune`.
 
-    gains = "gains.toml"         # in the hand file: a file of its own, found beside it
+    gains = "gains.toml"         # in the hand file: a file of its own, in or below the folder of the hand file
     [[gains]]                    # or the tables themselves
 
 They are numbers of the hand like any other, so the generated parameters carry them to the firmware.
@@ -8,6 +8,7 @@ They are numbers of the hand like any other, so the generated parameters carry t
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -22,7 +23,7 @@ from awiwi_gen.units import Quantity
 
 __all__ = ["GainsFile", "TendonGains", "gains_complaints", "with_gains"]
 
-Rate = Annotated[Quantity, Measure("100 1/s", "0", "1000000 1/s")]
+Rate = Annotated[Quantity, Measure("100 1/s", "1e-6 1/s", "1000000 1/s")]
 
 
 class TendonGains(Part):
@@ -33,12 +34,12 @@ class TendonGains(Part):
     """
 
     tendon: Annotated[int, Field(ge=0, examples=["11"])]
-    K_p: Annotated[Quantity, Measure("0.5 N m/rad", "0", "10000 N m/rad")]
-    K_d: Annotated[Quantity, Measure("0.001 N m s/rad", "0", "1000 N m s/rad")]
+    K_p: Annotated[Quantity, Measure("0.5 N m/rad", "1e-9 N m/rad", "10000 N m/rad")]
+    K_d: Annotated[Quantity, Measure("0.001 N m s/rad", "1e-12 N m s/rad", "1000 N m s/rad")]
     K_3: Rate
     K_4: Rate
-    C_t: Annotated[Quantity, Measure("1 rad/(N m)", "0", "1000000000 rad/(N m)")]
-    C_s: Annotated[Quantity, Measure("0.001 rad s^2/(N m)", "0", "1000000000 rad s^2/(N m)")]
+    C_t: Annotated[Quantity, Measure("1 rad/(N m)", "1e-12 rad/(N m)", "1000000000 rad/(N m)")]
+    C_s: Annotated[Quantity, Measure("0.001 rad s^2/(N m)", "1e-12 rad s^2/(N m)", "1000000000 rad s^2/(N m)")]
     source: Source
 
 
@@ -52,32 +53,41 @@ class GainsFile(Part):
 
 
 def with_gains(file: HandFile) -> HandFile:
-    """A hand file with the gains of the file it names in the place of that name.
+    """A hand file with the gains of the file it names in place of that name.
 
-    Raises `InputError` with the faults of that file, or with the line that names it if it cannot be read.
+    Only a regular file in or below the folder of the hand file is read. Raises `InputError` with the faults of that
+    file, or with the line that names it if it cannot be read.
     """
     name = file.data.get("gains")
     if not isinstance(name, str):
         return file
-    path = Path(file.name).parent / name
+    folder = Path(file.name).parent
     try:
-        included = HandFile.read(path)
+        inside = (folder / name).resolve().is_relative_to(folder.resolve())
+    except (OSError, ValueError, RuntimeError):  # a null character, a loop of links
+        inside = False
+    shown = f"= {json.dumps(name[:60])}"
+    if not inside:
+        message = f'{shown} is no file in or below the folder of the hand file; expected a path such as "gains.toml"'
+        raise InputError(file.fault(("gains",), message))
+    try:
+        included = HandFile.read(folder / name)
     except InputError as error:
         if any(fault.line for fault in error.faults):
             raise
-        found = [file.fault(("gains",), f'= "{name}": {fault.file} {fault.message}') for fault in error.faults]
+        found = [file.fault(("gains",), f"{shown}: {fault.file} {fault.message}") for fault in error.faults]
         raise InputError(found) from None
     included.validated(GainsFile)
-    return replace(file, data=file.data | included.data)
+    return replace(file, data=file.data | included.data, included={"gains": included})
 
 
 def gains_complaints(gains: tuple[TendonGains, ...], tendons: int) -> Iterator[tuple[Keys, str]]:
-    """Gains for tendons that the hand has not, and for one tendon twice."""
+    """Gains for tendons that the hand does not have, and a second set of gains for one tendon."""
     seen: dict[int, int] = {}
     for index, each in enumerate(gains):
         key = ("gains", index, "tendon")
         if each.tendon >= tendons:
-            yield key, f"= {each.tendon} is no tendon of this hand; it has 0 to {tendons - 1}"
+            yield key, f"= {each.tendon} is no tendon of this hand; expected 0 to {tendons - 1}"
         elif each.tendon in seen:
             yield key, f"= {each.tendon} has gains already in gains[{seen[each.tendon]}]"
         seen.setdefault(each.tendon, index)

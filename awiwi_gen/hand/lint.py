@@ -1,6 +1,6 @@
-"""Physics and cross-references: what a schema cannot see in a hand file.
+"""Physics and cross-references: what no hand can have, although every single value of its file is valid.
 
-Each check yields complaints, `(keys, predicate)` pairs, relative to the table it was given. Arithmetic is exact where
+Each check yields complaints, `(keys, predicate)` pairs, relative to the table it is given. Arithmetic is exact where
 the numbers allow it, so that a flat plate, whose moments fulfil xx + yy = zz, is not refused for a rounding error.
 """
 
@@ -13,6 +13,7 @@ from fractions import Fraction
 from typing import Protocol
 
 from awiwi_gen.hand.parts import Finger, FourBar, Keys, Limits, Link, Part, covers
+from awiwi_gen.hand.pose import Chain
 from awiwi_gen.hand.wrist import Wrist, closure
 from awiwi_gen.units import Quantity
 
@@ -23,20 +24,25 @@ Tensor = dict[str, Fraction]
 
 _SLIPS = [Fraction(10) ** places for places in (-3, -2, -1, 1, 2, 3)]
 _CLOSURE_STEPS = 1000
-_WIDEST_GYRATION = 1.0  # m; with a plausible mass and a plausible moment, their ratio can still be absurd
+_WIDEST_GYRATION = 1.0  # m; the ratio of a plausible moment to a plausible mass can still be absurd
+_NARROWEST_RANGE = 0.01  # deg; less than the backlash of any joint
+_SHORTEST_SPAN = 1e-4  # m; less than the thickness of a tendon
+_LEAST_ARM = 1e-7  # m; a tendon with less than this about every joint pulls nothing
 
 
 def complaints(limits: Limits, fingers: Mapping[str, Finger], wrist: Wrist | None = None) -> Iterator[Complaint]:
-    """All that is wrong with a hand whose single values are all right."""
+    """All faults of a hand whose single values are valid."""
     yield from below(("limits",), _limits(limits))
+    links = [link for finger in fingers.values() for link in finger.links]
+    alone = sum(not _is_of_a_body(_tensor(link)) for link in links) == 1
     for name, finger in fingers.items():
-        yield from below(("fingers", name), _finger(finger))
+        yield from below(("fingers", name), _finger(finger, alone))
     if wrist:
         yield from below(("wrist",), _wrist(wrist, sum(len(finger.tendons) for finger in fingers.values())))
 
 
 class Sourced(Protocol):
-    """A part of a hand that tells where its numbers come from."""
+    """A part of a hand that has the sources of its numbers."""
 
     @property
     def source(self) -> str | dict[str, str]:
@@ -47,7 +53,7 @@ class Sourced(Protocol):
 
 
 def below(keys: Keys, found: Iterable[Complaint]) -> Iterator[Complaint]:
-    """The complaints of a part, as those of the whole that has it at `keys`."""
+    """The complaints about a part, with `keys`, the path of the part, in front of their own."""
     return (((*keys, *inner), message) for inner, message in found)
 
 
@@ -62,26 +68,36 @@ def _upside_down(part: Part, low: str, high: str) -> Iterator[Complaint]:
         yield (low,), f'= "{bottom}" is not below {high} = "{top}"'
 
 
+def _range(part: Part) -> Iterator[Complaint]:
+    """The range of an angle from `low` to `high`."""
+    yield from _upside_down(part, "low", "high")
+    low, high = part.low, part.high  # type: ignore[attr-defined]
+    width = math.degrees(high.value - low.value)
+    if 0 < width < _NARROWEST_RANGE:
+        least = f"expected {_NARROWEST_RANGE} deg or more"
+        yield ("high",), f'= "{high}" leaves a range of {width:.2g} deg from low = "{low}"; {least}'
+
+
 def _wrist(wrist: Wrist, tendons: int) -> Iterator[Complaint]:
     yield from sources(wrist)
     if len(wrist.tendons) != tendons:
         yield ("tendons",), f"has {len(wrist.tendons)} entries, but {tendons} tendons of the fingers pass here"
     swings = {"q71": wrist.q71, "q73": wrist.q73}.items()
-    backwards = [fault for key, swing in swings for fault in below((key,), _upside_down(swing, "low", "high"))]
+    backwards = [fault for key, swing in swings for fault in below((key,), _range(swing))]
     yield from backwards or closure(wrist)
 
 
-def _finger(finger: Finger) -> Iterator[Complaint]:
+def _finger(finger: Finger, alone: bool) -> Iterator[Complaint]:
     for index, link in enumerate(finger.links):
-        yield from below(("links", index), _link(link, follows=link.joint in finger.leaders))
+        yield from below(("links", index), _link(link, link.joint in finger.leaders, alone))
     for index, pulley in enumerate(finger.pulleys):
         yield from below(("pulleys", index), sources(pulley))
     for index, tendon in enumerate(finger.tendons):
         yield from below(("tendons", index), sources(tendon))
     misnamed = [*_names(finger)]
     yield from misnamed
-    if not misnamed:  # who pulls what can only be told when every name has its joint
-        yield from _drive(finger)
+    if not misnamed and all(link.low and link.high for link in finger.links if link.joint in finger.joints):
+        yield from _tendons(finger)
 
 
 # ---------------------------------------------------------------------------------------------------- names
@@ -107,12 +123,12 @@ def _names(finger: Finger) -> Iterator[Complaint]:
                 yield keys, f'= "{name}" comes twice in one tendon'
             yield from _known(keys, name, name[1:], pulleys, "pulley")
         if not tendon.over and not tendon.span:
-            yield ("tendons", number), "neither winds over a pulley nor has a span; it would pull nothing"
+            yield ("tendons", number), "neither runs over a pulley nor has a span; it would pull nothing"
         if tendon.span:
             keys, end = ("tendons", number, "span", "joint"), tendon.span.joint
             yield from _known(keys, end, end, joints, "joint")
             if end == joints[0]:
-                yield keys, f'= "{end}" stands still in the palm; no joint moves it'
+                yield keys, f'= "{end}" is fixed in the palm; no joint moves it'
     yield from _couplings(finger, joints, pulleys)
 
 
@@ -141,21 +157,21 @@ def _known(keys: Keys, shown: str, name: str, known: list[str], kind: str) -> It
 
 def sources(part: Sourced) -> Iterator[Complaint]:
     """Each number has a source, and each source has a number."""
-    told = part.sources()
+    known = part.sources()
     if isinstance(part.source, dict):
         for key in part.source:
-            if key != "default" and not any(covers(key, path) for path in told):
-                near = difflib.get_close_matches(key, [path.partition("[")[0] for path in told], n=1)
+            if key != "default" and not any(covers(key, path) for path in known):
+                near = difflib.get_close_matches(key, [path.partition("[")[0] for path in known], n=1)
                 hint = f'; did you mean "{near[0]}"?' if near else ""
                 yield ("source", *key.split(".")), f"is the source of no number here{hint}"
-        if silent := [path for path, text in told.items() if not text]:
-            yield ("source",), f'says nothing of "{silent[0]}"; add it, or a default'
+        if silent := [path for path, text in known.items() if not text]:
+            yield ("source",), f'has no entry for "{silent[0]}"; add it, or a default'
 
 
 # ---------------------------------------------------------------------------------------------------- links
 
 
-def _link(link: Link, follows: bool) -> Iterator[Complaint]:
+def _link(link: Link, follows: bool, alone: bool) -> Iterator[Complaint]:
     yield from sources(link)
     for key in ("low", "high"):
         given = getattr(link, key)
@@ -164,50 +180,62 @@ def _link(link: Link, follows: bool) -> Iterator[Complaint]:
         if given is not None and follows:
             yield (key,), f'= "{given}" is one too many: this joint follows another, which has the range'
     if link.low and link.high and not follows:
-        yield from _upside_down(link, "low", "high")
-    yield from below(("inertia",), _inertia(link))
+        yield from _range(link)
+    yield from below(("inertia",), _inertia(link, alone))
     if link.four_bar:
         yield from below(("four_bar",), sources(link.four_bar))
         if follows:
-            yield ("four_bar",), "turns with a joint that follows another; it needs a joint of its own"
+            yield ("four_bar",), "is at a joint that follows another; it needs an independent joint"
         elif link.low and link.high:
             yield from below(("four_bar",), _closure(link.four_bar, link.low, link.high))
 
 
-def _inertia(link: Link) -> Iterator[Complaint]:
-    given: dict[str, Quantity] = {key: getattr(link.inertia, key) for key, _, _ in link.inertia.entries()}
-    tensor = {key: quantity.value for key, quantity in given.items()}
+def _tensor(link: Link) -> Tensor:
+    return {key: getattr(link.inertia, key).value for key, _, _ in link.inertia.entries()}
+
+
+def _inertia(link: Link, alone: bool) -> Iterator[Complaint]:
+    """The tensor is that of a body. A slip is suggested where no other tensor of the hand is wrong."""
+    tensor = _tensor(link)
     gyration = math.sqrt((tensor["xx"] + tensor["yy"] + tensor["zz"]) / (2 * link.mass.value))
     if gyration > _WIDEST_GYRATION:
         yield (), f"is too large for a mass of {link.mass}: radius of gyration {gyration:.3g} m"
     if _is_of_a_body(tensor):
         return
-    # Moving one decimal point may mend it. Of several ways the likeliest moves it by one place, in a moment rather than
-    # a product, and leaves a bone: a rod from the joint, with its centre c half way, has m (2 c)^2 / 12 across.
-    rod = link.mass.value * sum(c.value**2 for c in link.com) / 3 or Fraction(1)
-    ways = []
-    for key, value in tensor.items():
-        for factor in _SLIPS:
-            mended = tensor | {key: value * factor}
-            if _is_of_a_body(mended):
-                across = (mended["xx"] + mended["yy"] + mended["zz"]) / 2
-                by_one = factor in (10, Fraction(1, 10))
-                ways.append((not by_one, key[0] != key[1], abs(math.log(across / rod)), key, factor))
     message = "breaks the triangle inequality of the principal moments: no body is like that"
-    if not ways:
+    if not alone or (slip := _slip(link, tensor)) is None:
         yield (), message
         return
-    *_, key, factor = min(ways)
+    key, factor = slip
     much = f"{1 / factor} times too large" if factor < 1 else f"{factor} times too small"
-    yield (key,), f'= "{given[key]}" {message}; {key} is probably {much} (a slipped decimal point?)'
+    shown = getattr(link.inertia, key)
+    yield (key,), f'= "{shown}" {message}; {key} is probably {much} (a slipped decimal point?)'
+
+
+def _slip(link: Link, tensor: Tensor) -> tuple[str, Fraction] | None:
+    """The likeliest entry with a slipped decimal point, and the factor that corrects it.
+
+    That is a slip by one digit rather than more, in a moment rather than a product, and towards a bone: a rod from the
+    joint, with its centre c half way, has m (2 c)^2 / 12 across.
+    """
+    rod = link.mass.value * sum(c.value**2 for c in link.com) / 3 or Fraction(1)
+    found = []
+    for key, value in tensor.items():
+        for factor in _SLIPS:
+            corrected = tensor | {key: value * factor}
+            if _is_of_a_body(corrected):
+                across = (corrected["xx"] + corrected["yy"] + corrected["zz"]) / 2
+                by_one = factor in (10, Fraction(1, 10))
+                found.append((not by_one, key[0] != key[1], abs(math.log(across / rod)), key, factor))
+    return min(found)[3:] if found else None
 
 
 def _is_of_a_body(inertia: Tensor) -> bool:
     """Whether some distribution of mass has this tensor.
 
     I = tr(S) E - S with the second moments S = integral of r r^T dm, so a body has S >= 0: that is the triangle
-    inequality of the principal moments, without finding them. The sums of products of the eigenvalues of S (its
-    invariants) tell: none may be negative, and the second one is zero only for a needle, whose inertia is singular.
+    inequality of the principal moments, without finding them. It holds if no invariant of S (no sum of products of its
+    eigenvalues) is negative; the second is zero only for a needle, whose inertia is singular.
     """
     d, e, f = (-inertia[key] for key in ("xy", "xz", "yz"))
     total = (inertia["xx"] + inertia["yy"] + inertia["zz"]) / 2
@@ -235,43 +263,19 @@ def _closure(bar: FourBar, low: Quantity, high: Quantity) -> Iterator[Complaint]
 # ---------------------------------------------------------------------------------------------------- tendons
 
 
-def _drive(finger: Finger) -> Iterator[Complaint]:
-    """Tendons only pull, so each independent joint needs one on either side; together they must tell joints apart."""
-    order = [link.joint for link in finger.links]
-    spanned = {joint for tendon in finger.tendons if tendon.span for joint in order[: order.index(tendon.span.joint)]}
-    by_pulleys = [joint for joint in finger.joints if joint not in spanned]
-    # A follower turns by r_leader / r_follower, so on its pulley a tendon runs as far as on its leader's: senses add.
-    senses = [[0] * len(by_pulleys) for _ in finger.tendons]
-    for row, tendon in zip(senses, finger.tendons, strict=True):
-        for name in tendon.over:
-            joint = finger.leaders.get(name[1:], name[1:])
-            if joint in by_pulleys:
-                row[by_pulleys.index(joint)] += 1 if name[0] == "+" else -1
-    idle = False
-    for column, joint in enumerate(by_pulleys):
-        pulls = {"+": any(row[column] > 0 for row in senses), "-": any(row[column] < 0 for row in senses)}
-        missing = [f'"{sign}{joint}"' for sign, pulled in pulls.items() if not pulled]
-        if missing:
-            idle = True
-            need = f"has no tendon over {' nor '.join(missing)}; tendons only pull, so a joint needs both senses"
-            yield ("links", order.index(joint), "joint"), f'= "{joint}" {need}'
-    rank = _rank([[Fraction(sense) for sense in row] for row in senses])
-    if not idle and rank < len(by_pulleys):
-        joints = f"{rank} of the {len(by_pulleys)} joints {', '.join(by_pulleys)}"
-        yield ("tendons",), f"move only {joints} independently; their lengths would not tell the joint angles"
-
-
-def _rank(rows: list[list[Fraction]]) -> int:
-    """Rank of a matrix, by elimination without rounding."""
-    rank = 0
-    for column in range(len(rows[0]) if rows else 0):
-        pivot = next((row for row in rows[rank:] if row[column]), None)
-        if pivot is None:
-            continue
-        rows.remove(pivot)
-        rows.insert(rank, pivot)
-        for below in range(rank + 1, len(rows)):
-            factor = rows[below][column] / pivot[column]
-            rows[below] = [a - factor * b for a, b in zip(rows[below], pivot, strict=True)]
-        rank += 1
-    return rank
+def _tendons(finger: Finger) -> Iterator[Complaint]:
+    """Every tendon moves with some joint, and a span has a length in every pose: else its derivatives do not exist."""
+    chain = Chain(finger)
+    arms = [chain.coupling(q) for q in chain.poses()]
+    for index, tendon in enumerate(finger.tendons):
+        if tendon.span:
+            length, q = chain.shortest(index)
+            if length < _SHORTEST_SPAN:
+                pose = ", ".join(
+                    f"{joint} = {math.degrees(x):.4g} deg" for joint, x in zip(finger.joints, q, strict=True)
+                )
+                least = f"expected at least {_SHORTEST_SPAN * 1e3:g} mm in every pose"
+                yield ("tendons", index, "span"), f"has a length of {length * 1e3:.2g} mm at {pose}; {least}"
+                continue
+        if max(abs(arm) for coupling in arms for arm in coupling[index]) < _LEAST_ARM:
+            yield ("tendons", index), "pulls nothing: its length is the same in every pose"

@@ -1,4 +1,4 @@
-"""The parts of a hand as its file describes them: the schema, and what every part can tell about its numbers.
+"""The parts of a hand as its file describes them: the schema, and access to the numbers of every part.
 
 The keys of the file are the attributes here. Every number is a `Quantity`; everything else (names, turns, senses, the
 branch of a four-bar) is structure, on which derivations depend, while they never depend on numbers.
@@ -10,92 +10,33 @@ import hashlib
 import json
 import re
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from fractions import Fraction
-from functools import cached_property, partial
+from functools import partial
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, GetCoreSchemaHandler, PlainValidator, PrivateAttr
-from pydantic_core import CoreSchema, core_schema
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, PlainValidator, PrivateAttr
 
-from awiwi_gen.errors import InputError
-from awiwi_gen.units import Quantity, Unit, name_of, parse_quantity
+from awiwi_gen.hand.measure import Measure
+from awiwi_gen.units import Quantity
 
 __all__ = ["Coupling", "Finger", "FourBar", "Inertia", "Limits", "Link", "Measure", "Part", "Pulley", "Span", "Tendon"]
 
 Keys = tuple[str | int, ...]
-"""The way to a value in a hand file: `("fingers", "index", "links", 1, "mass")`."""
-
-
-# ---------------------------------------------------------------------------------------------------- numbers
-
-
-@dataclass(frozen=True)
-class Measure:
-    """What a number must be: its dimension (that of the example) and its plausible range, ends included.
-
-    The ranges are those of any hand a person would build, a cat's or a crane's; they catch "6.2 km", not bad taste.
-    A range from "0" leaves zero itself out: masses, radii and limits are positive.
-    """
-
-    example: str
-    low: str
-    high: str
-
-    @cached_property
-    def unit(self) -> Unit:
-        """The unit of the example."""
-        return parse_quantity(self.example).unit
-
-    @cached_property
-    def _ends(self) -> tuple[Fraction, Fraction]:
-        return parse_quantity(self.low).value, parse_quantity(self.high).value
-
-    @property
-    def expected(self) -> str:
-        """For error messages: `a length such as "6.2 mm"`."""
-        return f'{name_of(self.unit)} such as "{self.example}"'
-
-    def read(self, value: object) -> Quantity:
-        """Check one value of the file. Raises `ValueError` with a predicate: 'is a force; expected a length ...'."""
-        match value:
-            case str():
-                pass
-            case int() | float() if not isinstance(value, bool):
-                raise ValueError(f"has no unit; expected text: {self.expected}")
-            case _:
-                raise ValueError(f"is not text; expected {self.expected}")
-        try:
-            quantity = parse_quantity(value)
-        except InputError as error:
-            raise ValueError(error.faults[0].message) from None
-        # The radian counts here, though units compare without it: 20 is not an angle until it says rad or deg.
-        if (quantity.unit, quantity.unit.radians) != (self.unit, self.unit.radians):
-            raise ValueError(f"is {name_of(quantity.unit)}; expected {self.expected}")
-        low, high = self._ends
-        if low == 0 and quantity.value <= 0:
-            raise ValueError(f"must be above zero; expected {self.expected}")
-        if not low <= quantity.value <= high:
-            raise ValueError(f"is not plausible; expected {self.expected}, from {self.low} to {self.high}")
-        return quantity
-
-    def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
-        text = core_schema.str_schema(metadata={"pydantic_js_updates": {"examples": [self.example]}})
-        return core_schema.no_info_plain_validator_function(self.read, json_schema_input_schema=text)
+"""The path of a value in a hand file: `("fingers", "index", "links", 1, "mass")`."""
 
 
 Angle = Annotated[Quantity, Measure("20 deg", "-360 deg", "360 deg")]
 Length = Annotated[Quantity, Measure("6.2 mm", "-1 m", "1 m")]
-Size = Annotated[Quantity, Measure("6.2 mm", "0", "1 m")]
-Mass = Annotated[Quantity, Measure("1.5 g", "0", "10 kg")]
-Moment = Annotated[Quantity, Measure("35 g mm^2", "0", "1 kg m^2")]
+Size = Annotated[Quantity, Measure("6.2 mm", "10 um", "1 m")]
+# Models have bodies of a microgram and less where two joint axes meet.
+Mass = Annotated[Quantity, Measure("1.5 g", "1 ng", "10 kg")]
+Moment = Annotated[Quantity, Measure("35 g mm^2", "1e-9 g mm^2", "1 kg m^2")]
 Product = Annotated[Quantity, Measure("-2 g mm^2", "-1 kg m^2", "1 kg m^2")]
 Point = Annotated[tuple[Length, Length, Length], Field(strict=False, examples=['["6 mm", "0 mm", "0 mm"]'])]
 
 
 # ---------------------------------------------------------------------------------------------------- names and texts
 
-# Up to C23 and C++23: the generated header is included from both.
+# Keywords up to C23 and C++23: both languages include the generated header.
 _C = """alignas alignof asm auto bool break case char const constexpr continue default do double else enum extern false
     float for fortran goto if inline int long nullptr register restrict return short signed sizeof static static_assert
     struct switch thread_local true typedef typeof union unsigned void volatile while"""
@@ -104,7 +45,7 @@ _CPP = """and and_eq bitand bitor catch char8_t char16_t char32_t class co_await
     namespace new noexcept not not_eq operator or or_eq override private protected public reinterpret_cast requires
     static_cast template this throw try typeid typename using virtual wchar_t xor xor_eq"""
 _KEYWORDS = frozenset(f"{_C} {_CPP}".split())
-# A finger's name begins the names of its kernels, so it may not be the first word of a kernel of the whole hand.
+# A finger's name begins the names of its kernels, so it must differ from the first word of every other kernel.
 _KERNELS = """backstepping batch calibration cascade finger force forearm friction guiding hand impedance joint joints
     lever lqr model motor observer optimal palm params pole sdre self spring status step stiffness tendon tendons test
     version wrist"""
@@ -118,12 +59,12 @@ def _identifier(text: str, longest: int, underscores: bool = True, taken: frozen
     if text in _KEYWORDS:
         raise ValueError("is a keyword of C or C++")
     if text in taken:
-        raise ValueError("is a name the generated C keeps for itself")
+        raise ValueError("is a name that the generated C reserves")
     return text
 
 
 def _one_line(text: str) -> str:
-    """Text that ends up in a C comment: it may not close it, continue it, or hide what it says."""
+    """Text for a C comment: it must not close the comment, continue it, or hide characters."""
     if not text.strip() or not text.isprintable() or len(text) > 80:
         raise ValueError("is not one line of 1 to 80 printable characters")
     for bad in ("*/", "/*", "\\", "??"):
@@ -132,15 +73,20 @@ def _one_line(text: str) -> str:
     return text
 
 
+_MOST_SOURCES = 64  # keys of one table's source; no table has as many numbers
+
+
 def _source(value: object) -> str | dict[str, str]:
-    """One text for all numbers of a table, or one for each key; `span.from` in TOML is a table in a table."""
+    """One text for all numbers of a table, or one per key; `span.from` in TOML is a table in a table."""
     if isinstance(value, str):
         return _one_line(value)
+    if isinstance(value, dict) and len(value) > _MOST_SOURCES:
+        raise ValueError(f"has {len(value)} entries; expected at most {_MOST_SOURCES}")
     if not isinstance(value, dict) or not value:
         raise ValueError('is not a source; expected "table 5.1", or { mass = "table 5.1", default = "assumed" }')
     flat: dict[str, str] = {}
-    for key, told in value.items():
-        inner = _source(told)
+    for key, source in value.items():
+        inner = _source(source)
         flat |= {key: inner} if isinstance(inner, str) else {f"{key}.{below}": text for below, text in inner.items()}
     return dict(sorted(flat.items()))
 
@@ -168,20 +114,20 @@ Turn = Annotated[Literal["none", "x+90", "x-90", "y+90", "y-90", "z+90", "z-90"]
 
 
 class Part(BaseModel):
-    """A frozen piece of a hand."""
+    """A frozen part of a hand."""
 
     model_config = ConfigDict(strict=True, frozen=True, extra="forbid")
 
     def quantities(self) -> dict[str, Quantity]:
-        """Every number by its key path, relative to this part: `links[1].mass`."""
+        """Every number by its path, relative to this part: `links[1].mass`."""
         return {path: quantity for path, quantity, _ in _leaves(self)}
 
     def sources(self) -> dict[str, str]:
-        """Where each number comes from, by the same paths as `quantities`."""
+        """The source of each number, by the same paths as `quantities`."""
         return {path: source for path, _, source in _leaves(self)}
 
     def assumed(self) -> dict[str, Quantity]:
-        """The numbers whose source says that they are plausible guesses."""
+        """The numbers whose source marks them as guesses."""
         return {path: quantity for path, quantity, source in _leaves(self) if source.startswith("assumed")}
 
     def symbolic(self, leaf: Callable[[str, Quantity], object]) -> Any:
@@ -189,15 +135,15 @@ class Part(BaseModel):
         return _replaced(self, "", leaf)
 
     def digest(self) -> str:
-        """SHA-256, as 64 hexadecimal digits, of what this part says: not of how its text is laid out.
+        """SHA-256 of the values of this part, as 64 hexadecimal digits; the layout of its text does not count.
 
-        "6.5 mm" and "0.65 cm" are the same number, so they give the same digest.
+        "6.5 mm" and "0.65 cm" are the same number and give the same digest.
         """
         exact = self.symbolic(lambda _, quantity: str(quantity.value))
         return hashlib.sha256(json.dumps(exact.model_dump(mode="json", by_alias=True)).encode()).hexdigest()
 
     def __hash__(self) -> int:
-        return hash(self.digest())  # dictionaries inside keep pydantic from hashing its fields
+        return hash(self.digest())  # pydantic cannot hash the dictionaries inside
 
     def entries(self) -> Iterator[tuple[str, str, object]]:
         """Key in the file, attribute and value of each field, in the order of the schema."""
@@ -206,25 +152,25 @@ class Part(BaseModel):
 
 
 def _leaves(node: object) -> Iterator[tuple[str, Quantity, str]]:
-    """All (relative path, quantity, source) below a node; the nearest `source` above a number counts."""
+    """All (relative path, quantity, source) below a node; the nearest `source` above a number applies."""
     match node:
         case Quantity():
             yield "", node, ""
         case tuple() | dict():
             items = node.items() if isinstance(node, dict) else ((f"[{i}]", item) for i, item in enumerate(node))
             for key, item in items:
-                for path, quantity, told in _leaves(item):
-                    yield _join(key, path), quantity, told
+                for path, quantity, source in _leaves(item):
+                    yield _join(key, path), quantity, source
         case Part():
             own = getattr(node, "source", {})
             for key, _, item in node.entries():
-                for below, quantity, told in _leaves(item):
+                for below, quantity, source in _leaves(item):
                     path = _join(key, below)
-                    yield path, quantity, told or _told(own, path)
+                    yield path, quantity, source or _source_of(own, path)
 
 
-def _told(source: str | dict[str, str], path: str) -> str:
-    """The word of a table's `source` on one of its numbers: the longest key that covers it, else the default."""
+def _source_of(source: str | dict[str, str], path: str) -> str:
+    """The entry of a table's `source` for one of its numbers: the longest key that covers it, else the default."""
     if isinstance(source, str):
         return source
     covering = [key for key in source if covers(key, path)]
@@ -232,7 +178,7 @@ def _told(source: str | dict[str, str], path: str) -> str:
 
 
 def covers(key: str, path: str) -> bool:
-    """Whether a path leads to `key` or below it: "com" covers "com[1]", not "com_x"."""
+    """Whether a path is `key` or lies below it: "com" covers "com[1]", not "com_x"."""
     return path == key or path.startswith((f"{key}.", f"{key}["))
 
 
@@ -326,8 +272,8 @@ class Pulley(Part):
 class Span(Part):
     """A straight run of tendon, for tensegrity joints.
 
-    It leads from a point in the finger's base frame to a point that stands still in the base frame of `joint`: the
-    frame after that joint's turn and before its rotation, which the joints nearer to the palm move.
+    It leads from a point in the finger's base frame to a point fixed in the base frame of `joint`: the frame after that
+    joint's fixed turn and before its rotation, which the joints nearer to the palm move.
     """
 
     from_: Annotated[Point, Field(alias="from")]
@@ -339,7 +285,7 @@ class Tendon(Part):
     """Path length in the finger: rest + sum of sense * radius * angle over the pulleys + the length of the span."""
 
     rest: Length
-    over: Annotated[tuple[Over, ...], Field(strict=False)] = ()
+    over: Annotated[tuple[Over, ...], Field(strict=False, max_length=8)] = ()
     span: Span | None = None
     source: Source
 
@@ -355,9 +301,11 @@ class Finger(Part):
     """A serial chain from the palm to the tip, and the tendons that pull it."""
 
     links: Annotated[tuple[Link, ...], Field(strict=False, min_length=1, max_length=8, examples=["[[...links]]"])]
-    pulleys: Annotated[tuple[Pulley, ...], Field(strict=False)] = ()
-    tendons: Annotated[tuple[Tendon, ...], Field(strict=False, max_length=16, examples=["[[...tendons]]"])]
-    couplings: Annotated[tuple[Coupling, ...], Field(strict=False)] = ()
+    pulleys: Annotated[tuple[Pulley, ...], Field(strict=False, max_length=8)] = ()
+    tendons: Annotated[
+        tuple[Tendon, ...], Field(strict=False, min_length=1, max_length=16, examples=["[[...tendons]]"])
+    ]
+    couplings: Annotated[tuple[Coupling, ...], Field(strict=False, max_length=8)] = ()
 
     @property
     def leaders(self) -> dict[str, str]:
@@ -366,7 +314,7 @@ class Finger(Part):
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """The n independent joints, base to tip: those that follow no other. They are the finger's q."""
+        """The n independent joints, base to tip: those that follow no other joint. Their angles are the finger's q."""
         return tuple(link.joint for link in self.links if link.joint not in self.leaders)
 
     @property
@@ -375,7 +323,7 @@ class Finger(Part):
         return {pulley.joint: pulley.radius for pulley in self.pulleys}
 
     def structure(self) -> dict[str, Any]:
-        """All that is not a number, ready for JSON: fingers with equal structures share their derivations."""
+        """Everything but the numbers, ready for JSON: fingers with equal structures share their derivations."""
         return {
             "links": [[link.joint, link.turn, link.four_bar_structure()] for link in self.links],
             "pulleys": [pulley.joint for pulley in self.pulleys],
@@ -385,13 +333,13 @@ class Finger(Part):
 
 
 class Limits(Part):
-    """How far the inputs of kernels go: the ranges that are documented, sampled, and behind every error bound."""
+    """The ranges of the kernels' inputs: documented, sampled in verification, and the basis of every error bound."""
 
-    joint_velocity: Annotated[Quantity, Measure("20 rad/s", "0", "10000 rad/s")]
-    joint_acceleration: Annotated[Quantity, Measure("2000 rad/s^2", "0", "10000000 rad/s^2")]
-    joint_torque: Annotated[Quantity, Measure("1 N m", "0", "1000 N m")]
-    tendon_force: Annotated[Quantity, Measure("100 N", "0", "100000 N")]
-    tendon_stiffness_low: Annotated[Quantity, Measure("1000 N/m", "0", "1000000000 N/m")]
-    tendon_stiffness_high: Annotated[Quantity, Measure("50000 N/m", "0", "1000000000 N/m")]
-    gravity: Annotated[Quantity, Measure("9.81 m/s^2", "0", "1000 m/s^2")]
+    joint_velocity: Annotated[Quantity, Measure("20 rad/s", "0.001 rad/s", "10000 rad/s")]
+    joint_acceleration: Annotated[Quantity, Measure("2000 rad/s^2", "0.001 rad/s^2", "10000000 rad/s^2")]
+    joint_torque: Annotated[Quantity, Measure("1 N m", "1e-9 N m", "1000 N m")]
+    tendon_force: Annotated[Quantity, Measure("100 N", "1e-6 N", "100000 N")]
+    tendon_stiffness_low: Annotated[Quantity, Measure("1000 N/m", "0.001 N/m", "1000000000 N/m")]
+    tendon_stiffness_high: Annotated[Quantity, Measure("50000 N/m", "0.001 N/m", "1000000000 N/m")]
+    gravity: Annotated[Quantity, Measure("9.81 m/s^2", "1e-6 m/s^2", "1000 m/s^2")]
     source: Source

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from awiwi_gen.hand import Hand
+from awiwi_gen.hand.capability import left_out
 from awiwi_gen.kernel import Kernel
 from awiwi_gen.kernels.base_estimate import base_kernels
 from awiwi_gen.kernels.control_antagonistic import antagonistic_laws
@@ -23,7 +24,13 @@ from awiwi_gen.kernels.wrist import wrist_kernels
 
 
 def catalog(hand: Hand) -> list[Kernel]:
-    """All kernels of a hand, in the order of its parts."""
+    """All kernels that a hand can have, in the order of its parts."""
+    impossible = left_out(hand)
+    return [kernel for kernel in declared(hand) if (kernel.path, kernel.family) not in impossible]
+
+
+def declared(hand: Hand) -> list[Kernel]:
+    """All kernels of a hand, with those that its tendons make impossible (`hand.capability`)."""
     fingers = [
         kernel
         for name, finger in hand.fingers.items()

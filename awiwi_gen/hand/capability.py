@@ -1,0 +1,119 @@
+"""What a hand's tendons can do, and which kernels cannot exist because of what they cannot do.
+
+Tendons only pull: the torques -P' f of forces f >= 0 form a cone. Lengths tell the joint angles where P = dh/dq has as
+many independent columns as there are joints; a torque of any direction needs the cone to be the whole space.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+from awiwi_gen.hand.parts import Finger
+from awiwi_gen.hand.pose import Chain
+
+if TYPE_CHECKING:
+    from awiwi_gen.hand import Hand
+
+__all__ = ["left_out"]
+
+# Kernel families of a finger that need tendon lengths to tell the joint angles, and tendons that can give any torque.
+_NEED_LENGTHS = ("joint_estimate", "joint_estimate_error")
+_NEED_TORQUES = ("tendon_distribution",)
+_NEED_SPANS = ("base_estimate_by_gradient",)
+_RANK = 1e-7  # a singular value below this share of the largest is zero; central differences are good to 1e-10
+_RESIDUAL = 1e-7  # likewise for the part of a torque that no forces give
+
+
+def left_out(hand: Hand) -> dict[tuple[str, str], str]:
+    """(path of a part, kernel family) -> why this kernel cannot exist for the hand; empty for most hands."""
+    return {
+        (f"fingers.{name}", family): reason
+        for name, finger in hand.fingers.items()
+        for family, reason in _of_finger(finger)
+    }
+
+
+@lru_cache(maxsize=64)
+def _of_finger(finger: Finger) -> tuple[tuple[str, str], ...]:
+    """(Kernel family, reason) for every kernel that no pose of the finger allows."""
+    chain = Chain(finger)
+    couplings = [chain.coupling(q) for q in chain.poses()]
+    found: list[tuple[str, str]] = []
+    lengths = _indistinct(couplings, finger.joints)
+    torques = lengths or _beyond_pull(couplings, finger.joints)
+    found += [
+        (family, f"{lengths}: tendon lengths do not determine the joint angles") for family in _NEED_LENGTHS if lengths
+    ]
+    found += [(family, torques) for family in _NEED_TORQUES if torques]
+    order = [link.joint for link in finger.links]
+    ends = [order.index(tendon.span.joint) for tendon in finger.tendons if tendon.span]
+    base = {finger.leaders.get(joint, joint) for joint in order[: max(ends, default=0)]}
+    columns = [column for column, joint in enumerate(finger.joints) if joint in base]
+    rows = [row for row, tendon in enumerate(finger.tendons) if tendon.span]
+    spans = [[[coupling[row][column] for column in columns] for row in rows] for coupling in couplings]
+    if rows and (reason := _indistinct(spans, [finger.joints[column] for column in columns])):
+        found += [(family, f"of the spans, {reason}") for family in _NEED_SPANS]
+    return tuple(found)
+
+
+def _indistinct(couplings: Sequence[Any], joints: Sequence[str]) -> str:
+    """Why the tendons do not tell the joints apart in any of the poses; empty if they do."""
+    import numpy as np
+
+    best = max(int(np.linalg.matrix_rank(_scaled(coupling), _RANK)) for coupling in couplings)
+    if best == len(joints):
+        return ""
+    return f"the tendons move only {best} of the {len(joints)} joints {', '.join(joints)} independently"
+
+
+def _beyond_pull(couplings: Sequence[Any], joints: Sequence[str]) -> str:
+    """Which torques the tendons cannot pull in any of the poses, all joints being moved; empty if they can."""
+    missing = [_unreachable(_scaled(coupling)) for coupling in couplings]
+    if not all(torque is not None for torque in missing):
+        return ""
+    torque = missing[0]
+    largest = max(abs(torque))
+    signs = [f"{'+' if each > 0 else '-'}{joint}" for joint, each in zip(joints, torque, strict=True)
+             if abs(each) > 0.1 * largest]  # fmt: skip
+    return f"tendons only pull, and no forces give a torque towards {' and '.join(signs)}"
+
+
+def _scaled(coupling: Any) -> Any:
+    """The coupling with rows of equal length: a tendon's direction does not depend on its radii."""
+    import numpy as np
+
+    matrix = np.array(coupling, dtype=float)
+    return matrix / np.maximum(np.linalg.norm(matrix, axis=1, keepdims=True), 1e-12)
+
+
+def _unreachable(coupling: Any) -> Any:
+    """A direction of torque that no forces f >= 0 give as -P' f, or None if there is none.
+
+    The cone of the columns a of -P' is a linear space just if it has minus their sum. Where it has not, what is left
+    of that after the best forces (non-negative least squares, by Lawson and Hanson) is a torque out of reach.
+    """
+    import numpy as np
+
+    pulls = -coupling.T
+    wanted = -pulls.sum(axis=1)
+    forces = np.zeros(pulls.shape[1])
+    active = np.zeros(len(forces), dtype=bool)
+    rest = wanted
+    for _ in range(3 * len(forces)):
+        gain = np.where(active, 0.0, pulls.T @ rest)
+        if max(gain, default=0.0) <= _RESIDUAL:
+            break
+        active[int(gain.argmax())] = True
+        while True:
+            found = np.zeros(len(forces))
+            found[active] = np.linalg.lstsq(pulls[:, active], wanted, rcond=None)[0]
+            negative = active & (found <= 0)
+            if not negative.any():
+                break
+            share = min(forces[negative] / (forces[negative] - found[negative]))
+            forces = forces + share * (found - forces)
+            active &= forces > 1e-12
+        forces, rest = found, wanted - pulls @ found
+    return rest if np.linalg.norm(rest) > _RESIDUAL else None

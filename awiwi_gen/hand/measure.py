@@ -1,0 +1,82 @@
+"""What a number of a hand file must be: its dimension and its plausible range."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+
+from pydantic import GetCoreSchemaHandler
+from pydantic_core import CoreSchema, core_schema
+
+from awiwi_gen.errors import InputError
+from awiwi_gen.units import Quantity, Unit, name_of, parse_quantity
+
+__all__ = ["Measure"]
+
+_LEAST = Fraction(1, 10**40)  # in SI; far below the rounding errors in exported models
+
+
+@dataclass(frozen=True)
+class Measure:
+    """The dimension of a number (that of the example) and its plausible range, ends included.
+
+    The ranges cover every hand that people build, of a cat's or a crane's size; they catch "6.2 km" and "6.2 fm". A
+    range that begins below zero includes zero, and rounding errors of other programs, but no "1e-30 nm^39/m^38".
+    """
+
+    example: str
+    low: str
+    high: str
+
+    @cached_property
+    def unit(self) -> Unit:
+        """The unit of the example."""
+        return parse_quantity(self.example).unit
+
+    @cached_property
+    def _ends(self) -> tuple[Fraction, Fraction]:
+        return parse_quantity(self.low).value, parse_quantity(self.high).value
+
+    @property
+    def expected(self) -> str:
+        """For error messages: `a length such as "6.2 mm"`."""
+        return f'{name_of(self.unit)} such as "{self.example}"'
+
+    def read(self, value: object) -> Quantity:
+        """Read one value of the file. Raises `ValueError` with a predicate: 'is a force; expected a length ...'."""
+        match value:
+            case str():
+                pass
+            case int() | float() if not isinstance(value, bool):
+                raise ValueError(f"has no unit; expected text: {self.expected}")
+            case _:
+                raise ValueError(f"is not text; expected {self.expected}")
+        try:
+            quantity = parse_quantity(value)
+        except InputError as error:
+            raise ValueError(error.faults[0].message) from None
+        # Units compare without the radian, but here it counts: an angle must say rad or deg.
+        if (quantity.unit, quantity.unit.radians) != (self.unit, self.unit.radians):
+            raise ValueError(f"is {name_of(quantity.unit)}; expected {self.expected}")
+        low, high = self._ends
+        if low > 0 and quantity.value <= 0:
+            raise ValueError(f"must be above zero; expected {self.expected}")
+        if not low <= quantity.value <= high:
+            slip = self._other_angle(value, quantity)
+            raise ValueError(f"is not plausible; expected {self.expected}, from {self.low} to {self.high}{slip}")
+        if 0 < abs(quantity.value) < _LEAST:
+            zero = f'"0 {self.example.partition(" ")[2]}"'
+            raise ValueError(f"is not plausible; expected zero, written {zero}, or {self.expected}")
+        return quantity
+
+    def _other_angle(self, text: str, quantity: Quantity) -> str:
+        """A hint where degrees were written as radians: "80 rad" for an angle."""
+        if self.unit.label != "rad" or not text.endswith("rad"):
+            return ""
+        degrees = text.removesuffix("rad") + "deg"
+        return f'; did you mean "{degrees}"?' if abs(parse_quantity(degrees).value) <= self._ends[1] else ""
+
+    def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
+        text = core_schema.str_schema(metadata={"pydantic_js_updates": {"examples": [self.example]}})
+        return core_schema.no_info_plain_validator_function(self.read, json_schema_input_schema=text)
