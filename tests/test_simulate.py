@@ -254,8 +254,8 @@ def test_slopes_of_the_plant_are_those_of_its_matrix(lib):
 
 @pytest.mark.parametrize("late", [0, 1, 2])
 def test_the_spectral_radius_is_that_of_exact_sampling_for_every_whole_delay(lib, late):
-    sampling = pytest.importorskip("awiwi_gen.studies.sampling")
-    loops = pytest.importorskip("awiwi_gen.studies.sampled_loop")
+    sampling = pytest.importorskip("awiwi_gen.loops.sampled")
+    loops = pytest.importorskip("awiwi_gen.loops.linearised")
     machine = Machine(lib, controlled(), Scenario(JOINT | {"K": GAINS, "u": 0.0, "wanted": 0.0}, 0))
     A, B = machine.plant_slopes(), np.array([0, 0, 0, 1 / PLANT[1]])
 
@@ -265,8 +265,8 @@ def test_the_spectral_radius_is_that_of_exact_sampling_for_every_whole_delay(lib
 
 
 def test_the_delay_margin_is_where_the_loop_turns_unstable_and_near_that_of_continuous_time(lib):
-    sampling = pytest.importorskip("awiwi_gen.studies.sampling")
-    loops = pytest.importorskip("awiwi_gen.studies.sampled_loop")
+    sampling = pytest.importorskip("awiwi_gen.loops.sampled")
+    loops = pytest.importorskip("awiwi_gen.loops.linearised")
     fast = (30.0, 0.0, 20.0, 0.5)
     machine = Machine(lib, controlled(), Scenario(JOINT | {"K": fast, "u": 0.0, "wanted": 0.0}, 0))
     A, B = machine.plant_slopes(), np.array([0, 0, 0, 1 / PLANT[1]])
