@@ -26,11 +26,11 @@ class SampledLoop:
 
     def __init__(self, machine: Machine, applied: str = "u") -> None:
         self.period = machine.loop.period
-        acting = machine.where(applied)
+        acting = machine.indices(applied)
         self.A: Array = machine.plant_slopes()
         self.B: Array = slopes(machine.rates, machine.signals, np.array(acting))
-        machine.stand()
-        places = np.array(machine.kept())
+        machine.freeze_plant()
+        places = np.array(machine.memory())
         map_of: Array = slopes(lambda signals: machine.tick(signals)[places], machine.signals, places)
         read = np.abs(map_of).any(axis=0) | (places < machine.states) | np.isin(places, acting)
         self.acting = np.searchsorted(places[read], acting)
