@@ -68,7 +68,7 @@ def same_digits(printed: str, ours: float) -> bool:
     return Decimal(repr(float(ours))).quantize(Decimal(1).scaleb(last)) == number
 
 
-def curves(x: Any, lines: Any, xlabel: str, ylabel: str, *styles: str, width: float = 0.8, **settings: Any) -> Draw:
+def curves(x: Any, lines: Any, xlabel: str, ylabel: str, *styles: str, markersize: float = 3, **settings: Any) -> Draw:
     """Draw lines over x, from a mapping of labels to values (or to pairs of x and values), or one unlabelled line.
 
     ``styles`` are Matplotlib formats such as ":", one for each line; ``settings`` go to ``axes.set``.
@@ -78,7 +78,13 @@ def curves(x: Any, lines: Any, xlabel: str, ylabel: str, *styles: str, width: fl
         labelled = isinstance(lines, dict)
         for index, (label, values) in enumerate(lines.items() if labelled else [(None, lines)]):
             style = styles[index] if index < len(styles) else "-"
-            axes.plot(*(values if isinstance(values, tuple) else (x, values)), style, linewidth=width, label=label)
+            axes.plot(
+                *(values if isinstance(values, tuple) else (x, values)),
+                style,
+                linewidth=0.8,
+                markersize=markersize,
+                label=label,
+            )
         axes.set(xlabel=xlabel, ylabel=ylabel, **settings)
         if labelled:
             axes.legend()

@@ -22,7 +22,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from math import ceil, inf, prod
-from typing import Any
+from typing import Any, Union
 
 import numpy as np
 
@@ -31,6 +31,7 @@ from awiwi_gen.library import Library
 
 Array = np.ndarray[Any, Any]
 Wire = str | tuple[str, ...]
+Element = Union["Block", "Sum"]
 
 PERIOD = 1 / 3000  # s, of the hand's clock
 REACH = 0.25  # largest step of integration, in time constants of the plant's fastest mode
@@ -78,8 +79,8 @@ class Actuator:
 class Loop:
     """A plant, a law, sensors and actuators. ``states`` map each state of the plant to the signal of its rate."""
 
-    plant: Sequence[Block | Sum]
-    law: Sequence[Block | Sum]
+    plant: Sequence[Element]
+    law: Sequence[Element]
     states: Mapping[str, str]
     sensors: Sequence[Sensor] = ()
     actuators: Sequence[Actuator] = ()
@@ -177,9 +178,10 @@ class Machine:
         pairs += [(actuator.target, actuator.source) for actuator in self.loop.actuators]
         pairs += [(rate, state) for state, rate in self.loop.states.items()]
         for target, source in pairs:
-            if isinstance(target, str) and "[" not in target and isinstance(source, str) and source in sizes:
-                sizes.setdefault(target, sizes[source])
-        sizes |= {repr(number): 1 for number in self._constants()}
+            if isinstance(target, str) and "[" not in target:
+                sizes.setdefault(target, self._width(source, sizes))
+        sizes = {name: size for name, size in sizes.items() if size}
+        sizes |= {_constant(number): 1 for number in self._constants()}
         start = 0
         for name in dict.fromkeys([*self.loop.states, *self.loop.states.values(), *sizes]):
             if name not in sizes:
@@ -191,6 +193,13 @@ class Machine:
                 size = max(len(self.indices(factor)) for term in each.terms for factor in term)
                 self.slices[each.target] = slice(start, start + size)
                 start += size
+
+    def _width(self, wire: Wire, sizes: Mapping[str, int]) -> int:
+        """Number of elements of a wire; 0 if it leads to a signal of unknown size."""
+        if isinstance(wire, tuple):
+            return sum(self._width(part, sizes) for part in wire)
+        _, low, high = _parts(wire)
+        return sizes.get(wire, 0) if low is None else (high or low + 1) - low
 
     def _sums(self) -> list[Sum]:
         return [each for each in [*self.loop.plant, *self.loop.law] if isinstance(each, Sum)]
@@ -221,16 +230,15 @@ class Machine:
         if isinstance(wire, tuple):
             return [index for part in wire for index in self.indices(part)]
         if not isinstance(wire, str):
-            return [self.slices[repr(wire)].start]
-        found = re.fullmatch(r"(\w+)(?:\[(\d+)(?::(\d+))?\])?", wire)
-        if found is None or found[1] not in self.slices:
+            return [self.slices[_constant(wire)].start]
+        name, low, high = _parts(wire)
+        if name not in self.slices:
             raise InputError(f"no signal {wire!r}: no block writes it, and the scenario gives it no value")
-        whole = range(self.slices[found[1]].start, self.slices[found[1]].stop)
-        if found[2] is None:
+        whole = range(self.slices[name].start, self.slices[name].stop)
+        if low is None:
             return list(whole)
-        low = int(found[2])
-        chosen = list(whole[low : int(found[3] or low + 1)])
-        if len(chosen) != int(found[3] or low + 1) - low:
+        chosen = list(whole[low : high or low + 1])
+        if len(chosen) != (high or low + 1) - low:
             raise InputError(f"{wire!r} is beyond its signal, which has {len(whole)} elements")
         return chosen
 
@@ -250,7 +258,7 @@ class Machine:
         counts = (self.states, len(loop.plant), len(loop.law), len(sensors), len(actuators))
         return ffi.new("awiwi_loop *", (*counts, *blocks, *tables, loop.period, 1, seed))
 
-    def _row(self, block: Block | Sum) -> tuple[Any, ...]:
+    def _row(self, block: Element) -> tuple[Any, ...]:
         """A block as C has it: its function, and the indices of what it reads and writes."""
         if isinstance(block, Sum):
             function, target = self.library.ffi.NULL, self.indices(block.target)
@@ -360,6 +368,20 @@ class Machine:
             return 1  # the run ends before it begins
         fastest = float(np.abs(np.linalg.eigvals(slopes_now)).max(initial=0.0))
         return max(1, ceil(fastest * self.loop.period / REACH))
+
+
+def _parts(wire: str) -> tuple[str, int | None, int | None]:
+    """Name, first element and end of a wire such as "x", "x[2]" or "x[1:3]"."""
+    found = re.fullmatch(r"(\w+)(?:\[(\d+)(?::(\d+))?\])?", wire)
+    if found is None:
+        return wire, None, None
+    low, high = (int(each) if each else None for each in found.groups()[1:])
+    return found[1], low, high
+
+
+def _constant(number: float) -> str:
+    """Name of the signal that holds a constant factor."""
+    return repr(float(number) + 0.0)  # -0.0 is 0.0
 
 
 def slopes(function: Any, at: Array, by: Array) -> Array:

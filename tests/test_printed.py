@@ -8,8 +8,15 @@ import numpy as np
 import pytest
 
 from awiwi_gen.hand import Hand
-from awiwi_gen.loops.joint import TABLE_15_1, TABLE_16_1, impedance_loop, normalised_loop, position_loop
-from awiwi_gen.loops.linear_joint import TABLE_13_1, TABLE_14_2
+from awiwi_gen.loops.joint import (
+    TABLE_13_1,
+    TABLE_14_2,
+    TABLE_15_1,
+    TABLE_16_1,
+    impedance_loop,
+    normalised_loop,
+    position_loop,
+)
 from awiwi_gen.loops.pair import TABLE_PAIR, at_rest, pair_loop
 from awiwi_gen.loops.regulator import cancelling, regulator
 from awiwi_gen.loops.sampled import is_implementable

@@ -7,6 +7,7 @@ which it knows the share that the hand file gives, and for what a perturbation c
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import sqrt
 from typing import Any
@@ -16,7 +17,7 @@ from scipy.optimize import linear_sum_assignment
 
 from awiwi_gen.errors import InputError
 from awiwi_gen.hand import Hand
-from awiwi_gen.simulate import PERIOD, Actuator, Array, Block, Loop, Sensor
+from awiwi_gen.simulate import PERIOD, Actuator, Array, Block, Element, Loop, Sensor
 
 FINGER, JOINT = "index", "pip"
 DAMPING = 2e-4  # N m s/rad, of the link
@@ -119,7 +120,7 @@ def _cubic(library: Any) -> Array:
     return fitted
 
 
-def loop_around(joint: Joint, law: list[Block], late: bool = True) -> Loop:
+def loop_around(joint: Joint, law: Sequence[Element], late: bool = True) -> Loop:
     """The joint on the hand's clock, its sensors, its motors, and a law that reads these and writes ``wanted``."""
     noise = sqrt(2.0) * ANGLE_NOISE  # of the two sensors of a lever
     return Loop(

@@ -13,18 +13,22 @@ from typing import Any
 import numpy as np
 
 from awiwi_gen.hand import Hand
-from awiwi_gen.loops.clocked import overshoot, settling
+from awiwi_gen.kernels.fingers_control import antagonists, groups, senses
+from awiwi_gen.loops.hand_joint import STRETCH, Joint, joint_of, loop_around, values_of
+from awiwi_gen.loops.step import overshoot, settling
 from awiwi_gen.reproduce.distribution_search import Demands, closed_form_of
-from awiwi_gen.reproduce.joint_simulation import PERIOD, Array, Gains, Joint
 from awiwi_gen.reproduce.printed.joint import VISIBLE, paired
-from awiwi_gen.results import Figure
+from awiwi_gen.results import Figure, curves
+from awiwi_gen.simulate import PERIOD, Actuator, Array, Block, Element, Loop, Scenario, Sum, Trace, simulate
 
 FELT = (1.0, 0.7)  # N m/rad, of figure 8.3
 EPSILON = 1.5
 WEIGHTS = 10.0 ** np.arange(-5, 2)
 DEMANDS = 120
 TICKS, STEP_AT = 900, 30
+TIMES = np.arange(TICKS) * PERIOD
 STEP = 0.1  # rad
+DAMPING = 1e-3  # N m s/rad, of the link
 SOFT, STIFF, RESONANT = 0.3, 0.8, 1.3  # N m/rad, of the impedance; the tendons make about 1
 CHOSEN = "The source prints no gains; these were chosen such that the joint oscillates."
 TENSIONS = np.array([40.0, 60.0, 80.0])  # N, of figure 11.4
@@ -33,17 +37,31 @@ SWEEP, SWEPT = (
     1.0,
 )  # Hz, s
 LOW_TENSION, HIGH_TENSION = 30.0, 60.0  # N
-SLOW, AMPLITUDE, RUBBING, OBSERVER = 0.5, 0.5, 0.03, 300.0  # Hz, rad, N m, 1/s: figure 9.3
+SLOW, AMPLITUDE, DRY_FRICTION, OBSERVER = 0.5, 0.5, 0.03, 300.0  # Hz, rad, N m, 1/s: figure 9.3
 
 
 def figures(library: Any, hand: Hand) -> list[Figure]:
     """All figures that the hand has the joints for."""
     found = [algorithm_2(library, name) for name in paired(hand)[:1] if closed_form_of(library, name)]
     found.append(observer(library))
-    joint = Joint.of(library, hand)
-    if joint is None:
+    name = joint_with_own_pair(hand)
+    if name is None or hand.motor is None or hand.motor.friction is None or hand.spring is None:
         return found
-    return [*found, correction(library, joint), *force_steps(joint), *joint_steps(joint), sweep(joint)]
+    joint = replace(joint_of(library, hand, *name), damping=DAMPING)
+    bench = Bench(library, joint, float(hand.motor.pulley))
+    return [*found, correction(library, joint), *force_steps(bench), *joint_steps(bench), sweep(bench)]
+
+
+def joint_with_own_pair(hand: Hand) -> tuple[str, str] | None:
+    """Finger and joint that a pair of tendons has for itself; the largest pulley of several."""
+    found = []
+    for name, finger in hand.fingers.items():
+        for group in groups(finger):
+            turned = senses(finger, finger.tendons[group[0]])
+            if len(group) == 2 and antagonists(finger, group) and len(turned) == 1:
+                (joint,) = turned
+                found.append((float(finger.radii[joint]), name, joint))
+    return max(found)[1:] if found else None
 
 
 # -- chapter 7 ----------------------------------------------------------------------------------------------
@@ -56,13 +74,8 @@ def algorithm_2(library: Any, finger: str) -> Figure:
     violated = np.array([np.percentile(demands.violation(f), 90) for f in searched])
     missed = np.array([np.percentile(demands.miss(f), 90) for f in searched])
     ours = demands.closed_form()
-
-    def draw(axes: Any) -> None:
-        axes.loglog(WEIGHTS, violated, "o-", markersize=3, label="limits violated by [N]")
-        axes.loglog(WEIGHTS, missed, "s-", markersize=3, label="stiffness missed by [N m/rad]")
-        axes.set(xlabel="weight of the penalty", ylabel="90th percentile")
-        axes.legend()
-
+    lines = {"limits violated by [N]": violated, "stiffness missed by [N m/rad]": missed}
+    log: dict[str, Any] = {"xscale": "log", "yscale": "log"}
     return Figure(
         number="7 (algorithm 2)",
         title="What algorithm 2, mended, makes of demands that can be met",
@@ -74,7 +87,7 @@ def algorithm_2(library: Any, finger: str) -> Figure:
             f"{demands.miss(ours).max():.0e}."
         ),
         holds=bool(np.any((violated < VISIBLE) & (missed < 0.01))),
-        draw=draw,
+        draw=curves(WEIGHTS, lines, "weight of the penalty", "90th percentile", "o-", "s-", **log),
     )
 
 
@@ -83,24 +96,24 @@ def algorithm_2(library: Any, finger: str) -> Figure:
 
 def correction(library: Any, joint: Joint) -> Figure:
     """Figure 8.3: the controller's stiffness follows what a disturbance makes of the tendons' stiffness."""
-    curves = []
+    even = np.linspace(*STRETCH, 400) * joint.arm  # N m, of either tendon
+    slopes = np.array([joint.slopes(torque)[0] for torque in even])
+    shown = []
     for felt in FELT:
-        even = np.linspace(joint.spring.f[0], joint.spring.f[-1], 400)
-        mean = np.interp(EPSILON * felt, joint.stiffness(np.stack([even, even], axis=-1)), even)
-        reach = 0.9 * 2 * joint.R * min(mean - joint.spring.f[0], joint.spring.f[-1] - mean)
+        mean = np.interp(EPSILON * felt, 2 * slopes, even)
+        reach = 0.9 * 2 * min(mean - even[0], even[-1] - mean)
         load = np.linspace(-reach, reach, 201)
-        shift = load[:, None] / (2 * joint.R) * np.array([1, -1])
-        tendons = joint.stiffness(mean + shift)
+        tendons = sum(np.interp(mean + side * load / 2, even, slopes) for side in (1, -1))
         controller = library.stiffness_correction_scalar(felt, tendons)
         given = np.cumsum(1 / tendons) * (load[1] - load[0])
         deflexion = given - given[len(load) // 2] + load / controller.k_imp
         secant = np.divide(load, deflexion, out=np.full_like(load, felt), where=np.abs(load) > reach / 10)
-        curves.append((load, tendons, controller.k_imp, secant, controller.status))
-    worst = max(np.abs(curve[3] / felt - 1).max() for curve, felt in zip(curves, FELT, strict=True))
-    changes = max(np.ptp(curve[1]) / curve[1].mean() for curve in curves)
+        shown.append((load, tendons, controller.k_imp, secant, controller.status))
+    worst = max(np.abs(curve[3] / felt - 1).max() for curve, felt in zip(shown, FELT, strict=True))
+    changes = max(np.ptp(curve[1]) / curve[1].mean() for curve in shown)
 
     def draw(axes: Any) -> None:
-        for load, tendons, controller, secant, _ in curves:
+        for load, tendons, controller, secant, _ in shown:
             axes.plot(load, controller, color="tab:red", linewidth=0.8)
             axes.plot(load, tendons, ":", color="tab:blue")
             axes.plot(load, secant, "-.", color="tab:green")
@@ -116,7 +129,7 @@ def correction(library: Any, joint: Joint) -> Figure:
             "disturbance changes that of the tendons."
         ),
         found=f"It stays within {worst:.1%}, while the stiffness of the tendons changes by {changes:.0%}.",
-        holds=bool(worst < 0.1 and not any(np.any(curve[4]) for curve in curves)),
+        holds=bool(worst < 0.1 and not any(np.any(curve[4]) for curve in shown)),
         draw=draw,
     )
 
@@ -127,17 +140,10 @@ def correction(library: Any, joint: Joint) -> Figure:
 def observer(library: Any) -> Figure:
     """Figure 9.3: a slow sine with low stiffness and damping, with and without the observed friction fed forward."""
     runs = {fed: tracked(library, fed) for fed in (False, True)}
-    errors = {fed: float(np.sqrt(np.mean((run[0] - run[1]) ** 2))) for fed, run in runs.items()}
-    busy = {fed: float(np.abs(np.diff(run[2])).sum()) for fed, run in runs.items()}
-
-    def draw(axes: Any) -> None:
-        times = np.arange(len(runs[True][0])) * PERIOD
-        axes.plot(times, runs[True][0], ":", label="desired")
-        axes.plot(times, runs[False][1], linewidth=0.8, label="without compensation")
-        axes.plot(times, runs[True][1], linewidth=0.8, label="with compensation")
-        axes.set(xlabel="t [s]", ylabel="joint angle [rad]")
-        axes.legend()
-
+    errors = {fed: float(np.sqrt(np.mean((wanted - angle) ** 2))) for fed, (wanted, angle, _) in runs.items()}
+    busy = {fed: float(np.abs(np.diff(torque)).sum()) for fed, (_, _, torque) in runs.items()}
+    lines = {"desired": runs[True][0], "without compensation": runs[False][1], "with compensation": runs[True][1]}
+    times = np.arange(len(runs[True][0])) * PERIOD
     return Figure(
         number="9.3",
         title="A slow sine with and without friction compensation",
@@ -147,56 +153,119 @@ def observer(library: Any) -> Figure:
             f"travels {busy[True] / busy[False]:.1f} times as far; the text has it react violently."
         ),
         holds=errors[True] < errors[False] / 3,
-        draw=draw,
+        draw=curves(times, lines, "t [s]", "joint angle [rad]", ":"),
     )
 
 
 def tracked(library: Any, compensate: bool) -> tuple[Array, Array, Array]:
     """Desired angle, angle and torque (ticks) of a joint with dry friction, over two periods after the first."""
-    inertia, K, D, substeps = 1e-4, 0.3, 0.004, 8
-    q = qd = momentum = estimate = 0.0
-    rows = []
-    for tick in range(round(3 / SLOW / PERIOD)):
-        phase = 2 * np.pi * SLOW * tick * PERIOD
-        wanted, speed = AMPLITUDE * np.sin(phase), 2 * np.pi * SLOW * AMPLITUDE * np.cos(phase)
-        tau = K * (wanted - q) + D * (speed - qd) + estimate * compensate
-        rows.append((wanted, q, tau))
-        for _ in range(substeps):
-            qd += PERIOD / substeps / inertia * (tau - RUBBING * np.tanh(qd / 0.05))
-            q += PERIOD / substeps * qd
-        momentum, estimate, _ = library.friction_observer(momentum, tau, 0.0, qd, inertia, OBSERVER, PERIOD)
-    wanted, angle, torque = np.array(rows)[round(1 / SLOW / PERIOD) :].T
-    return wanted, angle, torque
+    inertia, ticks = 1e-4, round(3 / SLOW / PERIOD)
+    phase = 2 * np.pi * SLOW * np.arange(ticks) * PERIOD
+    goal = AMPLITUDE * np.stack([np.sin(phase), 2 * np.pi * SLOW * np.cos(phase)], axis=1)
+    law: list[Element] = [
+        Block(
+            "friction_observer", {"momentum_next": "momentum", "tau": "zeros[0]", "thd": "x[1]", "friction": "estimate"}
+        ),
+        Sum("compensation", (float(compensate), "estimate")),
+        Block(
+            "pole_placement_law",
+            {"x": ("x", "zeros"), "x_des": ("goal", "zeros"), "u_des": "compensation", "u": "command"},
+        ),
+    ]
+    loop = Loop([Block("plant_tendon")], law, {"x": "xd"}, actuators=[Actuator("command", "u", late=False)])
+    values = {
+        "x": np.zeros(2), "path": 0.0, "motor": (inertia, 1.0), "line": np.zeros(3), "zeros": np.zeros(2),
+        "friction": (10 * np.pi, 2 / np.pi * DRY_FRICTION, 0.0), "K": (0.3, 0.004, 0.0, 0.0), "momentum": 0.0,
+        "B": inertia, "gain": OBSERVER, "period": PERIOD,
+    }  # fmt: skip
+    (trace,) = simulate(library, loop, [Scenario(values, ticks, {"goal": goal})], ["x", "u"])
+    after = slice(round(1 / SLOW / PERIOD), None)
+    return goal[after, 0], trace["x"][after, 0], trace["u"][after, 0]
 
 
 # -- chapter 11 ---------------------------------------------------------------------------------------------
 
 
-def force_steps(joint: Joint) -> list[Figure]:
+class Bench:
+    """A joint between two tendons under the law of the two time scales: its impedance shared by motors on springs.
+
+    Motor gains kp and kd are those of the motor itself, whose pulley has the radius r [m].
+    """
+
+    def __init__(self, library: Any, joint: Joint, r: float) -> None:
+        self.library, self.joint, self.ratio = library, joint, joint.arm / r
+
+    def run(
+        self, goals: Array, forces: Array, K: float = 0.0, kp: float = 10.0, kd: float = 0.2, fed: float = 1.0,
+        compensation: float = 0.0, joint: Joint | None = None,
+    ) -> list[Trace]:  # fmt: skip
+        """Traces of runs to desired angles (runs, ticks) with pretensions (runs, ticks) [N], from rest.
+
+        K [N m/rad] is the link's impedance, critically damped for SOFT. Shares of the desired force and of the motors'
+        friction are fed forward.
+        """
+        plant, ratio = joint or self.joint, self.ratio
+        motors = [
+            Block(
+                "motor_impedance",
+                {
+                    "theta": f"x[{2 * i + 2}]", "thd": f"x[{2 * i + 3}]", "theta_des": f"theta_des[{i}]",
+                    "f_des": f"fed[{i}]", "friction": f"compensated[{i}]", "r": "one", "tau": f"wanted[{i}]",
+                },
+            )
+            for i in (0, 1)
+        ]  # fmt: skip
+        friction = [Block("motor_friction", {"thd": f"speeds[{i}]", "tau": f"modelled[{i}]"}) for i in (0, 1)]
+        D = critical(self.joint, SOFT) if K else 0.0
+        law: list[Element] = [
+            Sum("tau_link", (K, "q_des"), (-K, "x[0]"), (-D, "x[1]")),
+            Block("antagonistic_sharing", {"torque": "tau_link"}),
+            Sum("excess", (1.0, "shares"), (-1.0, "pretension[0]")),
+            Sum("theta_des", (1.0, "elongations"), ("compliances", "excess"), ("sides", "x[0]")),
+            Sum("speeds", (ratio, ("x[3]", "x[5]"))),
+            *friction,
+            Sum("compensated", (compensation * ratio, "modelled")),
+            Sum("fed", (fed, "shares")),
+            *motors,
+        ]
+        own = {
+            "motor_kp": kp * ratio**2, "motor_kd": kd * ratio**2, "one": 1.0, "sides": (1.0, -1.0),
+            "modelled": np.zeros(2),
+        }  # fmt: skip
+        scenarios = []
+        for goal, force in zip(goals, forces, strict=True):
+            values = values_of(plant, plant, float(force[0])) | own
+            del values["pretension"]
+            levels, level = np.unique(force * plant.arm, return_inverse=True)
+            elongations = np.array([plant.elongations(torque) for torque in levels])[level]
+            compliances = np.array([1 / plant.slopes(torque) for torque in levels])[level]
+            pretension = np.outer(force * plant.arm, [1, 0, 0])
+            inputs = {"q_des": goal, "pretension": pretension, "elongations": elongations, "compliances": compliances}
+            scenarios.append(Scenario(values, len(goal), inputs))
+        return simulate(self.library, loop_around(plant, law), scenarios, ["x", "tau"])
+
+
+def critical(joint: Joint, K: float) -> float:
+    """Damping [N m s/rad] that would be critical for the link on a spring of stiffness K."""
+    return float(2 * np.sqrt(K * joint.inertias[0]))
+
+
+def force_steps(bench: Bench) -> list[Figure]:
     """Figure 11.1: what feed-forward and friction compensation do to a step of the pretension, the joint held."""
-    held = replace(joint, inertia=1e6)
-    smooth = replace(held, friction=(joint.friction[0], 0.0, joint.friction[2]))
+    held = replace(bench.joint, inertias=bench.joint.inertias * [1e10, 1, 1])
+    smooth = replace(held, friction=held.friction * [1, 0, 1])
     wanted = np.where(np.arange(TICKS) < STEP_AT, LOW_TENSION, 2.5 * LOW_TENSION)
-    both = np.stack([wanted, wanted], axis=1)
-    neither, only_second = np.zeros(2), np.array([0.0, 1.0])
-    cases = [
-        ("11.1a", "feed-forward of the force", smooth, Gains(0.0, 0.0, feed_forward=only_second)),
-        ("11.1b", "friction compensation", held, Gains(0.0, 0.0, compensation=0.9 * only_second)),
+    cases: list[tuple[str, str, list[dict[str, Any]]]] = [
+        ("11.1a", "feed-forward of the force", [{"joint": smooth, "fed": share} for share in (0.0, 1.0)]),
+        ("11.1b", "friction compensation", [{"joint": held, "compensation": share} for share in (0.0, 0.9)]),
     ]
     found = []
-    for number, subject, plant, gains in cases:
-        forces = plant.forces(plant.run(np.zeros_like(both) + neither, both, gains))[..., 0]
+    for number, subject, choices in cases:
+        traces = [bench.run(np.zeros((1, TICKS)), wanted[None], **choice)[0] for choice in choices]
+        forces = np.stack([trace["tau"][:, 0] / bench.joint.arm for trace in traces], axis=1)
         errors = np.abs(forces[-1] - wanted[-1])
-        arrivals = settling(times_of(forces), forces[STEP_AT:], wanted[-1], wanted[0], 0.1) * 1e3
-
-        def draw(axes: Any, forces: Array = forces) -> None:
-            times = np.arange(TICKS) * PERIOD
-            axes.plot(times, wanted, "--", color="tab:green", label="desired")
-            axes.plot(times, forces[:, 1], color="tab:red", linewidth=0.8, label="with")
-            axes.plot(times, forces[:, 0], ":", color="tab:blue", label="without")
-            axes.set(xlabel="t [s]", ylabel="tendon force [N]")
-            axes.legend()
-
+        arrivals = settling(TIMES[:-STEP_AT], forces[STEP_AT:], wanted[-1], wanted[0], 0.1) * 1e3
+        lines = {"desired": wanted, "without": forces[:, 0], "with": forces[:, 1]}
         found.append(Figure(
             number=number, title=f"A step of the tendon force with and without {subject}",
             claim=f"The {subject} improves the force step.",
@@ -204,77 +273,59 @@ def force_steps(joint: Joint) -> list[Figure]:
                 f"At {TICKS * PERIOD:.1f} s the error is {errors[0]:.2g} N without and {errors[1]:.2g} N with it; the force "
                 f"stays within 10 % of the step {_after(arrivals[0])} and {_after(arrivals[1])}."
             ),
-            holds=bool(errors[1] < errors[0] / 2 and arrivals[1] <= arrivals[0]), draw=draw,
+            holds=bool(errors[1] < errors[0] / 2 and arrivals[1] <= arrivals[0]),
+            draw=curves(TIMES, lines, "t [s]", "tendon force [N]", "--", ":"),
         ))  # fmt: skip
     return found
-
-
-def times_of(run: Array) -> Array:
-    """Times [s] of the ticks from the step on."""
-    return np.arange(len(run) - STEP_AT) * PERIOD
 
 
 def _after(arrival: float) -> str:
     return f"after {arrival:.0f} ms" if np.isfinite(arrival) else "not at all"
 
 
-def joint_steps(joint: Joint) -> list[Figure]:
+def joint_steps(bench: Bench) -> list[Figure]:
     """Figures 11.2 and 11.3: steps at two impedances of the same damping, and at two pretensions."""
-    wanted = np.where(np.arange(TICKS) < STEP_AT, 0.0, STEP)[:, None].repeat(4, axis=1)
-    tensions = np.array([40.0, 40.0, LOW_TENSION, HIGH_TENSION])
-    K = np.array([SOFT, STIFF, STIFF, STIFF])
-    gains = Gains(K, critical(joint, SOFT), kp=40.0, kd=0.4, compensation=0.9)
-    q = joint.run(wanted, np.broadcast_to(tensions, wanted.shape), gains)[..., 0]
-    beyond = overshoot(q, STEP, 0.0)
+    wanted = np.where(np.arange(TICKS) < STEP_AT, 0.0, STEP)
 
-    def draw(first: int, labels: list[str]) -> Any:
-        def on(axes: Any) -> None:
-            times = np.arange(TICKS) * PERIOD
-            axes.plot(times, wanted[:, 0], "--", color="tab:green", linewidth=0.8, label="desired")
-            axes.plot(times, q[:, first : first + 2], linewidth=0.8, label=labels)
-            axes.set(xlabel="t [s]", ylabel="joint angle [rad]")
-            axes.legend()
+    def step(K: float, force: float) -> Array:
+        (trace,) = bench.run(wanted[None], np.full((1, TICKS), force), K, kp=40.0, kd=0.4, compensation=0.9)
+        q: Array = trace["x"][:, 0]
+        return q
 
-        return on
-
+    impedances = {f"K = {K:g} N m/rad": step(K, TENSIONS[0]) for K in (SOFT, STIFF)}
+    pretensions = {f"pretension {force:g} N": step(STIFF, force) for force in (LOW_TENSION, HIGH_TENSION)}
+    beyond = [float(overshoot(q, STEP, 0.0)) for q in (*impedances.values(), *pretensions.values())]
+    desired = {"desired": wanted}
     return [
         Figure(
             "11.2", "A step of the joint at two impedances (simulated)",
             "At the same damping a stiffer impedance oscillates more.",
-            f"The overshoot goes from {beyond[0]:.1%} to {beyond[1]:.1%} from K = {K[0]:g} to {K[1]:g} N m/rad. {CHOSEN}",
-            bool(beyond[1] > beyond[0] + 0.01), draw(0, [f"K = {each:g} N m/rad" for each in K[:2]]),
+            f"The overshoot goes from {beyond[0]:.1%} to {beyond[1]:.1%} from K = {SOFT:g} to {STIFF:g} N m/rad. {CHOSEN}",
+            beyond[1] > beyond[0] + 0.01, curves(TIMES, desired | impedances, "t [s]", "joint angle [rad]", "--"),
         ),
         Figure(
             "11.3", "A step of the joint at two pretensions (simulated)", "Stiffer tendons oscillate less.",
             f"The overshoot goes from {beyond[2]:.1%} to {beyond[3]:.1%} from {LOW_TENSION:g} to "
             f"{HIGH_TENSION:g} N. {CHOSEN}",
-            bool(beyond[3] < beyond[2] - 0.01), draw(2, [f"pretension {f:g} N" for f in tensions[2:]]),
+            beyond[3] < beyond[2] - 0.01, curves(TIMES, desired | pretensions, "t [s]", "joint angle [rad]", "--"),
         ),
     ]  # fmt: skip
 
 
-def critical(joint: Joint, K: float) -> float:
-    """Damping [N m s/rad] that would be critical for the link on a spring of stiffness K."""
-    return float(2 * np.sqrt(K * joint.inertia))
-
-
-def sweep(joint: Joint) -> Figure:
+def sweep(bench: Bench) -> Figure:
     """Figure 11.4: sines of several frequencies at three pretensions, after a first period."""
-    w = 2 * np.pi * np.repeat(SWEEP, len(TENSIONS))
-    times = np.arange(round(SWEPT / PERIOD))[:, None] * PERIOD
-    pulls = np.broadcast_to(np.tile(TENSIONS, len(SWEEP)), (len(times), len(w)))
-    gains = Gains(RESONANT, critical(joint, SOFT), kp=40.0, kd=0.4, compensation=0.9)
-    q = joint.run(STEP * np.sin(w * times), pulls, gains)[..., 0]
-    window = np.where(times >= SWEPT - 2 * np.pi / w * np.floor(w * SWEPT / 4 / np.pi), 1.0, 0.0)
-    window /= window.sum(axis=0)
-    gain = (np.abs((window * q * np.exp(-1j * w * times)).sum(axis=0)) * 2 / STEP).reshape(len(SWEEP), -1)
+    w, force = (each.ravel() for each in np.meshgrid(2 * np.pi * np.array(SWEEP), TENSIONS, indexing="ij"))
+    times = np.arange(round(SWEPT / PERIOD)) * PERIOD
+    phase = w[:, None] * times
+    traces = bench.run(
+        STEP * np.sin(phase), np.repeat(force[:, None], len(times), axis=1), RESONANT, kp=40.0, kd=0.4, compensation=0.9
+    )
+    q = np.stack([trace["x"][:, 0] for trace in traces])
+    window = np.where(times >= SWEPT - 2 * np.pi / w[:, None] * np.floor(w[:, None] * SWEPT / 4 / np.pi), 1.0, 0.0)
+    window /= window.sum(axis=1, keepdims=True)
+    gain = (np.abs((window * q * np.exp(-1j * phase)).sum(axis=1)) * 2 / STEP).reshape(len(SWEEP), -1)
     peaks = np.array(SWEEP)[gain.argmax(axis=0)]
-
-    def draw(axes: Any) -> None:
-        axes.plot(SWEEP, gain, "o-", markersize=3, linewidth=0.8, label=[f"pretension {f:g} N" for f in TENSIONS])
-        axes.set(xlabel="frequency [Hz]", ylabel="amplitude of the angle per desired angle")
-        axes.legend()
-
+    lines = {f"pretension {f:g} N": each for f, each in zip(TENSIONS, gain.T, strict=True)}
     return Figure(
         number="11.4",
         title="Gain of the joint over frequency at three pretensions (simulated)",
@@ -284,5 +335,5 @@ def sweep(joint: Joint) -> Figure:
             f"{', '.join(f'{peak:.2f}' for peak in gain.max(axis=0))}. {CHOSEN}"
         ),
         holds=bool(np.all(np.diff(peaks) > 0)),
-        draw=draw,
+        draw=curves(SWEEP, lines, "frequency [Hz]", "amplitude of the angle per desired angle", *["o-"] * 3),
     )

@@ -10,8 +10,8 @@ import numpy as np
 from awiwi_gen.hand import Hand
 from awiwi_gen.kernels.fingers_control import antagonists, groups
 from awiwi_gen.reproduce.distribution_search import WEIGHTS, Demands, closed_form_of
-from awiwi_gen.reproduce.joint_simulation import PERIOD
 from awiwi_gen.results import Printed, Verdict, compared
+from awiwi_gen.simulate import PERIOD
 
 COUNT = 300
 VISIBLE = 1e-3  # N; violations below are rounding

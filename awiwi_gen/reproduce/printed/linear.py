@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from awiwi_gen.hand import Hand
-from awiwi_gen.loops.linear_joint import TABLE_12_1, TABLE_12_1_TARGET, TABLE_13_1, TABLE_14_2, Array, Joint
+from awiwi_gen.loops.joint import TABLE_12_1, TABLE_12_1_TARGET, TABLE_13_1, TABLE_14_2, Array, Plant
 from awiwi_gen.loops.sampled import is_implementable
 from awiwi_gen.reproduce.figures.linear import stable_band
 from awiwi_gen.reproduce.figures.tendon import DAMPING, FREQUENCY, STEPS, TUNED_AT, Bench
@@ -88,9 +88,9 @@ def poles(library: Any) -> Iterator[Printed]:
     reach = np.stack([np.linalg.matrix_power(TABLE_12_1.A, i) @ TABLE_12_1.B for i in range(4)], axis=1)
     printed = k**2 / (m**2 * b**4)
     yield compared("eq. 12.16, det(J)", f"{printed:.6g}", abs(float(np.linalg.det(reach))), "that of controllability")
-    table = library.pole_placement(**TABLE_12_1.numbers, **TABLE_12_1_TARGET).K
-    other = library.pole_placement(**TABLE_12_1.numbers, **OTHER_TARGET).K
-    placed, meant = (_sorted(TABLE_12_1.closed(K)) for K in (table, other))
+    table = library.pole_placement(**TABLE_12_1.ports, **TABLE_12_1_TARGET).K
+    other = library.pole_placement(**TABLE_12_1.ports, **OTHER_TARGET).K
+    placed, meant = (_sorted(TABLE_12_1.loop(K).poles()) for K in (table, other))
     for index, text in enumerate(POLES_12_17):
         yield Printed(
             f"eq. 12.17, pole {index + 1}", f"{text} {'+-'[index % 2]} {'0.66' if index < 2 else '0.38'}j",
@@ -108,10 +108,10 @@ def poles(library: Any) -> Iterator[Printed]:
 def sensitivity(library: Any) -> Iterator[Printed]:
     """Equation 12.19 and section 12.3."""
     softer = TABLE_12_1.with_(k=0.6)
-    table = library.pole_placement(**TABLE_12_1.numbers, **TABLE_12_1_TARGET).K
-    other = library.pole_placement(**TABLE_12_1.numbers, **OTHER_TARGET).K
-    ours, meant = (_sorted(softer.closed(K)) for K in (table, other))
-    total = float(np.trace(softer.closed(other)))
+    table = library.pole_placement(**TABLE_12_1.ports, **TABLE_12_1_TARGET).K
+    other = library.pole_placement(**TABLE_12_1.ports, **OTHER_TARGET).K
+    ours, meant = (_sorted(softer.loop(K).poles()) for K in (table, other))
+    total = float(np.trace(softer.loop(other).closed))
     for index, text in enumerate(POLES_12_19):
         part = f" {'-+'[index % 2]} 225.14j" if index in (1, 2) else ""
         yield Printed(
@@ -156,7 +156,7 @@ def optimum(library: Any) -> Iterator[Printed]:
     )  # fmt: skip
 
 
-def fit_13_11(library: Any) -> Joint:
+def fit_13_11(library: Any) -> Plant:
     """A joint near table 13.1 whose optimum is eq. 13.11: its m as in table 14.2, b and d_q by Newton's method."""
     joint = TABLE_13_1.with_(m=TABLE_14_2.m, b=4.1e-3, dq=5e-4)
     first, _, third, fourth = map(float, GAINS_13_11)
@@ -180,7 +180,7 @@ def fit_13_11(library: Any) -> Joint:
 def pointwise(library: Any) -> Iterator[Printed]:
     """Equations 14.5 to 14.10 and the tables."""
     K = TABLE_14_2.optimum(library)
-    rows = {sign: np.linalg.eigvals(TABLE_14_2.closed(sign * K)).real.max() for sign in (1, -1)}
+    rows = {sign: TABLE_14_2.loop(sign * K).poles().real.max() for sign in (1, -1)}
     yield Printed(
         "eq. 14.5, 14.6: slowest pole", f"{rows[-1]:+.3g} 1/s", f"{rows[1]:+.3g} 1/s", "misprint",
         "the printed signs are solved by -S, and u = -R^-1 B'S x then drives the joint away; by table 14.2",
@@ -223,9 +223,8 @@ def _motor(k: float) -> tuple[Array, Array]:
     return np.array([[0, 1], [-k / 2e-3, 0]]), np.array([0, 1 / 2e-3])
 
 
-def _sorted(matrix: Array) -> Array:
-    """Eigenvalues, the fastest first, then by their imaginary parts."""
-    values = np.linalg.eigvals(matrix)
+def _sorted(values: Array) -> Array:
+    """Poles, the fastest first, then by their imaginary parts."""
     order = np.lexsort((-values.imag, -np.round(np.abs(values), 6)))
     found: Array = values[order]
     return found
