@@ -143,6 +143,12 @@ def motion_loop(plant: Plant, K: Array) -> Loop:
     return _loop_in(plant, _deflexion(plant.k / plant.m), K)
 
 
+def state_gains(plant: Plant, K: Array) -> Array:
+    """Gains (4,) on (q, q', theta, theta') of feedback K (4,) of the link's motion."""
+    gains: Array = np.ravel(K) @ _deflexion(plant.k / plant.m)
+    return gains
+
+
 def _deflexion(factor: float) -> Array:
     """The change of coordinates to q, q' and a factor times the spring's deflexion and its rate."""
     return np.array([[1, 0, 0, 0], [0, 1, 0, 0], [-factor, 0, factor, 0], [0, -factor, 0, factor]])

@@ -7,17 +7,18 @@ chapter 16; there is no friction and no noise in it, and no cascade to compare w
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from awiwi_gen.hand import Hand
-from awiwi_gen.loops.joint import TABLE_16_1, Array, Plant
+from awiwi_gen.loops.joint import TABLE_16_1, Plant
 from awiwi_gen.loops.pair import TABLE_PAIR, at_rest, pair_loop
 from awiwi_gen.loops.regulator import cancelling, exact_gains, regulator
-from awiwi_gen.loops.sampled import PERIOD
-from awiwi_gen.reproduce.pair_simulation import Setting, simulate
-from awiwi_gen.results import Figure
+from awiwi_gen.loops.step import overshoot, settling
+from awiwi_gen.results import Figure, curves
+from awiwi_gen.simulate import PERIOD, Actuator, Array, Block, Loop, Scenario, Sum, Trace, simulate
 
 IMPEDANCE = (0.5, 0.05)
 PRETENSION = 0.15  # N m
@@ -29,27 +30,38 @@ FREQUENCIES = (2.0, 4.0, 8.0, 16.0)  # Hz
 
 def figures(library: Any, hand: Hand) -> list[Figure]:
     """All of them; they need nothing of the hand."""
-    setting = tuned(library)
-    return [
-        deflexion(library),
-        pretension(library),
-        step(library, setting),
-        *sines(library, setting),
-        rendered(library),
-    ]
+    return [deflexion(library), pretension(library), step(library), *sines(library), rendered(library)]
 
 
-def tuned(library: Any) -> Setting:
-    """The pair of table 16.1 with gains from costs."""
+def run(library: Any, goals: Sequence[Array]) -> list[Trace]:
+    """The exact law under desired positions with four derivatives, each (ticks, 5), with gains from costs.
+
+    The springs are cubic, the first terms of an exponential: at rest, at the elongation p, they have the torque of the
+    pretension and the stiffness k of the pair.
+    """
     single = Plant(TABLE_16_1.m, 2 * TABLE_16_1.b, 2 * TABLE_16_1.k)
     found = exact_gains(library, single, regulator(single, *COSTS) + cancelling(single))
     tuning = np.concatenate([found.gains[2:], 2 * found.weights])
-    return Setting(TABLE_PAIR, PRETENSION, found.gains[:2], tuning)
-
-
-def wanted(position: float, *rates: float) -> tuple[float, ...]:
-    """A desired position with its four derivatives, zero if not given."""
-    return (position, *rates, *(0.0,) * (4 - len(rates)))
+    k, p = TABLE_PAIR.k[0], 1.5 * PRETENSION / TABLE_PAIR.k[0]
+    law = {"torques": "torques", "springs": "springs", "external": "zeros", "tunings": "tunings"}
+    loop = Loop(
+        plant=[Block("plant_antagonistic", {"load": "zeros[0]"})],
+        law=[
+            Sum("speeds", (1.0, ("x[3]", "x[5]")), ("sides", "x[1]")),
+            Block("antagonistic_springs"),
+            Block("backstepping_antagonistic_lyapunov", law | {"joint": "x[0:2]"}),
+            Block("backstepping_antagonistic", law | {"joint": "x[0:2]", "tau_m": "command"}),
+        ],
+        states={"x": "xd"},
+        actuators=[Actuator("command", "u")],
+    )
+    values = {
+        "x": (0, 0, p, 0, p, 0), "command": [PRETENSION] * 2, "tendons": [[0.4 * k, 0.2 * k / p, k / p**2 / 15]] * 2,
+        "inertias": (TABLE_PAIR.m, *TABLE_PAIR.b), "damping": 0.0, "friction": (1.0, 0.0, 0.0), "zeros": np.zeros(2),
+        "sides": (-1.0, 1.0), "pretension": (PRETENSION, 0, 0), "impedance": found.gains[:2], "tunings": [tuning] * 2,
+    }  # fmt: skip
+    scenarios = [Scenario(values, len(goal), {"desired": goal}) for goal in goals]
+    return simulate(library, loop, scenarios, ["x", "tau", "V"])
 
 
 def deflexion(library: Any) -> Figure:
@@ -63,17 +75,13 @@ def deflexion(library: Any) -> Figure:
     q = goal + np.concatenate([moved[:, 0], loaded[:, 0]])
     end = goal + torque / IMPEDANCE[0]
 
-    def draw(axes: Any) -> None:
-        axes.plot(np.concatenate([times, times[-1] + times]), q, linewidth=0.8)
-        axes.set(xlabel="t [s]", ylabel="q [rad]")
-
     return Figure(
         number="15.23",
         title="A step and a torque on the link, exact law",
         claim="The link arrives, then yields to the torque as its impedance says.",
         found=f"It ends at {q[-1]:.6f} rad; the step and torque over stiffness make {end:.6f}.",
         holds=bool(abs(q[-1] - end) < 1e-3 and (np.diff(q) > -1e-9).all()),
-        draw=draw,
+        draw=curves(np.concatenate([times, times[-1] + times]), q, "t [s]", "q [rad]"),
     )
 
 
@@ -88,12 +96,6 @@ def pretension(library: Any) -> Figure:
         runs[name] = (rest + loop.response(start - rest, times))[:, 2::2].mean(axis=1)
     left = {name: float(run[-1]) for name, run in runs.items()}
 
-    def draw(axes: Any) -> None:
-        for name, run in runs.items():
-            axes.plot(times, run, linewidth=0.8, label=name)
-        axes.set(xlabel="t [s]", ylabel="common torque [N m]")
-        axes.legend()
-
     return Figure(
         number="15.23 (pretension)",
         title="The pretension under the printed decoupling",
@@ -103,64 +105,49 @@ def pretension(library: Any) -> Figure:
             f"order six {left['exact']:.4g}."
         ),
         holds=left["decoupled"] > 0.9 * PRETENSION,
-        draw=draw,
+        draw=curves(times, runs, "t [s]", "common torque [N m]"),
     )
 
 
-def step(library: Any, setting: Setting) -> Figure:
+def step(library: Any) -> Figure:
     """Figure 15.24: a step, and the energy on its way down."""
-    run = simulate(library, setting, 0.15, lambda t: wanted(STEP if t >= STEP_AT else 0.0))
-    off = np.abs(run.q - STEP) > 0.02 * STEP
-    settled = float(run.times[off][-1] - STEP_AT)
-    after = run.times > STEP_AT + 2 * PERIOD
-    falls = bool((np.diff(run.V[after]) <= 1e-9 * run.V[after].max()).all())
-    over = max(float(run.q.max() / STEP - 1), 0.0)
-
-    def draw(axes: Any) -> None:
-        axes.plot(run.times, run.q, linewidth=0.8, label="q [rad]")
-        axes.plot(run.times, run.V / run.V.max(), linewidth=0.8, label="V, scaled")
-        axes.legend()
-        axes.set(xlabel="t [s]", ylabel="angle [rad], energy by its largest value")
-
+    ticks, at = round(0.15 / PERIOD), round(STEP_AT / PERIOD)
+    goal = np.zeros((ticks, 5))
+    goal[at:, 0] = STEP
+    (trace,) = run(library, [goal])
+    q, V, least = trace["x"][:, 0], trace["V"][:, 0], float(trace["tau"].min())
+    settled = float(settling(trace.time, q, STEP, 0.0)) - STEP_AT
+    over = float(overshoot(q, STEP, 0.0))
+    falls = bool((np.diff(V[at + 3 :]) <= 1e-9 * V[at + 3 :].max()).all())
+    lines = {"q [rad]": q, "V, scaled": V / V.max()}
     return Figure(
         number="15.24 (simulated)",
         title=f"A step of {STEP:g} rad at 3 kHz",
         claim="The backstepping law is fast and accurate.",
         found=(
             f"Settled after {settled * 1e3:.0f} ms with {over:.1%} overshoot; V falls after the step; the slacker tendon "
-            f"keeps {run.torques.min():.2g} N m."
+            f"keeps {least:.2g} N m."
         ),
-        holds=falls and settled < 0.04 and over < 0.02 and bool(run.torques.min() > 0),
-        draw=draw,
+        holds=falls and settled < 0.04 and over < 0.02 and least > 0,
+        draw=curves(trace.time, lines, "t [s]", "angle [rad], energy by its largest value"),
     )
 
 
-def sines(library: Any, setting: Setting) -> list[Figure]:
+def sines(library: Any) -> list[Figure]:
     """Figures 15.25 and 15.26: sines with their derivatives fed, and without."""
-    amplitude, w = 0.3, 2 * np.pi * np.array(FREQUENCIES)
-    powers = np.stack([w**order for order in range(5)], axis=-1)
-
-    def desired(t: float) -> Array:
-        s, c = amplitude * np.sin(w * t), amplitude * np.cos(w * t)
-        fed = powers * np.stack([s, c, -s, -c, s], axis=-1)
-        return np.stack([fed, fed * [1, 0, 0, 0, 0]])
-
-    run = simulate(library, setting, 0.15 + 1 / FREQUENCIES[0], desired)
-    late = run.times >= run.times[-1] - 1 / FREQUENCIES[0]
-    turned = np.exp(-1j * w * run.times[late, None])[:, None]
-    gains = np.abs((run.q[late] * turned).mean(axis=0)) * 2 / amplitude
-    error = float(np.abs(run.q[late, 0, 0] - amplitude * np.sin(w[0] * run.times[late])).max())
-
-    def follow(axes: Any) -> None:
-        axes.plot(run.times, run.q[:, :, 0], linewidth=0.8, label=["derivatives fed", "position only"])
-        axes.legend()
-        axes.set(xlabel="t [s]", ylabel="q [rad]")
-
-    def diagram(axes: Any) -> None:
-        axes.plot(FREQUENCIES, gains.T, "o-", label=["derivatives fed", "position only"])
-        axes.set(xlabel="frequency [Hz]", ylabel="gain")
-        axes.legend()
-
+    amplitude, labels = 0.3, ("derivatives fed", "position only")
+    times = np.arange(round((0.15 + 1 / FREQUENCIES[0]) / PERIOD)) * PERIOD
+    goals = []
+    for w in 2 * np.pi * np.array(FREQUENCIES):
+        s, c = amplitude * np.sin(w * times), amplitude * np.cos(w * times)
+        fed = w ** np.arange(5) * np.stack([s, c, -s, -c, s], axis=-1)
+        goals += [fed, fed * [1, 0, 0, 0, 0]]
+    q = np.array([trace["x"][:, 0] for trace in run(library, goals)]).reshape(len(FREQUENCIES), 2, -1)
+    late = times >= times[-1] - 1 / FREQUENCIES[0]
+    phase = 2 * np.pi * np.array(FREQUENCIES)[:, None] * times[late]
+    gains = np.abs((q[..., late] * np.exp(-1j * phase)[:, None]).mean(axis=-1)) * 2 / amplitude
+    error = float(np.abs(q[0, 0] - goals[0][:, 0])[late].max())
+    follow, gain = (dict(zip(labels, rows, strict=True)) for rows in (q[0], gains.T))
     return [
         Figure(
             number="15.25 (simulated)",
@@ -168,18 +155,18 @@ def sines(library: Any, setting: Setting) -> list[Figure]:
             claim="The law follows a sine.",
             found=f"Within {error:.1e} rad of {amplitude:g} rad once the sine's derivatives are fed.",
             holds=error < 0.01 * amplitude,
-            draw=follow,
+            draw=curves(times, follow, "t [s]", "q [rad]"),
         ),
         Figure(
             number="15.26 (simulated)",
             title="Gain over frequency at 3 kHz",
             claim="The gain stays near one over a wide range of frequencies.",
             found=(
-                f"At {FREQUENCIES[-1]:g} Hz it is {gains[0, -1]:.3f} with the derivatives fed, and {gains[1, -1]:.2f} "
+                f"At {FREQUENCIES[-1]:g} Hz it is {gains[-1, 0]:.3f} with the derivatives fed, and {gains[-1, 1]:.2f} "
                 "with the position alone."
             ),
-            holds=bool(np.abs(gains[0] - 1).max() < 0.05),
-            draw=diagram,
+            holds=bool(np.abs(gains[:, 0] - 1).max() < 0.05),
+            draw=curves(FREQUENCIES, gain, "frequency [Hz]", "gain", "o-", "o-"),
         ),
     ]
 
@@ -190,19 +177,14 @@ def rendered(library: Any) -> Figure:
     torques = {K_p: static_torques(library, K_p, imposed) for K_p in STIFFNESSES}
     worst = max(float(np.abs(t - K_p * imposed).max()) for K_p, t in torques.items())
 
-    def draw(axes: Any) -> None:
-        for K_p, torque in torques.items():
-            axes.plot(imposed, torque, "o-", label=f"K_p = {K_p:g} N m/rad")
-        axes.set(xlabel="imposed deflexion [rad]", ylabel="torque of the tendons [N m]")
-        axes.legend()
-
+    lines = {f"K_p = {K_p:g} N m/rad": torque for K_p, torque in torques.items()}
     return Figure(
         number="15.27 (simulated)",
         title="Torque at an imposed deflexion",
         claim="The torque of the tendons at an imposed deflexion is that of the desired stiffness.",
         found=f"It is, within {worst:.0e} N m.",
         holds=worst < 1e-9,
-        draw=draw,
+        draw=curves(imposed, lines, "imposed deflexion [rad]", "torque of the tendons [N m]", *["o-"] * 3),
     )
 
 

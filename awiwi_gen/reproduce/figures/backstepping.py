@@ -11,11 +11,21 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from scipy.linalg import expm
 
 from awiwi_gen.hand import Hand
-from awiwi_gen.loops.joint import TABLE_15_1, TABLE_16_1, Array, Loop, normalised_loop, position_loop
-from awiwi_gen.results import Figure
+from awiwi_gen.loops.joint import (
+    TABLE_15_1,
+    TABLE_16_1,
+    Plant,
+    normalised_loop,
+    position_loop,
+    state_gains,
+)
+from awiwi_gen.loops.joint import (
+    Loop as LinearLoop,
+)
+from awiwi_gen.results import Figure, curves
+from awiwi_gen.simulate import Actuator, Array, Block, Element, Loop, Scenario, Sum, Trace, simulate
 
 STEP = 0.8  # rad, as captioned
 FIGURE_15_1 = np.array([0.01, 2.0, 5.0, 7.5, 10.0]), np.linspace(0.5, 10.0, 10)
@@ -25,9 +35,8 @@ OUTER = (100.0, 100.0)  # K3, K4 of table 15.1
 SATURATION = 0.0005  # N m
 DELAYS = (0.0, 1e-4, 2e-4, 5e-4, 1e-3)
 SERVO = 333e-6  # s, of a complete round trip
-DIVERGED = 1e6  # where a simulation that runs away is held
 
-Builder = Callable[..., Loop]
+Builder = Callable[..., LinearLoop]
 
 
 def figures(library: Any, hand: Hand) -> list[Figure]:
@@ -45,35 +54,32 @@ def figures(library: Any, hand: Hand) -> list[Figure]:
 # -- section 15.1 ------------------------------------------------------------------------------------------
 
 
-def run_example(library: Any, x: Array, k: Array, until: float, ticks: int) -> tuple[Array, Array]:
-    """States (ticks + 1, ..., 2) of the example under the compiled law, and its energy V along the way."""
+def run_example(library: Any, starts: Array, gains: Array, until: float, ticks: int) -> tuple[Array, Array]:
+    """States (ticks + 1, runs, 2) of the example under the compiled law, and its energy V; runs differ in start and gains.
 
-    def flow(x: Array) -> Array:
-        u = library.backstepping_academic(x=x, k=k).u
-        first = x[..., 0]
-        return np.stack([first**2 - first**3 + x[..., 1], u], axis=-1)
-
-    h, states = until / ticks, [x]
-    for _ in range(ticks):
-        x = states[-1]
-        a = flow(x)
-        b = flow(x + h / 2 * a)
-        c = flow(x + h / 2 * b)
-        states.append(x + h / 6 * (a + 2 * b + 2 * c + flow(x + h * c)))
-    trace = np.array(states)
-    return trace, library.backstepping_academic_lyapunov(x=trace, k=k).V
+    The example's polynomial x1^2 - x1^3 is the torque of a cubic spring.
+    """
+    drift = {"deflexion": "x[0]", "deflexion_des": "x[0]", "torque": "drift", "k": "unused"}
+    plant: list[Element] = [
+        Block("secant_stiffness", drift),
+        Sum("xd[0]", (1.0, "drift"), (1.0, "x[1]")),
+        Block("backstepping_academic", {"k": "gains", "u": "xd[1]"}),
+    ]
+    scenarios = [
+        Scenario({"x": x, "gains": k, "spring": (0.0, 1.0, -1.0)}, ticks + 1)
+        for x, k in zip(*np.broadcast_arrays(starts, gains), strict=True)
+    ]
+    traces = simulate(library, Loop(plant, [], {"x": "xd"}, period=until / ticks), scenarios, ["x"])
+    states = np.stack([trace["x"] for trace in traces], axis=1)
+    return states, library.backstepping_academic_lyapunov(x=states, k=gains).V
 
 
 def convergence(library: Any) -> Figure:
     """Figure 15.1."""
     first, second = FIGURE_15_1
-    k = np.stack(np.broadcast_arrays(first[:, None], second), axis=-1)
-    trace, V = run_example(library, np.ones((*k.shape[:2], 2)), k, 60.0, 3000)
+    k = np.stack(np.meshgrid(first, second, indexing="ij"), axis=-1).reshape(-1, 2)
+    trace, V = run_example(library, np.ones_like(k), k, 60.0, 3000)
     falling, left = bool((np.diff(V, axis=0) <= 1e-12).all()), np.abs(trace[-1, ..., 0]).max()
-
-    def draw(axes: Any) -> None:
-        axes.plot(np.linspace(0, 10, 501), trace[:501, ..., 0].reshape(501, -1), linewidth=0.6)
-        axes.set(xlabel="t", ylabel="x1")
 
     return Figure(
         number="15.1",
@@ -81,7 +87,7 @@ def convergence(library: Any) -> Figure:
         claim="Every pair of positive gains brings the state to the origin.",
         found=f"All runs end within {left:.0e} after 60 s, and V falls all the way, with the control of eq. 15.10 mended.",
         holds=falling and bool(left < 0.1),
-        draw=draw,
+        draw=curves(np.linspace(0, 10, 501), trace[:501, :, 0], "t", "x1"),
     )
 
 
@@ -127,19 +133,14 @@ def sweep(library: Any, which: int, name: str, build: Builder) -> Figure:
         told = "K2 is a damping: more of it slows the link down"
         holds = monotone(rises)
 
-    def draw(axes: Any) -> None:
-        for value, run in runs.items():
-            axes.plot(times, run, linewidth=0.8, label=f"K{which} = {value:g}")
-        axes.set(xlabel="t [s]", ylabel="q [rad]", xlim=(0, 10))
-        axes.legend()
-
+    lines = {f"K{which} = {value:g}": run for value, run in runs.items()}
     return Figure(
         number=f"15.{6 + which} ({name})",
         title=f"Influence of K{which} on a step of {STEP:g} rad, {name}",
         claim=f"{told}.",
         found=f"Rise time and overshoot at K{which} = {shown}.",
         holds=holds,
-        draw=draw,
+        draw=curves(times, lines, "t [s]", "q [rad]", xlim=(0, 10)),
     )
 
 
@@ -148,7 +149,7 @@ def monotone(values: Sequence[float]) -> bool:
     return all(a < b for a, b in pairwise(values))
 
 
-def step_response(loop: Loop, times: Array) -> Array:
+def step_response(loop: LinearLoop, times: Array) -> Array:
     """Position [rad] of the link after a step of the desired one."""
     response: Array = STEP + loop.response([-STEP, 0, 0, 0], times)[:, 0]
     return response
@@ -160,49 +161,47 @@ def rise(times: Array, run: Array) -> float:
     return float(times[high] - times[low]) if run.max() >= 0.9 * STEP else float("inf")
 
 
-def held(loop: Loop, until: float, tick: float, limits: Any = np.inf, late: Any = 0.0) -> tuple[Array, Array]:
-    """Positions and torques (ticks, cases) of a step: torques held for a tick, cut at limits, late by some time [s]."""
-    limit, waits = np.broadcast_arrays(np.atleast_1d(limits), np.round(np.atleast_1d(late) / tick).astype(int))
-    n, cases = len(loop.A), np.arange(len(limit))
-    step = expm(np.block([[loop.A, loop.B], [np.zeros((1, n + 1))]]) * tick)
-    count = round(until / tick)
-    x = np.zeros((n, len(cases)))
-    x[0] = -STEP
-    positions, torques = np.empty((count, len(cases))), np.zeros((count + int(waits.max()), len(cases)))
-    for i in range(count):
-        positions[i] = STEP + x[0]
-        torques[i + waits, cases] = np.clip(-loop.K[0] @ x, -limit, limit)
-        x = np.clip(step[:n, :n] @ x + step[:n, n:] * torques[i], -DIVERGED, DIVERGED)
-    return positions, torques[:count]
+def held(
+    library: Any, plant: Plant, rates: Any, until: float, tick: float, limit: float = np.inf, late: float = 0.0
+) -> Trace:
+    """A step under the position law: torques change every tick, are cut at a limit, and come late by some time [s]."""
+    waits = round(late / tick)
+    law: list[Element] = [
+        Block("pole_placement_law", {"u": "command"}),
+        Sum("queue", (1.0, ("command", f"queue[0:{waits}]") if waits else "command")),
+    ]
+    loop = Loop(
+        [Block("plant_joint_linear")], law, {"x": "xd"},
+        actuators=[Actuator(f"queue[{waits}]", "u", limit, late=False)], period=tick,
+    )  # fmt: skip
+    values = {
+        "x": np.zeros(4), "plant": plant.numbers, "damping": np.zeros(2), "load": 0.0, "u_des": 0.0,
+        "x_des": (STEP, 0.0, STEP, 0.0), "K": state_gains(plant, position_loop(library, plant, rates).K),
+        "queue": np.zeros(waits + 1),
+    }  # fmt: skip
+    return simulate(library, loop, [Scenario(values, round(until / tick))], ["x", "u"])[0]
 
 
 def saturation(library: Any) -> list[Figure]:
     """Figures 15.10 and 15.11: K1 = K2 = 1, with and without a limit."""
-    gains, tick = (1.0, 1.0, *OUTER), 1e-4
-    loop = position_loop(library, TABLE_16_1, gains)
-    positions, torques = held(loop, 6.0, tick, (np.inf, SATURATION))
+    gains = (1.0, 1.0, *OUTER)
+    labels = {"free": np.inf, f"limit {SATURATION:g} N m": SATURATION}
+    runs = {label: held(library, TABLE_16_1, gains, 6.0, 1e-4, limit) for label, limit in labels.items()}
     lighter = position_loop(library, TABLE_15_1, gains)
-    times = np.arange(0, 6.0, tick)
-    light = -lighter.response([-STEP, 0, 0, 0], times) @ lighter.K[0]
-    peaks = [float(np.abs(torque).max()) for torque in (light, torques[:, 0])]
-
-    def draw(runs: Array, label: str, until: float) -> Callable[[Any], None]:
-        def on(axes: Any) -> None:
-            shown = round(until / tick)
-            axes.plot(times[:shown:10], runs[:shown:10], linewidth=0.8, label=["free", f"limit {SATURATION:g} N m"])
-            axes.set(xlabel="t [s]", ylabel=label)
-            axes.legend()
-
-        return on
-
+    light = lighter.response([-STEP, 0, 0, 0], runs["free"].time) @ lighter.K[0]
+    peaks = [float(np.abs(torque).max()) for torque in (light, runs["free"]["u"])]
+    left = max(abs(float(run["x"][-1, 0]) / STEP - 1) for run in runs.values())
+    angles, torques = (
+        {label: (run.time[::10], run[name][::10, 0]) for label, run in runs.items()} for name in ("x", "u")
+    )
     return [
         Figure(
             number="15.10",
             title="A step with saturated torque: link, plant of table 16.1",
             claim="The law stays stable in spite of the limit.",
-            found=f"Both runs end within {np.abs(positions[-1] / STEP - 1).max():.1%} of the step.",
-            holds=bool(np.abs(positions[-1] / STEP - 1).max() < 0.02),
-            draw=draw(positions, "q [rad]", 6.0),
+            found=f"Both runs end within {left:.1%} of the step.",
+            holds=left < 0.02,
+            draw=curves(None, angles, "t [s]", "q [rad]"),
         ),
         Figure(
             number="15.11",
@@ -213,31 +212,23 @@ def saturation(library: Any) -> list[Figure]:
                 f"16.1, shown here, it would reach {peaks[1]:.1e} N m."
             ),
             holds=peaks[0] > SATURATION,
-            draw=draw(torques, "torque [N m]", 0.3),
+            draw=curves(None, torques, "t [s]", "torque [N m]", xlim=(0, 0.3)),
         ),
     ]
 
 
 def delay(library: Any) -> Figure:
     """Figure 15.13: K = (5, 1, 100, 100) behind delays."""
-    loop, tick = position_loop(library, TABLE_15_1, (5.0, 1.0, *OUTER)), 2e-5
-    runs, _ = held(loop, 2.0, tick, late=(*DELAYS, SERVO))
-    overshoot = float(runs[:, -1].max() / STEP - 1)
-
-    def draw(axes: Any) -> None:
-        labels = [f"{late * 1e3:g} ms" for late in DELAYS]
-        axes.plot(np.arange(0, len(runs), 10) * tick, runs[::10, :-1], linewidth=0.8, label=labels)
-        axes.set(xlabel="t [s]", ylabel="q [rad]", ylim=(-0.2, 2.0))
-        axes.legend()
-
+    gains = (5.0, 1.0, *OUTER)
+    runs = {late: held(library, TABLE_15_1, gains, 2.0, 2e-5, late=late) for late in (*DELAYS, SERVO)}
+    overshoot = float(runs[SERVO]["x"][:, 0].max() / STEP - 1)
+    margin = position_loop(library, TABLE_15_1, gains).delay_margin()
+    lines = {f"{late * 1e3:g} ms": (runs[late].time[::10], runs[late]["x"][::10, 0]) for late in DELAYS}
     return Figure(
         number="15.13",
         title="A step behind delays",
         claim="At the 333 us of a round trip nothing oscillates, even with these large gains.",
-        found=(
-            f"With table 15.1 it then overshoots by {overshoot:.0%}, and {loop.delay_margin() * 1e3:.2f} ms are all "
-            "that the loop bears."
-        ),
+        found=f"With table 15.1 it then overshoots by {overshoot:.0%}; the delay margin is {margin * 1e3:.2f} ms.",
         holds=overshoot < 0.02,
-        draw=draw,
+        draw=curves(None, lines, "t [s]", "q [rad]", ylim=(-0.2, 2.0)),
     )

@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 
 from awiwi_gen.hand import Hand
-from awiwi_gen.loops.joint import TABLE_15_1, TABLE_16_1, UNIT_WEIGHTS, Array, impedance_loop, joint_loop
-from awiwi_gen.reproduce.figures.impedance import GAINS, characteristic
-from awiwi_gen.results import Figure
+from awiwi_gen.loops.joint import TABLE_15_1, TABLE_16_1, impedance_loop, joint_loop
+from awiwi_gen.reproduce.figures.impedance import GAINS, SPRING_JOINT
+from awiwi_gen.results import Figure, curves
+from awiwi_gen.simulate import Actuator, Block, Element, Loop, Scenario, Sum, Trace, Wire, simulate
 
 STEP = 0.8  # rad
 MOTOR = 200.0  # rad/s, of a critically damped motor under its own controller
@@ -43,12 +44,6 @@ def swing(library: Any) -> Figure:
     runs = {name: STEP + loop.response([-STEP, 0, 0, 0], times)[:, 0] for name, loop in loops.items()}
     left = {name: float(np.ptp(run[times > 0.1]) / STEP) for name, run in runs.items()}
 
-    def draw(axes: Any) -> None:
-        for name, run in runs.items():
-            axes.plot(times * 1e3, run, linewidth=0.8, label=name)
-        axes.set(xlabel="t [ms]", ylabel="link angle [rad]")
-        axes.legend()
-
     return Figure(
         number="15.15",
         title="A step with a PD controller of the motor and with the backstepping law (simulated)",
@@ -58,7 +53,7 @@ def swing(library: Any) -> Figure:
             f"{left['backstepping']:.1%} with the other, on the plant of table 16.1 without friction."
         ),
         holds=left["backstepping"] < 0.01 < left["PD on the motor"],
-        draw=draw,
+        draw=curves(times * 1e3, runs, "t [ms]", "link angle [rad]"),
     )
 
 
@@ -72,13 +67,6 @@ def rendered(library: Any) -> Figure:
     expected = RENDERED[0] * imposed
     worst = {name: float(np.abs(torque - expected).max()) for name, torque in torques.items()}
 
-    def draw(axes: Any) -> None:
-        for name, torque in torques.items():
-            axes.plot(imposed, torque, "o-", markersize=4, linewidth=0.8, label=name)
-        axes.plot(imposed, expected, ":", color="black", label="expected")
-        axes.set(xlabel="error of the position [rad]", ylabel="torque of the spring [N m]")
-        axes.legend()
-
     return Figure(
         number="15.18",
         title=f"Torque at an imposed error of the position, {RENDERED[0]:g} N m/rad (simulated)",
@@ -88,20 +76,29 @@ def rendered(library: Any) -> Figure:
             f"{worst['not fed']:.2g} N m off if it is not."
         ),
         holds=worst["outer torque fed"] < 1e-6,
-        draw=draw,
+        draw=curves(
+            imposed,
+            torques | {"expected": expected},
+            "error of the position [rad]",
+            "torque of the spring [N m]",
+            "o-",
+            "o-",
+            ":",
+        ),
     )
 
 
 def contact(library: Any) -> Figure:
     """Figure 15.22: a step into an obstacle, at two stiffnesses one after the other."""
-    times, q, torque = run_contact(library)
-    ends = [round(PHASE / TICK) - 1, len(times) - 1]
+    trace = run_contact(library)
+    q, torque = trace["x"][:, 0], trace["tau"][:, 0]
+    ends = [round(PHASE / TICK) - 1, len(q) - 1]
     expected = [K_p * (GOAL - q[end]) for K_p, end in zip(STIFFNESSES, ends, strict=True)]
     worst = max(abs(torque[end] / wanted - 1) for end, wanted in zip(ends, expected, strict=True))
 
     def draw(axes: Any) -> None:
-        axes.plot(times, q, linewidth=0.8, label="link angle [rad]")
-        axes.plot(times, torque, linewidth=0.8, label="torque of the spring [N m]")
+        axes.plot(trace.time, q, linewidth=0.8, label="link angle [rad]")
+        axes.plot(trace.time, torque, linewidth=0.8, label="torque of the spring [N m]")
         axes.axhline(GOAL, linestyle=":", color="black", linewidth=0.8, label="desired angle [rad]")
         axes.axvline(PHASE, color="black", linewidth=0.5)
         axes.set(xlabel="t [s]", ylabel="angle [rad], torque [N m]")
@@ -120,27 +117,28 @@ def contact(library: Any) -> Figure:
     )
 
 
-def run_contact(library: Any) -> tuple[Array, Array, Array]:
-    """Times (ticks), link angles and spring torques (ticks) of a step into the obstacle, by Runge and Kutta."""
-    m, b, _ = TABLE_16_1.numbers
-    desired = np.array([GOAL, 0.0, 0.0, 0.0, 0.0])
-
-    def flow(x: Array, K_p: float) -> Array:
-        torque, slope, curvature = characteristic(x[2] - x[0])
-        pushed = max(WALL * (x[0] - OBSTACLE) + WALL_DAMPING * x[1], 0.0) if x[0] > OBSTACLE else 0.0
-        motor = library.backstepping_nonlinear(
-            state=(x[0], x[1], torque, slope * (x[3] - x[1])), bodies=(m, b), spring=(slope, curvature),
-            gains=(K_p, *CONTACT), weights=UNIT_WEIGHTS, desired=desired, external=(-pushed, 0.0),
-        ).tau_m  # fmt: skip
-        return np.array([x[1], (torque - pushed) / m, x[3], (float(motor) - torque) / b])
-
-    times = np.arange(round(2 * PHASE / TICK)) * TICK
-    states = [np.zeros(4)]
-    for time in times[:-1]:
-        x, K_p = states[-1], STIFFNESSES[int(time >= PHASE)]
-        k1 = flow(x, K_p)
-        k2 = flow(x + TICK / 2 * k1, K_p)
-        k3 = flow(x + TICK / 2 * k2, K_p)
-        states.append(x + TICK / 6 * (k1 + 2 * k2 + 2 * k3 + flow(x + TICK * k3, K_p)))
-    trace = np.array(states)
-    return times, trace[:, 0], characteristic(trace[:, 2] - trace[:, 0])[0]
+def run_contact(library: Any) -> Trace:
+    """A step into the obstacle, a spring with a damper; the law acts as if in continuous time."""
+    ticks = round(2 * PHASE / TICK)
+    gains = np.array([(STIFFNESSES[int(tick * TICK >= PHASE)], *CONTACT) for tick in range(ticks)])
+    obstacle: dict[str, Wire] = {
+        "stretches": ("depth", "zeros[0]"),
+        "speeds": ("x[1]", "zeros[0]"),
+        "torques": "wall",
+        "springs": "unused",
+    }
+    plant: list[Element] = [
+        Sum("depth", (1.0, "x[0]"), (-OBSTACLE, "one")),
+        Block("antagonistic_springs", obstacle | {"tendons": "walls"}),
+        Sum("load", (-1.0, "wall[0]"), (-WALL_DAMPING / WALL, "wall[1]")),
+        Block("plant_joint_nonlinear"),
+    ]
+    law: dict[str, Wire] = {"state": ("x[0:2]", "tau"), "external": ("load", "zeros[0]"), "tau_m": "command"}
+    loop = Loop(
+        plant, [Block("backstepping_nonlinear", law)], {"x": "xd"},
+        actuators=[Actuator("command", "u", late=False)], period=TICK,
+    )  # fmt: skip
+    values = SPRING_JOINT | {
+        "x": np.zeros(4), "zeros": np.zeros(1), "one": 1.0, "walls": [(WALL, 0.0, 0.0)] * 2, "desired": (GOAL, 0, 0, 0, 0),
+    }  # fmt: skip
+    return simulate(library, loop, [Scenario(values, ticks, {"gains": gains})], ["x", "tau"])[0]
