@@ -13,12 +13,9 @@ import numpy as np
 
 from awiwi_gen.hand import Hand, Motor
 from awiwi_gen.identify import fit_friction
-from awiwi_gen.results import Figure
+from awiwi_gen.results import Figure, curves
+from awiwi_gen.simulate import PERIOD, Actuator, Array, Block, Element, Loop, Scenario, Sensor, Sum, Wire, simulate
 
-Array = np.ndarray[Any, Any]
-
-TICK = 1 / 3000  # s, of the controller
-SUBSTEPS = 2
 BANDWIDTH = 450.0  # rad/s, of the position loop: well above the ripple it has to show in its torque
 DAMPING = 0.7
 RUNS = 10
@@ -124,29 +121,37 @@ class Recordings:
 
 
 def drive(library: Any, speeds: Array, fed: Array, start: float, duration: float) -> tuple[Array, Array]:
-    """Angles [rad] and controller torques [N m], both (motors, ticks), of motors kept at their speeds [rad/s].
+    """Angles [rad] and controller torques [N m], both (motors, ticks), of motors controlled to their speeds [rad/s].
 
-    A share `fed` of the motor's own compensation is added to what the controller asks for.
+    A share `fed` of the motor's own compensation is added to the controller's torque.
     """
-    generator = np.random.default_rng(34)
     inertia = 2 * float(library.motor_energy(1.0))
-    proportional, derivative = inertia * BANDWIDTH**2, 2 * DAMPING * inertia * BANDWIDTH
-    state = np.stack([np.full_like(speeds, start), speeds])
-    step, record = TICK / SUBSTEPS, []
-
-    def rates(state: Array, torque: Array) -> Array:
-        return np.stack([state[1], library.motor_acceleration(*state, torque, 0.0)])
-
-    for tick in range(round(duration / TICK)):
-        position, velocity = state + generator.normal(0, [[POSITION_NOISE], [VELOCITY_NOISE]], state.shape)
-        asked = proportional * (start + speeds * tick * TICK - position) + derivative * (speeds - velocity)
-        torque = asked + fed * library.motor_compensation(position, speeds)
-        record.append((state[0], asked))
-        for _ in range(SUBSTEPS):  # Heun
-            slope = rates(state, torque)
-            state = state + step / 2 * (slope + rates(state + step * slope, torque))
-    angle, torques = np.transpose(record, (1, 2, 0))
-    return angle, torques
+    law: list[Element] = [
+        Block(
+            "pole_placement_law",
+            {"x": ("position", "velocity", "zeros"), "x_des": ("goal", "zeros"), "u_des": "zeros[0]", "u": "asked"},
+        ),
+        Block("motor_compensation", {"theta": "position", "thd": "goal[1]", "tau": "modelled"}),
+        Sum("command", (1.0, "asked"), ("fed", "modelled")),
+    ]
+    motor: dict[str, Wire] = {"theta": "x[0]", "thd": "x[1]", "tau": "u", "f": "zeros[0]", "thdd": "xd[1]"}
+    loop = Loop(
+        [Sum("xd[0]", (1.0, "x[1]")), Block("motor_acceleration", motor)], law, {"x": "xd"},
+        [Sensor("x[0]", "position", POSITION_NOISE), Sensor("x[1]", "velocity", VELOCITY_NOISE)],
+        [Actuator("command", "u", late=False)],
+    )  # fmt: skip
+    times = np.arange(round(duration / PERIOD)) * PERIOD
+    values = {
+        "zeros": np.zeros(2),
+        "K": (inertia * BANDWIDTH**2, 2 * DAMPING * inertia * BANDWIDTH, 0.0, 0.0),
+        "u": 0.0,
+    }
+    scenarios = []
+    for seed, (speed, share) in enumerate(zip(speeds, fed, strict=True)):
+        goal = np.stack([start + speed * times, np.full_like(times, speed)], axis=1)
+        scenarios.append(Scenario(values | {"x": goal[0], "fed": share}, len(times), {"goal": goal}, seed))
+    traces = simulate(library, loop, scenarios, ["x[0]", "asked"])
+    return np.stack([trace["x[0]"][:, 0] for trace in traces]), np.stack([trace["asked"][:, 0] for trace in traces])
 
 
 def repeatability(recordings: Recordings) -> Figure:
@@ -155,41 +160,32 @@ def repeatability(recordings: Recordings) -> Figure:
     spread = float(np.std(recordings.repeated - mean))
     share = spread / float(np.std(mean))
 
-    def draw(axes: Any) -> None:
-        axes.plot(recordings.theta, recordings.repeated.T, linewidth=0.4)
-        axes.set(xlabel="output angle [rad]", ylabel="commanded torque [N m]")
-
     return Figure(
         number="3.4",
         title=f"Commanded torque of {RUNS} motions at {recordings.speed:g} rad/s from the same angle",
         claim="The disturbance repeats: it depends on the position.",
         found=f"Runs differ by {share:.0%} of what they have in common.",
         holds=share < 0.2,
-        draw=draw,
+        draw=curves(recordings.theta, recordings.repeated.T, "output angle [rad]", "commanded torque [N m]"),
     )
 
 
 def frequencies(recordings: Recordings) -> Figure:
     """Figure 3.5: at twice the speed the main line is at twice the frequency, and as high."""
     fast, slow = recordings.repeated[0], recordings.slow
-    curves = [(recordings.speed, *recordings.spectrum(fast)), (recordings.speed / 2, *recordings.spectrum(slow))]
-    rotor = [lines > recordings.line / 2 for _, lines, _ in curves]
-    main = [speed * lines[ours][np.argmax(a[ours])] for (speed, lines, a), ours in zip(curves, rotor, strict=True)]
+    spectra = [(recordings.speed, *recordings.spectrum(fast)), (recordings.speed / 2, *recordings.spectrum(slow))]
+    rotor = [lines > recordings.line / 2 for _, lines, _ in spectra]
+    main = [speed * lines[ours][np.argmax(a[ours])] for (speed, lines, a), ours in zip(spectra, rotor, strict=True)]
     shift, heights = main[0] / main[1], recordings.peak(fast) / recordings.peak(slow)
 
-    def draw(axes: Any) -> None:
-        for speed, lines, amplitude in curves:
-            axes.plot(speed * lines / (2 * np.pi), amplitude, linewidth=0.8, label=f"{speed:g} rad/s")
-        axes.set(xlabel="frequency [Hz]", ylabel="torque amplitude [N m]", xlim=(0, recordings.highest))
-        axes.legend()
-
+    shown = {f"{speed:g} rad/s": (speed * lines / (2 * np.pi), amplitude) for speed, lines, amplitude in spectra}
     return Figure(
         number="3.5",
         title="Frequencies of the disturbance at two speeds",
         claim="The main line moves with the rotor's speed, so the disturbance depends on the position.",
         found=f"At twice the speed it is at {shift:.3g} times the frequency, {heights:.2f} times as high.",
         holds=abs(shift - 2) < 1e-6 and abs(heights - 1) < 0.1,
-        draw=draw,
+        draw=curves(None, shown, "frequency [Hz]", "torque amplitude [N m]", xlim=(0, recordings.highest)),
     )
 
 
@@ -198,21 +194,17 @@ def compensation(recordings: Recordings) -> Figure:
     without, fed = recordings.repeated[0], recordings.compensated
     left = recordings.peak(fed) / recordings.peak(without)
 
-    def draw(axes: Any) -> None:
-        for torque, label in ((without, "without compensation"), (fed, "with compensation")):
-            lines, amplitude = recordings.spectrum(torque)
-            frequency = lines * recordings.speed / (2 * np.pi)
-            axes.plot(frequency, amplitude, linewidth=0.8, label=label)
-        axes.set(xlabel="frequency [Hz]", ylabel="torque amplitude [N m]", xlim=(0, recordings.highest))
-        axes.legend()
-
+    shown = {}
+    for torque, label in ((without, "without compensation"), (fed, "with compensation")):
+        lines, amplitude = recordings.spectrum(torque)
+        shown[label] = lines * recordings.speed / (2 * np.pi), amplitude
     return Figure(
         number="3.6",
         title="Frequencies of the controller's torque with and without compensation",
         claim="Feeding the disturbance forward attenuates the rotor's main line.",
         found=f"Of its amplitude {left:.0%} is left.",
         holds=left < 0.25,
-        draw=draw,
+        draw=curves(None, shown, "frequency [Hz]", "torque amplitude [N m]", xlim=(0, recordings.highest)),
     )
 
 

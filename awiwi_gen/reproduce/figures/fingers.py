@@ -12,8 +12,7 @@ from awiwi_gen.hand.lever import Lever
 from awiwi_gen.kernels.base_estimate import base_of
 from awiwi_gen.reproduce.base_search import BaseSearch
 from awiwi_gen.results import Figure
-
-Array = np.ndarray[Any, Any]
+from awiwi_gen.simulate import Array, Block, Loop, Scenario, Sum, simulate
 
 RELEASE, JOINT = 0.1, 1  # rad, at the joint for flexion
 PRETENSION = 20.0  # N in every tendon
@@ -89,30 +88,45 @@ def coriolis(library: Any, hand: Hand, spring: Spring) -> Figure:
 
 
 def released(library: Any, hand: Hand) -> Release:
-    """Both motions for all readings, integrated together by one call of SciPy's DOP853."""
-    from scipy.integrate import solve_ivp
-
-    n = len(hand.fingers["index"].joints)
-    straight = np.zeros(n)
-    rest = library.index_tendon_lengths(straight)
-    slack = library.spring_elongation(PRETENSION).x
-    start = np.zeros((2, n))
-    start[0, JOINT] = RELEASE
+    """Both motions for all readings."""
+    n, m = len(hand.fingers["index"].joints), len(hand.fingers["index"].tendons)
+    straight, start = np.zeros(n), np.zeros(n)
+    start[JOINT] = RELEASE
     dampings = damping_readings(library, straight)
-    D = np.array(list(dampings.values()))[:, None]  # (readings, 1, n, n), against (2, n): with and without
-    kept = np.array([[1.0], [0.0]])
-
-    def motion(_: float, flat: Array) -> Array:
-        q, qd = np.moveaxis(flat.reshape(len(D), 2, 2, n), 2, 0)
-        force = library.spring_force(slack + library.index_tendon_lengths(q) - rest).f
-        torque = library.index_joint_torque(q, force) - (D @ qd[..., None])[..., 0]
-        return np.stack([qd, library.index_forward_dynamics(q, kept * qd, torque, np.zeros(3))], axis=2).ravel()
-
-    times = np.linspace(0.0, DURATION, STEPS)
-    whole = np.broadcast_to(start, (len(D), 2, 2, n)).ravel()
-    path = solve_ivp(motion, (0.0, DURATION), whole, "DOP853", times, rtol=1e-7, atol=1e-10)
-    q = path.y.reshape(len(D), 2, 2, n, -1)[:, :, 0].swapaxes(2, 3)
-    return Release(tuple(dampings), times, q[:, 0], q[:, 1])
+    springs = [Block("spring_force", {"x": f"elongations[{i}]", "f": f"forces[{i}]"}) for i in range(m)]
+    damping = [(f"damping[{i * n}:{i * n + n}]", f"qd[{i}]") for i in range(n)]  # row by row: the matrix is symmetric
+    paths = {
+        name: simulate(
+            library,
+            Loop(
+                [
+                    Sum("speeds", (1.0, "qd")),
+                    Block("index_tendon_lengths", {"h": "lengths"}),
+                    Sum("elongations", (1.0, "lengths"), (-1.0, "slack_lengths")),
+                    *springs,
+                    Block("index_joint_torque", {"f": "forces", "tau": "pull"}),
+                    Sum("tau", (1.0, "pull"), *damping),
+                    Block("index_forward_dynamics", {"qd": seen}),
+                ],
+                [], {"q": "speeds", "qd": "qdd"}, period=DURATION / (STEPS - 1),
+            ),
+            [
+                Scenario(
+                    {
+                        "q": start, "qd": straight, "at_rest": straight, "damping": -D, "forces": np.zeros(m),
+                        "slack_lengths": library.index_tendon_lengths(straight) - library.spring_elongation(PRETENSION).x,
+                        "g": np.zeros(3),
+                    },
+                    STEPS,
+                )
+                for D in dampings.values()
+            ],
+            ["q"],
+        )
+        for name, seen in (("full", "qd"), ("reduced", "at_rest"))
+    }  # fmt: skip
+    full, reduced = (np.stack([trace["q"] for trace in traces]) for traces in paths.values())
+    return Release(tuple(dampings), np.linspace(0.0, DURATION, STEPS), full, reduced)
 
 
 def damping_readings(library: Any, q: Array) -> dict[str, Array]:
