@@ -117,7 +117,7 @@ def generate(
 
         compiler()  # without one nothing can be verified: the error comes before anything is replaced
     if job.hand.gains:
-        with_studies("the check of its gains").require_running_gains(job.hand, job.store)
+        with_studies("the check of its gains", "tune").require_running_gains(job.hand, job.store)
     changed = generate(job, output)
     if verify:
         return prove(job, hand, output, as_json)
@@ -254,9 +254,9 @@ def report(
 ) -> int:  # fmt: skip
     """Compute the source's figures and numbers again, and write them on one page with the proof of every kernel."""
     from awiwi_gen.report import print_json
-    from awiwi_gen.studies.page import publish, summary, verdict
+    from awiwi_gen.reproduce import publish, summary, verdict
 
-    results = publish(make_job(hand), page)
+    results = publish(make_job(hand), page, with_studies("figures", "compare").comparison)
     if as_json:
         print_json(results.as_dict())
     else:
@@ -296,19 +296,19 @@ def simulate(
     hand: HandFile = None, as_json: Json = False,
 ) -> int:  # fmt: skip
     """Run laws on a joint between two tendons, on the hand's clock, and tell how they bear it."""
-    studies = with_studies("simulation", "benchmark.command")
+    studies = with_studies("simulation", "compare")
     one = scenario != ""
     shown = studies.one_run(hand, law, gains, scenario, force, plant) if one else studies.benchmark(hand, law, gains)
     shown.show(as_json)
     return 0
 
 
-def with_studies(purpose: str, module: str = "hand_gains") -> Any:
-    """A module of the studies. Raises InputError where the libraries are missing that it needs."""
+def with_studies(purpose: str, room: str) -> Any:
+    """A room that needs the extra "studies". Raises InputError where a library is missing that it needs."""
     from importlib import import_module
 
     try:
-        return import_module(f"awiwi_gen.studies.{module}")
+        return import_module(f"awiwi_gen.{room}")
     except ModuleNotFoundError as error:
         raise InputError(f"{error.name} needed for {purpose}; install it: pip install 'awiwi_gen[studies]'") from None
 

@@ -1,18 +1,17 @@
-"""Loops of compiled kernels on a real clock: how they are wired, and what Python asks of `csrc/simulate.c`.
+"""Simulation of control loops: compiled kernels as plant and law, wired by name, run by `csrc/simulate.c`.
 
     loop = Loop(
-        plant=[Block("plant_joint_linear", {"u": "applied"})],
-        law=[Block("pole_placement_law", {"x": "seen", "u": "wanted"})],
+        plant=[Block("plant_joint_linear")],
+        law=[Block("pole_placement_law", {"x": "measured", "u": "command"})],
         states={"x": "xd"},
-        sensors=[Sensor("x", "seen")],
-        actuators=[Actuator("wanted", "applied", limit=3.0)],
+        sensors=[Sensor("x", "measured")],
+        actuators=[Actuator("command", "u", limit=3.0)],
     )
-    trace, = simulate(library, loop, [Scenario({"x": x0, ...}, ticks=300)], watch=["x", "applied"])
+    trace, = simulate(library, loop, [Scenario({"x": x0, ...}, ticks=300)], watch=["x", "u"])
 
-All quantities are signals, arrays with a name. A port of a kernel is wired to the signal of its own name unless told
-otherwise: to another one, to elements of it ("x[2]", "x[1:3]"), or to several, one after the other. Whatever no kernel
-writes keeps the value that the scenario gives it: parameters, references at rest. What the law's kernels write and read
-is their memory: it lasts from one period to the next.
+All quantities are signals: named arrays. A port of a kernel is wired to the signal of its own name unless ``wires`` say
+otherwise: another name, some elements ("x[2]", "x[1:3]"), or a tuple of these. Signals that no block writes keep the
+values of the scenario: parameters, constant references. Signals that blocks of the law write last to the next period.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from math import ceil, inf, prod
-from typing import Any
+from typing import Any, Union
 
 import numpy as np
 
@@ -32,59 +31,70 @@ from awiwi_gen.library import Library
 
 Array = np.ndarray[Any, Any]
 Wire = str | tuple[str, ...]
+Element = Union["Block", "Sum"]
 
 PERIOD = 1 / 3000  # s, of the hand's clock
-REACH = 0.25  # how far a step of integration goes, in time constants of the plant's fastest motion
+REACH = 0.25  # largest step of integration, in time constants of the plant's fastest mode
 
 
 @dataclass(frozen=True)
 class Block:
-    """A kernel in a loop; ``wires`` tell which signals its ports are wired to."""
+    """A kernel in a loop; ``wires`` map its ports to signals."""
 
     kernel: str
     wires: Mapping[str, Wire] = field(default_factory=dict)
 
 
+class Sum:
+    """Writes sums of products: ``target`` becomes a b + c d + ... for the terms (a, b), (c, d), ..., element by element.
+
+    Factors are numbers or wires; a factor with one element applies to all elements.
+    """
+
+    def __init__(self, target: Wire, *terms: tuple[float | Wire, float | Wire]) -> None:
+        self.target, self.terms = target, terms
+
+
 @dataclass(frozen=True)
 class Sensor:
-    """Shows signals to the law, element by element: with normal noise of a standard deviation, in whole steps."""
+    """Measures signals for the law: adds normal noise of this standard deviation, then rounds to whole steps."""
 
-    shown: Wire
-    seen: Wire
+    source: Wire
+    target: Wire
     noise: float = 0.0
     step: float = 0.0
 
 
 @dataclass(frozen=True)
 class Actuator:
-    """Takes what a law wants to the plant, within +-limit; ``late`` by one period, or at once."""
+    """Applies a command of the law to the plant, within +-limit; one period late, or at once."""
 
-    wanted: Wire
-    applied: Wire
+    source: Wire
+    target: Wire
     limit: float = inf
     late: bool = True
 
 
 @dataclass(frozen=True)
 class Loop:
-    """A plant, a law, and what is between them. ``states`` maps each state of the plant to the signal of its rate."""
+    """A plant, a law, sensors and actuators. ``states`` map each state of the plant to the signal of its rate."""
 
-    plant: Sequence[Block]
-    law: Sequence[Block]
+    plant: Sequence[Element]
+    law: Sequence[Element]
     states: Mapping[str, str]
     sensors: Sequence[Sensor] = ()
     actuators: Sequence[Actuator] = ()
     period: float = PERIOD
 
     def exact(self) -> Loop:
-        """The same without noise, rounding and limits: what a linearisation is of."""
+        """The same without noise, rounding and limits, for linearisation."""
         sensors = [replace(sensor, noise=0.0, step=0.0) for sensor in self.sensors]
         return replace(self, sensors=sensors, actuators=[replace(a, limit=inf) for a in self.actuators])
 
 
 @dataclass(frozen=True)
 class Scenario:
-    """What one run begins with and what drives it: values of signals, and rows of them for each tick (ticks, size)."""
+    """One run: initial values of signals, and inputs that change every tick, each (ticks, size)."""
 
     values: Mapping[str, Any]
     ticks: int
@@ -94,10 +104,9 @@ class Scenario:
 
 @dataclass(frozen=True)
 class Trace:
-    """What was watched of one run: signals (rows, size) at the times (rows) [s].
+    """Watched signals (rows, size) of one run at the times (rows) [s].
 
-    ``done`` ticks of those asked for were possible; in ``refused`` of them the law had no answer. ``status`` is that of
-    the last, 0 for success.
+    ``done`` ticks were simulated, and in ``refused`` of them the law failed. ``status`` is that of the last, 0 for success.
     """
 
     time: Array
@@ -118,9 +127,9 @@ def simulate(
     every: int = 1,
     substeps: int | None = None,
 ) -> list[Trace]:
-    """Run every scenario, on all cores. Signals to ``watch`` are kept every so many ticks, as they are when it begins.
+    """Run every scenario, on all cores. Every ``every``-th tick records the signals to ``watch``, as at its beginning.
 
-    Steps of integration are chosen by the plant's fastest motion at the start unless their number is given. Raises
+    Without ``substeps`` the plant's fastest mode at the start decides how many steps of integration a period has. Raises
     InputError where signals and kernels do not fit.
     """
     watched = list(watch)
@@ -133,16 +142,18 @@ def simulate(
 
 
 class Machine:
-    """A loop as C sees it: places in one vector of signals, and the tables that point to them."""
+    """A loop as C has it: one vector of signals, and tables of indices into it."""
 
     def __init__(self, library: Library, loop: Loop, scenario: Scenario, substeps: int | None = None) -> None:
         self.library, self.loop = library, loop
-        self.places: dict[str, slice] = {}
+        self.slices: dict[str, slice] = {}
         self._allocate(scenario)
-        self.signals = np.zeros(max((place.stop for place in self.places.values()), default=0), self._dtype)
+        self.signals = np.zeros(max((each.stop for each in self.slices.values()), default=0), self._dtype)
         for name, value in scenario.values.items():
-            self.signals[self.places[name]] = np.ravel(value)
-        self._kept: list[Any] = []
+            self.signals[self.slices[name]] = np.ravel(value)
+        for number in self._constants():
+            self.signals[self.indices(number)] = number
+        self._alive: list[Any] = []  # C arrays that the tables point to
         self.c = self._struct(scenario.seed)
         self.c.substeps = substeps or self.substeps()
 
@@ -152,13 +163,10 @@ class Machine:
 
     @property
     def states(self) -> int:
-        """How many states the plant has."""
-        return sum(self._size(name) for name in self.loop.states)
+        """Number of states of the plant."""
+        return sum(len(self.indices(name)) for name in self.loop.states)
 
-    def _size(self, name: str) -> int:
-        return len(self.where(name))
-
-    # -- places ---------------------------------------------------------------------------------------------
+    # -- signals --------------------------------------------------------------------------------------------
 
     def _allocate(self, scenario: Scenario) -> None:
         sizes = {name: int(np.size(value)) for name, value in scenario.values.items()}
@@ -166,19 +174,44 @@ class Machine:
         for port, wire in self._wired():
             if isinstance(wire, str) and "[" not in wire:
                 sizes.setdefault(wire, prod(port["shape"]))
-        for sensor in self.loop.sensors:
-            self._same_size(sizes, sensor.shown, sensor.seen)
-        for actuator in self.loop.actuators:
-            self._same_size(sizes, actuator.applied, actuator.wanted)
-        place = 0
+        pairs: list[tuple[Wire, Wire]] = [(sensor.target, sensor.source) for sensor in self.loop.sensors]
+        pairs += [(actuator.target, actuator.source) for actuator in self.loop.actuators]
+        pairs += [(rate, state) for state, rate in self.loop.states.items()]
+        for target, source in pairs:
+            if isinstance(target, str) and "[" not in target:
+                sizes.setdefault(target, self._width(source, sizes))
+        sizes = {name: size for name, size in sizes.items() if size}
+        sizes |= {_constant(number): 1 for number in self._constants()}
+        start = 0
         for name in dict.fromkeys([*self.loop.states, *self.loop.states.values(), *sizes]):
             if name not in sizes:
-                raise InputError(f"{name} is a state that neither a kernel nor the scenario knows")
-            self.places[name] = slice(place, place + sizes[name])
-            place += sizes[name]
+                raise InputError(f"{name} is a state or a rate whose size neither a kernel nor the scenario gives")
+            self.slices[name] = slice(start, start + sizes[name])
+            start += sizes[name]
+        for each in self._sums():  # a sum is as long as its longest factor
+            if isinstance(each.target, str) and "[" not in each.target and each.target not in self.slices:
+                size = max(len(self.indices(factor)) for term in each.terms for factor in term)
+                self.slices[each.target] = slice(start, start + size)
+                start += size
+
+    def _width(self, wire: Wire, sizes: Mapping[str, int]) -> int:
+        """Number of elements of a wire; 0 if it leads to a signal of unknown size."""
+        if isinstance(wire, tuple):
+            return sum(self._width(part, sizes) for part in wire)
+        _, low, high = _parts(wire)
+        return sizes.get(wire, 0) if low is None else (high or low + 1) - low
+
+    def _sums(self) -> list[Sum]:
+        return [each for each in [*self.loop.plant, *self.loop.law] if isinstance(each, Sum)]
+
+    def _constants(self) -> set[float]:
+        factors = {factor for each in self._sums() for term in each.terms for factor in term}
+        return {factor for factor in factors if not isinstance(factor, str | tuple)}
 
     def _wired(self) -> Iterable[tuple[dict[str, Any], Wire]]:
         for block in [*self.loop.plant, *self.loop.law]:
+            if isinstance(block, Sum):
+                continue
             kernel = self._kernel(block)
             names = [port["name"] for port in kernel.inputs + kernel.outputs]
             unknown = [port for port in block.wires if port not in names]
@@ -192,84 +225,91 @@ class Machine:
             raise InputError(f"a loop needs {block.kernel}, which this library does not have")
         return self.library[block.kernel]
 
-    @staticmethod
-    def _same_size(sizes: dict[str, int], known: Wire, new: Wire) -> None:
-        if isinstance(new, str) and "[" not in new and isinstance(known, str) and known in sizes:
-            sizes.setdefault(new, sizes[known])
-
-    def where(self, wire: Wire) -> list[int]:
-        """Places of the elements that a wire leads to. Raises InputError if there are none."""
+    def indices(self, wire: float | Wire) -> list[int]:
+        """Indices of the signals of a wire, or of a constant of a sum. Raises InputError if there are none."""
         if isinstance(wire, tuple):
-            return [place for part in wire for place in self.where(part)]
-        found = re.fullmatch(r"(\w+)(?:\[(\d+)(?::(\d+))?\])?", wire)
-        if found is None or found[1] not in self.places:
-            raise InputError(f"no signal {wire!r}: nothing gives it a value")
-        places = range(self.places[found[1]].start, self.places[found[1]].stop)
-        if found[2] is None:
-            return list(places)
-        low = int(found[2])
-        chosen = list(places[low : int(found[3] or low + 1)])
-        if len(chosen) != int(found[3] or low + 1) - low:
-            raise InputError(f"{wire!r} is beyond its signal, which has {len(places)} elements")
+            return [index for part in wire for index in self.indices(part)]
+        if not isinstance(wire, str):
+            return [self.slices[_constant(wire)].start]
+        name, low, high = _parts(wire)
+        if name not in self.slices:
+            raise InputError(f"no signal {wire!r}: no block writes it, and the scenario gives it no value")
+        whole = range(self.slices[name].start, self.slices[name].stop)
+        if low is None:
+            return list(whole)
+        chosen = list(whole[low : high or low + 1])
+        if len(chosen) != (high or low + 1) - low:
+            raise InputError(f"{wire!r} is beyond its signal, which has {len(whole)} elements")
         return chosen
 
-    # -- what C is told -------------------------------------------------------------------------------------
+    # -- tables for C ---------------------------------------------------------------------------------------
 
     def _struct(self, seed: int) -> Any:
         ffi, loop = self.library.ffi, self.loop
-        blocks = [self._blocks(blocks) for blocks in (loop.plant, loop.law)]
-        sensors = [(a, b, s.noise, s.step) for s in loop.sensors for a, b in self._pairs(s.shown, s.seen)]
+        blocks = [ffi.new("awiwi_block[]", [self._row(each) for each in part]) for part in (loop.plant, loop.law)]
+        sensors = [(a, b, s.noise, s.step) for s in loop.sensors for a, b in self._pairs(s.source, s.target)]
         actuators = [
             (a, b, min(x.limit, float(np.finfo(self._dtype).max)), x.late)
             for x in loop.actuators
-            for a, b in self._pairs(x.wanted, x.applied)
+            for a, b in self._pairs(x.source, x.target)
         ]
         tables = [ffi.new("awiwi_sensor[]", sensors), ffi.new("awiwi_actuator[]", actuators)]
-        self._kept += [*blocks, *tables]
+        self._alive += [*blocks, *tables]
         counts = (self.states, len(loop.plant), len(loop.law), len(sensors), len(actuators))
         return ffi.new("awiwi_loop *", (*counts, *blocks, *tables, loop.period, 1, seed))
 
-    def _blocks(self, blocks: Sequence[Block]) -> Any:
-        ffi, rows = self.library.ffi, []
-        for block in blocks:
-            kernel = self._kernel(block)
-            sides = []
-            for ports in (kernel.inputs, kernel.outputs):
-                places = []
-                for port in ports:
-                    found = self.where(block.wires.get(port["name"], port["name"]))
-                    if len(found) != prod(port["shape"]):
-                        raise InputError(
-                            f"{block.kernel}: {port['name']} has {prod(port['shape'])} elements, "
-                            f"its wires lead to {len(found)}"
-                        )
-                    places += found
-                sides.append(ffi.new("int[]", places))
-            self._kept += sides
-            rows.append((kernel.flat, len(sides[0]), len(sides[1]), *sides))
-        return ffi.new("awiwi_block[]", rows)
+    def _row(self, block: Element) -> tuple[Any, ...]:
+        """A block as C has it: its function, and the indices of what it reads and writes."""
+        if isinstance(block, Sum):
+            function, target = self.library.ffi.NULL, self.indices(block.target)
+            read = [index for term in block.terms for factor in term for index in self._repeated(factor, len(target))]
+        else:
+            function = self._kernel(block).flat
+            read, target = (self._ports(block, ports) for ports in self._sides(block))
+        sides = [self.library.ffi.new("int[]", side) for side in (read, target)]
+        self._alive += sides
+        return function, len(read), len(target), *sides
+
+    def _sides(self, block: Block) -> tuple[Any, Any]:
+        kernel = self._kernel(block)
+        return kernel.inputs, kernel.outputs
+
+    def _ports(self, block: Block, ports: Any) -> list[int]:
+        indices: list[int] = []
+        for port in ports:
+            found, size = self.indices(block.wires.get(port["name"], port["name"])), prod(port["shape"])
+            if len(found) != size:
+                raise InputError(f"{block.kernel}: {port['name']} has {size} elements, its wires have {len(found)}")
+            indices += found
+        return indices
+
+    def _repeated(self, factor: float | Wire, size: int) -> list[int]:
+        found = self.indices(factor)
+        if len(found) not in (1, size):
+            raise InputError(f"a sum of {size} elements has the factor {factor!r} of {len(found)}")
+        return found if len(found) == size else found * size
 
     def _pairs(self, source: Wire, target: Wire) -> list[tuple[int, int]]:
-        ends = self.where(source), self.where(target)
+        ends = self.indices(source), self.indices(target)
         if len(ends[0]) != len(ends[1]):
             raise InputError(f"{source} has {len(ends[0])} elements, {target} has {len(ends[1])}")
         return list(zip(*ends, strict=True))
 
-    # -- what it does ---------------------------------------------------------------------------------------
+    # -- running --------------------------------------------------------------------------------------------
 
     def run(self, scenario: Scenario, watch: Sequence[str], every: int = 1) -> Trace:
         """Run the scenario from the present signals on."""
         ffi = self.library.ffi
-        driven = [(self.where(name), self._rows(value, scenario)) for name, value in scenario.inputs.items()]
+        driven = [(self.indices(name), self._rows(value, scenario)) for name, value in scenario.inputs.items()]
         rows = np.hstack([np.zeros((scenario.ticks, 0)), *(rows for _, rows in driven)])
         values = np.ascontiguousarray(rows, self._dtype)
-        inputs = [place for places, _ in driven for place in places]
-        parts = {name: self.where(name) for name in watch}
-        places = [place for part in parts.values() for place in part]
-        record = np.zeros((ceil(scenario.ticks / every), len(places)), self._dtype)
+        inputs = [index for indices, _ in driven for index in indices]
+        parts = {name: self.indices(name) for name in watch}
+        watched = [index for part in parts.values() for index in part]
+        record = np.zeros((ceil(scenario.ticks / every), len(watched)), self._dtype)
         pointer = f"{self.library.manifest['c_type']}[]"
-        tables = [ffi.new("int[]", inputs), ffi.from_buffer(pointer, values), ffi.new("int[]", places)]
-        counts = (scenario.ticks, len(inputs), len(places), every)
+        tables = [ffi.new("int[]", inputs), ffi.from_buffer(pointer, values), ffi.new("int[]", watched)]
+        counts = (scenario.ticks, len(inputs), len(watched), every)
         plan = ffi.new("awiwi_run *", (*counts, *tables, ffi.from_buffer(pointer, record)))
         refused, status = ffi.new("int *"), ffi.new("int *")
         done = self.library.c.awiwi_simulate(self.c, plan, ffi.from_buffer(pointer, self.signals), refused, status)
@@ -287,10 +327,10 @@ class Machine:
         return rows
 
     def rates(self, signals: Array) -> Array:
-        """Rates of the plant's states (states,) at given signals, which learn what else the plant tells."""
+        """Rates of the plant's states (states,) at given signals; writes the plant's other outputs into them."""
         pointer = f"{self.library.manifest['c_type']}[]"
         if self.library.c.awiwi_rates(self.c, self.library.ffi.from_buffer(pointer, signals)):
-            raise InputError("the plant has no rates there: a kernel of it refuses")
+            raise InputError("the plant has no rates there: one of its kernels fails")
         return signals[self.states : 2 * self.states].copy()
 
     def tick(self, signals: Array) -> Array:
@@ -299,26 +339,30 @@ class Machine:
         pointer = f"{self.library.manifest['c_type']}[]"
         status = self.library.c.awiwi_tick(self.c, 0, self.library.ffi.from_buffer(pointer, after))
         if status:
-            raise InputError(f"the loop cannot go on from there (status {status})")
+            raise InputError(f"the loop cannot continue from there (status {status})")
         return after
 
-    def stand(self) -> None:
-        """Let no time pass in a tick: what is left of it is what the law does."""
+    def freeze_plant(self) -> None:
+        """Make ticks take no time: from now on only the law changes signals."""
         self.c.period = 0
 
-    def kept(self) -> list[int]:
-        """Places of all that lasts from one period to the next: the plant's states, and what law and motors write."""
-        written = [b.wires.get(p["name"], p["name"]) for b in self.loop.law for p in self._kernel(b).outputs]
-        written += [sensor.seen for sensor in self.loop.sensors]
-        written += [wire for actuator in self.loop.actuators for wire in (actuator.wanted, actuator.applied)]
-        return sorted({*range(self.states), *(place for wire in written for place in self.where(wire))})
+    def memory(self) -> list[int]:
+        """Indices of all that lasts from one period to the next: the plant's states, and what law and actuators write."""
+        written = [sensor.target for sensor in self.loop.sensors]
+        written += [wire for actuator in self.loop.actuators for wire in (actuator.source, actuator.target)]
+        indices = {*range(self.states), *(index for wire in written for index in self.indices(wire))}
+        for block in self.loop.law:
+            indices |= set(
+                self.indices(block.target) if isinstance(block, Sum) else self._ports(block, self._sides(block)[1])
+            )
+        return sorted(indices)
 
     def plant_slopes(self) -> Array:
         """Slopes (states, states) of the rates by the states, at the present signals [1/s]."""
         return slopes(self.rates, self.signals, np.arange(self.states))
 
     def substeps(self) -> int:
-        """How many steps a period needs so that the plant's fastest motion is followed closely."""
+        """Number of integration steps in a period that the plant's fastest mode needs."""
         slopes_now = self.plant_slopes()
         if not np.isfinite(slopes_now).all():
             return 1  # the run ends before it begins
@@ -326,15 +370,29 @@ class Machine:
         return max(1, ceil(fastest * self.loop.period / REACH))
 
 
+def _parts(wire: str) -> tuple[str, int | None, int | None]:
+    """Name, first element and end of a wire such as "x", "x[2]" or "x[1:3]"."""
+    found = re.fullmatch(r"(\w+)(?:\[(\d+)(?::(\d+))?\])?", wire)
+    if found is None:
+        return wire, None, None
+    low, high = (int(each) if each else None for each in found.groups()[1:])
+    return found[1], low, high
+
+
+def _constant(number: float) -> str:
+    """Name of the signal that holds a constant factor."""
+    return repr(float(number) + 0.0)  # -0.0 is 0.0
+
+
 def slopes(function: Any, at: Array, by: Array) -> Array:
     """Central differences of a function of all signals by some of them, (outputs, len(by))."""
     columns = []
-    for place in by:
-        step = 1e-6 * max(1.0, abs(float(at[place])))
+    for index in by:
+        step = 1e-6 * max(1.0, abs(float(at[index])))
         ends = []
         for sign in (1, -1):
             moved = at.copy()
-            moved[place] += sign * step
+            moved[index] += sign * step
             ends.append(function(moved))
         columns.append((ends[0] - ends[1]) / (2 * step))
     return np.array(columns).T.reshape(-1, len(by))

@@ -1,5 +1,5 @@
-/* A sampled loop of kernels: a plant in continuous time, a law on a clock, sensors and actuators between them. Bounded
-   work, no heap; reentrant. All quantities live in one vector of signals; kernels are wired by places in it. */
+/* A simulated control loop: a plant in continuous time, a law on a clock, sensors and actuators between them. Bounded
+   work, no heap; reentrant. All quantities are in one vector of signals; kernels are wired by indices into it. */
 #ifndef AWIWI_SIMULATE_H
 #define AWIWI_SIMULATE_H
 
@@ -11,11 +11,12 @@ extern "C" {
 
 enum { AWIWI_MOST_RATES = 64, AWIWI_MOST_ARGUMENTS = 512 };
 
-/* A kernel whose inputs lie one after the other, and its outputs likewise; returns an awiwi_status. */
+/* A kernel with all inputs in one array and all outputs in another; returns an awiwi_status. */
 typedef int (*awiwi_flat)(const awiwi_real *in, awiwi_real *out);
 
-/* A kernel in its place: inputs are read from the signals `from`, outputs written to the signals `to`; at most
-   AWIWI_MOST_ARGUMENTS of each. */
+/* A kernel in a loop: it reads its inputs from the signals `from` and writes its outputs to the signals `to`; at most
+   AWIWI_MOST_ARGUMENTS of each. Without a kernel (NULL) a block adds products: for n outputs, output i is
+   in[i] * in[n + i] + in[2 n + i] * in[3 n + i] + ... */
 typedef struct awiwi_block {
     awiwi_flat kernel;
     int inputs;
@@ -24,7 +25,7 @@ typedef struct awiwi_block {
     const int *to;
 } awiwi_block;
 
-/* Shows one signal to the law: with normal noise, then rounded to whole steps. Neither where they are 0. */
+/* Measures one signal for the law: adds normal noise of this standard deviation, then rounds to whole steps; 0 for none. */
 typedef struct awiwi_sensor {
     int from;
     int to;
@@ -32,7 +33,7 @@ typedef struct awiwi_sensor {
     awiwi_real step;
 } awiwi_sensor;
 
-/* Takes what the law commands to the plant, within its limit; one sample later if it is late. */
+/* Applies a command of the law to the plant, within +-limit; one period later if `late`. */
 typedef struct awiwi_actuator {
     int from;
     int to;
@@ -57,8 +58,8 @@ typedef struct awiwi_loop {
     unsigned seed;     /* of the noise */
 } awiwi_loop;
 
-/* What drives a run and what is kept of it: in tick i the signals `input` take the values of row i of inputs[ticks][],
-   and every so many ticks the signals `watch` become a row of record[], before the plant moves on. */
+/* Inputs and record of a run: in tick i the signals `input` take the values of row i of values[ticks][inputs], and in
+   every `every`-th tick the signals `watch` are written to the next row of record[], before the plant moves. */
 typedef struct awiwi_run {
     int ticks;
     int inputs;
@@ -70,19 +71,19 @@ typedef struct awiwi_run {
     awiwi_real *record;
 } awiwi_run;
 
-/* The rates of the plant's states, and all that its kernels tell besides; AWIWI_OK or AWIWI_OUT_OF_DOMAIN. */
+/* Compute the rates of the plant's states and all other outputs of its blocks. AWIWI_OK or AWIWI_OUT_OF_DOMAIN. */
 int awiwi_rates(const awiwi_loop *loop, awiwi_real *signals);
 
-/* One period: sense, act on what was commanded, think, and integrate by Runge and Kutta's method. Where a block of the
-   law has no result, its signals stay as they were, and in this period nothing is commanded: 0. Returns
-   AWIWI_OK             all went well;
-   AWIWI_NOT_CONVERGED  the law refused;
-   AWIWI_OUT_OF_DOMAIN  a kernel of the plant has no result there;
-   AWIWI_NOT_FINITE     a state is not a number any more. */
+/* One period: read sensors, apply delayed commands, run the law, apply the other commands, and integrate by Runge and
+   Kutta's method. Where a block of the law fails, its outputs stay as they were and all commands are 0. Returns
+   AWIWI_OK             success;
+   AWIWI_NOT_CONVERGED  a block of the law failed;
+   AWIWI_OUT_OF_DOMAIN  a block of the plant failed;
+   AWIWI_NOT_FINITE     a state is infinite or not a number. */
 int awiwi_tick(const awiwi_loop *loop, unsigned tick, awiwi_real *signals);
 
-/* Ticks until all are done or the plant fails: returns how many were done. `refused` counts those without a command,
-   `status` is the last tick's. */
+/* Run ticks until all are done or the plant fails; returns their number. `refused` counts the ticks in which the law
+   failed; `status` is that of the last tick. */
 int awiwi_simulate(const awiwi_loop *loop, const awiwi_run *run, awiwi_real *signals, int *refused, int *status);
 
 #ifdef __cplusplus

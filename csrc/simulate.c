@@ -1,4 +1,4 @@
-/* Sampled loops of kernels: what a law does on a real clock. */
+/* A control law on a clock, and a plant in continuous time: loops of kernels, simulated. */
 #include "numerics.h"
 #include "awiwi_simulate.h"
 
@@ -18,13 +18,25 @@ static int all_finite(const awiwi_real *x, int n)
     return 1;
 }
 
-/* Run a kernel on its signals; `out` keeps its results. */
+/* Output i is the sum of in[i] * in[n + i], in[2 n + i] * in[3 n + i] and so on, for n outputs. */
+static int sum_of_products(const awiwi_block *block, const awiwi_real *in, awiwi_real *out)
+{
+    const int n = block->outputs;
+    for (int i = 0; i < n; i++) {
+        out[i] = 0;
+        for (int j = i; j + n < block->inputs; j += 2 * n)
+            out[i] += in[j] * in[j + n];
+    }
+    return AWIWI_OK;
+}
+
+/* Run a block on its signals; `out` receives its outputs. */
 static int call(const awiwi_block *block, const awiwi_real *signals, awiwi_real *out)
 {
     awiwi_real in[AWIWI_MOST_ARGUMENTS];
     for (int i = 0; i < block->inputs; i++)
         in[i] = signals[block->from[i]];
-    return block->kernel(in, out);
+    return block->kernel ? block->kernel(in, out) : sum_of_products(block, in, out);
 }
 
 static void put(const awiwi_block *block, const awiwi_real *out, awiwi_real *signals)
@@ -72,7 +84,7 @@ static int advance(const awiwi_loop *loop, awiwi_real h, awiwi_real *signals)
     return AWIWI_OK;
 }
 
-/* The noise: bits that depend on the counter only (a mixer with full avalanche). */
+/* Random bits that depend on the counter only (a mixer with full avalanche). */
 static uint32_t mixed(uint32_t x)
 {
     x = (x ^ (x >> 16)) * UINT32_C(0x7feb352d);
@@ -118,7 +130,7 @@ static void act(const awiwi_loop *loop, int late, awiwi_real *signals)
     }
 }
 
-static int think(const awiwi_loop *loop, awiwi_real *signals)
+static int run_law(const awiwi_loop *loop, awiwi_real *signals)
 {
     awiwi_real out[AWIWI_MOST_ARGUMENTS];
     int refused = 0;
@@ -135,14 +147,14 @@ static int think(const awiwi_loop *loop, awiwi_real *signals)
     return refused;
 }
 
-/* All but the plant's motion. */
+/* Everything in a tick but the motion of the plant. */
 static int control(const awiwi_loop *loop, unsigned tick, awiwi_real *signals)
 {
-    if (awiwi_rates(loop, signals)) /* so that sensors see the present */
+    if (awiwi_rates(loop, signals)) /* so that sensors see the present state */
         return AWIWI_OUT_OF_DOMAIN;
     sense(loop, tick, signals);
     act(loop, 1, signals);
-    const int refused = think(loop, signals);
+    const int refused = run_law(loop, signals);
     act(loop, 0, signals);
     return refused ? AWIWI_NOT_CONVERGED : AWIWI_OK;
 }
@@ -158,11 +170,11 @@ static int integrate(const awiwi_loop *loop, awiwi_real *signals)
 
 int awiwi_tick(const awiwi_loop *loop, unsigned tick, awiwi_real *signals)
 {
-    const int thought = control(loop, tick, signals);
-    if (thought == AWIWI_OUT_OF_DOMAIN)
-        return thought;
+    const int controlled = control(loop, tick, signals);
+    if (controlled == AWIWI_OUT_OF_DOMAIN)
+        return controlled;
     const int moved = integrate(loop, signals);
-    return moved ? moved : thought;
+    return moved ? moved : controlled;
 }
 
 int awiwi_simulate(const awiwi_loop *loop, const awiwi_run *run, awiwi_real *signals, int *refused, int *status)
@@ -175,12 +187,12 @@ int awiwi_simulate(const awiwi_loop *loop, const awiwi_run *run, awiwi_real *sig
             return tick;
         for (int i = 0; i < run->inputs; i++)
             signals[run->input[i]] = run->values[tick * run->inputs + i];
-        const int thought = control(loop, (unsigned)tick, signals);
+        const int controlled = control(loop, (unsigned)tick, signals);
         for (int i = 0; tick % run->every == 0 && i < run->watched; i++)
             *row++ = signals[run->watch[i]];
-        *refused += thought == AWIWI_NOT_CONVERGED;
-        const int moved = thought == AWIWI_OUT_OF_DOMAIN ? thought : integrate(loop, signals);
-        *status = moved ? moved : thought;
+        *refused += controlled == AWIWI_NOT_CONVERGED;
+        const int moved = controlled == AWIWI_OUT_OF_DOMAIN ? controlled : integrate(loop, signals);
+        *status = moved ? moved : controlled;
     }
     return run->ticks;
 }

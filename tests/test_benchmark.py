@@ -7,14 +7,14 @@ import pytest
 
 pytest.importorskip("scipy")
 
+from awiwi_gen.compare.clock import clocked, require_clocked, running_gains
+from awiwi_gen.compare.compare import compare
+from awiwi_gen.compare.laws import LAWS
+from awiwi_gen.compare.printed_gains import printed_gains
+from awiwi_gen.compare.scenarios import FORCES, PLANTS
 from awiwi_gen.errors import InputError
+from awiwi_gen.loops.hand_joint import joint_of, loop_around, values_of
 from awiwi_gen.simulate import Scenario, simulate
-from awiwi_gen.studies.benchmark.clock import clocked, require_clocked, running_gains
-from awiwi_gen.studies.benchmark.compare import compare
-from awiwi_gen.studies.benchmark.joint import joint_of, loop_around, values_of
-from awiwi_gen.studies.benchmark.laws import LAWS
-from awiwi_gen.studies.benchmark.printed_gains import printed_gains
-from awiwi_gen.studies.benchmark.scenarios import FORCES, PLANTS
 
 BEST = LAWS["backstepping_adaptive"]
 HEAVIER = "link 30 % heavier"

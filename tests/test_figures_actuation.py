@@ -6,7 +6,7 @@ import pytest
 from actuators import compiled, hand_text
 
 from awiwi_gen.hand import Hand
-from awiwi_gen.studies.figures.actuation import figures
+from awiwi_gen.reproduce.figures.actuation import figures
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ from actuators import compiled, hand_text
 
 from awiwi_gen.errors import InputError
 from awiwi_gen.hand import Hand
-from awiwi_gen.studies.identify import fit_calibration, fit_friction, fit_ripple, fit_unit
+from awiwi_gen.identify import fit_calibration, fit_friction, fit_ripple, fit_unit
 
 ENDS = (410.0, 3685.0)
 SLACK, TAUT = 3.25, 3.62

@@ -12,7 +12,7 @@ from thumbs import SHIPPED, literal, replaced, thumb, wider
 from awiwi_gen.build import load
 from awiwi_gen.hand import Hand
 from awiwi_gen.pipeline import Job, cached_tree
-from awiwi_gen.studies.base_search import BaseSearch
+from awiwi_gen.reproduce.base_search import BaseSearch
 
 OK, NOT_CONVERGED, NOT_FINITE = 0, 2, 3  # of awiwi_status
 STRAIGHT = ("index", "middle", "ring", "fifth")  # fingers with constant couplings

@@ -29,12 +29,15 @@ COMPILER = [
     ["build"],
     ["verify"],
 ]
+ROOMS = ("reproduce", "compare", "tune")
 TOP = [
     ["derive", "records", "budget"],
     ["judge"],
     ["parallel", "tasks"],
     ["pipeline"],
-    ["report", "explain", "simulate", "studies"],
+    ["report", "explain", "simulate", "results"],
+    ["loops", "identify"],
+    [*ROOMS],
     ["__init__"],
     ["__main__"],
 ]
@@ -76,6 +79,7 @@ def test_imports_run_downhill(path):
     for name in used:
         allowed = any(name in ladder and own in ladder and ladder[name] <= ladder[own] for ladder in ladders)
         assert allowed, f"{path.name} imports {name}"
+        assert not {own, name} <= set(ROOMS), f"{path.name} imports {name}: rooms do not use one another"
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda p: str(p.relative_to(PACKAGE)))

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from awiwi_gen.studies.gain_search import PRINTED_BOX, USEFUL_BOX, draw, nearest
-from awiwi_gen.studies.joint_loops import TABLE_16_1, Plant
+from awiwi_gen.loops.joint import TABLE_16_1, Plant
+from awiwi_gen.reproduce.gain_search import PRINTED_BOX, USEFUL_BOX, draw, nearest
 
 OK, OUT_OF_DOMAIN, NOT_CONVERGED, NOT_FINITE = range(4)
 UNIT = np.array([1.0, 1.0])

@@ -8,18 +8,25 @@ import numpy as np
 import pytest
 
 from awiwi_gen.hand import Hand
-from awiwi_gen.studies.figures import linear
-from awiwi_gen.studies.figures.backstepping import OUTER, STEP, rise, step_response
-from awiwi_gen.studies.gain_search import PRINTED_BOX, draw, nearest
-from awiwi_gen.studies.joint_loops import TABLE_15_1, TABLE_16_1, impedance_loop, normalised_loop, position_loop
-from awiwi_gen.studies.linear_joint import TABLE_13_1, TABLE_14_2
-from awiwi_gen.studies.optimal_gains import cancelling, regulator
-from awiwi_gen.studies.pair_loops import TABLE_PAIR, at_rest, pair_loop
-from awiwi_gen.studies.printed import all_numbers
-from awiwi_gen.studies.printed.backstepping import FIGURE_15_16
-from awiwi_gen.studies.printed.linear import GAINS_13_11, fit_13_11
-from awiwi_gen.studies.printed.number import compared, same_digits
-from awiwi_gen.studies.sampling import is_implementable
+from awiwi_gen.loops.joint import (
+    TABLE_13_1,
+    TABLE_14_2,
+    TABLE_15_1,
+    TABLE_16_1,
+    impedance_loop,
+    normalised_loop,
+    position_loop,
+)
+from awiwi_gen.loops.pair import TABLE_PAIR, at_rest, pair_loop
+from awiwi_gen.loops.regulator import cancelling, regulator
+from awiwi_gen.loops.sampled import is_implementable
+from awiwi_gen.reproduce.figures import linear
+from awiwi_gen.reproduce.figures.backstepping import OUTER, STEP, rise, step_response
+from awiwi_gen.reproduce.gain_search import PRINTED_BOX, draw, nearest
+from awiwi_gen.reproduce.printed import all_numbers
+from awiwi_gen.reproduce.printed.backstepping import FIGURE_15_16
+from awiwi_gen.reproduce.printed.linear import GAINS_13_11, fit_13_11
+from awiwi_gen.results import compared, same_digits
 
 
 @pytest.fixture(scope="module")

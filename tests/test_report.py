@@ -11,18 +11,18 @@ from html.parser import HTMLParser
 import pytest
 from typer.testing import CliRunner
 
+from awiwi_gen import reproduce
 from awiwi_gen.__main__ import app
 from awiwi_gen.build import load
 from awiwi_gen.emit.tree import read_manifest
 from awiwi_gen.errors import InputError
 from awiwi_gen.hand import Hand
 from awiwi_gen.pipeline import Job, Proof, cached_tree, verify
-from awiwi_gen.studies import page
-from awiwi_gen.studies.figures import all_figures
-from awiwi_gen.studies.figures import fingers as figures_fingers
-from awiwi_gen.studies.figures.fingers import coriolis, released
-from awiwi_gen.studies.printed.number import compared
-from awiwi_gen.studies.table import Table
+from awiwi_gen.reproduce import page
+from awiwi_gen.reproduce.figures import all_figures
+from awiwi_gen.reproduce.figures import fingers as figures_fingers
+from awiwi_gen.reproduce.figures.fingers import coriolis, released
+from awiwi_gen.results import Table, compared
 
 
 @pytest.fixture(scope="module")
@@ -137,11 +137,11 @@ def test_text_of_a_figure_cannot_become_markup(tmp_path, hand, figures):
 
 
 def test_the_command_writes_the_page_and_tells_each_verdict(tmp_path, monkeypatch, results, some_proof, hand):
-    def publish(job, path):
+    def publish(job, path, comparison):
         page.write_page(path, hand, results, some_proof[1])
         return results
 
-    monkeypatch.setattr(page, "publish", publish)
+    monkeypatch.setattr(reproduce, "publish", publish)
     target = tmp_path / "index.html"
     told = CliRunner().invoke(app, ["report", "--page", str(target)])
     as_json = CliRunner().invoke(app, ["report", "--page", str(target), "--json"])
@@ -158,7 +158,7 @@ def test_without_the_drawing_libraries_the_command_says_what_to_install(tmp_path
     monkeypatch.setattr(page.importlib.util, "find_spec", lambda name: None)
 
     with pytest.raises(InputError, match="pip install 'awiwi_gen\\[studies\\]'"):
-        page.publish(Job(hand), tmp_path / "index.html")
+        page.publish(Job(hand), tmp_path / "index.html", None)
 
 
 def test_a_claw_shows_what_it_has_a_finger_on_straight_tendons_but_no_index(root):

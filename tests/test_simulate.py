@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from awiwi_gen.errors import InputError
-from awiwi_gen.simulate import PERIOD, Actuator, Block, Loop, Machine, Scenario, Sensor, simulate
+from awiwi_gen.simulate import PERIOD, Actuator, Block, Loop, Machine, Scenario, Sensor, Sum, simulate
 
 PLANT, DAMPING = (2e-5, 2e-3, 1.0), (1e-3, 0.02)
 INERTIAS, TENDONS, FRICTION = (2e-5, 2e-3, 3e-3), ((0.3, 0.2, 1.0), (0.4, 0.1, 2.0)), (10.0, 0.3, 0.02)
@@ -81,6 +81,29 @@ def test_half_the_step_leaves_a_sixteenth_of_the_error(lib):
     coarse, fine = np.abs(ends[0] - ends[2]).max(), np.abs(ends[1] - ends[2]).max()
 
     assert 10 < coarse / fine < 25
+
+
+def test_sums_of_products_make_a_plant_of_signals(lib):
+    """A pendulum without gravity on a spring: the rate of the angle is the speed, that of the speed -k / m times x."""
+    loop = Loop([Sum("xd[0]", (1.0, "x[1]")), Sum("xd[1]", ("k", "x[0]"), (-0.5, ("x[1]",)))], [], {"x": "xd"})
+    trace = run(lib, loop, {"x": (1.0, 0.0), "k": -100.0}, 900, ["x"])
+
+    rate, w = 0.25, np.sqrt(100.0 - 0.25**2)
+    exact = np.exp(-rate * trace.time) * (np.cos(w * trace.time) + rate / w * np.sin(w * trace.time))
+    assert trace["x"][:, 0] == pytest.approx(exact, abs=1e-5)
+
+
+def test_a_sum_shifts_a_queue_so_that_a_command_arrives_several_periods_later(lib):
+    goal = np.zeros((9, 4))
+    goal[2:, 0] = 1.0
+    law = [*FEEDBACK, Sum("queue", (1.0, ("wanted", "queue[0:3]")))]
+    loop = joint(law, [Sensor("x", "seen")], [Actuator("queue[3]", "u", late=False)])
+    values = JOINT | {"x": np.zeros(4), "K": GAINS, "u": 0.0, "queue": np.zeros(4)}
+    del values["x_des"]
+
+    trace = run(lib, loop, values, 9, ["u"], inputs={"x_des": goal})
+
+    assert int(np.flatnonzero(trace["u"][:, 0])[0]) == 2 + 3
 
 
 # -- the clock ----------------------------------------------------------------------------------------------
@@ -224,7 +247,8 @@ def test_a_law_that_reads_what_is_no_number_commands_nothing_and_recovers(lib):
         (Loop([Block("plant_joint_linear", {"u": "torques"})], [], {"x": "xd"}), {"torques": np.zeros(2)}, "u has 1"),
         (joint(FEEDBACK, [Sensor("x[7]", "seen")]), {}, "beyond its signal, which has 4 elements"),
         (joint(actuators=[Actuator("wanted", "x")]), {"wanted": 0.0}, "wanted has 1 elements, x has 4"),
-        (Loop([Block("plant_joint_linear")], [], {"y": "xd"}), {}, "y is a state that neither"),
+        (joint([Sum("total", ("x", "damping"))]), {}, "a sum of 4 elements has the factor 'damping' of 2"),
+        (Loop([Block("plant_joint_linear")], [], {"y": "xd"}), {}, "y is a state or a rate whose size"),
     ],
 )
 def test_wires_that_lead_nowhere_are_told_by_name(lib, loop, values, message):
@@ -254,8 +278,8 @@ def test_slopes_of_the_plant_are_those_of_its_matrix(lib):
 
 @pytest.mark.parametrize("late", [0, 1, 2])
 def test_the_spectral_radius_is_that_of_exact_sampling_for_every_whole_delay(lib, late):
-    sampling = pytest.importorskip("awiwi_gen.studies.sampling")
-    loops = pytest.importorskip("awiwi_gen.studies.sampled_loop")
+    sampling = pytest.importorskip("awiwi_gen.loops.sampled")
+    loops = pytest.importorskip("awiwi_gen.loops.linearised")
     machine = Machine(lib, controlled(), Scenario(JOINT | {"K": GAINS, "u": 0.0, "wanted": 0.0}, 0))
     A, B = machine.plant_slopes(), np.array([0, 0, 0, 1 / PLANT[1]])
 
@@ -265,8 +289,8 @@ def test_the_spectral_radius_is_that_of_exact_sampling_for_every_whole_delay(lib
 
 
 def test_the_delay_margin_is_where_the_loop_turns_unstable_and_near_that_of_continuous_time(lib):
-    sampling = pytest.importorskip("awiwi_gen.studies.sampling")
-    loops = pytest.importorskip("awiwi_gen.studies.sampled_loop")
+    sampling = pytest.importorskip("awiwi_gen.loops.sampled")
+    loops = pytest.importorskip("awiwi_gen.loops.linearised")
     fast = (30.0, 0.0, 20.0, 0.5)
     machine = Machine(lib, controlled(), Scenario(JOINT | {"K": fast, "u": 0.0, "wanted": 0.0}, 0))
     A, B = machine.plant_slopes(), np.array([0, 0, 0, 1 / PLANT[1]])

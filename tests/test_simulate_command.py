@@ -10,10 +10,10 @@ from test_cli import answer, complaint, told
 
 pytest.importorskip("scipy")
 
+from awiwi_gen.compare.laws import LAWS
 from awiwi_gen.hand import Hand
-from awiwi_gen.studies.benchmark.laws import LAWS
-from awiwi_gen.studies.hand_gains import failing
-from awiwi_gen.studies.tune import GAINS, plants, tune_tendon
+from awiwi_gen.tune.hand_gains import failing
+from awiwi_gen.tune.tendons import GAINS, plants, tune_tendon
 
 TENDON = 12  # the index's pip
 

@@ -11,10 +11,10 @@ from typer.testing import CliRunner
 
 import awiwi_gen
 from awiwi_gen.__main__ import app
+from awiwi_gen.loops.joint import Plant
+from awiwi_gen.loops.regulator import cancelling, regulator
 from awiwi_gen.resources import DEFAULT_HAND
-from awiwi_gen.studies.joint_loops import Plant
-from awiwi_gen.studies.optimal_gains import cancelling, regulator
-from awiwi_gen.studies.tune import GAINS, plants
+from awiwi_gen.tune.tendons import GAINS, plants
 
 TENDONS = 38
 COSTS = """[cost]

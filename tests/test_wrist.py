@@ -13,7 +13,7 @@ from awiwi_gen.hand.wrist import Linkage
 from awiwi_gen.ir.algebras import ball
 from awiwi_gen.ir.passes.bind import bind
 from awiwi_gen.kernels.wrist import wrist_kernels
-from awiwi_gen.studies.figures.wrist import bar_errors, figures, internal_angles, layers, tendon_displacements
+from awiwi_gen.reproduce.figures.wrist import bar_errors, figures, internal_angles, layers, tendon_displacements
 from awiwi_gen.verify.reference import ball_values
 
 A, B, C = 0.050, 0.042, 0.036  # table 6.1

@@ -11,7 +11,7 @@ from awiwi_gen.build import load
 from awiwi_gen.errors import InputError
 from awiwi_gen.hand import Hand
 from awiwi_gen.pipeline import Job, cached_tree
-from awiwi_gen.studies.figures.wrist import bar_errors, figures, internal_angles, tendon_displacements
+from awiwi_gen.reproduce.figures.wrist import bar_errors, figures, internal_angles, tendon_displacements
 
 PACKAGED = (Path(__file__).parents[1] / "awiwi_gen" / "hand.toml").read_text(encoding="utf-8")
 DRAWN = {"a0": (0, 21, 36), "a": (50, 21, 0), "b": (50, 42, 36), "palm": (50, 21, 18)}  # mm, the neutral pose

@@ -1,0 +1,126 @@
+"""What a clock of 3 kHz and one sample of delay leave of a law and its gains: the loop of the compiled kernels.
+
+At rest dry friction is a stiff damper, and would make nearly all gains look good; while a motor slides it is a constant
+torque, and damps nothing. Gains must do for both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from awiwi_gen.compare.laws import Law
+from awiwi_gen.errors import InputError
+from awiwi_gen.loops.hand_joint import Joint, loop_around, values_of
+from awiwi_gen.loops.linearised import STABLE, SampledLoop
+from awiwi_gen.loops.nearest import nearest
+from awiwi_gen.simulate import PERIOD, Machine, Scenario, simulate
+
+SPARE = (0.0, 0.25, 0.5, 0.75, 1.0)  # periods of further delay that the nearest gains bear
+RESTING = 600  # ticks in which noise is watched
+SETTLING = 12  # ticks, until all that a law writes has come to rest
+
+
+@dataclass(frozen=True)
+class Clocked:
+    """A law with gains on the clock: spectral radius, and the delay [s] that it bears beyond its one sample.
+
+    ``noise`` is the largest torque that the sensors' noise alone makes it ask for, in parts of what the motors have.
+    """
+
+    law: str
+    gains: Mapping[str, float]
+    radius: float
+    margin: float
+    noise: float
+
+    @property
+    def runs(self) -> bool:
+        """Whether it can run."""
+        return self.radius < STABLE and self.noise < 1
+
+    @property
+    def reason(self) -> str:
+        """Why it can, or cannot."""
+        clock = f"{1 / PERIOD:.0f} Hz and one sample of delay"
+        if self.radius >= STABLE:
+            return f"unstable at {clock}: spectral radius {self.radius:.4g}"
+        if self.noise >= 1:
+            return f"stable at {clock}, but the sensors' noise alone drives the motors to their limit"
+        return f"stable at {clock}: spectral radius {self.radius:.4f}, delay margin {self.margin * 1e6:.0f} us"
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        return {
+            "law": self.law, "gains": dict(self.gains), "radius": self.radius, "margin": self.margin,
+            "noise": self.noise, "runs": self.runs,
+        }  # fmt: skip
+
+
+def clocked(library: Any, law: Law, gains: Mapping[str, float], joint: Joint, force: float) -> Clocked:
+    """How a law with gains does on the clock. Raises InputError where its kernels refuse them."""
+    loops = loops_of(library, law, gains, joint, force)
+    radius = max(loop.radius(0.0) for loop in loops)
+    spare = min(loop.margin() for loop in loops) if radius < STABLE else 0.0
+    return Clocked(law.name, dict(gains), radius, spare, noise(library, law, gains, joint, force))
+
+
+def noise(library: Any, law: Law, gains: Mapping[str, float], joint: Joint, force: float) -> float:
+    """The largest torque besides its mean that a law asks for at rest, in parts of the motors' limit."""
+    values = values_of(joint, joint.believed(), force) | law.values(library, joint.believed(), force, gains)
+    loop = loop_around(joint, list(law.blocks))
+    (trace,) = simulate(library, loop, [Scenario(values, RESTING, seed=1)], ["wanted"])
+    asked = trace["wanted"][RESTING // 3 :]
+    return float(np.abs(asked - asked.mean(axis=0)).max() / joint.limit) if len(asked) else float("inf")
+
+
+def loops_of(library: Any, law: Law, gains: Mapping[str, float], joint: Joint, force: float) -> list[SampledLoop]:
+    """The loop with motors that slide, then with motors at rest."""
+    sliding = replace(joint, friction=joint.friction * [1, 0, 1])
+    loops = []
+    for each in (sliding, joint):
+        values = values_of(each, each.believed(), force) | law.values(library, each.believed(), force, gains)
+        machine = Machine(library, loop_around(each, list(law.blocks)).exact(), Scenario(values, 0))
+        for _ in range(SETTLING):
+            machine.signals[:] = machine.tick(machine.signals)
+        loops.append(SampledLoop(machine))
+    return loops
+
+
+def running_gains(library: Any, law: Law, gains: Mapping[str, float], joint: Joint, force: float) -> Clocked | None:
+    """The gains nearest to some that fail, and how they do: they bear another sample of delay, too."""
+
+    def works(chosen: Mapping[str, float]) -> bool:
+        try:
+            if noise(library, law, chosen, joint, force) >= 1:  # the quicker look, and it sees what is unstable, too
+                return False
+            loops = loops_of(library, law, chosen, joint, force)
+        except InputError:
+            return False
+        return all(loop.radius(late) < STABLE for loop in loops for late in SPARE)
+
+    def radius(chosen: Mapping[str, float]) -> float:
+        try:
+            return max(loop.radius(1.0) for loop in loops_of(library, law, chosen, joint, force))
+        except InputError:
+            return float("inf")
+
+    found = nearest(gains, {name: gain.power for name, gain in law.gains.items()}, works, radius)
+    return clocked(library, law, found.gains, joint, force) if found else None
+
+
+def require_clocked(library: Any, law: Law, gains: Mapping[str, float], joint: Joint, force: float) -> Clocked:
+    """How gains do on the clock. Raises InputError for such that fail, with the reason and the nearest that do not."""
+    found = clocked(library, law, gains, joint, force)
+    if found.runs:
+        return found
+    way_out = running_gains(library, law, gains, joint, force)
+    if way_out is None:
+        instead = "neither another bandwidth nor a change of gains was found to mend that"
+    else:
+        told = ", ".join(f"{name} = {value:.4g}" for name, value in way_out.gains.items() if value != gains[name])
+        instead = f"the nearest that run have {told} ({way_out.reason})"
+    raise InputError(f"{law.name}: these gains are {found.reason}; {instead}")

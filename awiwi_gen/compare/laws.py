@@ -1,0 +1,331 @@
+"""The laws that are compared, as blocks of kernels with gains, and how each comes to what it needs.
+
+All of them move along the reference filter and know the joint by the same observer, so that what is compared is the
+law alone. Those of the source take the springs and the friction for what the hand file says. The last one also takes
+from the observer how stiff the springs are and what the motors must overcome besides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from awiwi_gen.errors import InputError, unknown
+from awiwi_gen.loops.hand_joint import Joint
+from awiwi_gen.simulate import Array, Block, Wire
+
+Values = dict[str, Any]
+Wires = dict[str, Wire]
+
+
+@dataclass(frozen=True)
+class Gain:
+    """A number that tunes a law, and the power of the law's bandwidth that it grows with."""
+
+    value: float
+    unit: str
+    power: int = 1
+
+
+@dataclass(frozen=True)
+class Law:
+    """Blocks that come from what is observed to ``wanted``, and what they take from the joint and from the gains."""
+
+    name: str
+    source: str
+    says: str
+    gains: Mapping[str, Gain]
+    blocks: tuple[Block, ...]
+    design: Callable[[Any, Joint, float, Mapping[str, float]], Values]
+
+    def gains_with(self, chosen: Mapping[str, float]) -> dict[str, float]:
+        """Its gains, some of them chosen. Raises InputError for one that it has not, or that is not positive."""
+        for name, value in chosen.items():
+            if name not in self.gains:
+                raise InputError(f"{self.name} has no gain {name!r}; it has {', '.join(self.gains)}")
+            if not (value > 0 and np.isfinite(value)):
+                raise InputError(f"{self.name}: the gain {name} = {value:g} is not positive and finite")
+        return {name: float(chosen.get(name, gain.value)) for name, gain in self.gains.items()}
+
+    def values(self, library: Any, believed: Joint, force: float, gains: Mapping[str, float]) -> Values:
+        """What its blocks are given besides what the joint gives, at a pretension [N]."""
+        return COMMON | self.design(library, believed, force, gains)
+
+
+COMMON = {"smoothing": 0.022, "bandwidths": [600.0, 600.0, 1000.0, 20.0], "one": 1.0}
+
+KNOWN: Wires = {name: f"known_{name}" for name in ("inertias", "tendons", "damping", "friction")}
+OBSERVED = (
+    Block("reference_filter", {"desired": "goal", "delay": "smoothing", "motion_next": "motion"}),
+    Block(
+        "antagonistic_observer",
+        KNOWN | {"memory_next": "memory", "stretches": "stretches_seen", "acting": "u", "load": "load_seen"},
+    ),
+)
+STATE = ("joint", "motors")
+SETPOINT = Block(
+    "antagonistic_setpoint",
+    {"desired": "motion", "inertias": "known_inertias", "damping": "known_damping"},
+)
+FEEDBACK = Block("antagonistic_feedback", {"x": STATE, "resistance": "modelled", "tau_m": "wanted"})
+COMPENSATED = Block(  # adds the friction that a law has no place for
+    "antagonistic_feedback",
+    {
+        "x": STATE, "x_des": STATE, "u_des": "torques_wanted", "feedback": "no_feedback", "resistance": "modelled",
+        "tau_m": "wanted",
+    },
+)  # fmt: skip
+PAIR: Wires = {"desired": "motion", "external": ("load_seen", "nothing"), "inertias": "known_inertias"}
+
+
+def rest(believed: Joint, force: float) -> Values:
+    """What a law knows of the springs at rest."""
+    torque = force * believed.arm
+    return {
+        "elongations": believed.elongations(torque),
+        "slopes": believed.slopes(torque),
+        "no_feedback": np.zeros((2, 6)),
+    }
+
+
+def of_modes(link: Array, pull: Array) -> Array:
+    """Feedback (2, 6) from that of the link's mode, (q, q', psi, psi'), and of the pretension's, (sigma, sigma')."""
+    against = np.concatenate([link[:2] / 2, link[2:] / 4, -link[2:] / 4])
+    together = np.concatenate([[0, 0], pull / 2, pull / 2])
+    return np.array([against + together, together - against])
+
+
+def answered(result: Any, law: str) -> Any:
+    """A kernel's result. Raises InputError where it has none."""
+    if result.status:
+        raise InputError(f"{law}: no gains follow from what was chosen")
+    return result
+
+
+# -- designs ------------------------------------------------------------------------------------------------
+
+
+def motor_pd(_: Any, believed: Joint, force: float, gains: Mapping[str, float]) -> Values:
+    """Each motor on a spring and a damper of its own; the link hangs between the tendons' springs."""
+    feedback = np.zeros((2, 6))
+    for motor in (0, 1):
+        feedback[motor, 2 * motor + 2 : 2 * motor + 4] = gains["kp"], gains["kd"]
+    return rest(believed, force) | {"feedback": feedback}
+
+
+def placed(library: Any, believed: Joint, force: float, gains: Mapping[str, float]) -> Values:
+    """Poles of the link's mode and of the pretension's."""
+    m, b, _ = believed.inertias
+    k = float(believed.slopes(force * believed.arm).mean())
+    link = answered(
+        library.pole_placement(
+            m=m, b=2 * b, k=2 * k, dq=believed.damping, dtheta=0.0, omega=[gains["slow"], gains["fast"]], xi=[1.0, 1.0]
+        ),
+        "pole_placement",
+    )
+    pull = answered(library.pole_placement_motor(b=b, dtheta=0.0, k=k, omega0=gains["pull"], xi0=1.0), "pole_placement")
+    return rest(believed, force) | {"feedback": of_modes(link.K, 2 * pull.K)}
+
+
+def plant_of(believed: Joint, force: float) -> tuple[Array, Array, float, float]:
+    """A (4, 4) and B (4,) of the link's mode; inertia and stiffness of one motor, the pretension's mode."""
+    m, b, _ = believed.inertias
+    k = float(believed.slopes(force * believed.arm).mean())
+    A = np.array([
+        [0, 1, 0, 0], [-2 * k / m, -believed.damping / m, 2 * k / m, 0], [0, 0, 0, 1], [k / b, 0, -k / b, 0],
+    ])  # fmt: skip
+    return A, np.array([0, 0, 0, 1 / (2 * b)]), float(b), k
+
+
+def regulated(library: Any, believed: Joint, force: float, gains: Mapping[str, float]) -> Values:
+    """The optimum for what the link's error, the motors' speed and torque cost."""
+    A, B, b, k = plant_of(believed, force)
+    Q = np.diag([gains["error"] ** 2, 0, 0, gains["speed"] ** 2])
+    link = answered(library.lqr(A=A, B=B, Q=Q, R=1.0), "lqr")
+    pull = answered(library.pole_placement_motor(b=b, dtheta=0.0, k=k, omega0=gains["pull"], xi0=1.0), "lqr")
+    return rest(believed, force) | {"feedback": of_modes(link.K, 2 * pull.K)}
+
+
+def scheduled(_: Any, believed: Joint, force: float, gains: Mapping[str, float]) -> Values:
+    """Impedance of the link over force loops of both tendons; of four joints the law is for, three stand still."""
+    others = np.eye(4)
+    others[0, 0] = 0
+
+    def first(value: float) -> Array:
+        matrix: Array = others.copy()
+        matrix[0, 0] = value
+        return matrix
+
+    return rest(believed, force) | {
+        "mass": first(float(believed.inertias[0])),
+        "coriolis": np.diag([believed.damping, 0, 0, 0]),
+        "three": np.zeros(3),
+        "four": np.zeros(4),
+        "stiff": first(gains["K_p"]),
+        "damp": first(gains["K_d"]),
+        "omega0": gains["omega"],
+        "xi0": gains["xi"],
+        "force_gains": np.zeros(4),
+        "wound": np.zeros(2),
+    }
+
+
+def backstepped(_: Any, believed: Joint, force: float, gains: Mapping[str, float]) -> Values:
+    """Gains of all backstepping laws of a pair."""
+    tuning = [gains[name] for name in ("K_3", "K_4", "C_t", "C_s")]
+    return rest(believed, force) | {
+        "impedance": [gains["K_p"], gains["K_d"]],
+        "tunings": [tuning, tuning],
+        "torques_wanted": np.zeros(2),
+    }
+
+
+def state_dependent(_: Any, believed: Joint, force: float, gains: Mapping[str, float]) -> Values:
+    """Two optima for the springs' secants: of the link's mode, of inertia 2 b, and of either motor's pull."""
+    p = believed.elongations(force * believed.arm)
+    k3 = believed.tendons[:, 2].mean()
+    slope = believed.slopes(force * believed.arm).mean()
+    weight = gains["error"] ** 2
+    return rest(believed, force) | {
+        "both": 2 * believed.inertias[1],
+        "no_drag": 0.0,
+        "difference": [2 * slope, 0.0, 2 * k3],  # phi(p + d) - phi(p - d)
+        "spring": believed.tendons.mean(axis=0),
+        "weights": [weight, 1e-6, 1e-6, gains["speed"] ** 2],
+        "pull_weights": [weight, gains["speed"] ** 2],
+        "R": 1.0,
+        "K_kept": np.zeros(4),
+        "K_pull": np.zeros(2),
+        "sum_wanted": force * believed.arm,
+        "together_wanted": [p.mean(), 0.0],
+    }
+
+
+STIFFNESS = {"K_p": Gain(0.5, "N m/rad", 2), "K_d": Gain(0.003, "N m s/rad", 1)}
+STEPS = {
+    "K_3": Gain(150.0, "1/s"),
+    "K_4": Gain(150.0, "1/s"),
+    "C_t": Gain(100.0, "rad/(N m)", 0),
+    "C_s": Gain(0.01, "rad s^2/(N m)", -2),
+}
+
+
+def pair_law(name: str, kernel: str, source: str, says: str) -> Law:
+    """A backstepping law of the source: springs and friction as the hand file has them."""
+    model = Block(
+        "antagonistic_springs",
+        {"stretches": "stretches_known", "tendons": "known_tendons", "torques": "torques_modelled", "springs": "local"},
+    )
+    law = Block(kernel, PAIR | {"springs": "local", "tau_m": "torques_wanted"})
+
+    def design(library: Any, believed: Joint, force: float, gains: Mapping[str, float]) -> Values:
+        known = backstepped(library, believed, force, gains)
+        return known | {"stretches_known": known["elongations"], "speeds": np.zeros(2)}
+
+    return Law(name, source, says, STIFFNESS | STEPS, (*OBSERVED, model, law, COMPENSATED), design)
+
+
+FORCES = tuple(
+    Block(
+        "tendon_force_scheduled",
+        {
+            "f": f"torques[{2 * i}]", "fd": f"torques[{2 * i + 1}]", "f_des": f"shares[{i}]", "fd_des": "nothing",
+            "f_hat": f"torques[{2 * i}]", "friction": f"modelled[{i}]", "r": "one", "b": f"known_inertias[{i + 1}]",
+            "stiffness": f"slopes[{i}]", "stiffness_rate": "nothing", "tau": f"wanted[{i}]",
+            "gains": f"force_gains[{2 * i}:{2 * i + 2}]",
+        },
+    )
+    for i in (0, 1)
+)  # fmt: skip
+IMPEDANCE = Block(
+    "joint_impedance",
+    {
+        "M": "mass", "C": "coriolis", "gravity": "four", "q": ("joint[0]", "three"), "qd": ("joint[1]", "three"),
+        "q_des": ("motion[0]", "three"), "qd_des": ("motion[1]", "three"), "qdd_des": ("motion[2]", "three"),
+        "K": "stiff", "D": "damp", "tau": "tau_link",
+    },
+)  # fmt: skip
+SHARING = Block("antagonistic_sharing", {"torque": "tau_link[0]", "pretension": "pretension"})
+
+MODES = (
+    Block("antagonistic_modes"),
+    Block(
+        "antagonistic_modes", {"motors": "x_des[2:6]", "against": "against_wanted", "together": "together_wanted"}
+    ),
+    Block(
+        "sdre_joint",
+        {
+            "m": "known_inertias[0]", "b": "both", "dq": "known_damping", "dtheta": "no_drag", "spring": "difference",
+            "K_last": "K_kept", "K": "K_kept", "x": ("joint", "against"),
+            "x_des": ("motion[0:2]", "against_wanted"), "u": "difference_wanted",
+        },
+    ),
+    Block(
+        "sdre_tendon",
+        {
+            "theta": "together[0]", "thd": "together[1]", "theta_des": "together_wanted[0]", "b": "known_inertias[1]",
+            "dtheta": "no_drag", "weights": "pull_weights", "K": "K_pull", "u": "sum_wanted",
+        },
+    ),
+    Block(
+        "antagonistic_sharing",
+        {"torque": "difference_wanted", "pretension": ("sum_wanted", "nothing", "nothing"), "shares": "torques_wanted"},
+    ),
+)  # fmt: skip
+
+LAWS = {
+    law.name: law
+    for law in (
+        Law(
+            "motor_pd", "eq. 11.3", "each motor on a spring and a damper of its own",
+            {"kp": Gain(60.0, "N m/rad", 2), "kd": Gain(0.6, "N m s/rad")}, (*OBSERVED, SETPOINT, FEEDBACK), motor_pd,
+        ),
+        Law(
+            "pole_placement", "eq. 12.13 to 12.16", "poles of the link and of the pretension",
+            {"slow": Gain(150.0, "rad/s"), "fast": Gain(250.0, "rad/s"), "pull": Gain(150.0, "rad/s")},
+            (*OBSERVED, SETPOINT, FEEDBACK), placed,
+        ),
+        Law(
+            "lqr", "eq. 13.1 to 13.5", "the optimum of error, speed and torque",
+            {"error": Gain(100.0, "N m/rad", 2), "speed": Gain(0.5, "N m s/rad"), "pull": Gain(150.0, "rad/s")},
+            (*OBSERVED, SETPOINT, FEEDBACK), regulated,
+        ),
+        Law(
+            "sdre", "eq. 14.4 to 14.12", "the optimum for the springs' secants, found anew in every sample",
+            {"error": Gain(200.0, "N m/rad", 2), "speed": Gain(0.5, "N m s/rad")},
+            (*OBSERVED, SETPOINT, *MODES, COMPENSATED), state_dependent,
+        ),
+        Law(
+            "cascade", "eq. 10.8 to 10.12, 11.10", "impedance of the link over force loops of the tendons",
+            STIFFNESS | {"K_d": Gain(0.006, "N m s/rad"), "omega": Gain(100.0, "rad/s"), "xi": Gain(1.0, "1", 0)},
+            (*OBSERVED, IMPEDANCE, SHARING, *FORCES), scheduled,
+        ),
+        pair_law(
+            "backstepping_decoupled", "backstepping_antagonistic_decoupled", "eq. 15.84 to 15.88, as printed",
+            "each motor as if alone with the link",
+        ),
+        pair_law(
+            "backstepping_antagonistic", "backstepping_antagonistic", "eq. 15.82 to 15.106, mended",
+            "exact for all six states, with the springs of the hand file",
+        ),
+        Law(
+            "backstepping_adaptive", "eq. 15.82 to 15.106, mended and extended",
+            "the same with damping, springs that are learnt, and whatever the motors must overcome", STIFFNESS | STEPS,
+            (
+                *OBSERVED,
+                Block("backstepping_adaptive", PAIR | {"damping": "known_damping", "tau_m": "wanted"}),
+            ),
+            backstepped,
+        ),
+    )
+}  # fmt: skip
+
+
+def law_of(name: str) -> Law:
+    """A law by name. Raises InputError with near names."""
+    if name not in LAWS:
+        raise unknown("law", name, LAWS, f"there are {', '.join(LAWS)}")
+    return LAWS[name]

@@ -1,0 +1,165 @@
+"""The joint that laws are compared on: between two tendons of the hand, with all that a real one has.
+
+Its link, motors, springs and friction are the hand's, in the terms of the joint: with lever arm R and pulley r, an
+angle of the motor is R / r times what the joint sees, a torque r / R times. The law knows them but for the friction, of
+which it knows the share that the hand file gives, and for what a perturbation changes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import sqrt
+from typing import Any
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from awiwi_gen.errors import InputError
+from awiwi_gen.hand import Hand
+from awiwi_gen.simulate import PERIOD, Actuator, Array, Block, Element, Loop, Sensor
+
+FINGER, JOINT = "index", "pip"
+DAMPING = 2e-4  # N m s/rad, of the link
+ENCODER = 2 * np.pi / 4096  # rad, one step of the motor's sensor before the gear
+TORQUE_NOISE = 2e-4  # N m, standard deviation; one step of it is as much
+ANGLE_NOISE = 1e-4  # rad, likewise of the elongation
+STRETCH = (3.0, 80.0)  # N: tendon forces between which the spring's cubic is fitted
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A link between two tendons, as its joint sees it: inertias [kg m^2], springs, friction, limits.
+
+    A row of ``tendons`` is (k1, k2, k3) of a spring's torque k1 p + k2 p^2 + k3 p^3 at the elongation p [rad];
+    ``friction`` is (steepness, level, viscosity) of either motor, ``known`` the share of it that laws may know;
+    ``arm`` turns a tendon's force into a torque; ``limit`` is the motors' largest torque [N m].
+    """
+
+    inertias: Array
+    tendons: Array
+    damping: float
+    friction: Array
+    known: float
+    arm: float
+    limit: float
+    encoder: float
+
+    def believed(self) -> Joint:
+        """What a law knows of it."""
+        return replace(self, friction=self.friction * [1, self.known, self.known])
+
+    def perturbed(self, springs: tuple[float, float] = (1, 1), friction: float = 1, link: float = 1) -> Joint:
+        """Another one, with springs, friction and link so many times as stiff, strong and heavy."""
+        tendons = self.tendons * np.array(springs)[:, None]
+        return replace(
+            self,
+            tendons=tendons,
+            friction=self.friction * [1, friction, friction],
+            inertias=self.inertias * [link, 1, 1],
+        )
+
+    def elongations(self, torque: float) -> Array:
+        """Elongations (2,) [rad] at which both springs pull with a torque [N m]."""
+        roots = [np.roots([*spring[::-1], -torque]) for spring in self.tendons]
+        return np.array([min(z.real for z in root if abs(z.imag) < 1e-9 and z.real >= 0) for root in roots])
+
+    def slopes(self, torque: float) -> Array:
+        """Stiffnesses (2,) [N m/rad] of the springs there."""
+        p = self.elongations(torque)
+        slopes: Array = self.tendons[:, 0] + 2 * self.tendons[:, 1] * p + 3 * self.tendons[:, 2] * p**2
+        return slopes
+
+
+def joint_of(library: Any, hand: Hand, finger: str = FINGER, joint: str = JOINT) -> Joint:
+    """The joint of a hand; its finger straight, its other joints held. Raises InputError where there is none."""
+    if hand.motor is None or hand.spring is None or hand.motor.friction is None:
+        raise InputError("a joint between tendons needs a hand with the sections [motor], with friction, and [spring]")
+    finger = finger if finger in hand.fingers else next(iter(hand.fingers))
+    names = hand.fingers[finger].joints
+    index = names.index(joint) if joint in names else 0
+    straight = np.zeros(len(names))
+    arms = np.abs(library[f"{finger}_coupling"](straight))
+    pulls = [arm[index] for arm, place in zip(arms, joints_of(arms), strict=True) if place == index]
+    arm = float(max(pulls))
+    ratio = arm / float(hand.motor.pulley)
+    b = 2 * float(library.motor_energy(1.0)) * ratio**2
+    link = float(library[f"{finger}_mass_matrix"](straight)[index, index])
+    friction = hand.motor.friction
+    return Joint(
+        inertias=np.array([link, b, b]),
+        tendons=np.array([_cubic(library) * arm ** np.array([2, 3, 4])] * 2),
+        damping=DAMPING,
+        friction=np.array(
+            [float(friction.steepness) * ratio, float(friction.level) * ratio, float(friction.viscosity) * ratio**2]
+        ),
+        known=float(hand.motor.compensation),
+        arm=arm,
+        limit=float(hand.motor.torque) * ratio,
+        encoder=ENCODER / float(hand.motor.gear_ratio) / ratio,
+    )
+
+
+def joints_of(arms: Array) -> list[int]:
+    """The joint of each tendon, from lever arms (m, n): shared out evenly, so that the arms are as long as can be."""
+    tendons, joints = arms.shape
+    share = -(-tendons // joints)
+    _, places = linear_sum_assignment(np.repeat(arms, share, axis=1), maximize=True)
+    return [int(place) // share for place in places]
+
+
+def _cubic(library: Any) -> Array:
+    """Coefficients (k1, k2, k3) of the hand's spring from where it begins to pull, fitted to its forces."""
+    forces = np.linspace(*STRETCH, 200)
+    found = library.spring_elongation(forces)
+    x, f = found.x[found.status == 0], forces[found.status == 0]
+    if not len(x):
+        raise InputError("the hand's spring holds none of the forces that a joint needs")
+    x = x - (x[0] - f[0] / float(library.spring_stiffness(x[0]).k))
+    fitted: Array = np.linalg.lstsq(x[:, None] ** [1, 2, 3] / f[:, None], np.ones_like(f), rcond=None)[0]
+    return fitted
+
+
+def loop_around(joint: Joint, law: Sequence[Element], late: bool = True) -> Loop:
+    """The joint on the hand's clock, its sensors, its motors, and a law that reads these and writes ``wanted``."""
+    noise = sqrt(2.0) * ANGLE_NOISE  # of the two sensors of a lever
+    return Loop(
+        plant=[Block("plant_antagonistic")],
+        law=law,
+        states={"x": "xd"},
+        sensors=[
+            Sensor(("x[2]", "x[4]"), "thetas", step=joint.encoder),
+            Sensor("stretches", "stretches_seen", noise=noise, step=ANGLE_NOISE),
+            Sensor("tau", "measured", noise=TORQUE_NOISE, step=TORQUE_NOISE),
+            Sensor("u", "acted"),
+        ],
+        actuators=[Actuator("wanted", "u", limit=joint.limit, late=late)],
+        period=PERIOD,
+    )
+
+
+def values_of(joint: Joint, believed: Joint, force: float) -> dict[str, Any]:
+    """Signals of the joint at rest under a pretension [N], and of what its law knows."""
+    torque = force * joint.arm
+    theta = joint.elongations(torque)
+    return {
+        "x": [0, 0, theta[0], 0, theta[1], 0],
+        "u": [torque, torque],
+        "wanted": [torque, torque],
+        "load": 0.0,
+        "inertias": joint.inertias,
+        "tendons": joint.tendons,
+        "damping": joint.damping,
+        "friction": joint.friction,
+        "memory": [0, 0, 0, theta[0], 0, 0, theta[1], 0, 0, torque, torque, 1, 1],
+        "motion": np.zeros(5),
+        "goal": np.zeros(5),
+        "period": PERIOD,
+        "known_inertias": believed.inertias,
+        "known_tendons": believed.tendons,
+        "known_damping": believed.damping,
+        "known_friction": believed.friction,
+        "pretension": [torque, 0, 0],
+        "nothing": 0.0,
+        "acted": [torque, torque],
+    }

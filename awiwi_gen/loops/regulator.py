@@ -1,0 +1,121 @@
+"""Gains of the impedance law for what motion may cost (chapter 16).
+
+A linear-quadratic regulator gives feedback gains, and the closed loop's poles split into two pairs: one for the link,
+one for the torque. Near the impedance that the first pair would be alone, the law has exactly these feedback gains with
+positive rates and weights. The two curves 1 / C_t = 0 and K_4 / C_t = 0 cross at that impedance, so a small step away,
+in the right direction, gives C_t and K_4 whatever positive values are wanted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.linalg import solve_continuous_are
+
+from awiwi_gen.errors import InputError
+from awiwi_gen.loops.joint import Array, Loop, Plant, joint_loop
+
+Quadratic = tuple[float, float]
+
+STEPS = 0.5 ** np.arange(1.0, 40.0)  # tried from the longest on, in parts of the distance to the impedance's origin
+_PAIRINGS: dict[int, tuple[tuple[int, ...], ...]] = {
+    0: ((),),
+    2: ((0, 1),),
+    4: ((0, 1, 2, 3), (0, 2, 1, 3), (0, 3, 1, 2)),
+}
+
+
+@dataclass(frozen=True)
+class Gains:
+    """Gains (K_p, K_d, K_3, K_4) and weights (C_t, C_s) of the impedance law."""
+
+    gains: Array
+    weights: Array
+
+
+def regulator(plant: Plant, Q: Array, R: float, cancelled: bool = False) -> Array:
+    """Feedback gains (4,) on (q, q', tau, tau') that cost least, for the plant or for that of table 16.1.
+
+    Raises InputError for costs that no feedback minimises.
+    """
+    loop = joint_loop(plant, np.zeros(4), np.zeros(2))
+    A = loop.A.copy()
+    if cancelled:
+        A[3] = 0
+    try:
+        S = solve_continuous_are(A, loop.B, Q, np.array([[R]]))
+    except np.linalg.LinAlgError as error:
+        raise InputError(f"no feedback minimises the costs Q = {Q.tolist()}, R = {R:g}: {error}") from None
+    gains: Array = (loop.B.T @ S)[0] / R
+    return gains
+
+
+def cancelling(plant: Plant) -> Array:
+    """Gains that cancel the spring's torque: what tells the feedback gains of the two plants apart (eq. 15.62)."""
+    return np.array([0, 0, (plant.m + plant.b) / plant.m, 0])
+
+
+def exact_gains(library: Any, plant: Plant, wanted: Array) -> Gains:
+    """Gains whose feedback on the plant of table 16.1 is exactly ``wanted``: those that settle a pretension fastest.
+
+    Raises InputError where the closed loop is not stable, or four equal poles leave no two pairs.
+    """
+    m, b, k = plant.numbers
+    c = k / b * wanted
+    poles = np.roots([1, c[3], c[2], c[1] / m, c[0] / m])
+    if not poles.real.max() < 0:
+        raise InputError(
+            f"the feedback gains {_short(wanted)} do not stabilise the joint; its poles are {_short(poles)}"
+        )
+    found = [gains for link, torque in pairs(poles) for gains in _near(library, plant, wanted, link, torque)]
+    if not found:
+        raise InputError(f"the feedback gains {_short(wanted)} leave no two different pairs of poles: {_short(poles)}")
+    return min(found, key=lambda gains: pretension_loop(plant, gains).sampled_radius())
+
+
+def _near(library: Any, plant: Plant, wanted: Array, link: Quadratic, torque: Quadratic) -> Iterator[Gains]:
+    """The exact gains nearest to an impedance that alone would have one pair of the poles, at most one set."""
+    (a1, a0), (sigma, pi) = link, torque
+    slow = min(sigma / 2, pi / (2 * sigma))  # a K_4 that leaves K_3 and C_s positive
+    towards = np.array([[pi / a0 - 1, a1 - sigma], [a1 * pi / a0 - sigma, a0 - pi]])
+    if abs(np.linalg.det(towards)) <= 1e-12 * np.prod(np.linalg.norm(towards, axis=1)):
+        return
+    impedance = plant.m * np.array([a0, a1])
+    direction = np.linalg.solve(towards, [1, slow])
+    tried = impedance + STEPS[:, None] * direction / np.max(np.abs(direction) / impedance)
+    found = library.optimal_backstepping_weights(K_opt=wanted, plant=plant.numbers, impedance=tried)
+    for place in np.flatnonzero(found.status == 0)[:1]:
+        yield Gains(np.append(tried[place], found.rates[place]), found.weights[place])
+
+
+def pairs(poles: Array) -> Iterator[tuple[Quadratic, Quadratic]]:
+    """All ways to group four poles into two real quadratics s^2 + a s + b, given as (a, b), in either order."""
+    upper = sorted((z for z in poles if z.imag > 0), key=abs)
+    real = sorted(-z.real for z in poles if z.imag == 0)
+    complex_pairs = [(-2 * z.real, abs(z) ** 2) for z in upper]
+    for order in _PAIRINGS[len(real)]:
+        quadratics = [(real[i] + real[j], real[i] * real[j]) for i, j in zip(order[::2], order[1::2], strict=True)]
+        first, second = complex_pairs + quadratics
+        yield first, second
+        yield second, first
+
+
+def loop_of(plant: Plant, wanted: Array) -> Loop:
+    """The joint under feedback gains of the plant of table 16.1, with the spring cancelled."""
+    return joint_loop(plant, wanted - cancelling(plant), np.zeros(2))
+
+
+def pretension_loop(plant: Plant, gains: Gains) -> Loop:
+    """The torque that both motors of a pair have in common: the link does not feel it (section 15.5)."""
+    _, _, fast, slow = gains.gains
+    back = plant.b / plant.k
+    K = back * np.array([[fast * slow + gains.weights[0] / gains.weights[1], fast + slow]]) - [[1, 0]]
+    A = np.array([[0, 1], [-1 / back, 0]])
+    return Loop(A, np.array([[0], [1 / back]]), np.zeros((2, 1)), K, np.zeros((1, 1)))
+
+
+def _short(numbers: Array) -> str:
+    return ", ".join(f"{number:.4g}" for number in numbers)

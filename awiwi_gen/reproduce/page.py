@@ -1,0 +1,171 @@
+"""All studies on one page: figures with claims and verdicts, printed numbers against ours, the proof of every kernel."""
+
+from __future__ import annotations
+
+import importlib.util
+import io
+import re
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from awiwi_gen.emit.files import render
+from awiwi_gen.errors import InputError
+from awiwi_gen.hand import Hand
+from awiwi_gen.report import COLUMNS, proof_rows
+from awiwi_gen.reproduce.figures import all_figures, in_order
+from awiwi_gen.reproduce.figures.absent import ABSENT
+from awiwi_gen.reproduce.printed import all_numbers
+from awiwi_gen.results import Figure, Printed, Table, Verdict
+
+if TYPE_CHECKING:
+    from awiwi_gen.pipeline import Job, Proof
+
+SIZE = (6.4, 3.9)  # inches
+STYLE = {
+    "svg.fonttype": "path",
+    "font.size": 9.0,
+    "axes.grid": True,
+    "grid.alpha": 0.3,
+    "grid.linewidth": 0.5,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "legend.frameon": False,
+}
+FIRST_OF_PART_II = 7  # chapter
+COUNTED: dict[Verdict, str] = {
+    "agrees": "agree",
+    "misprint": "are misprints",
+    "not reproducible": "cannot be reproduced",
+}
+PARTS = {"Modelling": range(FIRST_OF_PART_II), "Control": range(FIRST_OF_PART_II, 100)}
+
+
+@dataclass(frozen=True)
+class Results:
+    """All that the page shows of a hand."""
+
+    figures: Sequence[Figure]
+    numbers: Sequence[Printed]
+    proof: Proof
+    compared: Sequence[Table] = ()
+
+    def as_dict(self) -> dict[str, Any]:
+        """For programs."""
+        shown = [
+            {"number": f.number, "title": f.title, "claim": f.claim, "found": f.found, "holds": bool(f.holds)}
+            for f in self.figures
+        ]
+        return {
+            "figures": shown,
+            "numbers": [vars(number) for number in self.numbers],
+            "compared": [vars(table) for table in self.compared],
+        }
+
+
+Comparison = Callable[[Any, Hand], tuple[list[Figure], list[Table]]]
+
+
+def publish(job: Job, path: Path, comparison: Comparison) -> Results:
+    """Compute all studies of a hand, verify its kernels, write both. Raises InputError where libraries are missing."""
+    from awiwi_gen.build import load
+    from awiwi_gen.pipeline import cached_tree, verify
+
+    missing = [name for name in ("matplotlib", "scipy") if importlib.util.find_spec(name) is None]
+    if missing:
+        raise InputError(f"{' and '.join(missing)} needed for figures; install them: pip install 'awiwi_gen[studies]'")
+    directory = cached_tree(job)
+    library = load(directory, job.store)
+    compared_figures, tables = comparison(library, job.hand)
+    figures = in_order([*all_figures(library, job.hand), *compared_figures])
+    results = Results(figures, all_numbers(library, job.hand), verify(job, directory), tables)
+    write_page(path, job.hand, results, library.manifest)
+    return results
+
+
+def write_page(path: Path, hand: Hand, results: Results, manifest: Mapping[str, Any]) -> None:
+    """Write one HTML file that needs no other; the same bytes for the same results."""
+    kernels = {entry["name"]: chapter(entry["source"]) for entry in manifest["kernels"]}
+    rows = proof_rows(results.proof.verdicts, manifest)
+    parts = [
+        {
+            "name": name,
+            "anchor": name.lower(),
+            "figures": [_shown(figure) for figure in results.figures if chapter(figure.number) in chapters],
+            "kernels": _escaped(row for row in rows if kernels[row[0]] in chapters),
+        }
+        for name, chapters in PARTS.items()
+    ]
+    page = render(
+        "report.html.j2",
+        hand=escape(hand.name),
+        digest=hand.digest(),
+        summary=escape(summary(results)),
+        parts=parts,
+        absent=_escaped(ABSENT.items()),
+        columns=COLUMNS,
+        compared=[{"title": escape(t.title), "columns": t.columns, "rows": _escaped(t.rows)} for t in results.compared],
+        numbers=_escaped((n.where, n.printed, n.ours, n.verdict, n.reason) for n in results.numbers),
+        laws=_escaped(
+            (law.part, law.statement, f"{law.worst:.0e}", "holds" if law.passed else "fails")
+            for law in results.proof.laws
+        ),
+    )
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(page, encoding="utf-8", newline="\n")
+
+
+def chapter(place: str) -> int:
+    """The chapter that a figure, an equation or a kernel's source is of; one that the source lacks counts as the last."""
+    found = re.search(r"\d+", place)
+    return int(found[0]) if found else max(PARTS["Control"])
+
+
+def summary(results: Results) -> str:
+    """A sentence on what agrees."""
+    verdicts = Counter(number.verdict for number in results.numbers)
+    told = ", ".join(f"{verdicts[name]} {word}" for name, word in COUNTED.items() if verdicts[name])
+    holding = sum(bool(figure.holds) for figure in results.figures)
+    proved = sum(verdict.passed for verdict in results.proof.verdicts)
+    return (
+        f"{holding} of {len(results.figures)} claims of figures hold. Printed numbers: {told or 'none compared'}. "
+        f"{proved} of {len(results.proof.verdicts)} kernels proved."
+    )
+
+
+def verdict(figure: Figure) -> str:
+    """Whether a figure's claim holds, in words."""
+    return "holds" if figure.holds else "does not hold"
+
+
+def _shown(figure: Figure) -> dict[str, str]:
+    return {
+        "anchor": f"figure-{re.sub(r'[^0-9a-z]+', '-', figure.number.lower()).strip('-')}",
+        "number": escape(figure.number),
+        "title": escape(figure.title),
+        "claim": escape(figure.claim),
+        "found": escape(figure.found),
+        "verdict": verdict(figure),
+        "drawing": drawing(figure),
+    }
+
+
+def drawing(figure: Figure) -> str:
+    """A figure as SVG text, without date or version."""
+    import matplotlib as mpl
+    from matplotlib.figure import Figure as Canvas
+
+    text = io.StringIO()
+    # what must be unique inside one drawing is made from the salt, and must be unique on the page
+    with mpl.rc_context(STYLE | {"svg.hashsalt": figure.number}):
+        canvas = Canvas(figsize=SIZE, layout="constrained")
+        figure.draw(canvas.add_subplot())
+        canvas.savefig(text, format="svg", metadata={"Date": None, "Creator": None, "Format": None, "Type": None})
+    return text.getvalue()[text.getvalue().index("<svg") :]
+
+
+def _escaped(rows: Iterable[Sequence[str]]) -> list[list[str]]:
+    return [[escape(cell) for cell in row] for row in rows]

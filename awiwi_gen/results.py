@@ -1,0 +1,92 @@
+"""What a study finds: a figure, a printed number beside ours, a table. The report page shows all three."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from decimal import Decimal, InvalidOperation
+from typing import Any, Literal
+
+Verdict = Literal["agrees", "misprint", "not reproducible"]
+Draw = Callable[[Any], None]
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A figure of the source, computed again. ``draw`` takes Matplotlib axes.
+
+    ``claim`` is what the source concludes from the figure, in our words. ``found`` is what the compiled kernels give, in
+    numbers. ``holds`` says whether the claim is true of the same data, for this hand.
+    """
+
+    number: str
+    title: str
+    claim: str
+    found: str
+    holds: bool
+    draw: Draw
+
+
+@dataclass(frozen=True)
+class Table:
+    """Columns and rows of text; the last column is a verdict."""
+
+    title: str
+    columns: tuple[str, ...]
+    rows: list[tuple[str, ...]]
+
+
+@dataclass(frozen=True)
+class Printed:
+    """A number or formula that the source prints: where, what is printed, what we compute, and why they differ."""
+
+    where: str
+    printed: str
+    ours: str
+    verdict: Verdict
+    reason: str
+
+
+def compared(where: str, printed: str, ours: float, reason: str, otherwise: Verdict = "misprint") -> Printed:
+    """A printed number beside ours: "agrees" if the printed digits are the same, else the verdict ``otherwise``."""
+    agrees = same_digits(printed, ours)
+    return Printed(where, printed, f"{ours:.7g}", "agrees" if agrees else otherwise, reason)
+
+
+def same_digits(printed: str, ours: float) -> bool:
+    """Whether our value, rounded to the printed digits, is the printed value.
+
+    Trailing zeros of a printed integer count as unknown: "4600" has two digits.
+    """
+    try:
+        number = Decimal(printed)
+    except InvalidOperation:
+        return False
+    last = number.normalize().as_tuple().exponent if number == number.to_integral() else number.as_tuple().exponent
+    if not isinstance(last, int) or number == 0:
+        return float(number) == ours
+    return Decimal(repr(float(ours))).quantize(Decimal(1).scaleb(last)) == number
+
+
+def curves(x: Any, lines: Any, xlabel: str, ylabel: str, *styles: str, markersize: float = 3, **settings: Any) -> Draw:
+    """Draw lines over x, from a mapping of labels to values (or to pairs of x and values), or one unlabelled line.
+
+    ``styles`` are Matplotlib formats such as ":", one for each line; ``settings`` go to ``axes.set``.
+    """
+
+    def draw(axes: Any) -> None:
+        labelled = isinstance(lines, dict)
+        for index, (label, values) in enumerate(lines.items() if labelled else [(None, lines)]):
+            style = styles[index] if index < len(styles) else "-"
+            axes.plot(
+                *(values if isinstance(values, tuple) else (x, values)),
+                style,
+                linewidth=0.8,
+                markersize=markersize,
+                label=label,
+            )
+        axes.set(xlabel=xlabel, ylabel=ylabel, **settings)
+        if labelled:
+            axes.legend()
+
+    return draw

@@ -1,1 +1,0 @@
-"""Studies of the compiled hand: what the source shows in its figures, computed again."""

@@ -1,0 +1,83 @@
+"""Gains that a hand file brings along, tried on the clock before they become C.
+
+Each tendon is taken as one half of its joint, as `awiwi-gen tune` does; the law is the antagonistic one, at 3 kHz and a
+delay of one sample, about a rest under two pretensions. Gains that are unstable there are refused.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+import awiwi_gen
+from awiwi_gen.cache import Cache, code_digest, key
+from awiwi_gen.errors import Fault, InputError
+from awiwi_gen.hand import Hand
+from awiwi_gen.loops.joint import Plant
+from awiwi_gen.loops.nearest import nearest
+from awiwi_gen.loops.pair import Pair, pair_loop
+from awiwi_gen.loops.sampled import PERIOD
+from awiwi_gen.tune.tendons import GAINS, plants
+
+PRETENSIONS = (10.0, 20.0)  # N
+POWERS = {"K_p": 2, "K_d": 1, "K_3": 1, "K_4": 1, "C_t": 0, "C_s": -2}  # of the bandwidth that a gain grows with
+
+
+def require_running_gains(hand: Hand, store: Cache) -> None:
+    """Raise InputError that names every tendon of a hand whose gains cannot run, and the nearest that can."""
+    if not hand.gains:
+        return
+    digest = key(hand.digest(), code_digest())
+    faults = store.memo("gains", digest, lambda: failing(awiwi_gen.build(hand), hand))
+    if faults:
+        raise InputError(faults)
+
+
+def failing(library: Any, hand: Hand) -> list[Fault]:
+    """A fault for each tendon whose gains cannot run."""
+    found: dict[int, tuple[str, list[Plant]]] = {}
+    for force in PRETENSIONS:
+        for name, finger in hand.fingers.items():
+            first = hand.blocks[name][0].start
+            for index, (joint, plant) in enumerate(plants(library, hand, name, finger, force)):
+                found.setdefault(first + index, (f"{name}, {joint}", []))[1].append(plant)
+    faults = []
+    for place, gains in enumerate(hand.gains):
+        joint, both = found[gains.tendon]
+        wanted = {name: float(getattr(gains, name)) for name in GAINS}
+        worst = max(radius(library, plant, wanted) for plant in both)
+        if not worst < 1:
+            message = (
+                f"= {gains.tendon} ({joint}): these gains are unstable at {1 / PERIOD:.0f} Hz and a delay of one sample "
+                f"(spectral radius {worst:.3g}); {way_out(library, both, wanted)}"
+            )
+            faults.append(Fault(key=f"gains[{place}].tendon", message=message))
+    return faults
+
+
+def radius(library: Any, plant: Plant, gains: Mapping[str, float], delay: int = 1) -> float:
+    """Spectral radius of a joint whose both tendons have these gains; infinite where the law refuses them."""
+    pair = Pair(plant.m, (plant.b / 2,) * 2, (plant.k / 2,) * 2)
+    impedance, tuning = list(gains.values())[:2], list(gains.values())[2:]
+    loop, constant = pair_loop(library.backstepping_antagonistic, pair, impedance, tuning)
+    if not (np.isfinite(loop.K).all() and np.isfinite(constant).all()):
+        return float("inf")
+    return loop.sampled_radius(delay)
+
+
+def way_out(library: Any, both: list[Plant], gains: dict[str, float]) -> str:
+    """The nearest gains that run, in words; they bear another sample of delay, too."""
+
+    def works(chosen: Mapping[str, float]) -> bool:
+        return all(radius(library, plant, chosen, delay) < 1 for plant in both for delay in (1, 2))
+
+    def widest(chosen: Mapping[str, float]) -> float:
+        return max(radius(library, plant, chosen, 2) for plant in both)
+
+    found = nearest(gains, POWERS, works, widest)
+    if found is None:
+        return "neither another bandwidth nor a change of gains was found to mend that"
+    told = ", ".join(f'{name} = "{value:.6g} {GAINS[name]}"' for name, value in found.gains.items())
+    return f"the nearest that run are {told}"
