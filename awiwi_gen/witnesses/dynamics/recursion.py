@@ -29,7 +29,7 @@ def coriolis_matrix(finger: Finger, q: SX, qd: SX) -> SX:
 
 
 def gravity(finger: Finger, q: SX, g: SX) -> SX:
-    """Joint torques (n) [N m] that hold the finger still."""
+    """Joint torques (n) [N m] that hold the finger at rest."""
     return _weight(assemble(finger, q), g, q.numel())
 
 
@@ -68,7 +68,7 @@ def dynamics(finger: Finger, q: SX, qd: SX, g: SX) -> tuple[SX, SX, SX]:
 
 
 def energy(finger: Finger, q: SX, qd: SX, g: SX) -> tuple[SX, SX]:
-    """Kinetic and potential energy [J] (eq. 5.4); potential zero is a mass at the origin of the base."""
+    """Kinetic and potential energy [J] (eq. 5.4); the potential of a mass at the base frame's origin is zero."""
     assembly = assemble(finger, q)
     potential, down = -ca.dot(g, assembly.palm_moment), assembly.base_rotation @ g
     for joint in assembly.joints:
