@@ -11,14 +11,14 @@ extern "C" {
 extern const char awiwi_model_digest[65];
 
 /*
- * Stiffness of every tendon that is pulled with a tension: spring and fibre in series, and its
- * derivatives. slope and curvature are dk/df and d2k/df2.
+ * Stiffness of every tendon at its tension, spring and fibre in series, and its derivatives. slope and
+ * curvature are dk/df and d2k/df2.
  * Source: figure 4.7, section 4.3.
  *   in   tension[8] in N, 3.87595 to 100.149
  *   out  k[8] in N/m
  *   out  slope[8] in 1/m
  *   out  curvature[8] in 1/(N m)
- * Returns 0 where every tension is on its spring's curve, give or take a hundredth; elsewhere 1, and
+ * Returns 0 where every tension is on its spring's curve, with a margin of 0.4 %; elsewhere 1, and
  * what is not defined is NaN.
  * Cost: 198 add, 198 mul, 7 calls.
  */
@@ -34,7 +34,7 @@ int awiwi_thumb_tendon_stiffness(const double tension[8], double k[8], double sl
 void awiwi_thumb_fingertip_pose(const double q[4], double T[16]);
 
 /*
- * Pose of every link frame (at its joint, turning with the link) in the finger's base frame.
+ * Pose of every link frame (origin at its joint, fixed to the link) in the finger's base frame.
  * Source: eq. 5.2.
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   out  T[4][4][4] in 1, m
@@ -52,7 +52,7 @@ void awiwi_thumb_link_poses(const double q[4], double T[64]);
 void awiwi_thumb_jacobian(const double q[4], double J[24]);
 
 /*
- * Pose of the fingertip and its Jacobian, both in base axes, in one call that shares their work.
+ * Pose of the fingertip and its Jacobian, both in base axes, in one call with fewer operations.
  * Source: eq. 5.2, 5.3, table 5.1, differentiated.
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   out  T[4][4] in 1, m
@@ -71,7 +71,7 @@ void awiwi_thumb_pose_and_jacobian(const double q[4], double T[16], double J[24]
 void awiwi_thumb_mass_matrix(const double q[4], double M[16]);
 
 /*
- * Coriolis matrix of Christoffel symbols, so that dM/dt - 2 C is skew-symmetric.
+ * Coriolis matrix by Christoffel symbols, so that dM/dt - 2 C is skew-symmetric.
  * Source: eq. 2.17.
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   in   qd[4] in rad/s, -20 to 20
@@ -81,7 +81,7 @@ void awiwi_thumb_mass_matrix(const double q[4], double M[16]);
 void awiwi_thumb_coriolis_matrix(const double q[4], const double qd[4], double C[16]);
 
 /*
- * Joint torques that hold the finger still against gravity g (in base axes).
+ * Joint torques that hold the finger at rest against gravity g (in base axes).
  * Source: eq. 2.17, 5.4.
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   in   g[3] in m/s^2, -9.81 to 9.81
@@ -139,7 +139,7 @@ void awiwi_thumb_inverse_dynamics_derivatives(const double q[4], const double qd
 void awiwi_thumb_forward_dynamics(const double q[4], const double qd[4], const double tau[4], const double g[3], double qdd[4]);
 
 /*
- * Mass matrix, Coriolis matrix and gravity torques in one call that shares their work.
+ * Mass matrix, Coriolis matrix and gravity torques in one call with fewer operations.
  * Source: eq. 2.17.
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   in   qd[4] in rad/s, -20 to 20
@@ -164,7 +164,7 @@ void awiwi_thumb_dynamics(const double q[4], const double qd[4], const double g[
 void awiwi_thumb_energy(const double q[4], const double qd[4], const double g[3], double kinetic[1], double potential[1]);
 
 /*
- * Length of every tendon's path in the finger, from its routing.
+ * Path length of every tendon in the finger, by its routing.
  * Source: eq. 5.5, 5.18, 5.22.
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   out  h[8] in m
@@ -201,7 +201,7 @@ void awiwi_thumb_coupling_derivative(const double q[4], double dP[128]);
 void awiwi_thumb_joint_torque(const double q[4], const double f[8], double tau[4]);
 
 /*
- * Joint stiffness -d tau/dq felt through tendons of stiffness k that pull with forces f.
+ * Joint stiffness -d tau/dq of tendons with the stiffnesses k and the forces f.
  * Source: eq. 5.12, 5.23.
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   in   f[8] in N, 0 to 100
@@ -212,7 +212,7 @@ void awiwi_thumb_joint_torque(const double q[4], const double f[8], double tau[4
 void awiwi_thumb_joint_stiffness(const double q[4], const double f[8], const double k[8], double K[16]);
 
 /*
- * Joint torques and joint stiffness of the tendons in one call that shares their work.
+ * Joint torques and joint stiffness of the tendons in one call with fewer operations.
  * Source: eq. 5.8, 5.12, 5.23.
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   in   f[8] in N, 0 to 100
@@ -224,7 +224,8 @@ void awiwi_thumb_joint_stiffness(const double q[4], const double f[8], const dou
 void awiwi_thumb_joint_torque_and_stiffness(const double q[4], const double f[8], const double k[8], double tau[4], double K[16]);
 
 /*
- * Joint angles whose tendon lengths are nearest to the measured h; start is the last estimate.
+ * Joint angles whose tendon lengths are nearest to the measured h (least squares); start is the last
+ * estimate.
  * Source: eq. 5.14, 5.15, 5.24.
  *   in   h[8] in m, from [0, 0, 0, 0, -0.01117, -0.01117, -0.01955, -0.01955] to [0.1515, 0.1515, 0.1515, 0.1515, 0.01117, 0.01117, 0.01955, 0.01955]
  *   in   start[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
@@ -235,8 +236,8 @@ void awiwi_thumb_joint_torque_and_stiffness(const double q[4], const double f[8]
 int awiwi_thumb_joint_estimate(const double h[8], const double start[4], double q[4]);
 
 /*
- * Error of the joint estimate: covariance for lengths of standard deviation noise, worst for errors up
- * to noise.
+ * Errors of the joint estimate: covariance for lengths with standard deviation noise, worst for errors
+ * up to noise.
  * Source: eq. 5.14, linearised.
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   in   noise[1] in m, 0 to 0.001
@@ -247,10 +248,10 @@ int awiwi_thumb_joint_estimate(const double h[8], const double start[4], double 
 void awiwi_thumb_joint_estimate_error(const double q[4], const double noise[1], double covariance[16], double worst[4]);
 
 /*
- * Tendon forces from f_min to f_max that give the joint torque tau and come nearest to the joint
- * stiffness K. The torque is exact where the limits allow it, else the nearest (AWIWI_INFEASIBLE). The
- * stiffness is the nearest of all with that torque, by the sum of the squares of the errors of all
- * entries (the squared Frobenius norm).
+ * Tendon forces from f_min to f_max for the joint torque tau and the nearest possible joint stiffness
+ * to K. The torque is exact if the limits allow it, otherwise the nearest possible one (status
+ * AWIWI_INFEASIBLE). Of all forces with that torque, the result has the least error of the stiffness
+ * in the Frobenius norm.
  * Source: eq. 7.2, 7.6, mended.
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   in   tau[4] in N m, -1 to 1
@@ -275,14 +276,14 @@ int awiwi_thumb_tendon_distribution(const double q[4], const double tau[4], cons
 int awiwi_thumb_base_estimate_by_gradient(const double h[4], const double start[2], double q[2]);
 
 /*
- * Stiffness of every tendon that is pulled with a tension: spring and fibre in series, and its
- * derivatives. slope and curvature are dk/df and d2k/df2.
+ * Stiffness of every tendon at its tension, spring and fibre in series, and its derivatives. slope and
+ * curvature are dk/df and d2k/df2.
  * Source: figure 4.7, section 4.3.
  *   in   tension[8] in N, 3.87595 to 100.149
  *   out  k[8] in N/m
  *   out  slope[8] in 1/m
  *   out  curvature[8] in 1/(N m)
- * Returns 0 where every tension is on its spring's curve, give or take a hundredth; elsewhere 1, and
+ * Returns 0 where every tension is on its spring's curve, with a margin of 0.4 %; elsewhere 1, and
  * what is not defined is NaN.
  * Cost: 198 add, 198 mul, 7 calls.
  */
@@ -298,7 +299,7 @@ int awiwi_index_tendon_stiffness(const double tension[8], double k[8], double sl
 void awiwi_index_fingertip_pose(const double q[4], double T[16]);
 
 /*
- * Pose of every link frame (at its joint, turning with the link) in the finger's base frame.
+ * Pose of every link frame (origin at its joint, fixed to the link) in the finger's base frame.
  * Source: eq. 5.2.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   out  T[4][4][4] in 1, m
@@ -316,7 +317,7 @@ void awiwi_index_link_poses(const double q[4], double T[64]);
 void awiwi_index_jacobian(const double q[4], double J[24]);
 
 /*
- * Pose of the fingertip and its Jacobian, both in base axes, in one call that shares their work.
+ * Pose of the fingertip and its Jacobian, both in base axes, in one call with fewer operations.
  * Source: eq. 5.2, 5.3, table 5.1, differentiated.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   out  T[4][4] in 1, m
@@ -335,7 +336,7 @@ void awiwi_index_pose_and_jacobian(const double q[4], double T[16], double J[24]
 void awiwi_index_mass_matrix(const double q[4], double M[16]);
 
 /*
- * Coriolis matrix of Christoffel symbols, so that dM/dt - 2 C is skew-symmetric.
+ * Coriolis matrix by Christoffel symbols, so that dM/dt - 2 C is skew-symmetric.
  * Source: eq. 2.17.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   qd[4] in rad/s, -20 to 20
@@ -345,7 +346,7 @@ void awiwi_index_mass_matrix(const double q[4], double M[16]);
 void awiwi_index_coriolis_matrix(const double q[4], const double qd[4], double C[16]);
 
 /*
- * Joint torques that hold the finger still against gravity g (in base axes).
+ * Joint torques that hold the finger at rest against gravity g (in base axes).
  * Source: eq. 2.17, 5.4.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   g[3] in m/s^2, -9.81 to 9.81
@@ -403,7 +404,7 @@ void awiwi_index_inverse_dynamics_derivatives(const double q[4], const double qd
 void awiwi_index_forward_dynamics(const double q[4], const double qd[4], const double tau[4], const double g[3], double qdd[4]);
 
 /*
- * Mass matrix, Coriolis matrix and gravity torques in one call that shares their work.
+ * Mass matrix, Coriolis matrix and gravity torques in one call with fewer operations.
  * Source: eq. 2.17.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   qd[4] in rad/s, -20 to 20
@@ -428,7 +429,7 @@ void awiwi_index_dynamics(const double q[4], const double qd[4], const double g[
 void awiwi_index_energy(const double q[4], const double qd[4], const double g[3], double kinetic[1], double potential[1]);
 
 /*
- * Length of every tendon's path in the finger, from its routing.
+ * Path length of every tendon in the finger, by its routing.
  * Source: eq. 5.5, 5.18, 5.22.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   out  h[8] in m
@@ -465,7 +466,7 @@ void awiwi_index_coupling_derivative(const double q[4], double dP[128]);
 void awiwi_index_joint_torque(const double q[4], const double f[8], double tau[4]);
 
 /*
- * Joint stiffness -d tau/dq felt through tendons of stiffness k that pull with forces f.
+ * Joint stiffness -d tau/dq of tendons with the stiffnesses k and the forces f.
  * Source: eq. 5.12, 5.23.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   f[8] in N, 0 to 100
@@ -476,7 +477,7 @@ void awiwi_index_joint_torque(const double q[4], const double f[8], double tau[4
 void awiwi_index_joint_stiffness(const double q[4], const double f[8], const double k[8], double K[16]);
 
 /*
- * Joint torques and joint stiffness of the tendons in one call that shares their work.
+ * Joint torques and joint stiffness of the tendons in one call with fewer operations.
  * Source: eq. 5.8, 5.12, 5.23.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   f[8] in N, 0 to 100
@@ -488,7 +489,8 @@ void awiwi_index_joint_stiffness(const double q[4], const double f[8], const dou
 void awiwi_index_joint_torque_and_stiffness(const double q[4], const double f[8], const double k[8], double tau[4], double K[16]);
 
 /*
- * Joint angles whose tendon lengths are nearest to the measured h; start is the last estimate.
+ * Joint angles whose tendon lengths are nearest to the measured h (least squares); start is the last
+ * estimate.
  * Source: eq. 5.14, 5.15, 5.24.
  *   in   h[8] in m, from [-0.01278, -0.01278, -0.01278, -0.01278, -0.009425, -0.009425, -0.01571, -0.01571] to [0.01278, 0.01278, 0.01278, 0.01278, 0.009425, 0.009425, 0.01571, 0.01571]
  *   in   start[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
@@ -498,8 +500,8 @@ void awiwi_index_joint_torque_and_stiffness(const double q[4], const double f[8]
 void awiwi_index_joint_estimate(const double h[8], const double start[4], double q[4]);
 
 /*
- * Error of the joint estimate: covariance for lengths of standard deviation noise, worst for errors up
- * to noise.
+ * Errors of the joint estimate: covariance for lengths with standard deviation noise, worst for errors
+ * up to noise.
  * Source: eq. 5.14, linearised.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   noise[1] in m, 0 to 0.001
@@ -510,10 +512,10 @@ void awiwi_index_joint_estimate(const double h[8], const double start[4], double
 void awiwi_index_joint_estimate_error(const double q[4], const double noise[1], double covariance[16], double worst[4]);
 
 /*
- * Tendon forces from f_min to f_max that give the joint torque tau and come nearest to the joint
- * stiffness K. The torque is exact where the limits allow it, else the nearest (AWIWI_INFEASIBLE). The
- * stiffness is the nearest of all with that torque, by the sum of the squares of the errors of all
- * entries (the squared Frobenius norm).
+ * Tendon forces from f_min to f_max for the joint torque tau and the nearest possible joint stiffness
+ * to K. The torque is exact if the limits allow it, otherwise the nearest possible one (status
+ * AWIWI_INFEASIBLE). Of all forces with that torque, the result has the least error of the stiffness
+ * in the Frobenius norm.
  * Source: eq. 7.2, 7.6, mended.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   tau[4] in N m, -1 to 1
@@ -527,14 +529,14 @@ void awiwi_index_joint_estimate_error(const double q[4], const double noise[1], 
 int awiwi_index_tendon_distribution(const double q[4], const double tau[4], const double K[16], const double f_min[1], const double f_max[1], double f[8]);
 
 /*
- * Stiffness of every tendon that is pulled with a tension: spring and fibre in series, and its
- * derivatives. slope and curvature are dk/df and d2k/df2.
+ * Stiffness of every tendon at its tension, spring and fibre in series, and its derivatives. slope and
+ * curvature are dk/df and d2k/df2.
  * Source: figure 4.7, section 4.3.
  *   in   tension[8] in N, 3.87595 to 100.149
  *   out  k[8] in N/m
  *   out  slope[8] in 1/m
  *   out  curvature[8] in 1/(N m)
- * Returns 0 where every tension is on its spring's curve, give or take a hundredth; elsewhere 1, and
+ * Returns 0 where every tension is on its spring's curve, with a margin of 0.4 %; elsewhere 1, and
  * what is not defined is NaN.
  * Cost: 198 add, 198 mul, 7 calls.
  */
@@ -550,7 +552,7 @@ int awiwi_middle_tendon_stiffness(const double tension[8], double k[8], double s
 void awiwi_middle_fingertip_pose(const double q[4], double T[16]);
 
 /*
- * Pose of every link frame (at its joint, turning with the link) in the finger's base frame.
+ * Pose of every link frame (origin at its joint, fixed to the link) in the finger's base frame.
  * Source: eq. 5.2.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   out  T[4][4][4] in 1, m
@@ -568,7 +570,7 @@ void awiwi_middle_link_poses(const double q[4], double T[64]);
 void awiwi_middle_jacobian(const double q[4], double J[24]);
 
 /*
- * Pose of the fingertip and its Jacobian, both in base axes, in one call that shares their work.
+ * Pose of the fingertip and its Jacobian, both in base axes, in one call with fewer operations.
  * Source: eq. 5.2, 5.3, table 5.1, differentiated.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   out  T[4][4] in 1, m
@@ -587,7 +589,7 @@ void awiwi_middle_pose_and_jacobian(const double q[4], double T[16], double J[24
 void awiwi_middle_mass_matrix(const double q[4], double M[16]);
 
 /*
- * Coriolis matrix of Christoffel symbols, so that dM/dt - 2 C is skew-symmetric.
+ * Coriolis matrix by Christoffel symbols, so that dM/dt - 2 C is skew-symmetric.
  * Source: eq. 2.17.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   qd[4] in rad/s, -20 to 20
@@ -597,7 +599,7 @@ void awiwi_middle_mass_matrix(const double q[4], double M[16]);
 void awiwi_middle_coriolis_matrix(const double q[4], const double qd[4], double C[16]);
 
 /*
- * Joint torques that hold the finger still against gravity g (in base axes).
+ * Joint torques that hold the finger at rest against gravity g (in base axes).
  * Source: eq. 2.17, 5.4.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   g[3] in m/s^2, -9.81 to 9.81
@@ -655,7 +657,7 @@ void awiwi_middle_inverse_dynamics_derivatives(const double q[4], const double q
 void awiwi_middle_forward_dynamics(const double q[4], const double qd[4], const double tau[4], const double g[3], double qdd[4]);
 
 /*
- * Mass matrix, Coriolis matrix and gravity torques in one call that shares their work.
+ * Mass matrix, Coriolis matrix and gravity torques in one call with fewer operations.
  * Source: eq. 2.17.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   qd[4] in rad/s, -20 to 20
@@ -680,7 +682,7 @@ void awiwi_middle_dynamics(const double q[4], const double qd[4], const double g
 void awiwi_middle_energy(const double q[4], const double qd[4], const double g[3], double kinetic[1], double potential[1]);
 
 /*
- * Length of every tendon's path in the finger, from its routing.
+ * Path length of every tendon in the finger, by its routing.
  * Source: eq. 5.5, 5.18, 5.22.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   out  h[8] in m
@@ -717,7 +719,7 @@ void awiwi_middle_coupling_derivative(const double q[4], double dP[128]);
 void awiwi_middle_joint_torque(const double q[4], const double f[8], double tau[4]);
 
 /*
- * Joint stiffness -d tau/dq felt through tendons of stiffness k that pull with forces f.
+ * Joint stiffness -d tau/dq of tendons with the stiffnesses k and the forces f.
  * Source: eq. 5.12, 5.23.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   f[8] in N, 0 to 100
@@ -728,7 +730,7 @@ void awiwi_middle_joint_torque(const double q[4], const double f[8], double tau[
 void awiwi_middle_joint_stiffness(const double q[4], const double f[8], const double k[8], double K[16]);
 
 /*
- * Joint torques and joint stiffness of the tendons in one call that shares their work.
+ * Joint torques and joint stiffness of the tendons in one call with fewer operations.
  * Source: eq. 5.8, 5.12, 5.23.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   f[8] in N, 0 to 100
@@ -740,7 +742,8 @@ void awiwi_middle_joint_stiffness(const double q[4], const double f[8], const do
 void awiwi_middle_joint_torque_and_stiffness(const double q[4], const double f[8], const double k[8], double tau[4], double K[16]);
 
 /*
- * Joint angles whose tendon lengths are nearest to the measured h; start is the last estimate.
+ * Joint angles whose tendon lengths are nearest to the measured h (least squares); start is the last
+ * estimate.
  * Source: eq. 5.14, 5.15, 5.24.
  *   in   h[8] in m, from [-0.01278, -0.01278, -0.01278, -0.01278, -0.009425, -0.009425, -0.01571, -0.01571] to [0.01278, 0.01278, 0.01278, 0.01278, 0.009425, 0.009425, 0.01571, 0.01571]
  *   in   start[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
@@ -750,8 +753,8 @@ void awiwi_middle_joint_torque_and_stiffness(const double q[4], const double f[8
 void awiwi_middle_joint_estimate(const double h[8], const double start[4], double q[4]);
 
 /*
- * Error of the joint estimate: covariance for lengths of standard deviation noise, worst for errors up
- * to noise.
+ * Errors of the joint estimate: covariance for lengths with standard deviation noise, worst for errors
+ * up to noise.
  * Source: eq. 5.14, linearised.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   noise[1] in m, 0 to 0.001
@@ -762,10 +765,10 @@ void awiwi_middle_joint_estimate(const double h[8], const double start[4], doubl
 void awiwi_middle_joint_estimate_error(const double q[4], const double noise[1], double covariance[16], double worst[4]);
 
 /*
- * Tendon forces from f_min to f_max that give the joint torque tau and come nearest to the joint
- * stiffness K. The torque is exact where the limits allow it, else the nearest (AWIWI_INFEASIBLE). The
- * stiffness is the nearest of all with that torque, by the sum of the squares of the errors of all
- * entries (the squared Frobenius norm).
+ * Tendon forces from f_min to f_max for the joint torque tau and the nearest possible joint stiffness
+ * to K. The torque is exact if the limits allow it, otherwise the nearest possible one (status
+ * AWIWI_INFEASIBLE). Of all forces with that torque, the result has the least error of the stiffness
+ * in the Frobenius norm.
  * Source: eq. 7.2, 7.6, mended.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   tau[4] in N m, -1 to 1
@@ -779,14 +782,14 @@ void awiwi_middle_joint_estimate_error(const double q[4], const double noise[1],
 int awiwi_middle_tendon_distribution(const double q[4], const double tau[4], const double K[16], const double f_min[1], const double f_max[1], double f[8]);
 
 /*
- * Stiffness of every tendon that is pulled with a tension: spring and fibre in series, and its
- * derivatives. slope and curvature are dk/df and d2k/df2.
+ * Stiffness of every tendon at its tension, spring and fibre in series, and its derivatives. slope and
+ * curvature are dk/df and d2k/df2.
  * Source: figure 4.7, section 4.3.
  *   in   tension[6] in N, 3.87595 to 100.149
  *   out  k[6] in N/m
  *   out  slope[6] in 1/m
  *   out  curvature[6] in 1/(N m)
- * Returns 0 where every tension is on its spring's curve, give or take a hundredth; elsewhere 1, and
+ * Returns 0 where every tension is on its spring's curve, with a margin of 0.4 %; elsewhere 1, and
  * what is not defined is NaN.
  * Cost: 148 add, 148 mul, 5 calls.
  */
@@ -802,7 +805,7 @@ int awiwi_ring_tendon_stiffness(const double tension[6], double k[6], double slo
 void awiwi_ring_fingertip_pose(const double q[3], double T[16]);
 
 /*
- * Pose of every link frame (at its joint, turning with the link) in the finger's base frame.
+ * Pose of every link frame (origin at its joint, fixed to the link) in the finger's base frame.
  * Source: eq. 5.2.
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   out  T[4][4][4] in 1, m
@@ -820,7 +823,7 @@ void awiwi_ring_link_poses(const double q[3], double T[64]);
 void awiwi_ring_jacobian(const double q[3], double J[18]);
 
 /*
- * Pose of the fingertip and its Jacobian, both in base axes, in one call that shares their work.
+ * Pose of the fingertip and its Jacobian, both in base axes, in one call with fewer operations.
  * Source: eq. 5.2, 5.3, table 5.1, differentiated.
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   out  T[4][4] in 1, m
@@ -839,7 +842,7 @@ void awiwi_ring_pose_and_jacobian(const double q[3], double T[16], double J[18])
 void awiwi_ring_mass_matrix(const double q[3], double M[9]);
 
 /*
- * Coriolis matrix of Christoffel symbols, so that dM/dt - 2 C is skew-symmetric.
+ * Coriolis matrix by Christoffel symbols, so that dM/dt - 2 C is skew-symmetric.
  * Source: eq. 2.17.
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   in   qd[3] in rad/s, -20 to 20
@@ -849,7 +852,7 @@ void awiwi_ring_mass_matrix(const double q[3], double M[9]);
 void awiwi_ring_coriolis_matrix(const double q[3], const double qd[3], double C[9]);
 
 /*
- * Joint torques that hold the finger still against gravity g (in base axes).
+ * Joint torques that hold the finger at rest against gravity g (in base axes).
  * Source: eq. 2.17, 5.4.
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   in   g[3] in m/s^2, -9.81 to 9.81
@@ -907,7 +910,7 @@ void awiwi_ring_inverse_dynamics_derivatives(const double q[3], const double qd[
 void awiwi_ring_forward_dynamics(const double q[3], const double qd[3], const double tau[3], const double g[3], double qdd[3]);
 
 /*
- * Mass matrix, Coriolis matrix and gravity torques in one call that shares their work.
+ * Mass matrix, Coriolis matrix and gravity torques in one call with fewer operations.
  * Source: eq. 2.17.
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   in   qd[3] in rad/s, -20 to 20
@@ -932,7 +935,7 @@ void awiwi_ring_dynamics(const double q[3], const double qd[3], const double g[3
 void awiwi_ring_energy(const double q[3], const double qd[3], const double g[3], double kinetic[1], double potential[1]);
 
 /*
- * Length of every tendon's path in the finger, from its routing.
+ * Path length of every tendon in the finger, by its routing.
  * Source: eq. 5.5, 5.18, 5.22.
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   out  h[6] in m
@@ -969,7 +972,7 @@ void awiwi_ring_coupling_derivative(const double q[3], double dP[54]);
 void awiwi_ring_joint_torque(const double q[3], const double f[6], double tau[3]);
 
 /*
- * Joint stiffness -d tau/dq felt through tendons of stiffness k that pull with forces f.
+ * Joint stiffness -d tau/dq of tendons with the stiffnesses k and the forces f.
  * Source: eq. 5.12, 5.23.
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   in   f[6] in N, 0 to 100
@@ -980,7 +983,7 @@ void awiwi_ring_joint_torque(const double q[3], const double f[6], double tau[3]
 void awiwi_ring_joint_stiffness(const double q[3], const double f[6], const double k[6], double K[9]);
 
 /*
- * Joint torques and joint stiffness of the tendons in one call that shares their work.
+ * Joint torques and joint stiffness of the tendons in one call with fewer operations.
  * Source: eq. 5.8, 5.12, 5.23.
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   in   f[6] in N, 0 to 100
@@ -992,7 +995,8 @@ void awiwi_ring_joint_stiffness(const double q[3], const double f[6], const doub
 void awiwi_ring_joint_torque_and_stiffness(const double q[3], const double f[6], const double k[6], double tau[3], double K[9]);
 
 /*
- * Joint angles whose tendon lengths are nearest to the measured h; start is the last estimate.
+ * Joint angles whose tendon lengths are nearest to the measured h (least squares); start is the last
+ * estimate.
  * Source: eq. 5.14, 5.15, 5.24.
  *   in   h[6] in m, from [-0.01278, -0.01278, -0.01278, -0.01278, -0.008639, -0.008639] to [0.01278, 0.01278, 0.01278, 0.01278, 0.008639, 0.008639]
  *   in   start[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
@@ -1002,8 +1006,8 @@ void awiwi_ring_joint_torque_and_stiffness(const double q[3], const double f[6],
 void awiwi_ring_joint_estimate(const double h[6], const double start[3], double q[3]);
 
 /*
- * Error of the joint estimate: covariance for lengths of standard deviation noise, worst for errors up
- * to noise.
+ * Errors of the joint estimate: covariance for lengths with standard deviation noise, worst for errors
+ * up to noise.
  * Source: eq. 5.14, linearised.
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   in   noise[1] in m, 0 to 0.001
@@ -1014,10 +1018,10 @@ void awiwi_ring_joint_estimate(const double h[6], const double start[3], double 
 void awiwi_ring_joint_estimate_error(const double q[3], const double noise[1], double covariance[9], double worst[3]);
 
 /*
- * Tendon forces from f_min to f_max that give the joint torque tau and come nearest to the joint
- * stiffness K. The torque is exact where the limits allow it, else the nearest (AWIWI_INFEASIBLE). The
- * stiffness is the nearest of all with that torque, by the sum of the squares of the errors of all
- * entries (the squared Frobenius norm).
+ * Tendon forces from f_min to f_max for the joint torque tau and the nearest possible joint stiffness
+ * to K. The torque is exact if the limits allow it, otherwise the nearest possible one (status
+ * AWIWI_INFEASIBLE). Of all forces with that torque, the result has the least error of the stiffness
+ * in the Frobenius norm.
  * Source: eq. 7.2, 7.6, mended.
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   in   tau[3] in N m, -1 to 1
@@ -1031,14 +1035,14 @@ void awiwi_ring_joint_estimate_error(const double q[3], const double noise[1], d
 int awiwi_ring_tendon_distribution(const double q[3], const double tau[3], const double K[9], const double f_min[1], const double f_max[1], double f[6]);
 
 /*
- * Stiffness of every tendon that is pulled with a tension: spring and fibre in series, and its
- * derivatives. slope and curvature are dk/df and d2k/df2.
+ * Stiffness of every tendon at its tension, spring and fibre in series, and its derivatives. slope and
+ * curvature are dk/df and d2k/df2.
  * Source: figure 4.7, section 4.3.
  *   in   tension[8] in N, 3.87595 to 100.149
  *   out  k[8] in N/m
  *   out  slope[8] in 1/m
  *   out  curvature[8] in 1/(N m)
- * Returns 0 where every tension is on its spring's curve, give or take a hundredth; elsewhere 1, and
+ * Returns 0 where every tension is on its spring's curve, with a margin of 0.4 %; elsewhere 1, and
  * what is not defined is NaN.
  * Cost: 198 add, 198 mul, 7 calls.
  */
@@ -1054,7 +1058,7 @@ int awiwi_fifth_tendon_stiffness(const double tension[8], double k[8], double sl
 void awiwi_fifth_fingertip_pose(const double q[4], double T[16]);
 
 /*
- * Pose of every link frame (at its joint, turning with the link) in the finger's base frame.
+ * Pose of every link frame (origin at its joint, fixed to the link) in the finger's base frame.
  * Source: eq. 5.2.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   out  T[5][4][4] in 1, m
@@ -1072,7 +1076,7 @@ void awiwi_fifth_link_poses(const double q[4], double T[80]);
 void awiwi_fifth_jacobian(const double q[4], double J[24]);
 
 /*
- * Pose of the fingertip and its Jacobian, both in base axes, in one call that shares their work.
+ * Pose of the fingertip and its Jacobian, both in base axes, in one call with fewer operations.
  * Source: eq. 5.2, 5.3, table 5.1, differentiated.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   out  T[4][4] in 1, m
@@ -1091,7 +1095,7 @@ void awiwi_fifth_pose_and_jacobian(const double q[4], double T[16], double J[24]
 void awiwi_fifth_mass_matrix(const double q[4], double M[16]);
 
 /*
- * Coriolis matrix of Christoffel symbols, so that dM/dt - 2 C is skew-symmetric.
+ * Coriolis matrix by Christoffel symbols, so that dM/dt - 2 C is skew-symmetric.
  * Source: eq. 2.17.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   in   qd[4] in rad/s, -20 to 20
@@ -1101,7 +1105,7 @@ void awiwi_fifth_mass_matrix(const double q[4], double M[16]);
 void awiwi_fifth_coriolis_matrix(const double q[4], const double qd[4], double C[16]);
 
 /*
- * Joint torques that hold the finger still against gravity g (in base axes).
+ * Joint torques that hold the finger at rest against gravity g (in base axes).
  * Source: eq. 2.17, 5.4.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   in   g[3] in m/s^2, -9.81 to 9.81
@@ -1159,7 +1163,7 @@ void awiwi_fifth_inverse_dynamics_derivatives(const double q[4], const double qd
 void awiwi_fifth_forward_dynamics(const double q[4], const double qd[4], const double tau[4], const double g[3], double qdd[4]);
 
 /*
- * Mass matrix, Coriolis matrix and gravity torques in one call that shares their work.
+ * Mass matrix, Coriolis matrix and gravity torques in one call with fewer operations.
  * Source: eq. 2.17.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   in   qd[4] in rad/s, -20 to 20
@@ -1184,7 +1188,7 @@ void awiwi_fifth_dynamics(const double q[4], const double qd[4], const double g[
 void awiwi_fifth_energy(const double q[4], const double qd[4], const double g[3], double kinetic[1], double potential[1]);
 
 /*
- * Length of every tendon's path in the finger, from its routing.
+ * Path length of every tendon in the finger, by its routing.
  * Source: eq. 5.5, 5.18, 5.22.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   out  h[8] in m
@@ -1221,7 +1225,7 @@ void awiwi_fifth_coupling_derivative(const double q[4], double dP[128]);
 void awiwi_fifth_joint_torque(const double q[4], const double f[8], double tau[4]);
 
 /*
- * Joint stiffness -d tau/dq felt through tendons of stiffness k that pull with forces f.
+ * Joint stiffness -d tau/dq of tendons with the stiffnesses k and the forces f.
  * Source: eq. 5.12, 5.23.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   in   f[8] in N, 0 to 100
@@ -1232,7 +1236,7 @@ void awiwi_fifth_joint_torque(const double q[4], const double f[8], double tau[4
 void awiwi_fifth_joint_stiffness(const double q[4], const double f[8], const double k[8], double K[16]);
 
 /*
- * Joint torques and joint stiffness of the tendons in one call that shares their work.
+ * Joint torques and joint stiffness of the tendons in one call with fewer operations.
  * Source: eq. 5.8, 5.12, 5.23.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   in   f[8] in N, 0 to 100
@@ -1244,7 +1248,8 @@ void awiwi_fifth_joint_stiffness(const double q[4], const double f[8], const dou
 void awiwi_fifth_joint_torque_and_stiffness(const double q[4], const double f[8], const double k[8], double tau[4], double K[16]);
 
 /*
- * Joint angles whose tendon lengths are nearest to the measured h; start is the last estimate.
+ * Joint angles whose tendon lengths are nearest to the measured h (least squares); start is the last
+ * estimate.
  * Source: eq. 5.14, 5.15, 5.24.
  *   in   h[8] in m, from [-0.005585, -0.005585, -0.01169, -0.01169, -0.01169, -0.01169, -0.007854, -0.007854] to [0.005585, 0.005585, 0.01169, 0.01169, 0.01169, 0.01169, 0.007854, 0.007854]
  *   in   start[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
@@ -1254,8 +1259,8 @@ void awiwi_fifth_joint_torque_and_stiffness(const double q[4], const double f[8]
 void awiwi_fifth_joint_estimate(const double h[8], const double start[4], double q[4]);
 
 /*
- * Error of the joint estimate: covariance for lengths of standard deviation noise, worst for errors up
- * to noise.
+ * Errors of the joint estimate: covariance for lengths with standard deviation noise, worst for errors
+ * up to noise.
  * Source: eq. 5.14, linearised.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   in   noise[1] in m, 0 to 0.001
@@ -1266,10 +1271,10 @@ void awiwi_fifth_joint_estimate(const double h[8], const double start[4], double
 void awiwi_fifth_joint_estimate_error(const double q[4], const double noise[1], double covariance[16], double worst[4]);
 
 /*
- * Tendon forces from f_min to f_max that give the joint torque tau and come nearest to the joint
- * stiffness K. The torque is exact where the limits allow it, else the nearest (AWIWI_INFEASIBLE). The
- * stiffness is the nearest of all with that torque, by the sum of the squares of the errors of all
- * entries (the squared Frobenius norm).
+ * Tendon forces from f_min to f_max for the joint torque tau and the nearest possible joint stiffness
+ * to K. The torque is exact if the limits allow it, otherwise the nearest possible one (status
+ * AWIWI_INFEASIBLE). Of all forces with that torque, the result has the least error of the stiffness
+ * in the Frobenius norm.
  * Source: eq. 7.2, 7.6, mended.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   in   tau[4] in N m, -1 to 1
@@ -1283,9 +1288,8 @@ void awiwi_fifth_joint_estimate_error(const double q[4], const double noise[1], 
 int awiwi_fifth_tendon_distribution(const double q[4], const double tau[4], const double K[16], const double f_min[1], const double f_max[1], double f[8]);
 
 /*
- * Angles of coupler and rocker at a joint angle, and their turns per turn of the joint. The
- * transmission is the sine of the angle between coupler and rocker: where it is zero the linkage
- * locks.
+ * Angles of coupler and rocker at a joint angle, and their derivatives by it, the ratios. The
+ * transmission is the sine of the angle between coupler and rocker; at zero the linkage locks.
  * Source: section 5.5.
  *   in   q[1] in rad, -0.523599 to 0.698132
  *   out  coupler[1] in rad
@@ -1306,8 +1310,8 @@ int awiwi_fifth_hmc_four_bar(const double q[1], double coupler[1], double rocker
  *   out  A[3] in m
  *   out  B[3] in m
  *   out  C[3] in m
- * Returns 0 where the side bars are short of the line B0C0 (q73 between 0 and pi) and their plane is
- * short of A0 and bar AA0 reaches; elsewhere 1, and what is not defined is NaN.
+ * Returns 0 where q73 is between 0 and pi and the plane of the side bars has not passed A0 and bar AA0
+ * closes the loop; elsewhere 1, and what is not defined is NaN.
  * Cost: 20 add, 39 mul, 2 div, 1 neg, 1 sqrt, 2 sincos.
  */
 int awiwi_wrist_points(const double q71[1], const double q73[1], double A[3], double B[3], double C[3]);
@@ -1318,20 +1322,20 @@ int awiwi_wrist_points(const double q71[1], const double q73[1], double A[3], do
  *   in   q71[1] in rad, 0.100424 to 1.14762
  *   in   q73[1] in rad, 0.6234 to 1.32153
  *   out  T[4][4] in 1, m
- * Returns 0 where the side bars are short of the line B0C0 (q73 between 0 and pi) and their plane is
- * short of A0 and bar AA0 reaches; elsewhere 1, and what is not defined is NaN.
+ * Returns 0 where q73 is between 0 and pi and the plane of the side bars has not passed A0 and bar AA0
+ * closes the loop; elsewhere 1, and what is not defined is NaN.
  * Cost: 24 add, 48 mul, 2 div, 1 neg, 1 sqrt, 2 sincos.
  */
 int awiwi_wrist_palm_pose(const double q71[1], const double q73[1], double T[16]);
 
 /*
- * Length of every tendon's straight run through the wrist.
+ * Length of every tendon's straight path through the wrist.
  * Source: eq. 6.9.
  *   in   q71[1] in rad, 0.100424 to 1.14762
  *   in   q73[1] in rad, 0.6234 to 1.32153
  *   out  h[38] in m
- * Returns 0 where the side bars are short of the line B0C0 (q73 between 0 and pi) and their plane is
- * short of A0 and bar AA0 reaches; elsewhere 1, and what is not defined is NaN.
+ * Returns 0 where q73 is between 0 and pi and the plane of the side bars has not passed A0 and bar AA0
+ * closes the loop; elsewhere 1, and what is not defined is NaN.
  * Cost: 180 add, 143 mul, 2 div, 39 sqrt, 2 sincos.
  */
 int awiwi_wrist_tendon_lengths(const double q71[1], const double q73[1], double h[38]);
@@ -1342,21 +1346,21 @@ int awiwi_wrist_tendon_lengths(const double q71[1], const double q73[1], double 
  *   in   q71[1] in rad, 0.100424 to 1.14762
  *   in   q73[1] in rad, 0.6234 to 1.32153
  *   out  dh[38][2] in m/rad
- * Returns 0 where the side bars are short of the line B0C0 (q73 between 0 and pi) and their plane is
- * short of A0 and bar AA0 reaches; elsewhere 1, and what is not defined is NaN.
+ * Returns 0 where q73 is between 0 and pi and the plane of the side bars has not passed A0 and bar AA0
+ * closes the loop; elsewhere 1, and what is not defined is NaN.
  * Cost: 436 add, 478 mul, 41 div, 39 sqrt, 2 sincos.
  */
 int awiwi_wrist_coupling(const double q71[1], const double q73[1], double dh[76]);
 
 /*
- * Length of every tendon's path in its finger and in the wrist, whose internal angles are wrist =
- * (q71, q73).
+ * Path length of every tendon in its finger and in the wrist, at its internal angles wrist = (q71,
+ * q73).
  * Source: eq. 5.1, 5.5, 6.9.
  *   in   q[19] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727, -0.3491, -0.1745, -0.08727, -0.08727, -0.3491, -0.1745, -0.08727, -0.08727, -0.3491, -0.1745, -0.08727, -0.5236, -0.3491, -0.1745, -0.08727] to [0.6109, 0.6109, 1.396, 1.396, 0.3491, 1.484, 1.571, 1.396, 0.3491, 1.484, 1.571, 1.396, 0.3491, 1.484, 1.571, 0.6981, 0.3491, 1.484, 1.571]
  *   in   wrist[2] in rad, from [0.1004, 0.6234] to [1.148, 1.322]
  *   out  h[38] in m
- * Returns 0 where the side bars are short of the line B0C0 (q73 between 0 and pi) and their plane is
- * short of A0 and bar AA0 reaches; elsewhere 1, and what is not defined is NaN.
+ * Returns 0 where q73 is between 0 and pi and the plane of the side bars has not passed A0 and bar AA0
+ * closes the loop; elsewhere 1, and what is not defined is NaN.
  * Cost: 254 add, 180 mul, 2 div, 43 sqrt, 4 sincos.
  */
 int awiwi_hand_tendon_lengths(const double q[19], const double wrist[2], double h[38]);
@@ -1381,7 +1385,7 @@ void awiwi_hand_coupling(const double q[19], double P[722]);
 void awiwi_hand_joint_torque(const double q[19], const double f[38], double tau[19]);
 
 /*
- * Joint stiffness -d tau/dq through tendons of stiffness k that pull with forces f; zero outside the
+ * Joint stiffness -d tau/dq of tendons with the stiffnesses k and the forces f; zero outside the
  * blocks.
  * Source: eq. 5.12, 5.23.
  *   in   q[19] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727, -0.3491, -0.1745, -0.08727, -0.08727, -0.3491, -0.1745, -0.08727, -0.08727, -0.3491, -0.1745, -0.08727, -0.5236, -0.3491, -0.1745, -0.08727] to [0.6109, 0.6109, 1.396, 1.396, 0.3491, 1.484, 1.571, 1.396, 0.3491, 1.484, 1.571, 1.396, 0.3491, 1.484, 1.571, 0.6981, 0.3491, 1.484, 1.571]
@@ -1393,9 +1397,8 @@ void awiwi_hand_joint_torque(const double q[19], const double f[38], double tau[
 void awiwi_hand_joint_stiffness(const double q[19], const double f[38], const double k[38], double K[361]);
 
 /*
- * Tendon lengths in the finger, of motor angles theta, elongations x and changes w of the lengths in
- * the wrist. All three count from the straight finger at which they were zeroed. The motor reels in
- * for positive theta.
+ * Tendon lengths in the finger from motor angles theta, elongations x and changes w of the lengths in
+ * the wrist. All three are zero at the straight finger. A positive theta winds the tendon up.
  * Source: eq. 5.1.
  *   in   theta[8] in rad, -5 to 5
  *   in   x[8] in m, 0 to 0.1
@@ -1406,9 +1409,8 @@ void awiwi_hand_joint_stiffness(const double q[19], const double f[38], const do
 void awiwi_thumb_measured_lengths(const double theta[8], const double x[8], const double w[8], double h[8]);
 
 /*
- * Tendon lengths in the finger, of motor angles theta, elongations x and changes w of the lengths in
- * the wrist. All three count from the straight finger at which they were zeroed. The motor reels in
- * for positive theta.
+ * Tendon lengths in the finger from motor angles theta, elongations x and changes w of the lengths in
+ * the wrist. All three are zero at the straight finger. A positive theta winds the tendon up.
  * Source: eq. 5.1.
  *   in   theta[8] in rad, -5 to 5
  *   in   x[8] in m, 0 to 0.1
@@ -1419,9 +1421,8 @@ void awiwi_thumb_measured_lengths(const double theta[8], const double x[8], cons
 void awiwi_index_measured_lengths(const double theta[8], const double x[8], const double w[8], double h[8]);
 
 /*
- * Tendon lengths in the finger, of motor angles theta, elongations x and changes w of the lengths in
- * the wrist. All three count from the straight finger at which they were zeroed. The motor reels in
- * for positive theta.
+ * Tendon lengths in the finger from motor angles theta, elongations x and changes w of the lengths in
+ * the wrist. All three are zero at the straight finger. A positive theta winds the tendon up.
  * Source: eq. 5.1.
  *   in   theta[8] in rad, -5 to 5
  *   in   x[8] in m, 0 to 0.1
@@ -1432,9 +1433,8 @@ void awiwi_index_measured_lengths(const double theta[8], const double x[8], cons
 void awiwi_middle_measured_lengths(const double theta[8], const double x[8], const double w[8], double h[8]);
 
 /*
- * Tendon lengths in the finger, of motor angles theta, elongations x and changes w of the lengths in
- * the wrist. All three count from the straight finger at which they were zeroed. The motor reels in
- * for positive theta.
+ * Tendon lengths in the finger from motor angles theta, elongations x and changes w of the lengths in
+ * the wrist. All three are zero at the straight finger. A positive theta winds the tendon up.
  * Source: eq. 5.1.
  *   in   theta[6] in rad, -5 to 5
  *   in   x[6] in m, 0 to 0.1
@@ -1445,9 +1445,8 @@ void awiwi_middle_measured_lengths(const double theta[8], const double x[8], con
 void awiwi_ring_measured_lengths(const double theta[6], const double x[6], const double w[6], double h[6]);
 
 /*
- * Tendon lengths in the finger, of motor angles theta, elongations x and changes w of the lengths in
- * the wrist. All three count from the straight finger at which they were zeroed. The motor reels in
- * for positive theta.
+ * Tendon lengths in the finger from motor angles theta, elongations x and changes w of the lengths in
+ * the wrist. All three are zero at the straight finger. A positive theta winds the tendon up.
  * Source: eq. 5.1.
  *   in   theta[8] in rad, -5 to 5
  *   in   x[8] in m, 0 to 0.1
@@ -1458,7 +1457,7 @@ void awiwi_ring_measured_lengths(const double theta[6], const double x[6], const
 void awiwi_fifth_measured_lengths(const double theta[8], const double x[8], const double w[8], double h[8]);
 
 /*
- * Kinetic energy of rotor and gear: half of B thd^2, with the inertia B that the output shaft feels.
+ * Kinetic energy of rotor and gear: half of B thd^2, with the inertia B reflected to the output shaft.
  * Source: eq. 3.1.
  *   in   thd[1] in rad/s, -20 to 20
  *   out  energy[1] in J
@@ -1467,8 +1466,7 @@ void awiwi_fifth_measured_lengths(const double theta[8], const double x[8], cons
 void awiwi_motor_energy(const double thd[1], double energy[1]);
 
 /*
- * Friction torque of motor and gear at the speed thd: what the motor must overcome, positive for
- * positive thd.
+ * Friction torque of motor and gear at the speed thd; it has the sign of thd and opposes the motor.
  * Source: eq. 3.8.
  *   in   thd[1] in rad/s, -20 to 20
  *   out  tau[1] in N m
@@ -1477,7 +1475,7 @@ void awiwi_motor_energy(const double thd[1], double energy[1]);
 void awiwi_motor_friction(const double thd[1], double tau[1]);
 
 /*
- * Slope of the friction torque; an explicit step of a simulation must stay below 2 B / damping.
+ * Slope of the friction torque; explicit integration needs steps shorter than 2 B / damping.
  * Source: eq. 3.8, differentiated.
  *   in   thd[1] in rad/s, -20 to 20
  *   out  damping[1] in N m s/rad
@@ -1486,7 +1484,7 @@ void awiwi_motor_friction(const double thd[1], double tau[1]);
 void awiwi_motor_damping(const double thd[1], double damping[1]);
 
 /*
- * Periodic disturbance torque of both shafts at the angle theta: what the motor must overcome.
+ * Periodic disturbance torque of both shafts at the angle theta; positive values oppose the motor.
  * Source: eq. 3.4, 3.5.
  *   in   theta[1] in rad, -5 to 5
  *   out  tau[1] in N m
@@ -1495,8 +1493,7 @@ void awiwi_motor_damping(const double thd[1], double damping[1]);
 void awiwi_motor_ripple(const double theta[1], double tau[1]);
 
 /*
- * Motor torque to feed forward against friction and ripple: the share of both that is safe to
- * compensate.
+ * Motor torque to feed forward against friction and ripple: the share `compensation` of both.
  * Source: section 3.2.
  *   in   theta[1] in rad, -5 to 5
  *   in   thd[1] in rad/s, -20 to 20
@@ -1537,20 +1534,21 @@ void awiwi_motor_torque(const double theta[1], const double thd[1], const double
  *   out  force[1] in N
  *   out  stiffness[1] in N/m
  * Returns 0 where the roller is clear of the motor's pulley and the roller is clear of the fixed
- * pulley and the tendon turns the lever towards its taut end and the spring is stretched; elsewhere 1,
+ * pulley and the tendon pulls the lever towards its taut end and the spring is stretched; elsewhere 1,
  * and what is not defined is NaN.
  * Cost: 38 add, 54 mul, 7 div, 3 sqrt, 1 sincos, 2 calls.
  */
 int awiwi_spring_lever(const double theta[1], double dL[1], double force[1], double stiffness[1]);
 
 /*
- * Tendon force at the elongation x, counted from the slack end of the lever's travel. A polynomial
- * that the check of the hand file has found within 1e-6 of the largest force from the lever's own.
+ * Tendon force at the elongation x, counted from the slack end of the lever's travel. A polynomial;
+ * checking the hand file ensures that it differs from the mechanism by less than 1e-6 of the largest
+ * force.
  * Source: figure 4.7.
  *   in   x[1] in m, 0 to 0.0100745
  *   out  f[1] in N
- * Returns 0 where the argument is within the lever's travel, give or take a hundredth; elsewhere 1,
- * and what is not defined is NaN.
+ * Returns 0 where the argument is within the lever's travel, with a margin of 0.4 %; elsewhere 1, and
+ * what is not defined is NaN.
  * Cost: 18 add, 18 mul.
  */
 int awiwi_spring_force(const double x[1], double f[1]);
@@ -1560,41 +1558,41 @@ int awiwi_spring_force(const double x[1], double f[1]);
  * Source: figure 4.7.
  *   in   x[1] in m, 0 to 0.0100745
  *   out  k[1] in N/m
- * Returns 0 where the argument is within the lever's travel, give or take a hundredth; elsewhere 1,
- * and what is not defined is NaN.
+ * Returns 0 where the argument is within the lever's travel, with a margin of 0.4 %; elsewhere 1, and
+ * what is not defined is NaN.
  * Cost: 18 add, 18 mul.
  */
 int awiwi_spring_stiffness(const double x[1], double k[1]);
 
 /*
- * Elongation at which the tendon's force is f: the inverse of the force.
+ * Elongation at which the tendon's force is f.
  * Source: figure 4.7.
  *   in   f[1] in N, 3.87595 to 100.149
  *   out  x[1] in m
- * Returns 0 where the argument is within the lever's travel, give or take a hundredth; elsewhere 1,
- * and what is not defined is NaN.
+ * Returns 0 where the argument is within the lever's travel, with a margin of 0.4 %; elsewhere 1, and
+ * what is not defined is NaN.
  * Cost: 18 add, 18 mul.
  */
 int awiwi_spring_elongation(const double f[1], double x[1]);
 
 /*
- * dL, force and stiffness of every tendon from its sensor: the design's, or its own where it was
- * calibrated.
+ * dL, force and stiffness of every tendon from its sensor, by the design or by the tendon's own
+ * calibration.
  * Source: section 4.1.
  *   in   readings[38] in 1, 410 to 3685
  *   out  dL[38] in m
  *   out  force[38] in N
  *   out  stiffness[38] in N/m
- * Returns 0 where the argument is within the lever's travel, give or take a hundredth; elsewhere 1,
- * and what is not defined is NaN.
+ * Returns 0 where the argument is within the lever's travel, with a margin of 0.4 %; elsewhere 1, and
+ * what is not defined is NaN.
  * Cost: 1062 add, 1062 mul, 37 calls.
  */
 int awiwi_calibration_readings(const double readings[38], double dL[38], double force[38], double stiffness[38]);
 
 /*
- * dL, force and stiffness of one sensor's counts by polynomials from the bench, coefficients from the
- * constant up. Their argument is (2 counts - ends[0] - ends[1]) / (ends[1] - ends[0]): -1 at the slack
- * end, 1 at the taut one.
+ * dL, force and stiffness at one sensor's counts by polynomials from the bench, constant coefficient
+ * first. The argument is (2 counts - ends[0] - ends[1]) / (ends[1] - ends[0]): -1 at the slack end, 1
+ * at the taut end.
  * Source: section 4.1.
  *   in   counts[1] in 1, 614.688 to 3480.31
  *   in   ends[2] in 1, from [205.3, 3480] to [614.7, 3890]
@@ -1604,8 +1602,8 @@ int awiwi_calibration_readings(const double readings[38], double dL[38], double 
  *   out  dL[1] in m
  *   out  force[1] in N
  *   out  stiffness[1] in N/m
- * Returns 0 where the argument is within the lever's travel, give or take a hundredth; elsewhere 1,
- * and what is not defined is NaN.
+ * Returns 0 where the argument is within the lever's travel, with a margin of 0.4 %; elsewhere 1, and
+ * what is not defined is NaN.
  * Cost: 23 add, 19 mul, 1 div.
  */
 int awiwi_calibration_polynomials(const double counts[1], const double ends[2], const double length_powers[7], const double force_powers[7], const double stiffness_powers[7], double dL[1], double force[1], double stiffness[1]);
@@ -1620,7 +1618,7 @@ int awiwi_calibration_polynomials(const double counts[1], const double ends[2], 
 void awiwi_tendon_stretch(const double f[1], double x[1]);
 
 /*
- * Stiffness of a whole tendon: of the fibre, in series with its mechanism of stiffness k.
+ * Stiffness of a whole tendon: the fibre in series with a spring mechanism of stiffness k.
  * Source: section 4.3.
  *   in   k[1] in N/m, 1000 to 50000
  *   out  stiffness[1] in N/m
@@ -1629,8 +1627,7 @@ void awiwi_tendon_stretch(const double f[1], double x[1]);
 void awiwi_tendon_stiffness(const double k[1], double stiffness[1]);
 
 /*
- * Force lost in the guidings by a tendon that is pulled with the force f and bent by the angle bend in
- * all.
+ * Friction loss in the guidings of a tendon under the force f that they bend by the total angle bend.
  * Source: eq. 4.1.
  *   in   f[1] in N, 0 to 100
  *   in   bend[1] in rad, 0 to 6
@@ -1640,10 +1637,10 @@ void awiwi_tendon_stiffness(const double k[1], double stiffness[1]);
 void awiwi_guiding_friction(const double f[1], const double bend[1], double loss[1]);
 
 /*
- * Controller stiffness that, behind tendons of stiffness K_mech, makes the joints feel like K_eff.
- * Both are symmetric, their lower triangles are read. The tendons must be stiffer than what is to be
- * felt in every direction; where they are not, no positive definite controller exists. Stiffer by a
- * factor eps, as eq. 8.2 has it, gives eps / (eps - 1) K_eff.
+ * Controller stiffness K_imp that, in series with the tendons' joint stiffness K_mech, gives the
+ * stiffness K_eff. K_eff and K_mech are symmetric; only their lower triangles are read. K_mech must
+ * exceed K_eff in every direction, otherwise no positive definite K_imp exists. For K_mech = eps K_eff
+ * (eq. 8.2), K_imp is eps / (eps - 1) K_eff.
  * Source: eq. 8.1, with the condition of section 8.2 mended.
  *   in   K_eff[4][4] in N m/rad, from [0.2, -0.05, -0.05, -0.05, -0.05, 0.2, -0.05, -0.05, -0.05, -0.05, 0.2, -0.05, -0.05, -0.05, -0.05, 0.2] to [2, 0.05, 0.05, 0.05, 0.05, 2, 0.05, 0.05, 0.05, 0.05, 2, 0.05, 0.05, 0.05, 0.05, 2]
  *   in   K_mech[4][4] in N m/rad, from [4, -0.5, -0.5, -0.5, -0.5, 4, -0.5, -0.5, -0.5, -0.5, 4, -0.5, -0.5, -0.5, -0.5, 4] to [20, 0.5, 0.5, 0.5, 0.5, 20, 0.5, 0.5, 0.5, 0.5, 20, 0.5, 0.5, 0.5, 0.5, 20]
@@ -1657,8 +1654,8 @@ void awiwi_guiding_friction(const double f[1], const double bend[1], double loss
 int awiwi_stiffness_correction(const double K_eff[16], const double K_mech[16], double K_imp[16]);
 
 /*
- * The same for one joint, and by how much k_imp changes with k_mech: what a poor guess of the tendons
- * costs.
+ * Controller stiffness k_imp of one joint, and its sensitivity dk_imp/dk_mech to errors of the
+ * tendons' stiffness.
  * Source: eq. 8.1.
  *   in   k_eff[1] in N m/rad, 0.05 to 3
  *   in   k_mech[1] in N m/rad, 3.5 to 20
@@ -1671,9 +1668,9 @@ int awiwi_stiffness_correction(const double K_eff[16], const double K_mech[16], 
 int awiwi_stiffness_correction_scalar(const double k_eff[1], const double k_mech[1], double k_imp[1], double sensitivity[1]);
 
 /*
- * Friction torque of a motor that turned under the torque u against the load tau in the sample that
- * just ended. thd is the velocity at the end of that sample. The momentum is the observer's memory:
- * begin with that of the motor at rest, zero, and pass on what is returned. Stable for all gains and
+ * Friction torque of a motor under the torque u and the load tau during the sample that just ended.
+ * thd is the velocity at the end of that sample. momentum is the observer's memory: start with zero
+ * for a motor at rest, then pass the last momentum_next. The observer is stable for all gains and
  * periods.
  * Source: eq. 9.1, 9.2, mended, over one sample.
  *   in   momentum[1] in N m s, -0.05 to 0.05
@@ -1692,9 +1689,9 @@ int awiwi_stiffness_correction_scalar(const double k_eff[1], const double k_mech
 int awiwi_friction_observer(const double momentum[1], const double u[1], const double tau[1], const double thd[1], const double B[1], const double gain[1], const double period[1], double momentum_next[1], double friction[1]);
 
 /*
- * Joint torques that make the joints feel like a spring K and a damper D about the desired motion. M,
- * C and gravity are those of the joints where they are; C must make dM/dt - 2 C skew-symmetric. It
- * acts on the desired velocity: so the joints stay passive.
+ * Joint torques that make the joints behave as a spring K and a damper D about the desired motion. M,
+ * C and gravity are those at the measured q and qd; dM/dt - 2 C must be skew-symmetric. C multiplies
+ * the desired velocity, so that the controlled joints are passive.
  * Source: eq. 11.4, 11.10, mended.
  *   in   M[4][4] in kg m^2, from [1e-07, -0.0001, -0.0001, -0.0001, -0.0001, 1e-07, -0.0001, -0.0001, -0.0001, -0.0001, 1e-07, -0.0001, -0.0001, -0.0001, -0.0001, 1e-07] to [0.0001, 0.0001, 0.0001, 0.0001, 0.0001, 0.0001, 0.0001, 0.0001, 0.0001, 0.0001, 0.0001, 0.0001, 0.0001, 0.0001, 0.0001, 0.0001]
  *   in   C[4][4] in N m s/rad, -0.001 to 0.001
@@ -1712,9 +1709,9 @@ int awiwi_friction_observer(const double momentum[1], const double u[1], const d
 void awiwi_joint_impedance(const double M[16], const double C[16], const double gravity[4], const double q[4], const double qd[4], const double q_des[4], const double qd_des[4], const double qdd_des[4], const double K[16], const double D[16], double tau[4]);
 
 /*
- * Motor torque that brings a motor to the angle at which its tendon pulls with f_des; a spring and a
- * damper hold it. For joints that are slow against it: the law of the two time scales. friction is the
- * torque to compensate.
+ * Motor torque that moves a motor to the angle theta_des of the tendon force f_des, as a spring and a
+ * damper would. This is the fast loop of two time scales: the joints must be slow against it. friction
+ * is the torque to compensate.
  * Source: eq. 11.3, mended.
  *   in   theta[1] in rad, -10 to 10
  *   in   thd[1] in rad/s, -20 to 20
@@ -1732,9 +1729,10 @@ void awiwi_joint_impedance(const double M[16], const double C[16], const double 
 int awiwi_motor_impedance(const double theta[1], const double thd[1], const double theta_des[1], const double f_des[1], const double friction[1], const double r[1], const double motor_kp[1], const double motor_kd[1], double tau[1]);
 
 /*
- * Motor torque that makes the error of a tendon's force die out as e'' + kd e' + kp e = 0, whatever
- * the joints do. The tendon has the stiffness k, with the slope dk/df, and is stretched at the rate
- * xd; hdd is the acceleration of its path, by which the joints stretch it.
+ * Motor torque that makes the force error of a tendon decay as e'' + kd e' + kp e = 0, for any motion
+ * of the joints. The tendon has the stiffness k with the slope dk/df, and its elongation has the rate
+ * xd. hdd is the second derivative of its path length, by which the joints stretch it. kp and kd are
+ * force_kp and force_kd.
  * Source: eq. 11.16, mended.
  *   in   f[1] in N, 0 to 120
  *   in   xd[1] in m/s, -0.2 to 0.2
@@ -1758,10 +1756,10 @@ int awiwi_motor_impedance(const double theta[1], const double thd[1], const doub
 int awiwi_cascade(const double f[1], const double xd[1], const double stiffness[1], const double slope[1], const double hdd[1], const double f_des[1], const double fd_des[1], const double fdd_des[1], const double friction[1], const double r[1], const double B[1], const double force_kp[1], const double force_kd[1], double tau[1]);
 
 /*
- * Whether joint damping D and force loops kp, kd make a stable cascade: proved where the margin is
- * positive. The proof is the energy qd' M qd / 2 + q' K q / 2 + sum (S11 e^2 + 2 S12 e e' + S22 e'^2),
- * which falls. weight and omega choose it: force errors cost weight (e^2 + e'^2 / omega^2). A heavier
- * weight proves more, and bounds less.
+ * Stability of the cascade with joint damping D and force loops kp, kd: proved if the margin is
+ * positive. The proof is the falling energy qd' M qd / 2 + q' K q / 2 + sum (S11 e^2 + 2 S12 e e' +
+ * S22 e'^2). weight and omega choose it: force errors lose weight (e^2 + e'^2 / omega^2). A larger
+ * weight proves more, with a looser bound.
  * Source: eq. 11.17 to 11.21, mended.
  *   in   D[4][4] in N m s/rad, from [0.001, -0.02, -0.02, -0.02, -0.02, 0.001, -0.02, -0.02, -0.02, -0.02, 0.001, -0.02, -0.02, -0.02, -0.02, 0.001] to [0.1, 0.02, 0.02, 0.02, 0.02, 0.1, 0.02, 0.02, 0.02, 0.02, 0.1, 0.02, 0.02, 0.02, 0.02, 0.1]
  *   in   P[8][4] in m/rad, -0.03 to 0.03
@@ -1778,9 +1776,9 @@ int awiwi_cascade(const double f[1], const double xd[1], const double stiffness[
 int awiwi_cascade_certificate(const double D[16], const double P[32], const double kp[8], const double kd[8], const double weight[1], const double omega[1], double margin[1], double S[24]);
 
 /*
- * Motor torque that brings the tendon force f to f_des: kp and kd on its error, estimates cancel the
- * rest. f_hat is the force whose torque is fed forward: the measured one cancels it, the desired one
- * adds no feedback.
+ * Motor torque that controls the tendon force f to f_des with gains kp and kd; friction and force are
+ * compensated. f_hat is the force whose torque is fed forward: the measured force, or the desired one,
+ * which adds no feedback.
  * Source: eq. 10.2, with the signs mended.
  *   in   f[1] in N, 0 to 120
  *   in   fd[1] in N/s, -5000 to 5000
@@ -1799,9 +1797,9 @@ int awiwi_cascade_certificate(const double D[16], const double P[32], const doub
 int awiwi_tendon_force_pd(const double f[1], const double fd[1], const double f_des[1], const double fd_des[1], const double f_hat[1], const double friction[1], const double r[1], const double kp[1], const double kd[1], double tau[1]);
 
 /*
- * Motor torque that brings the tendon force to f_des as a motor of inertia b does on a spring of
- * omega0 and xi0. The gains (kp, kd) follow from the tendon's stiffness at the desired force and from
- * its rate, which is zero where the desired force rests.
+ * Motor torque that controls the tendon force to f_des with the frequency omega0 and the damping ratio
+ * xi0. The gains (kp, kd) follow from the motor's inertia b, the tendon's stiffness at the desired
+ * force and the rate of that stiffness, which is zero for a constant desired force.
  * Source: eq. 10.8 to 10.12, mended.
  *   in   f[1] in N, 0 to 120
  *   in   fd[1] in N/s, -5000 to 5000
@@ -1825,8 +1823,7 @@ int awiwi_tendon_force_pd(const double f[1], const double fd[1], const double f_
 int awiwi_tendon_force_scheduled(const double f[1], const double fd[1], const double f_des[1], const double fd_des[1], const double f_hat[1], const double friction[1], const double r[1], const double b[1], const double stiffness[1], const double stiffness_rate[1], const double omega0[1], const double xi0[1], double tau[1], double gains[2]);
 
 /*
- * Gains of a motor that pulls against a grounded spring k: poles of frequency omega0 and damping ratio
- * xi0.
+ * Gains of a motor on a grounded spring k for poles of frequency omega0 and damping ratio xi0.
  * Source: eq. 12.7.
  *   in   b[1] in kg m^2, 0.0001 to 0.01
  *   in   dtheta[1] in N m s/rad, 0 to 0.1
@@ -1841,7 +1838,7 @@ int awiwi_tendon_force_scheduled(const double f[1], const double fd[1], const do
 int awiwi_pole_placement_motor(const double b[1], const double dtheta[1], const double k[1], const double omega0[1], const double xi0[1], double K[2]);
 
 /*
- * Gains and torque of a motor on a tendon: optimal for the secant between theta and theta_des, in
+ * Optimal gains and torque of a motor on a tendon, by the secant between theta and theta_des, in
  * closed form. The tendon's torque is spring . (theta, theta^2, theta^3).
  * Source: eq. 14.4 to 14.9, mended.
  *   in   theta[1] in rad, 0 to 3
@@ -1861,8 +1858,7 @@ int awiwi_pole_placement_motor(const double b[1], const double dtheta[1], const 
 int awiwi_sdre_tendon(const double theta[1], const double thd[1], const double theta_des[1], const double b[1], const double dtheta[1], const double spring[3], const double weights[2], const double R[1], double K[2], double u[1]);
 
 /*
- * Gains on (q, dq/dt, theta, dtheta/dt) that make a joint with a spring k two oscillators omega and
- * xi.
+ * Gains on (q, dq/dt, theta, dtheta/dt) of a joint with a spring k for two pole pairs of omega and xi.
  * Source: eq. 12.13 to 12.16, mended.
  *   in   m[1] in kg m^2, 3e-07 to 0.0001
  *   in   b[1] in kg m^2, 0.0001 to 0.01
@@ -1881,8 +1877,8 @@ int awiwi_sdre_tendon(const double theta[1], const double thd[1], const double t
 int awiwi_pole_placement(const double m[1], const double b[1], const double k[1], const double dq[1], const double dtheta[1], const double omega[2], const double xi[2], double K[4]);
 
 /*
- * Motor torque u_des - K (x - x_des), where u_des holds the desired state; for optimal gains just as
- * well.
+ * Motor torque u_des - K (x - x_des), where u_des holds the desired state; for placed and optimal
+ * gains.
  * Source: eq. 12.2, 13.3, 14.12.
  *   in   K[4] in N m/rad, N m s/rad, from [-1e+04, -100, -1e+04, -100] to [1e+04, 100, 1e+04, 100]
  *   in   x[4] in rad, rad/s, from [-3, -50, -3, -50] to [3, 50, 3, 50]
@@ -1906,8 +1902,9 @@ void awiwi_pole_placement_law(const double K[4], const double x[4], const double
 void awiwi_secant_stiffness(const double spring[3], const double deflexion[1], const double deflexion_des[1], double k[1], double torque[1]);
 
 /*
- * Gains and torque of a joint with a spring: optimal for its secant between the state and the desired
- * one. K_last are the gains of the last tick: a guess, and what remains where there are no new ones.
+ * Optimal gains and torque of a joint with a spring, by its secant between the state and the desired
+ * state. K_last are the gains of the last tick: the initial guess, and the result if there is no
+ * solution.
  * Source: eq. 14.10 to 14.12, mended.
  *   in   m[1] in kg m^2, 3e-07 to 0.0001
  *   in   b[1] in kg m^2, 0.0001 to 0.01
@@ -1928,9 +1925,9 @@ int awiwi_sdre_joint(const double m[1], const double b[1], const double dq[1], c
 
 /*
  * Gains of u = -K x that minimise the integral of x'Q x + R u^2, and the least cost x'S x; in coherent
- * units. The residual is that of the Riccati equation for S, relative to its terms. Refused are a
- * plant that B cannot stabilise, costs that reward a motion, and costs that leave one for nothing that
- * does not decay by itself.
+ * units. The residual is that of the Riccati equation for S, relative to its terms. An error status is
+ * returned for a plant that B cannot stabilise, a cost that is negative for some motion, and a motion
+ * without cost that does not decay.
  * Source: eq. 13.1 to 13.5.
  *   in   A[4][4] in 1, -1e+07 to 1e+07
  *   in   B[4] in 1, -10000 to 10000
@@ -1956,7 +1953,7 @@ int awiwi_lqr(const double A[16], const double B[4], const double Q[16], const d
 int awiwi_backstepping_academic(const double x[2], const double k[2], double u[1]);
 
 /*
- * Energy of the example, its rate under the law, and the virtual control of x2.
+ * Lyapunov function of the example, its rate under the law, and the virtual control of x2.
  * Source: eq. 15.2, 15.6, 15.9, mended.
  *   in   x[2] in 1, from [-3, -10] to [3, 10]
  *   in   k[2] in 1, 0.01 to 10
@@ -1968,8 +1965,8 @@ int awiwi_backstepping_academic(const double x[2], const double k[2], double u[1
 void awiwi_backstepping_academic_lyapunov(const double x[2], const double k[2], double V[1], double Vdot[1], double controls[1]);
 
 /*
- * Motor torque that takes the link (q and three derivatives) to desired (q_d and four); scales of 1 as
- * printed.
+ * Motor torque that moves the link (motion: q, 3 derivatives) to desired (q_d, 4 derivatives); printed
+ * scales are 1.
  * Source: eq. 15.17 to 15.50.
  *   in   motion[4] in rad, rad/s, rad/s^2, rad/s^3, from [-2, -20, -2000, -2e+05] to [2, 20, 2000, 2e+05]
  *   in   desired[5] in rad, rad/s, rad/s^2, rad/s^3, rad/s^4, from [-2, -20, -2000, -2e+05, -2e+07] to [2, 20, 2000, 2e+05, 2e+07]
@@ -1985,8 +1982,8 @@ void awiwi_backstepping_academic_lyapunov(const double x[2], const double k[2], 
 int awiwi_backstepping_position(const double motion[4], const double desired[5], const double plant[3], const double rates[4], const double scales[3], double tau_m[1]);
 
 /*
- * Energy of the position law's errors, its rate under the law, and the virtual controls of q', q'' and
- * q'''.
+ * Lyapunov function of the position law, its rate under the law, and the virtual controls of q', q''
+ * and q'''.
  * Source: eq. 15.27 to 15.46.
  *   in   motion[4] in rad, rad/s, rad/s^2, rad/s^3, from [-2, -20, -2000, -2e+05] to [2, 20, 2000, 2e+05]
  *   in   desired[5] in rad, rad/s, rad/s^2, rad/s^3, rad/s^4, from [-2, -20, -2000, -2e+05, -2e+07] to [2, 20, 2000, 2e+05, 2e+07]
@@ -2002,9 +1999,10 @@ void awiwi_backstepping_position_lyapunov(const double motion[4], const double d
 
 /*
  * Motor torque that gives the link the stiffness K_p and the damping K_d about desired (q_d and four
- * derivatives). state is (q, q', tau, tau') with the spring's torque tau, external the torque on the
- * link and its rate: left out, the static stiffness is wrong. plant is (link, motor, spring); gains
- * are (K_p, K_d, K_3, K_4); weights (C_t, C_s) are 1 as printed.
+ * derivatives). state is (q, q', tau, tau') with the spring's torque tau. external is the torque on
+ * the link and its rate; if these are left out, the static stiffness is wrong. plant is (link's
+ * inertia, motor's inertia, stiffness), gains are (K_p, K_d, K_3, K_4). The printed weights (C_t, C_s)
+ * are 1.
  * Source: eq. 15.51 to 15.70, mended.
  *   in   state[4] in rad, rad/s, N m, N m/s, from [-2, -20, -2, -200] to [2, 20, 2, 200]
  *   in   desired[5] in rad, rad/s, rad/s^2, rad/s^3, rad/s^4, from [-2, -20, -2000, -2e+05, -2e+07] to [2, 20, 2000, 2e+05, 2e+07]
@@ -2021,8 +2019,8 @@ void awiwi_backstepping_position_lyapunov(const double motion[4], const double d
 int awiwi_backstepping_impedance(const double state[4], const double desired[5], const double external[2], const double plant[3], const double gains[4], const double weights[2], double tau_m[1]);
 
 /*
- * Energy of the impedance law, its rate under the law, and the virtual controls of tau and tau'.
- * Serves the law for nonlinear springs too: neither depends on the spring.
+ * Lyapunov function of the impedance law, its rate under the law, and the virtual controls of tau and
+ * tau'. It is that of the law for nonlinear springs too, as it does not depend on the spring.
  * Source: eq. 15.54, 15.57, 15.64, 15.66, mended.
  *   in   state[4] in rad, rad/s, N m, N m/s, from [-2, -20, -2, -200] to [2, 20, 2, 200]
  *   in   desired[5] in rad, rad/s, rad/s^2, rad/s^3, rad/s^4, from [-2, -20, -2000, -2e+05, -2e+07] to [2, 20, 2000, 2e+05, 2e+07]
@@ -2038,8 +2036,8 @@ int awiwi_backstepping_impedance(const double state[4], const double desired[5],
 void awiwi_backstepping_impedance_lyapunov(const double state[4], const double desired[5], const double external[2], const double plant[3], const double gains[4], const double weights[2], double V[1], double Vdot[1], double controls[2]);
 
 /*
- * The impedance law behind a nonlinear spring phi: tau = phi, and spring is (phi', phi'') at its
- * elongation. bodies are the inertias of link and motor.
+ * Motor torque of the impedance law behind a nonlinear spring phi: spring is (phi', phi'') at its
+ * elongation. state is (q, q', tau, tau') with tau = phi; bodies are the inertias of link and motor.
  * Source: eq. 15.71 to 15.81, mended.
  *   in   state[4] in rad, rad/s, N m, N m/s, from [-2, -20, -2, -200] to [2, 20, 2, 200]
  *   in   desired[5] in rad, rad/s, rad/s^2, rad/s^3, rad/s^4, from [-2, -20, -2000, -2e+05, -2e+07] to [2, 20, 2000, 2e+05, 2e+07]
@@ -2057,10 +2055,10 @@ void awiwi_backstepping_impedance_lyapunov(const double state[4], const double d
 int awiwi_backstepping_nonlinear(const double state[4], const double desired[5], const double external[2], const double bodies[2], const double spring[2], const double gains[4], const double weights[2], double tau_m[1]);
 
 /*
- * Torques of both motors: impedance of the link and common torque of the springs, exact for all six
- * states. By motor: torques (tau, tau') of its spring, springs (phi', phi'') at its elongation,
- * tunings (K_3, K_4, C_t, C_s). inertias are (link, motor 1, motor 2), impedance is (K_p, K_d),
- * pretension the common torque with two derivatives.
+ * Torques of both motors for an impedance of the link and a common torque of the springs, exact for
+ * all six states. One row per motor: torques (tau, tau') of its spring, springs (phi', phi'') at its
+ * elongation, and tunings (K_3, K_4, C_t, C_s). inertias are (link, motor 1, motor 2), impedance is
+ * (K_p, K_d), and pretension is the common torque with two derivatives.
  * Source: eq. 15.82 to 15.106, mended.
  *   in   joint[2] in rad, rad/s, from [-2, -20] to [2, 20]
  *   in   torques[2][2] in N m, N m/s, from [0, -200, 0, -200] to [2, 200, 2, 200]
@@ -2083,8 +2081,8 @@ int awiwi_backstepping_nonlinear(const double state[4], const double desired[5],
 int awiwi_backstepping_antagonistic(const double joint[2], const double torques[4], const double desired[5], const double pretension[3], const double external[2], const double inertias[3], const double springs[4], const double impedance[2], const double tunings[8], double tau_m[2]);
 
 /*
- * Energy of the six states, its rate under the law, and the virtual controls of each motor's torque
- * and rate.
+ * Lyapunov function of the antagonistic law, its rate, and the virtual controls of each spring's
+ * torque and rate.
  * Source: eq. 15.88, 15.95, 15.97, 15.105, mended.
  *   in   joint[2] in rad, rad/s, from [-2, -20] to [2, 20]
  *   in   torques[2][2] in N m, N m/s, from [0, -200, 0, -200] to [2, 200, 2, 200]
@@ -2103,7 +2101,7 @@ int awiwi_backstepping_antagonistic(const double joint[2], const double torques[
 void awiwi_backstepping_antagonistic_lyapunov(const double joint[2], const double torques[4], const double desired[5], const double pretension[3], const double external[2], const double inertias[3], const double springs[4], const double impedance[2], const double tunings[8], double V[1], double Vdot[1], double controls[4]);
 
 /*
- * The printed decoupling of the motors, for comparison only: it takes the pretension for motion and
+ * The printed decoupling of the motors, for comparison only: it mistakes pretension for motion and
  * releases it.
  * Source: eq. 15.84 to 15.88, as printed.
  *   in   joint[2] in rad, rad/s, from [-2, -20] to [2, 20]
@@ -2127,9 +2125,9 @@ void awiwi_backstepping_antagonistic_lyapunov(const double joint[2], const doubl
 int awiwi_backstepping_antagonistic_decoupled(const double joint[2], const double torques[4], const double desired[5], const double pretension[3], const double external[2], const double inertias[3], const double springs[4], const double impedance[2], const double tunings[8], double tau_m[2]);
 
 /*
- * The impedance law as tau_m = -K (q, q', tau, tau') + h (tau_ext, tau_ext'), linear spring, q_d = 0.
- * K_cancelled are the gains for a plant whose spring's torque is cancelled: tau_m = (m + b) / m tau -
- * K_cancelled x.
+ * Gains of the impedance law written as tau_m = -K (q, q', tau, tau') + h (tau_ext, tau_ext'), for q_d
+ * = 0. The spring is linear. K_cancelled are the gains for a plant whose spring's torque is cancelled:
+ * tau_m = (m + b) / m tau - K_cancelled x.
  * Source: eq. 15.70, 16.1 to 16.3, mended.
  *   in   plant[3] in kg m^2, N m/rad, from [5e-07, 0.0001, 0.05] to [0.001, 0.01, 50]
  *   in   gains[4] in N m/rad, N m s/rad, 1/s, from [0.01, 0.0001, 0.1, 0.1] to [50, 1, 2000, 2000]
@@ -2142,7 +2140,7 @@ int awiwi_backstepping_antagonistic_decoupled(const double joint[2], const doubl
 void awiwi_backstepping_state_gains(const double plant[3], const double gains[4], const double weights[2], double K[4], double K_cancelled[4], double h[2]);
 
 /*
- * Slopes of K_cancelled by the gains K_p, K_d, K_3, K_4.
+ * Partial derivatives of K_cancelled by the gains K_p, K_d, K_3, K_4.
  * Source: eq. 16.3, mended and differentiated.
  *   in   plant[3] in kg m^2, N m/rad, from [5e-07, 0.0001, 0.05] to [0.001, 0.01, 50]
  *   in   gains[4] in N m/rad, N m s/rad, 1/s, from [0.01, 0.0001, 0.1, 0.1] to [50, 1, 2000, 2000]
@@ -2153,7 +2151,7 @@ void awiwi_backstepping_state_gains(const double plant[3], const double gains[4]
 void awiwi_backstepping_state_gains_derivatives(const double plant[3], const double gains[4], const double weights[2], double dK[16]);
 
 /*
- * K_3 and K_4 that give tau and tau' the feedback gains K_opt, with (K_p, K_d) and the weights given.
+ * K_3 and K_4 for which tau and tau' have the feedback gains K_opt, for given (K_p, K_d) and weights.
  * Source: eq. 16.3, 16.4, solved.
  *   in   K_opt[4] in N m/rad, N m s/rad, 1, s, from [33.03, 0.693, 342, 3.33] to [40.37, 0.847, 418, 4.07]
  *   in   plant[3] in kg m^2, N m/rad, from [9.8e-05, 0.00196, 0.588] to [0.000102, 0.00204, 0.612]
@@ -2169,9 +2167,9 @@ void awiwi_backstepping_state_gains_derivatives(const double plant[3], const dou
 int awiwi_optimal_backstepping_rates(const double K_opt[4], const double plant[3], const double impedance[2], const double weights[2], double rates[2]);
 
 /*
- * (K_3, K_4) and the weights (C_t, C_s) that give all four feedback gains K_opt exactly, with (K_p,
- * K_d) given. Some K_p and K_d do whenever the closed loop is stable and has two different pairs of
- * poles: near those of one pair.
+ * (K_3, K_4) and weights (C_t, C_s) for which all four feedback gains are exactly K_opt, for given
+ * (K_p, K_d). Whenever the closed loop is stable and has two different pairs of poles, a solution
+ * exists for some K_p and K_d near those of one pair.
  * Source: eq. 15.89, 15.97, 16.3, 16.4, solved.
  *   in   K_opt[4] in N m/rad, N m s/rad, 1, s, from [18.9, 0.819, 477, 0.279] to [23.1, 1.001, 583, 0.341]
  *   in   plant[3] in kg m^2, N m/rad, from [9.8e-05, 0.00196, 0.588] to [0.000102, 0.00204, 0.612]
@@ -2187,9 +2185,9 @@ int awiwi_optimal_backstepping_weights(const double K_opt[4], const double plant
 
 /*
  * (K_p, K_d) and (K_3, K_4) whose feedback gains are nearest to K_opt, by relative errors; start is a
- * guess. Status 0: they are equal. 1: no positive gains have them, these come nearest; or something
- * given is not positive, and start is returned. 2: these are the nearest found. 3: something given is
- * not a number; the result is zero.
+ * guess. Status 0: the feedback gains are equal. 1: no positive gains give K_opt, and the result is
+ * nearest to it; or an input is not positive, and the result is start. 2: not converged, the result is
+ * the best found. 3: an input is not a number, and the result is zero.
  * Source: eq. 16.4.
  *   in   K_opt[4] in N m/rad, N m s/rad, 1, s, 1e-09 to 1e+09
  *   in   plant[3] in kg m^2, N m/rad, from [5e-07, 0.0001, 0.05] to [0.001, 0.01, 50]
@@ -2203,10 +2201,10 @@ int awiwi_optimal_backstepping_weights(const double K_opt[4], const double plant
 int awiwi_optimal_backstepping(const double K_opt[4], const double plant[3], const double weights[2], const double start[4], double impedance[2], double rates[2]);
 
 /*
- * A motion and its first four derivatives, a sample later, on the way to the desired motion and its
- * derivatives. What is desired with all its derivatives is reached without error, and a jump after 1.7
- * times the delay. motion is the filter's memory: begin with where the joint is, at rest, and pass on
- * what is returned.
+ * Filtered motion (position and four derivatives) one sample later, moving to the desired motion. A
+ * motion that is given with all its derivatives is followed without error. A step settles after 1.7
+ * times the delay. motion is the filter's memory: start with the joint's position at rest, then pass
+ * the last output.
  * Source: Bessel's filter of fifth order.
  *   in   motion[5] in rad, rad/s, rad/s^2, rad/s^3, rad/s^4, from [-2, -20, -2000, -2e+05, -2e+07] to [2, 20, 2000, 2e+05, 2e+07]
  *   in   desired[5] in rad, rad/s, rad/s^2, rad/s^3, rad/s^4, from [-2, -20, -2000, -2e+05, -2e+07] to [2, 20, 2000, 2e+05, 2e+07]
@@ -2220,11 +2218,11 @@ int awiwi_optimal_backstepping(const double K_opt[4], const double plant[3], con
 int awiwi_reference_filter(const double motion[5], const double desired[5], const double delay[1], const double period[1], double motion_next[5]);
 
 /*
- * All that the laws of such a joint ask for, a sample ahead, from angles of motors, elongations and
- * torques. acted are the motors' torques of the sample that ended, acting those of the next;
- * bandwidths are of the link, the motors, the torques and the springs' scales. resistance is what the
- * motors must overcome, modelled what they would by the friction model alone. The memory begins with
- * angles at rest, the torques, and scales of 1.
+ * State of an antagonistic joint one sample ahead, from motor angles thetas, elongations stretches and
+ * torques. acted are the motor torques of the sample that ended, acting those of the next. bandwidths
+ * are those of the link, the motors, the torques and the scales of the springs. resistance is the
+ * estimated torque against each motor, modelled the part of it that the friction model explains. Start
+ * the memory with angles at rest, spring torques, and scales 1.
  * Source: eq. 15.82, observed.
  *   in   memory[13] in rad, rad/s, rad/s^2, N m, 1, from [-2, -20, -2000, -2, -20, -2000, -2, -20, -2000, 0, 0, 0, 0] to [2, 20, 2000, 2, 20, 2000, 2, 20, 2000, 2, 2, 2, 2]
  *   in   thetas[2] in rad, -2 to 2
@@ -2251,7 +2249,7 @@ int awiwi_reference_filter(const double motion[5], const double desired[5], cons
 void awiwi_antagonistic_observer(const double memory[13], const double thetas[2], const double stretches[2], const double measured[2], const double acted[2], const double acting[2], const double inertias[3], const double tendons[6], const double damping[1], const double friction[3], const double bandwidths[4], const double period[1], double memory_next[13], double joint[2], double motors[4], double torques[4], double springs[4], double load[1], double modelled[2], double resistance[2]);
 
 /*
- * State and motor torques of a desired motion, with springs that are linear about their elongations.
+ * State and motor torques for a desired motion, with springs that are linear about their elongations.
  * Source: eq. 15.82, solved for a desired motion.
  *   in   desired[5] in rad, rad/s, rad/s^2, rad/s^3, rad/s^4, from [-2, -20, -2000, -2e+05, -2e+07] to [2, 20, 2000, 2e+05, 2e+07]
  *   in   pretension[3] in N m, N m/s, N m/s^2, from [0, -10, -1000] to [1, 10, 1000]
@@ -2268,8 +2266,7 @@ void awiwi_antagonistic_observer(const double memory[13], const double thetas[2]
 int awiwi_antagonistic_setpoint(const double desired[5], const double pretension[3], const double elongations[2], const double slopes[2], const double inertias[3], const double damping[1], double x_des[6], double u_des[2]);
 
 /*
- * Motor torques u_des - K (x - x_des), with the gains K = feedback, and what the motors must overcome
- * besides.
+ * Motor torques u_des - K (x - x_des), with the gains K = feedback, plus the resistance to compensate.
  * Source: eq. 12.2, 13.3, for two motors.
  *   in   x[6] in rad, rad/s, from [-3, -50, -3, -50, -3, -50] to [3, 50, 3, 50, 3, 50]
  *   in   x_des[6] in rad, rad/s, from [-3, -50, -3, -50, -3, -50] to [3, 50, 3, 50, 3, 50]
@@ -2282,8 +2279,8 @@ int awiwi_antagonistic_setpoint(const double desired[5], const double pretension
 void awiwi_antagonistic_feedback(const double x[6], const double x_des[6], const double u_des[2], const double feedback[12], const double resistance[2], double tau_m[2]);
 
 /*
- * Angle and speed of half the motors' difference, which moves the link, and of half their sum, which
- * pulls.
+ * Motor angles and speeds as half their difference (against), which moves the link, and half their sum
+ * (together).
  * Source: eq. 15.82, for equal motors.
  *   in   motors[2][2] in rad, rad/s, from [-2, -50, -2, -50] to [2, 50, 2, 50]
  *   out  against[2] in rad, rad/s
@@ -2293,7 +2290,7 @@ void awiwi_antagonistic_feedback(const double x[6], const double x_des[6], const
 void awiwi_antagonistic_modes(const double motors[4], double against[2], double together[2]);
 
 /*
- * Torques of the springs that together pull the link with a torque, about a common pretension.
+ * Spring torques for a torque on the link and a common pretension.
  * Source: eq. 15.88.
  *   in   torque[1] in N m, -2 to 2
  *   in   pretension[3] in N m, N m/s, N m/s^2, from [0, -10, -1000] to [1, 10, 1000]
@@ -2303,8 +2300,8 @@ void awiwi_antagonistic_modes(const double motors[4], double against[2], double 
 void awiwi_antagonistic_sharing(const double torque[1], const double pretension[3], double shares[2]);
 
 /*
- * The antagonistic law for a link with damping; springs, external torque and resistance are those
- * observed.
+ * The antagonistic law for a link with damping; springs, external torque and resistance come from the
+ * observer.
  * Source: eq. 15.82 to 15.106, mended, with the link's damping and an observer.
  *   in   joint[2] in rad, rad/s, from [-2, -20] to [2, 20]
  *   in   torques[2][2] in N m, N m/s, from [0, -200, 0, -200] to [2, 200, 2, 200]
@@ -2329,10 +2326,10 @@ void awiwi_antagonistic_sharing(const double torque[1], const double pretension[
 int awiwi_backstepping_adaptive(const double joint[2], const double torques[4], const double desired[5], const double pretension[3], const double external[2], const double inertias[3], const double springs[4], const double damping[1], const double impedance[2], const double tunings[8], const double resistance[2], double tau_m[2]);
 
 /*
- * A motor that winds up a tendon with a spring, the joint held: rates of x = (theta, theta'), and the
- * force f. path is what the joint takes of the tendon; motor is (inertia, pulley's radius), line the
- * spring's (k1, k2, k3) of f = k1 p + k2 p^2 + k3 p^3 where it is taut, friction is (steepness, level,
- * viscosity).
+ * A motor that winds up a tendon with a spring, at a fixed joint: rates of x = (theta, theta'), and
+ * the force f. path is the tendon's path length at the joint. motor is (inertia, pulley's radius),
+ * friction is (steepness, level, viscosity). line is (k1, k2, k3) of the spring's force f = k1 p + k2
+ * p^2 + k3 p^3 for elongations p > 0.
  * Source: eq. 10.1, mended; eq. 3.8.
  *   in   x[2] in rad, rad/s, from [-3, -50] to [3, 50]
  *   in   u[1] in N m, -3 to 3
@@ -2348,7 +2345,7 @@ void awiwi_plant_tendon(const double x[2], const double u[1], const double path[
 
 /*
  * A link behind a linear spring: rates of x = (q, q', theta, theta'), and the spring's torque tau with
- * its rate. plant is (link, motor, spring), damping what holds link and motor back.
+ * its rate. plant is (link's inertia, motor's inertia, stiffness), damping is that of link and motor.
  * Source: eq. 15.11, 15.12.
  *   in   x[4] in rad, rad/s, from [-3, -50, -3, -50] to [3, 50, 3, 50]
  *   in   u[1] in N m, -3 to 3
@@ -2362,8 +2359,7 @@ void awiwi_plant_tendon(const double x[2], const double u[1], const double path[
 void awiwi_plant_joint_linear(const double x[4], const double u[1], const double load[1], const double plant[3], const double damping[2], double xd[4], double tau[2]);
 
 /*
- * The same behind a spring phi(d) = k1 d + k3 d^3, with the coefficients curve; spring is (phi',
- * phi'').
+ * A link behind a spring phi(d) = k1 d + k3 d^3 with curve = (k1, k3); spring is (phi', phi'').
  * Source: eq. 15.71.
  *   in   x[4] in rad, rad/s, from [-3, -50, -3, -50] to [3, 50, 3, 50]
  *   in   u[1] in N m, -3 to 3
@@ -2379,10 +2375,10 @@ void awiwi_plant_joint_linear(const double x[4], const double u[1], const double
 void awiwi_plant_joint_nonlinear(const double x[4], const double u[1], const double load[1], const double bodies[2], const double curve[2], const double damping[2], double xd[4], double tau[2], double spring[2]);
 
 /*
- * A link between two tendons: rates of (q, q', theta1, theta1', theta2, theta2'); elongations and
- * torques of both. inertias are (link, motor 1, motor 2), a row of tendons is (k1, k2, k3) of phi = k1
- * p + k2 p^2 + k3 p^3, where p is the elongation theta1 - q or theta2 + q of a taut tendon; friction
- * of either motor is (steepness, level, viscosity).
+ * A link between two tendons: rates of (q, q', theta1, theta1', theta2, theta2'), elongations and
+ * spring torques. inertias are (link, motor 1, motor 2), a row of tendons is (k1, k2, k3) of phi = k1
+ * p + k2 p^2 + k3 p^3, where p is the elongation theta1 - q or theta2 + q if positive. friction of
+ * each motor is (steepness, level, viscosity).
  * Source: eq. 15.82, with friction and springs that only pull.
  *   in   x[6] in rad, rad/s, from [-3, -50, -3, -50, -3, -50] to [3, 50, 3, 50, 3, 50]
  *   in   u[2] in N m, -5 to 5
@@ -2399,8 +2395,8 @@ void awiwi_plant_joint_nonlinear(const double x[4], const double u[1], const dou
 void awiwi_plant_antagonistic(const double x[6], const double u[2], const double load[1], const double inertias[3], const double tendons[6], const double damping[1], const double friction[3], double xd[6], double stretches[2], double tau[2]);
 
 /*
- * What both springs of such a joint do at given elongations: a row (tau, tau') and a row (phi', phi'')
- * for each.
+ * Torque and rate (tau, tau'), slope and curvature (phi', phi'') of both springs of an antagonistic
+ * joint.
  * Source: eq. 15.71, 15.82.
  *   in   stretches[2] in rad, -1 to 2
  *   in   speeds[2] in rad/s, -50 to 50
@@ -2412,9 +2408,9 @@ void awiwi_plant_antagonistic(const double x[6], const double u[2], const double
 void awiwi_antagonistic_springs(const double stretches[2], const double speeds[2], const double tendons[6], double torques[4], double springs[4]);
 
 /*
- * Forces of a finger's tendons: path is what its joints take of each, slack where it begins to pull.
- * The first half of a finger's plant. Joint torques and the joints' acceleration follow from the
- * finger's own kernels.
+ * Forces of a finger's tendons: path is their length at the joints, slack the total length at which
+ * each gets taut. This is the first half of a finger's plant. Joint torques and accelerations follow
+ * from the finger's own kernels.
  * Source: section 5.1, eq. 10.1.
  *   in   thetas[8] in rad, -5 to 5
  *   in   path[8] in m, -0.03 to 0.03
@@ -2427,8 +2423,8 @@ void awiwi_antagonistic_springs(const double stretches[2], const double speeds[2
 void awiwi_plant_finger_forces(const double thetas[8], const double path[8], const double slack[8], const double motor[2], const double line[3], double f[8]);
 
 /*
- * The other half: rates of (q, q', theta, theta') of four joints, which accelerate with qdd, and eight
- * motors.
+ * Second half of a finger's plant: rates of (q, q', theta, theta') of four joints with accelerations
+ * qdd, 8 motors.
  * Source: eq. 10.1, mended.
  *   in   qd[4] in rad/s, -50 to 50
  *   in   qdd[4] in rad/s^2, -10000 to 10000
