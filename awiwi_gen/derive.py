@@ -15,7 +15,7 @@ from awiwi_gen.kernel import Kernel
 
 
 class Deriver:
-    """Derives kernels of one part of the hand; the part's symbols are made once and shared."""
+    """Derives kernels of one part of the hand. They share the part's SymPy symbols."""
 
     def __init__(self, part: Any) -> None:
         self.part = part
@@ -43,7 +43,7 @@ class Deriver:
             arguments.append(sympy.Matrix(symbols))
         result = kernel.routes["sympy"](self._trees["sympy"], *arguments)
         outputs = []
-        for (name, shape), value in zip(kernel.results.items(), _several(kernel, result), strict=True):
+        for (name, shape), value in zip(kernel.results.items(), _results(kernel, result), strict=True):
             elements = lower_sympy(builder, _flat(value), leaves)
             outputs.append(Output(name, shape, tuple(elements)))
         return _checked(kernel, builder.graph(outputs))
@@ -66,7 +66,7 @@ class Deriver:
             arguments.append(ca.SX.sym(port, spec.size))
             leaves.append((arguments[-1], [builder.input(port, i) for i in range(spec.size)]))
         result = kernel.routes["casadi"](tree, *arguments)
-        values = [ca.vertcat(*(ca.vec(ca.SX(v).T) for v in _rows(value))) for value in _several(kernel, result)]
+        values = [ca.vertcat(*(ca.vec(ca.SX(v).T) for v in _rows(value))) for value in _results(kernel, result)]
         outputs = [
             Output(name, shape, tuple(elements))
             for (name, shape), elements in zip(
@@ -76,7 +76,7 @@ class Deriver:
         return _checked(kernel, builder.graph(outputs))
 
 
-def _several(kernel: Kernel, result: Any) -> tuple[Any, ...]:
+def _results(kernel: Kernel, result: Any) -> tuple[Any, ...]:
     return tuple(result) if len(kernel.results) > 1 else (result,)
 
 
@@ -97,7 +97,7 @@ def _checked(kernel: Kernel, graph: Graph) -> Graph:
 
 
 def check_dimensions(kernel: Kernel, graph: Graph) -> None:
-    """Evaluate a derived graph in units; raises DimensionError where they do not fit."""
+    """Evaluate a derived graph in units. Raises DimensionError where units do not match or differ from the ports'."""
     quantities = kernel.part.quantities()
 
     def leaf(node: Node) -> Any:

@@ -1,4 +1,4 @@
-"""What verification finds of compiled kernels (levels 1 and 3) and of the physics of a part (level 5)."""
+"""Verdicts on compiled kernels (levels 1 and 3) and on the physics of a part (level 5 of docs/verification.md)."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from awiwi_gen.verify.verdict import Verdict, judge, judge_solver
 
 
 def verdict_key(record: Record, compiled: str) -> str:
-    """What a verdict depends on: the record, the compiled text, what compiles it, and the judge."""
+    """Key of a verdict: the record, the compiled text, the code that compiles and judges it."""
     return key(record.digest, compiled, code_of(__name__, "awiwi_gen.build"), code_digest("csrc"))
 
 
 def laws_key(records: Sequence[Record]) -> str:
-    """What the laws of physics on a part depend on: its records, and the laws."""
+    """Key of the laws of physics of a part: its records, and the code of the laws."""
     return key(*(record.digest for record in records), code_of("awiwi_gen.verify.physics"))
 
 
 def judge_record(
     kernel: Kernel, record: Record, used: Mapping[str, Record], function: Callable[..., Any], options: Options
 ) -> Verdict:
-    """Levels 1 and 3 for one compiled kernel, joined with levels 2 and 4 of its record."""
+    """Levels 1 and 3 for one compiled kernel, with levels 2 and 4 from its record."""
     if record.graph is None:
         problem, tolerance = problem_of(kernel, used), solver_of(kernel).tolerance[options.scalar]
         mirror = problem.mirror(record.inputs, options.math == "own")

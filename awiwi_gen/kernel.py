@@ -1,4 +1,4 @@
-"""What a kernel is: typed ports, and two routes to its outputs, one in each wing."""
+"""The types `Port`, `Solver` and `Kernel`: typed ports, and two routes to the outputs, one in each wing."""
 
 from __future__ import annotations
 
@@ -11,18 +11,21 @@ from typing import Any
 from awiwi_gen.units import Unit
 
 GUARDS = "guards"
-WINGS = {"sympy": "awiwi_gen.definitions", "casadi": "awiwi_gen.witnesses"}  # the library each wing derives with
+WINGS = {
+    "sympy": "awiwi_gen.definitions",
+    "casadi": "awiwi_gen.witnesses",
+}  # by the library that each wing derives with
 
 
 @dataclass(frozen=True)
 class Route:
-    """A function of a wing, by the names of its module and itself; the module is imported at the first call."""
+    """A function of a wing, by name; its module is imported at the first call."""
 
     module: str
     function: str
 
     def __call__(self, part: Any, *arguments: Any) -> Any:
-        """Outputs, then guards, of a part with symbols for its numbers and one column of symbols per input port."""
+        """Outputs, then guards, from a part with symbols for its numbers and one column of symbols per input port."""
         return getattr(import_module(self.module), self.function)(part, *arguments)
 
 
@@ -31,7 +34,7 @@ class Port:
     """One array argument of a kernel.
 
     ``unit`` is one unit for the whole array or one per element, row by row. ``low`` and ``high`` (a number
-    or one per element) bound the values the kernel is documented and verified for; outputs have none.
+    or one per element) are the range that the kernel is documented and verified for; outputs have no range.
     """
 
     shape: tuple[int, ...]
@@ -51,7 +54,7 @@ class Port:
 
     @property
     def unit_text(self) -> str:
-        """The unit for people; mixed arrays list their distinct units."""
+        """The unit as text; arrays of mixed units list each unit once."""
         return ", ".join(dict.fromkeys(str(unit) for unit in self.units))
 
     def bounds(self) -> list[tuple[float, float]]:
@@ -63,13 +66,13 @@ class Port:
 
 @dataclass(frozen=True)
 class Solver:
-    """What makes a kernel that must iterate: a template that binds a solver of csrc to generated kernels.
+    """How a kernel iterates: a template that binds a solver of csrc to generated kernels.
 
-    ``uses`` are the families of the kernels of the same part that it calls; ``equations`` and ``unknowns`` tell
-    which of their tendons and joints take part. ``arrays`` become C constants, ``strings`` go to the template as
-    they are. ``problem`` names what is solved, so that verification knows well-posed inputs and their exact
-    solution; a compiled result may differ from that by ``tolerance`` of the largest, per scalar type.
-    ``iterations`` counts the calls of the used kernels in the worst case.
+    ``uses`` are the families of the kernels of the same part that it calls. ``equations`` and ``unknowns`` are the
+    indices of the tendons and joints that take part. ``arrays`` become C constants, ``strings`` go to the template
+    unchanged. ``problem`` names an entry of `verify.problems.PROBLEMS`, which draws well-posed inputs and has their exact
+    solutions; a compiled result may differ from these by ``tolerance`` of the largest element, per scalar type.
+    ``iterations`` is the number of calls of the used kernels in the worst case.
     """
 
     template: str
@@ -87,12 +90,12 @@ class Solver:
 class Kernel:
     """One function of the C interface.
 
-    ``part`` is the piece of the hand the routes receive as their first argument, ``path`` its place in the
-    hand file. Kernels of parts with equal ``structure`` share their derivation. The first route is the
-    definition, the others are independent ways to the same result.
+    ``part`` is the part of the hand that the routes receive as their first argument, ``path`` its path in the hand
+    file. Kernels of parts with equal ``structure`` share their derivation. The first route is the definition, the
+    other is its witness; a kernel with a ``solver`` has none.
 
-    ``guards`` say in words what must hold for the result to exist. Routes of a guarded kernel return, after
-    their outputs, one expression per guard that is positive where it holds; the C then returns a status.
+    ``guards`` are the conditions, in words, under which the result exists. Routes of a guarded kernel return, after
+    their outputs, one expression per guard that is positive where the condition holds; the C returns a status.
     """
 
     name: str
@@ -109,7 +112,7 @@ class Kernel:
 
     @property
     def results(self) -> dict[str, tuple[int, ...]]:
-        """Shapes of all that a route returns: the outputs, then the guards if there are any."""
+        """Shapes of what a route returns: the outputs, then the guards if there are any."""
         shapes = {name: port.shape for name, port in self.outputs.items()}
         return {**shapes, GUARDS: (len(self.guards),)} if self.guards else shapes
 
@@ -122,5 +125,5 @@ class Kernel:
 
     @property
     def family(self) -> str:
-        """The kernel's name without its part: what the five fingers' versions have in common."""
+        """The kernel's name without its part, as for all fingers: "mass_matrix" of "index_mass_matrix"."""
         return self.name.removeprefix(self.path.partition(".")[2] + "_")

@@ -1,7 +1,7 @@
-"""Kernels from their derivations to their C text: bound, compared, optimised, printed; pure functions.
+"""From the derivations of a kernel to its C text: bind numbers, compare routes, optimise, print; pure functions.
 
-Its result, a `Record`, is kept by the digest of everything it depends on, so that a changed number costs the
-kernels that use it and no others.
+The result, a `Record`, is cached by the digest of everything that it depends on. So a changed number only affects the
+kernels that use it.
 """
 
 from __future__ import annotations
@@ -38,17 +38,17 @@ from awiwi_gen.verify.reference import (
 )
 from awiwi_gen.verify.samples import draw
 
-ROUTES_AGREE = 1e-40  # level 4
+ROUTES_AGREE = 1e-40  # level 4 of docs/verification.md
 PASSES_AGREE = 1e-50  # level 2
-HOPELESS = 1.3  # passes seldom make up for more
+HOPELESS = 1.3  # passes rarely recover a larger ratio of costs
 
 
 @dataclass(frozen=True)
 class Record:
-    """What is known of a kernel before it is compiled; ``digest`` names what it was made from.
+    """A kernel before it is compiled; ``digest`` is that of everything it was made from.
 
-    ``values`` are the numbers of the hand that its graph reads when it runs; ``costs``, after each pass, its
-    operations and their weight; ``inputs`` are the samples of its reference where a problem chose them.
+    ``values`` are the numbers of the hand that its graph reads at run time. ``costs`` has, after each pass, the number
+    of operations and their weight. ``inputs`` are the samples of its reference if a problem chose them.
     """
 
     digest: str
@@ -65,7 +65,7 @@ class Record:
 
 
 def derivation_key(kernel: Kernel, route: str) -> str:
-    """What a derivation depends on: the structure of the part, the ports, the code of the route; no number."""
+    """Key of a derivation: the structure of the part, the ports and the code of the route, but no number."""
     derived = kernel.routes[route]
     code = code_of("awiwi_gen.derive", derived.module, type(kernel.part).__module__)
     ports = [(name, port.shape, port.unit) for side in (kernel.inputs, kernel.outputs) for name, port in side.items()]
@@ -74,7 +74,7 @@ def derivation_key(kernel: Kernel, route: str) -> str:
 
 @dataclass(frozen=True)
 class Fingerprint:
-    """What the key of a record needs of a graph, so that the graph itself is read only if the record is missing."""
+    """The part of a graph that the key of a record needs; the graph is read only if the record is missing."""
 
     digest: str
     params: tuple[str, ...]
@@ -82,18 +82,18 @@ class Fingerprint:
 
 
 def fingerprints(kernel: Kernel, cache: Cache) -> dict[str, Fingerprint]:
-    """Those of a kernel's derivations by all its routes."""
+    """Fingerprints of a kernel's derivations, by route."""
 
-    def taken(route: str) -> Fingerprint:
+    def fingerprint(route: str) -> Fingerprint:
         graph = load_graphs(kernel, cache, route)[route]
         return Fingerprint(graph.digest, graph.params, len(graph.nodes))
 
     keys = {route: derivation_key(kernel, route) for route in kernel.routes}
-    return {route: cache.memo("fingerprints", digest, partial(taken, route)) for route, digest in keys.items()}
+    return {route: cache.memo("fingerprints", digest, partial(fingerprint, route)) for route, digest in keys.items()}
 
 
 def record_key(kernel: Kernel, graphs: Mapping[str, Fingerprint], prefix: str, options: Options) -> str:
-    """What a record depends on: the derivations, the numbers in them, the ports, the compiler's own code."""
+    """Key of a record: the derivations, the numbers in them, the ports, the options and the generator's code."""
     values = values_of(kernel)
     used = {path: str(values[path]) for graph in graphs.values() for path in graph.params}
     code = code_of(__name__) + code_digest("templates")
@@ -103,12 +103,12 @@ def record_key(kernel: Kernel, graphs: Mapping[str, Fingerprint], prefix: str, o
 
 
 def solver_key(kernel: Kernel, used: Mapping[str, str], prefix: str, options: Options) -> str:
-    """What a record of a kernel with a solver depends on: the keys of the records it uses, and itself."""
+    """Key of the record of a kernel with a solver: its own, and those of the records that it uses."""
     return key(record_key(kernel, {}, prefix, options), *used.values())
 
 
 def load_graphs(kernel: Kernel, cache: Cache, *routes: str) -> dict[str, Graph]:
-    """The derivations of a kernel by the given routes or by all, from the cache."""
+    """The derivations of a kernel by the given routes, or by all, from the cache. Raises VerificationError if missing."""
     found: dict[str, Graph] = {}
     for route in routes or kernel.routes:
         graph = cache.get("derived", derivation_key(kernel, route))
@@ -119,7 +119,7 @@ def load_graphs(kernel: Kernel, cache: Cache, *routes: str) -> dict[str, Graph]:
 
 
 def cheapest(bound: Mapping[str, Graph]) -> tuple[str, list[tuple[str, Graph]]]:
-    """The route whose C costs least, and its stages; a route that starts out far behind is not optimised."""
+    """The route with the cheapest C, and its stages; a route that is far more expensive at first is not optimised."""
     raw = {route: cost(graph).weight for route, graph in bound.items()}
     promising = [route for route, weight in raw.items() if weight <= HOPELESS * min(raw.values())]
     stages = {route: optimise(bound[route]) for route in promising}
@@ -129,7 +129,7 @@ def cheapest(bound: Mapping[str, Graph]) -> tuple[str, list[tuple[str, Graph]]]:
 
 @dataclass(frozen=True)
 class Candidate:
-    """A kernel of which the graphs are known: bound, the best of them optimised, not compared yet."""
+    """A kernel with its graphs bound and the cheapest of them optimised, before they are compared."""
 
     kernel: Kernel
     digest: str
@@ -140,14 +140,14 @@ class Candidate:
 
     @property
     def final(self) -> Graph:
-        """What is emitted."""
+        """The graph that is emitted."""
         return self.stages[-1][1]
 
 
 def make_records(
     tasks: Sequence[tuple[Kernel, Mapping[str, Graph], str]], prefix: str, options: Options
 ) -> list[Record]:
-    """Bind, compare the routes, optimise the cheaper one, print it; for kernels (with graphs, digest) of one part.
+    """Bind, compare the routes, optimise the cheaper one and print it, for (kernel, graphs, digest) of one part.
 
     Raises VerificationError where two routes, or the graphs before and after a pass, differ.
     """
@@ -156,12 +156,12 @@ def make_records(
     known: dict[tuple[str, ...], tuple[Mapping[str, Graph], str, Sequence[tuple[str, Graph]]]] = {}
     candidates = []
     for kernel, graphs, digest in tasks:
-        alike = tuple(graph.digest for graph in graphs.values())
-        if alike not in known:
+        digests = tuple(graph.digest for graph in graphs.values())
+        if digests not in known:
             bound = {route: bind(graph, numbers) for route, graph in graphs.items()}
-            known[alike] = (bound, *cheapest(bound))
+            known[digests] = (bound, *cheapest(bound))
         inputs = draw(kernel.inputs, kernel.path, options.dtype)
-        candidates.append(Candidate(kernel, digest, *known[alike], inputs))
+        candidates.append(Candidate(kernel, digest, *known[digests], inputs))
     cases = [(graph, c.inputs) for c in candidates for graph in (*c.bound.values(), c.final)]
     found = iter(ball_values_together(cases, values))
     made = []
@@ -180,7 +180,7 @@ def _record(
     prefix: str,
     options: Options,
 ) -> Record:
-    """Compare, and print what agrees."""
+    """Compare the routes and the passes, then print the C."""
     kernel, route, final = candidate.kernel, candidate.route, candidate.final
     definition = next(iter(exact.values()))
     graphs_compared = (*candidate.bound.values(), final)
@@ -216,7 +216,7 @@ def _record(
 def culprit(
     before: BallArrays, stages: Sequence[tuple[str, Graph]], inputs: Mapping[str, Any], values: Mapping[str, Fraction]
 ) -> str:
-    """Which of the passes changes the value, once their end result is known to."""
+    """The first pass that changes the value, where the final graph is known to differ."""
     for name, graph in stages:
         after = ball_values(graph, inputs, values)
         change = disagreement(before, after, partial(term_size, graph, inputs, values))
@@ -229,7 +229,7 @@ def culprit(
 def make_solver_record(
     kernel: Kernel, used: Mapping[str, Record], digest: str, prefix: str, options: Options
 ) -> Record:
-    """Bind a solver to the kernels it uses, and find the exact solutions it is to be held against."""
+    """Bind a solver to the kernels it uses, and find the exact solutions of its samples."""
     solver = solver_of(kernel)
     runtime = any(record.graph is not None and record.graph.params for record in used.values())
     functions = {family: record.function for family, record in used.items()}
@@ -241,7 +241,7 @@ def make_solver_record(
 
 
 def problem_of(kernel: Kernel, used: Mapping[str, Record]) -> Problem:
-    """What a kernel with a solver solves; the kernels it calls may belong to other parts, so their numbers are bound."""
+    """The problem of a kernel with a solver. Kernels that it calls may be of other parts, so their numbers are bound."""
     solver = solver_of(kernel)
     graphs = {family: fill(record.graph, record.values) for family, record in used.items() if record.graph is not None}
     return PROBLEMS[solver.problem](solver, graphs, values_of(kernel))
@@ -262,11 +262,11 @@ def values_of(kernel: Kernel) -> Mapping[str, Fraction]:
     return _VALUES[id(part)][1]
 
 
-_VALUES: dict[int, tuple[Any, dict[str, Fraction]]] = {}  # many kernels share a part, which is kept with its numbers
+_VALUES: dict[int, tuple[Any, dict[str, Fraction]]] = {}  # by id of the part, which is stored to keep that id valid
 
 
 def manifest_entry(kernel: Kernel, record: Record) -> dict[str, Any]:
-    """A kernel as plain data: what ``list --json`` shows and what a library is loaded from."""
+    """A kernel as plain data, for ``list --json`` and for loading a library."""
 
     def port(name: str, spec: Any, ranged: bool) -> dict[str, Any]:
         entry: dict[str, Any] = {"name": name, "shape": list(spec.shape), "unit": spec.unit_text}

@@ -1,6 +1,6 @@
-"""Which modules of the package a module imports, directly or not, and one digest of their text.
+"""The modules of the package that a module imports, directly or not, and one digest of their text.
 
-A cached result is keyed by the code that made it. Imports inside functions count too: rather one module too many.
+Cached results are keyed by the code that made them. Imports inside functions count too.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Reading the tree of a finger: names and structure, no physics. Both routes of every quantity start from here.
+"""Names and structure of a finger's chain, no physics: all that both wings share besides the numbers.
 
 A finger is anything with these attributes (the hand file's `Finger` and its symbolic copies are):
 
@@ -7,7 +7,7 @@ A finger is anything with these attributes (the hand file's `Finger` and its sym
     tendons[i]    rest, over (senses and joints: "+flexion", "-pip"), span (None or from_[3], to[3], joint)
     couplings[i]  follower, leader
 
-The leaves are numbers or symbols of either algebra. Independent joints are counted along the chain, base to tip.
+The numbers may be symbols of either library. Independent joints are counted along the chain, base to tip.
 """
 
 from typing import Any
@@ -21,7 +21,7 @@ def leaders(finger: Finger) -> dict[str, str]:
 
 
 def coordinates(finger: Finger) -> dict[str, int]:
-    """Joint -> index in q of the coordinate that moves it; a follower has its leader's."""
+    """Joint -> index in q of the coordinate that moves it; a follower has the index of its leader."""
     follows = leaders(finger)
     free = [link.joint for link in finger.links if link.joint not in follows]
     return {link.joint: free.index(follows.get(link.joint, link.joint)) for link in finger.links}
@@ -33,10 +33,10 @@ def radius(finger: Finger, joint: str) -> Any:
 
 
 def quarter_turns(turn: str) -> tuple[int, int]:
-    """A fixed turn such as "x+90" as (axis, quarter turns): (0, 1). No turn is (2, 0)."""
+    """A fixed rotation such as "x+90" as (axis, number of 90 degree rotations): (0, 1); "none" is (2, 0)."""
     return (2, 0) if turn == "none" else ("xyz".index(turn[0]), int(turn[1:]) // 90)
 
 
 def sense(over: str) -> tuple[int, str]:
-    """A pulley a tendon rolls on, "-pip", as (sign, joint): (-1, "pip")."""
+    """A pulley that a tendon runs over, "-pip", as (sign, joint): (-1, "pip")."""
     return (1 if over[0] == "+" else -1), over[1:]

@@ -44,14 +44,14 @@ extern "C" {
 extern const char awiwi_model_digest[65];
 
 /*
- * Stiffness of every tendon that is pulled with a tension: spring and fibre in series, and its
- * derivatives. slope and curvature are dk/df and d2k/df2.
+ * Stiffness of every tendon at its tension, spring and fibre in series, and its derivatives. slope and
+ * curvature are dk/df and d2k/df2.
  * Source: figure 4.7, section 4.3.
  *   in   tension[8] in N, 3.87595 to 100.149
  *   out  k[8] in N/m
  *   out  slope[8] in 1/m
  *   out  curvature[8] in 1/(N m)
- * Returns 0 where every tension is on its spring's curve, give or take a hundredth; elsewhere 1, and
+ * Returns 0 where every tension is on its spring's curve, with a margin of 0.4 %; elsewhere 1, and
  * what is not defined is NaN.
  * Cost: 198 add, 198 mul, 7 calls.
  */
@@ -67,7 +67,7 @@ int awiwi_thumb_tendon_stiffness(const double tension_in[8], double k_out[8], do
 void awiwi_thumb_fingertip_pose(const double q_in[4], double T_out[16]);
 
 /*
- * Pose of every link frame (at its joint, turning with the link) in the finger's base frame.
+ * Pose of every link frame (origin at its joint, fixed to the link) in the finger's base frame.
  * Source: eq. 5.2.
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   out  T[4][4][4] in 1, m
@@ -85,7 +85,7 @@ void awiwi_thumb_link_poses(const double q_in[4], double T_out[64]);
 void awiwi_thumb_jacobian(const double q_in[4], double J_out[24]);
 
 /*
- * Pose of the fingertip and its Jacobian, both in base axes, in one call that shares their work.
+ * Pose of the fingertip and its Jacobian, both in base axes, in one call with fewer operations.
  * Source: eq. 5.2, 5.3, table 5.1, differentiated.
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   out  T[4][4] in 1, m
@@ -104,7 +104,7 @@ void awiwi_thumb_pose_and_jacobian(const double q_in[4], double T_out[16], doubl
 void awiwi_thumb_mass_matrix(const double q_in[4], double M_out[16]);
 
 /*
- * Coriolis matrix of Christoffel symbols, so that dM/dt - 2 C is skew-symmetric.
+ * Coriolis matrix by Christoffel symbols, so that dM/dt - 2 C is skew-symmetric.
  * Source: eq. 2.17.
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   in   qd[4] in rad/s, -20 to 20
@@ -114,7 +114,7 @@ void awiwi_thumb_mass_matrix(const double q_in[4], double M_out[16]);
 void awiwi_thumb_coriolis_matrix(const double q_in[4], const double qd_in[4], double C_out[16]);
 
 /*
- * Joint torques that hold the finger still against gravity g (in base axes).
+ * Joint torques that hold the finger at rest against gravity g (in base axes).
  * Source: eq. 2.17, 5.4.
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   in   g[3] in m/s^2, -9.81 to 9.81
@@ -172,7 +172,7 @@ void awiwi_thumb_inverse_dynamics_derivatives(const double q_in[4], const double
 void awiwi_thumb_forward_dynamics(const double q_in[4], const double qd_in[4], const double tau_in[4], const double g_in[3], double qdd_out[4]);
 
 /*
- * Mass matrix, Coriolis matrix and gravity torques in one call that shares their work.
+ * Mass matrix, Coriolis matrix and gravity torques in one call with fewer operations.
  * Source: eq. 2.17.
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   in   qd[4] in rad/s, -20 to 20
@@ -197,7 +197,7 @@ void awiwi_thumb_dynamics(const double q_in[4], const double qd_in[4], const dou
 void awiwi_thumb_energy(const double q_in[4], const double qd_in[4], const double g_in[3], double kinetic_out[1], double potential_out[1]);
 
 /*
- * Length of every tendon's path in the finger, from its routing.
+ * Path length of every tendon in the finger, by its routing.
  * Source: eq. 5.5, 5.18, 5.22.
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   out  h[8] in m
@@ -234,7 +234,7 @@ void awiwi_thumb_coupling_derivative(const double q_in[4], double dP_out[128]);
 void awiwi_thumb_joint_torque(const double q_in[4], const double f_in[8], double tau_out[4]);
 
 /*
- * Joint stiffness -d tau/dq felt through tendons of stiffness k that pull with forces f.
+ * Joint stiffness -d tau/dq of tendons with the stiffnesses k and the forces f.
  * Source: eq. 5.12, 5.23.
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   in   f[8] in N, 0 to 100
@@ -245,7 +245,7 @@ void awiwi_thumb_joint_torque(const double q_in[4], const double f_in[8], double
 void awiwi_thumb_joint_stiffness(const double q_in[4], const double f_in[8], const double k_in[8], double K_out[16]);
 
 /*
- * Joint torques and joint stiffness of the tendons in one call that shares their work.
+ * Joint torques and joint stiffness of the tendons in one call with fewer operations.
  * Source: eq. 5.8, 5.12, 5.23.
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   in   f[8] in N, 0 to 100
@@ -257,7 +257,8 @@ void awiwi_thumb_joint_stiffness(const double q_in[4], const double f_in[8], con
 void awiwi_thumb_joint_torque_and_stiffness(const double q_in[4], const double f_in[8], const double k_in[8], double tau_out[4], double K_out[16]);
 
 /*
- * Joint angles whose tendon lengths are nearest to the measured h; start is the last estimate.
+ * Joint angles whose tendon lengths are nearest to the measured h (least squares); start is the last
+ * estimate.
  * Source: eq. 5.14, 5.15, 5.24.
  *   in   h[8] in m, from [0, 0, 0, 0, -0.01117, -0.01117, -0.01955, -0.01955] to [0.1515, 0.1515, 0.1515, 0.1515, 0.01117, 0.01117, 0.01955, 0.01955]
  *   in   start[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
@@ -268,8 +269,8 @@ void awiwi_thumb_joint_torque_and_stiffness(const double q_in[4], const double f
 int awiwi_thumb_joint_estimate(const double h_in[8], const double start_in[4], double q_out[4]);
 
 /*
- * Error of the joint estimate: covariance for lengths of standard deviation noise, worst for errors up
- * to noise.
+ * Errors of the joint estimate: covariance for lengths with standard deviation noise, worst for errors
+ * up to noise.
  * Source: eq. 5.14, linearised.
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   in   noise[1] in m, 0 to 0.001
@@ -280,10 +281,10 @@ int awiwi_thumb_joint_estimate(const double h_in[8], const double start_in[4], d
 void awiwi_thumb_joint_estimate_error(const double q_in[4], const double noise_in[1], double covariance_out[16], double worst_out[4]);
 
 /*
- * Tendon forces from f_min to f_max that give the joint torque tau and come nearest to the joint
- * stiffness K. The torque is exact where the limits allow it, else the nearest (AWIWI_INFEASIBLE). The
- * stiffness is the nearest of all with that torque, by the sum of the squares of the errors of all
- * entries (the squared Frobenius norm).
+ * Tendon forces from f_min to f_max for the joint torque tau and the nearest possible joint stiffness
+ * to K. The torque is exact if the limits allow it, otherwise the nearest possible one (status
+ * AWIWI_INFEASIBLE). Of all forces with that torque, the result has the least error of the stiffness
+ * in the Frobenius norm.
  * Source: eq. 7.2, 7.6, mended.
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   in   tau[4] in N m, -1 to 1
@@ -308,14 +309,14 @@ int awiwi_thumb_tendon_distribution(const double q_in[4], const double tau_in[4]
 int awiwi_thumb_base_estimate_by_gradient(const double h_in[4], const double start_in[2], double q_out[2]);
 
 /*
- * Stiffness of every tendon that is pulled with a tension: spring and fibre in series, and its
- * derivatives. slope and curvature are dk/df and d2k/df2.
+ * Stiffness of every tendon at its tension, spring and fibre in series, and its derivatives. slope and
+ * curvature are dk/df and d2k/df2.
  * Source: figure 4.7, section 4.3.
  *   in   tension[8] in N, 3.87595 to 100.149
  *   out  k[8] in N/m
  *   out  slope[8] in 1/m
  *   out  curvature[8] in 1/(N m)
- * Returns 0 where every tension is on its spring's curve, give or take a hundredth; elsewhere 1, and
+ * Returns 0 where every tension is on its spring's curve, with a margin of 0.4 %; elsewhere 1, and
  * what is not defined is NaN.
  * Cost: 198 add, 198 mul, 7 calls.
  */
@@ -331,7 +332,7 @@ int awiwi_index_tendon_stiffness(const double tension_in[8], double k_out[8], do
 void awiwi_index_fingertip_pose(const double q_in[4], double T_out[16]);
 
 /*
- * Pose of every link frame (at its joint, turning with the link) in the finger's base frame.
+ * Pose of every link frame (origin at its joint, fixed to the link) in the finger's base frame.
  * Source: eq. 5.2.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   out  T[4][4][4] in 1, m
@@ -349,7 +350,7 @@ void awiwi_index_link_poses(const double q_in[4], double T_out[64]);
 void awiwi_index_jacobian(const double q_in[4], double J_out[24]);
 
 /*
- * Pose of the fingertip and its Jacobian, both in base axes, in one call that shares their work.
+ * Pose of the fingertip and its Jacobian, both in base axes, in one call with fewer operations.
  * Source: eq. 5.2, 5.3, table 5.1, differentiated.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   out  T[4][4] in 1, m
@@ -368,7 +369,7 @@ void awiwi_index_pose_and_jacobian(const double q_in[4], double T_out[16], doubl
 void awiwi_index_mass_matrix(const double q_in[4], double M_out[16]);
 
 /*
- * Coriolis matrix of Christoffel symbols, so that dM/dt - 2 C is skew-symmetric.
+ * Coriolis matrix by Christoffel symbols, so that dM/dt - 2 C is skew-symmetric.
  * Source: eq. 2.17.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   qd[4] in rad/s, -20 to 20
@@ -378,7 +379,7 @@ void awiwi_index_mass_matrix(const double q_in[4], double M_out[16]);
 void awiwi_index_coriolis_matrix(const double q_in[4], const double qd_in[4], double C_out[16]);
 
 /*
- * Joint torques that hold the finger still against gravity g (in base axes).
+ * Joint torques that hold the finger at rest against gravity g (in base axes).
  * Source: eq. 2.17, 5.4.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   g[3] in m/s^2, -9.81 to 9.81
@@ -436,7 +437,7 @@ void awiwi_index_inverse_dynamics_derivatives(const double q_in[4], const double
 void awiwi_index_forward_dynamics(const double q_in[4], const double qd_in[4], const double tau_in[4], const double g_in[3], double qdd_out[4]);
 
 /*
- * Mass matrix, Coriolis matrix and gravity torques in one call that shares their work.
+ * Mass matrix, Coriolis matrix and gravity torques in one call with fewer operations.
  * Source: eq. 2.17.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   qd[4] in rad/s, -20 to 20
@@ -461,7 +462,7 @@ void awiwi_index_dynamics(const double q_in[4], const double qd_in[4], const dou
 void awiwi_index_energy(const double q_in[4], const double qd_in[4], const double g_in[3], double kinetic_out[1], double potential_out[1]);
 
 /*
- * Length of every tendon's path in the finger, from its routing.
+ * Path length of every tendon in the finger, by its routing.
  * Source: eq. 5.5, 5.18, 5.22.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   out  h[8] in m
@@ -498,7 +499,7 @@ void awiwi_index_coupling_derivative(const double q_in[4], double dP_out[128]);
 void awiwi_index_joint_torque(const double q_in[4], const double f_in[8], double tau_out[4]);
 
 /*
- * Joint stiffness -d tau/dq felt through tendons of stiffness k that pull with forces f.
+ * Joint stiffness -d tau/dq of tendons with the stiffnesses k and the forces f.
  * Source: eq. 5.12, 5.23.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   f[8] in N, 0 to 100
@@ -509,7 +510,7 @@ void awiwi_index_joint_torque(const double q_in[4], const double f_in[8], double
 void awiwi_index_joint_stiffness(const double q_in[4], const double f_in[8], const double k_in[8], double K_out[16]);
 
 /*
- * Joint torques and joint stiffness of the tendons in one call that shares their work.
+ * Joint torques and joint stiffness of the tendons in one call with fewer operations.
  * Source: eq. 5.8, 5.12, 5.23.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   f[8] in N, 0 to 100
@@ -521,7 +522,8 @@ void awiwi_index_joint_stiffness(const double q_in[4], const double f_in[8], con
 void awiwi_index_joint_torque_and_stiffness(const double q_in[4], const double f_in[8], const double k_in[8], double tau_out[4], double K_out[16]);
 
 /*
- * Joint angles whose tendon lengths are nearest to the measured h; start is the last estimate.
+ * Joint angles whose tendon lengths are nearest to the measured h (least squares); start is the last
+ * estimate.
  * Source: eq. 5.14, 5.15, 5.24.
  *   in   h[8] in m, from [-0.01278, -0.01278, -0.01278, -0.01278, -0.009425, -0.009425, -0.01571, -0.01571] to [0.01278, 0.01278, 0.01278, 0.01278, 0.009425, 0.009425, 0.01571, 0.01571]
  *   in   start[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
@@ -531,8 +533,8 @@ void awiwi_index_joint_torque_and_stiffness(const double q_in[4], const double f
 void awiwi_index_joint_estimate(const double h_in[8], const double start_in[4], double q_out[4]);
 
 /*
- * Error of the joint estimate: covariance for lengths of standard deviation noise, worst for errors up
- * to noise.
+ * Errors of the joint estimate: covariance for lengths with standard deviation noise, worst for errors
+ * up to noise.
  * Source: eq. 5.14, linearised.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   noise[1] in m, 0 to 0.001
@@ -543,10 +545,10 @@ void awiwi_index_joint_estimate(const double h_in[8], const double start_in[4], 
 void awiwi_index_joint_estimate_error(const double q_in[4], const double noise_in[1], double covariance_out[16], double worst_out[4]);
 
 /*
- * Tendon forces from f_min to f_max that give the joint torque tau and come nearest to the joint
- * stiffness K. The torque is exact where the limits allow it, else the nearest (AWIWI_INFEASIBLE). The
- * stiffness is the nearest of all with that torque, by the sum of the squares of the errors of all
- * entries (the squared Frobenius norm).
+ * Tendon forces from f_min to f_max for the joint torque tau and the nearest possible joint stiffness
+ * to K. The torque is exact if the limits allow it, otherwise the nearest possible one (status
+ * AWIWI_INFEASIBLE). Of all forces with that torque, the result has the least error of the stiffness
+ * in the Frobenius norm.
  * Source: eq. 7.2, 7.6, mended.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   tau[4] in N m, -1 to 1
@@ -560,14 +562,14 @@ void awiwi_index_joint_estimate_error(const double q_in[4], const double noise_i
 int awiwi_index_tendon_distribution(const double q_in[4], const double tau_in[4], const double K_in[16], const double f_min_in[1], const double f_max_in[1], double f_out[8]);
 
 /*
- * Stiffness of every tendon that is pulled with a tension: spring and fibre in series, and its
- * derivatives. slope and curvature are dk/df and d2k/df2.
+ * Stiffness of every tendon at its tension, spring and fibre in series, and its derivatives. slope and
+ * curvature are dk/df and d2k/df2.
  * Source: figure 4.7, section 4.3.
  *   in   tension[8] in N, 3.87595 to 100.149
  *   out  k[8] in N/m
  *   out  slope[8] in 1/m
  *   out  curvature[8] in 1/(N m)
- * Returns 0 where every tension is on its spring's curve, give or take a hundredth; elsewhere 1, and
+ * Returns 0 where every tension is on its spring's curve, with a margin of 0.4 %; elsewhere 1, and
  * what is not defined is NaN.
  * Cost: 198 add, 198 mul, 7 calls.
  */
@@ -583,7 +585,7 @@ int awiwi_middle_tendon_stiffness(const double tension_in[8], double k_out[8], d
 void awiwi_middle_fingertip_pose(const double q_in[4], double T_out[16]);
 
 /*
- * Pose of every link frame (at its joint, turning with the link) in the finger's base frame.
+ * Pose of every link frame (origin at its joint, fixed to the link) in the finger's base frame.
  * Source: eq. 5.2.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   out  T[4][4][4] in 1, m
@@ -601,7 +603,7 @@ void awiwi_middle_link_poses(const double q_in[4], double T_out[64]);
 void awiwi_middle_jacobian(const double q_in[4], double J_out[24]);
 
 /*
- * Pose of the fingertip and its Jacobian, both in base axes, in one call that shares their work.
+ * Pose of the fingertip and its Jacobian, both in base axes, in one call with fewer operations.
  * Source: eq. 5.2, 5.3, table 5.1, differentiated.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   out  T[4][4] in 1, m
@@ -620,7 +622,7 @@ void awiwi_middle_pose_and_jacobian(const double q_in[4], double T_out[16], doub
 void awiwi_middle_mass_matrix(const double q_in[4], double M_out[16]);
 
 /*
- * Coriolis matrix of Christoffel symbols, so that dM/dt - 2 C is skew-symmetric.
+ * Coriolis matrix by Christoffel symbols, so that dM/dt - 2 C is skew-symmetric.
  * Source: eq. 2.17.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   qd[4] in rad/s, -20 to 20
@@ -630,7 +632,7 @@ void awiwi_middle_mass_matrix(const double q_in[4], double M_out[16]);
 void awiwi_middle_coriolis_matrix(const double q_in[4], const double qd_in[4], double C_out[16]);
 
 /*
- * Joint torques that hold the finger still against gravity g (in base axes).
+ * Joint torques that hold the finger at rest against gravity g (in base axes).
  * Source: eq. 2.17, 5.4.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   g[3] in m/s^2, -9.81 to 9.81
@@ -688,7 +690,7 @@ void awiwi_middle_inverse_dynamics_derivatives(const double q_in[4], const doubl
 void awiwi_middle_forward_dynamics(const double q_in[4], const double qd_in[4], const double tau_in[4], const double g_in[3], double qdd_out[4]);
 
 /*
- * Mass matrix, Coriolis matrix and gravity torques in one call that shares their work.
+ * Mass matrix, Coriolis matrix and gravity torques in one call with fewer operations.
  * Source: eq. 2.17.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   qd[4] in rad/s, -20 to 20
@@ -713,7 +715,7 @@ void awiwi_middle_dynamics(const double q_in[4], const double qd_in[4], const do
 void awiwi_middle_energy(const double q_in[4], const double qd_in[4], const double g_in[3], double kinetic_out[1], double potential_out[1]);
 
 /*
- * Length of every tendon's path in the finger, from its routing.
+ * Path length of every tendon in the finger, by its routing.
  * Source: eq. 5.5, 5.18, 5.22.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   out  h[8] in m
@@ -750,7 +752,7 @@ void awiwi_middle_coupling_derivative(const double q_in[4], double dP_out[128]);
 void awiwi_middle_joint_torque(const double q_in[4], const double f_in[8], double tau_out[4]);
 
 /*
- * Joint stiffness -d tau/dq felt through tendons of stiffness k that pull with forces f.
+ * Joint stiffness -d tau/dq of tendons with the stiffnesses k and the forces f.
  * Source: eq. 5.12, 5.23.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   f[8] in N, 0 to 100
@@ -761,7 +763,7 @@ void awiwi_middle_joint_torque(const double q_in[4], const double f_in[8], doubl
 void awiwi_middle_joint_stiffness(const double q_in[4], const double f_in[8], const double k_in[8], double K_out[16]);
 
 /*
- * Joint torques and joint stiffness of the tendons in one call that shares their work.
+ * Joint torques and joint stiffness of the tendons in one call with fewer operations.
  * Source: eq. 5.8, 5.12, 5.23.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   f[8] in N, 0 to 100
@@ -773,7 +775,8 @@ void awiwi_middle_joint_stiffness(const double q_in[4], const double f_in[8], co
 void awiwi_middle_joint_torque_and_stiffness(const double q_in[4], const double f_in[8], const double k_in[8], double tau_out[4], double K_out[16]);
 
 /*
- * Joint angles whose tendon lengths are nearest to the measured h; start is the last estimate.
+ * Joint angles whose tendon lengths are nearest to the measured h (least squares); start is the last
+ * estimate.
  * Source: eq. 5.14, 5.15, 5.24.
  *   in   h[8] in m, from [-0.01278, -0.01278, -0.01278, -0.01278, -0.009425, -0.009425, -0.01571, -0.01571] to [0.01278, 0.01278, 0.01278, 0.01278, 0.009425, 0.009425, 0.01571, 0.01571]
  *   in   start[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
@@ -783,8 +786,8 @@ void awiwi_middle_joint_torque_and_stiffness(const double q_in[4], const double 
 void awiwi_middle_joint_estimate(const double h_in[8], const double start_in[4], double q_out[4]);
 
 /*
- * Error of the joint estimate: covariance for lengths of standard deviation noise, worst for errors up
- * to noise.
+ * Errors of the joint estimate: covariance for lengths with standard deviation noise, worst for errors
+ * up to noise.
  * Source: eq. 5.14, linearised.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   noise[1] in m, 0 to 0.001
@@ -795,10 +798,10 @@ void awiwi_middle_joint_estimate(const double h_in[8], const double start_in[4],
 void awiwi_middle_joint_estimate_error(const double q_in[4], const double noise_in[1], double covariance_out[16], double worst_out[4]);
 
 /*
- * Tendon forces from f_min to f_max that give the joint torque tau and come nearest to the joint
- * stiffness K. The torque is exact where the limits allow it, else the nearest (AWIWI_INFEASIBLE). The
- * stiffness is the nearest of all with that torque, by the sum of the squares of the errors of all
- * entries (the squared Frobenius norm).
+ * Tendon forces from f_min to f_max for the joint torque tau and the nearest possible joint stiffness
+ * to K. The torque is exact if the limits allow it, otherwise the nearest possible one (status
+ * AWIWI_INFEASIBLE). Of all forces with that torque, the result has the least error of the stiffness
+ * in the Frobenius norm.
  * Source: eq. 7.2, 7.6, mended.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   tau[4] in N m, -1 to 1
@@ -812,14 +815,14 @@ void awiwi_middle_joint_estimate_error(const double q_in[4], const double noise_
 int awiwi_middle_tendon_distribution(const double q_in[4], const double tau_in[4], const double K_in[16], const double f_min_in[1], const double f_max_in[1], double f_out[8]);
 
 /*
- * Stiffness of every tendon that is pulled with a tension: spring and fibre in series, and its
- * derivatives. slope and curvature are dk/df and d2k/df2.
+ * Stiffness of every tendon at its tension, spring and fibre in series, and its derivatives. slope and
+ * curvature are dk/df and d2k/df2.
  * Source: figure 4.7, section 4.3.
  *   in   tension[6] in N, 3.87595 to 100.149
  *   out  k[6] in N/m
  *   out  slope[6] in 1/m
  *   out  curvature[6] in 1/(N m)
- * Returns 0 where every tension is on its spring's curve, give or take a hundredth; elsewhere 1, and
+ * Returns 0 where every tension is on its spring's curve, with a margin of 0.4 %; elsewhere 1, and
  * what is not defined is NaN.
  * Cost: 148 add, 148 mul, 5 calls.
  */
@@ -835,7 +838,7 @@ int awiwi_ring_tendon_stiffness(const double tension_in[6], double k_out[6], dou
 void awiwi_ring_fingertip_pose(const double q_in[3], double T_out[16]);
 
 /*
- * Pose of every link frame (at its joint, turning with the link) in the finger's base frame.
+ * Pose of every link frame (origin at its joint, fixed to the link) in the finger's base frame.
  * Source: eq. 5.2.
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   out  T[4][4][4] in 1, m
@@ -853,7 +856,7 @@ void awiwi_ring_link_poses(const double q_in[3], double T_out[64]);
 void awiwi_ring_jacobian(const double q_in[3], double J_out[18]);
 
 /*
- * Pose of the fingertip and its Jacobian, both in base axes, in one call that shares their work.
+ * Pose of the fingertip and its Jacobian, both in base axes, in one call with fewer operations.
  * Source: eq. 5.2, 5.3, table 5.1, differentiated.
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   out  T[4][4] in 1, m
@@ -872,7 +875,7 @@ void awiwi_ring_pose_and_jacobian(const double q_in[3], double T_out[16], double
 void awiwi_ring_mass_matrix(const double q_in[3], double M_out[9]);
 
 /*
- * Coriolis matrix of Christoffel symbols, so that dM/dt - 2 C is skew-symmetric.
+ * Coriolis matrix by Christoffel symbols, so that dM/dt - 2 C is skew-symmetric.
  * Source: eq. 2.17.
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   in   qd[3] in rad/s, -20 to 20
@@ -882,7 +885,7 @@ void awiwi_ring_mass_matrix(const double q_in[3], double M_out[9]);
 void awiwi_ring_coriolis_matrix(const double q_in[3], const double qd_in[3], double C_out[9]);
 
 /*
- * Joint torques that hold the finger still against gravity g (in base axes).
+ * Joint torques that hold the finger at rest against gravity g (in base axes).
  * Source: eq. 2.17, 5.4.
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   in   g[3] in m/s^2, -9.81 to 9.81
@@ -940,7 +943,7 @@ void awiwi_ring_inverse_dynamics_derivatives(const double q_in[3], const double 
 void awiwi_ring_forward_dynamics(const double q_in[3], const double qd_in[3], const double tau_in[3], const double g_in[3], double qdd_out[3]);
 
 /*
- * Mass matrix, Coriolis matrix and gravity torques in one call that shares their work.
+ * Mass matrix, Coriolis matrix and gravity torques in one call with fewer operations.
  * Source: eq. 2.17.
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   in   qd[3] in rad/s, -20 to 20
@@ -965,7 +968,7 @@ void awiwi_ring_dynamics(const double q_in[3], const double qd_in[3], const doub
 void awiwi_ring_energy(const double q_in[3], const double qd_in[3], const double g_in[3], double kinetic_out[1], double potential_out[1]);
 
 /*
- * Length of every tendon's path in the finger, from its routing.
+ * Path length of every tendon in the finger, by its routing.
  * Source: eq. 5.5, 5.18, 5.22.
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   out  h[6] in m
@@ -1002,7 +1005,7 @@ void awiwi_ring_coupling_derivative(const double q_in[3], double dP_out[54]);
 void awiwi_ring_joint_torque(const double q_in[3], const double f_in[6], double tau_out[3]);
 
 /*
- * Joint stiffness -d tau/dq felt through tendons of stiffness k that pull with forces f.
+ * Joint stiffness -d tau/dq of tendons with the stiffnesses k and the forces f.
  * Source: eq. 5.12, 5.23.
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   in   f[6] in N, 0 to 100
@@ -1013,7 +1016,7 @@ void awiwi_ring_joint_torque(const double q_in[3], const double f_in[6], double 
 void awiwi_ring_joint_stiffness(const double q_in[3], const double f_in[6], const double k_in[6], double K_out[9]);
 
 /*
- * Joint torques and joint stiffness of the tendons in one call that shares their work.
+ * Joint torques and joint stiffness of the tendons in one call with fewer operations.
  * Source: eq. 5.8, 5.12, 5.23.
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   in   f[6] in N, 0 to 100
@@ -1025,7 +1028,8 @@ void awiwi_ring_joint_stiffness(const double q_in[3], const double f_in[6], cons
 void awiwi_ring_joint_torque_and_stiffness(const double q_in[3], const double f_in[6], const double k_in[6], double tau_out[3], double K_out[9]);
 
 /*
- * Joint angles whose tendon lengths are nearest to the measured h; start is the last estimate.
+ * Joint angles whose tendon lengths are nearest to the measured h (least squares); start is the last
+ * estimate.
  * Source: eq. 5.14, 5.15, 5.24.
  *   in   h[6] in m, from [-0.01278, -0.01278, -0.01278, -0.01278, -0.008639, -0.008639] to [0.01278, 0.01278, 0.01278, 0.01278, 0.008639, 0.008639]
  *   in   start[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
@@ -1035,8 +1039,8 @@ void awiwi_ring_joint_torque_and_stiffness(const double q_in[3], const double f_
 void awiwi_ring_joint_estimate(const double h_in[6], const double start_in[3], double q_out[3]);
 
 /*
- * Error of the joint estimate: covariance for lengths of standard deviation noise, worst for errors up
- * to noise.
+ * Errors of the joint estimate: covariance for lengths with standard deviation noise, worst for errors
+ * up to noise.
  * Source: eq. 5.14, linearised.
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   in   noise[1] in m, 0 to 0.001
@@ -1047,10 +1051,10 @@ void awiwi_ring_joint_estimate(const double h_in[6], const double start_in[3], d
 void awiwi_ring_joint_estimate_error(const double q_in[3], const double noise_in[1], double covariance_out[9], double worst_out[3]);
 
 /*
- * Tendon forces from f_min to f_max that give the joint torque tau and come nearest to the joint
- * stiffness K. The torque is exact where the limits allow it, else the nearest (AWIWI_INFEASIBLE). The
- * stiffness is the nearest of all with that torque, by the sum of the squares of the errors of all
- * entries (the squared Frobenius norm).
+ * Tendon forces from f_min to f_max for the joint torque tau and the nearest possible joint stiffness
+ * to K. The torque is exact if the limits allow it, otherwise the nearest possible one (status
+ * AWIWI_INFEASIBLE). Of all forces with that torque, the result has the least error of the stiffness
+ * in the Frobenius norm.
  * Source: eq. 7.2, 7.6, mended.
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   in   tau[3] in N m, -1 to 1
@@ -1064,14 +1068,14 @@ void awiwi_ring_joint_estimate_error(const double q_in[3], const double noise_in
 int awiwi_ring_tendon_distribution(const double q_in[3], const double tau_in[3], const double K_in[9], const double f_min_in[1], const double f_max_in[1], double f_out[6]);
 
 /*
- * Stiffness of every tendon that is pulled with a tension: spring and fibre in series, and its
- * derivatives. slope and curvature are dk/df and d2k/df2.
+ * Stiffness of every tendon at its tension, spring and fibre in series, and its derivatives. slope and
+ * curvature are dk/df and d2k/df2.
  * Source: figure 4.7, section 4.3.
  *   in   tension[8] in N, 3.87595 to 100.149
  *   out  k[8] in N/m
  *   out  slope[8] in 1/m
  *   out  curvature[8] in 1/(N m)
- * Returns 0 where every tension is on its spring's curve, give or take a hundredth; elsewhere 1, and
+ * Returns 0 where every tension is on its spring's curve, with a margin of 0.4 %; elsewhere 1, and
  * what is not defined is NaN.
  * Cost: 198 add, 198 mul, 7 calls.
  */
@@ -1087,7 +1091,7 @@ int awiwi_fifth_tendon_stiffness(const double tension_in[8], double k_out[8], do
 void awiwi_fifth_fingertip_pose(const double q_in[4], double T_out[16]);
 
 /*
- * Pose of every link frame (at its joint, turning with the link) in the finger's base frame.
+ * Pose of every link frame (origin at its joint, fixed to the link) in the finger's base frame.
  * Source: eq. 5.2.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   out  T[5][4][4] in 1, m
@@ -1105,7 +1109,7 @@ void awiwi_fifth_link_poses(const double q_in[4], double T_out[80]);
 void awiwi_fifth_jacobian(const double q_in[4], double J_out[24]);
 
 /*
- * Pose of the fingertip and its Jacobian, both in base axes, in one call that shares their work.
+ * Pose of the fingertip and its Jacobian, both in base axes, in one call with fewer operations.
  * Source: eq. 5.2, 5.3, table 5.1, differentiated.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   out  T[4][4] in 1, m
@@ -1124,7 +1128,7 @@ void awiwi_fifth_pose_and_jacobian(const double q_in[4], double T_out[16], doubl
 void awiwi_fifth_mass_matrix(const double q_in[4], double M_out[16]);
 
 /*
- * Coriolis matrix of Christoffel symbols, so that dM/dt - 2 C is skew-symmetric.
+ * Coriolis matrix by Christoffel symbols, so that dM/dt - 2 C is skew-symmetric.
  * Source: eq. 2.17.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   in   qd[4] in rad/s, -20 to 20
@@ -1134,7 +1138,7 @@ void awiwi_fifth_mass_matrix(const double q_in[4], double M_out[16]);
 void awiwi_fifth_coriolis_matrix(const double q_in[4], const double qd_in[4], double C_out[16]);
 
 /*
- * Joint torques that hold the finger still against gravity g (in base axes).
+ * Joint torques that hold the finger at rest against gravity g (in base axes).
  * Source: eq. 2.17, 5.4.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   in   g[3] in m/s^2, -9.81 to 9.81
@@ -1192,7 +1196,7 @@ void awiwi_fifth_inverse_dynamics_derivatives(const double q_in[4], const double
 void awiwi_fifth_forward_dynamics(const double q_in[4], const double qd_in[4], const double tau_in[4], const double g_in[3], double qdd_out[4]);
 
 /*
- * Mass matrix, Coriolis matrix and gravity torques in one call that shares their work.
+ * Mass matrix, Coriolis matrix and gravity torques in one call with fewer operations.
  * Source: eq. 2.17.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   in   qd[4] in rad/s, -20 to 20
@@ -1217,7 +1221,7 @@ void awiwi_fifth_dynamics(const double q_in[4], const double qd_in[4], const dou
 void awiwi_fifth_energy(const double q_in[4], const double qd_in[4], const double g_in[3], double kinetic_out[1], double potential_out[1]);
 
 /*
- * Length of every tendon's path in the finger, from its routing.
+ * Path length of every tendon in the finger, by its routing.
  * Source: eq. 5.5, 5.18, 5.22.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   out  h[8] in m
@@ -1254,7 +1258,7 @@ void awiwi_fifth_coupling_derivative(const double q_in[4], double dP_out[128]);
 void awiwi_fifth_joint_torque(const double q_in[4], const double f_in[8], double tau_out[4]);
 
 /*
- * Joint stiffness -d tau/dq felt through tendons of stiffness k that pull with forces f.
+ * Joint stiffness -d tau/dq of tendons with the stiffnesses k and the forces f.
  * Source: eq. 5.12, 5.23.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   in   f[8] in N, 0 to 100
@@ -1265,7 +1269,7 @@ void awiwi_fifth_joint_torque(const double q_in[4], const double f_in[8], double
 void awiwi_fifth_joint_stiffness(const double q_in[4], const double f_in[8], const double k_in[8], double K_out[16]);
 
 /*
- * Joint torques and joint stiffness of the tendons in one call that shares their work.
+ * Joint torques and joint stiffness of the tendons in one call with fewer operations.
  * Source: eq. 5.8, 5.12, 5.23.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   in   f[8] in N, 0 to 100
@@ -1277,7 +1281,8 @@ void awiwi_fifth_joint_stiffness(const double q_in[4], const double f_in[8], con
 void awiwi_fifth_joint_torque_and_stiffness(const double q_in[4], const double f_in[8], const double k_in[8], double tau_out[4], double K_out[16]);
 
 /*
- * Joint angles whose tendon lengths are nearest to the measured h; start is the last estimate.
+ * Joint angles whose tendon lengths are nearest to the measured h (least squares); start is the last
+ * estimate.
  * Source: eq. 5.14, 5.15, 5.24.
  *   in   h[8] in m, from [-0.005585, -0.005585, -0.01169, -0.01169, -0.01169, -0.01169, -0.007854, -0.007854] to [0.005585, 0.005585, 0.01169, 0.01169, 0.01169, 0.01169, 0.007854, 0.007854]
  *   in   start[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
@@ -1287,8 +1292,8 @@ void awiwi_fifth_joint_torque_and_stiffness(const double q_in[4], const double f
 void awiwi_fifth_joint_estimate(const double h_in[8], const double start_in[4], double q_out[4]);
 
 /*
- * Error of the joint estimate: covariance for lengths of standard deviation noise, worst for errors up
- * to noise.
+ * Errors of the joint estimate: covariance for lengths with standard deviation noise, worst for errors
+ * up to noise.
  * Source: eq. 5.14, linearised.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   in   noise[1] in m, 0 to 0.001
@@ -1299,10 +1304,10 @@ void awiwi_fifth_joint_estimate(const double h_in[8], const double start_in[4], 
 void awiwi_fifth_joint_estimate_error(const double q_in[4], const double noise_in[1], double covariance_out[16], double worst_out[4]);
 
 /*
- * Tendon forces from f_min to f_max that give the joint torque tau and come nearest to the joint
- * stiffness K. The torque is exact where the limits allow it, else the nearest (AWIWI_INFEASIBLE). The
- * stiffness is the nearest of all with that torque, by the sum of the squares of the errors of all
- * entries (the squared Frobenius norm).
+ * Tendon forces from f_min to f_max for the joint torque tau and the nearest possible joint stiffness
+ * to K. The torque is exact if the limits allow it, otherwise the nearest possible one (status
+ * AWIWI_INFEASIBLE). Of all forces with that torque, the result has the least error of the stiffness
+ * in the Frobenius norm.
  * Source: eq. 7.2, 7.6, mended.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   in   tau[4] in N m, -1 to 1
@@ -1316,9 +1321,8 @@ void awiwi_fifth_joint_estimate_error(const double q_in[4], const double noise_i
 int awiwi_fifth_tendon_distribution(const double q_in[4], const double tau_in[4], const double K_in[16], const double f_min_in[1], const double f_max_in[1], double f_out[8]);
 
 /*
- * Angles of coupler and rocker at a joint angle, and their turns per turn of the joint. The
- * transmission is the sine of the angle between coupler and rocker: where it is zero the linkage
- * locks.
+ * Angles of coupler and rocker at a joint angle, and their derivatives by it, the ratios. The
+ * transmission is the sine of the angle between coupler and rocker; at zero the linkage locks.
  * Source: section 5.5.
  *   in   q[1] in rad, -0.523599 to 0.698132
  *   out  coupler[1] in rad
@@ -1339,8 +1343,8 @@ int awiwi_fifth_hmc_four_bar(const double q_in[1], double coupler_out[1], double
  *   out  A[3] in m
  *   out  B[3] in m
  *   out  C[3] in m
- * Returns 0 where the side bars are short of the line B0C0 (q73 between 0 and pi) and their plane is
- * short of A0 and bar AA0 reaches; elsewhere 1, and what is not defined is NaN.
+ * Returns 0 where q73 is between 0 and pi and the plane of the side bars has not passed A0 and bar AA0
+ * closes the loop; elsewhere 1, and what is not defined is NaN.
  * Cost: 20 add, 39 mul, 2 div, 1 neg, 1 sqrt, 2 sincos.
  */
 int awiwi_wrist_points(const double q71_in[1], const double q73_in[1], double A_out[3], double B_out[3], double C_out[3]);
@@ -1351,20 +1355,20 @@ int awiwi_wrist_points(const double q71_in[1], const double q73_in[1], double A_
  *   in   q71[1] in rad, 0.100424 to 1.14762
  *   in   q73[1] in rad, 0.6234 to 1.32153
  *   out  T[4][4] in 1, m
- * Returns 0 where the side bars are short of the line B0C0 (q73 between 0 and pi) and their plane is
- * short of A0 and bar AA0 reaches; elsewhere 1, and what is not defined is NaN.
+ * Returns 0 where q73 is between 0 and pi and the plane of the side bars has not passed A0 and bar AA0
+ * closes the loop; elsewhere 1, and what is not defined is NaN.
  * Cost: 24 add, 48 mul, 2 div, 1 neg, 1 sqrt, 2 sincos.
  */
 int awiwi_wrist_palm_pose(const double q71_in[1], const double q73_in[1], double T_out[16]);
 
 /*
- * Length of every tendon's straight run through the wrist.
+ * Length of every tendon's straight path through the wrist.
  * Source: eq. 6.9.
  *   in   q71[1] in rad, 0.100424 to 1.14762
  *   in   q73[1] in rad, 0.6234 to 1.32153
  *   out  h[38] in m
- * Returns 0 where the side bars are short of the line B0C0 (q73 between 0 and pi) and their plane is
- * short of A0 and bar AA0 reaches; elsewhere 1, and what is not defined is NaN.
+ * Returns 0 where q73 is between 0 and pi and the plane of the side bars has not passed A0 and bar AA0
+ * closes the loop; elsewhere 1, and what is not defined is NaN.
  * Cost: 180 add, 143 mul, 2 div, 39 sqrt, 2 sincos.
  */
 int awiwi_wrist_tendon_lengths(const double q71_in[1], const double q73_in[1], double h_out[38]);
@@ -1375,21 +1379,21 @@ int awiwi_wrist_tendon_lengths(const double q71_in[1], const double q73_in[1], d
  *   in   q71[1] in rad, 0.100424 to 1.14762
  *   in   q73[1] in rad, 0.6234 to 1.32153
  *   out  dh[38][2] in m/rad
- * Returns 0 where the side bars are short of the line B0C0 (q73 between 0 and pi) and their plane is
- * short of A0 and bar AA0 reaches; elsewhere 1, and what is not defined is NaN.
+ * Returns 0 where q73 is between 0 and pi and the plane of the side bars has not passed A0 and bar AA0
+ * closes the loop; elsewhere 1, and what is not defined is NaN.
  * Cost: 436 add, 478 mul, 41 div, 39 sqrt, 2 sincos.
  */
 int awiwi_wrist_coupling(const double q71_in[1], const double q73_in[1], double dh_out[76]);
 
 /*
- * Length of every tendon's path in its finger and in the wrist, whose internal angles are wrist =
- * (q71, q73).
+ * Path length of every tendon in its finger and in the wrist, at its internal angles wrist = (q71,
+ * q73).
  * Source: eq. 5.1, 5.5, 6.9.
  *   in   q[19] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727, -0.3491, -0.1745, -0.08727, -0.08727, -0.3491, -0.1745, -0.08727, -0.08727, -0.3491, -0.1745, -0.08727, -0.5236, -0.3491, -0.1745, -0.08727] to [0.6109, 0.6109, 1.396, 1.396, 0.3491, 1.484, 1.571, 1.396, 0.3491, 1.484, 1.571, 1.396, 0.3491, 1.484, 1.571, 0.6981, 0.3491, 1.484, 1.571]
  *   in   wrist[2] in rad, from [0.1004, 0.6234] to [1.148, 1.322]
  *   out  h[38] in m
- * Returns 0 where the side bars are short of the line B0C0 (q73 between 0 and pi) and their plane is
- * short of A0 and bar AA0 reaches; elsewhere 1, and what is not defined is NaN.
+ * Returns 0 where q73 is between 0 and pi and the plane of the side bars has not passed A0 and bar AA0
+ * closes the loop; elsewhere 1, and what is not defined is NaN.
  * Cost: 254 add, 180 mul, 2 div, 43 sqrt, 4 sincos.
  */
 int awiwi_hand_tendon_lengths(const double q_in[19], const double wrist_in[2], double h_out[38]);
@@ -1414,7 +1418,7 @@ void awiwi_hand_coupling(const double q_in[19], double P_out[722]);
 void awiwi_hand_joint_torque(const double q_in[19], const double f_in[38], double tau_out[19]);
 
 /*
- * Joint stiffness -d tau/dq through tendons of stiffness k that pull with forces f; zero outside the
+ * Joint stiffness -d tau/dq of tendons with the stiffnesses k and the forces f; zero outside the
  * blocks.
  * Source: eq. 5.12, 5.23.
  *   in   q[19] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727, -0.3491, -0.1745, -0.08727, -0.08727, -0.3491, -0.1745, -0.08727, -0.08727, -0.3491, -0.1745, -0.08727, -0.5236, -0.3491, -0.1745, -0.08727] to [0.6109, 0.6109, 1.396, 1.396, 0.3491, 1.484, 1.571, 1.396, 0.3491, 1.484, 1.571, 1.396, 0.3491, 1.484, 1.571, 0.6981, 0.3491, 1.484, 1.571]
@@ -1426,9 +1430,8 @@ void awiwi_hand_joint_torque(const double q_in[19], const double f_in[38], doubl
 void awiwi_hand_joint_stiffness(const double q_in[19], const double f_in[38], const double k_in[38], double K_out[361]);
 
 /*
- * Tendon lengths in the finger, of motor angles theta, elongations x and changes w of the lengths in
- * the wrist. All three count from the straight finger at which they were zeroed. The motor reels in
- * for positive theta.
+ * Tendon lengths in the finger from motor angles theta, elongations x and changes w of the lengths in
+ * the wrist. All three are zero at the straight finger. A positive theta winds the tendon up.
  * Source: eq. 5.1.
  *   in   theta[8] in rad, -5 to 5
  *   in   x[8] in m, 0 to 0.1
@@ -1439,9 +1442,8 @@ void awiwi_hand_joint_stiffness(const double q_in[19], const double f_in[38], co
 void awiwi_thumb_measured_lengths(const double theta_in[8], const double x_in[8], const double w_in[8], double h_out[8]);
 
 /*
- * Tendon lengths in the finger, of motor angles theta, elongations x and changes w of the lengths in
- * the wrist. All three count from the straight finger at which they were zeroed. The motor reels in
- * for positive theta.
+ * Tendon lengths in the finger from motor angles theta, elongations x and changes w of the lengths in
+ * the wrist. All three are zero at the straight finger. A positive theta winds the tendon up.
  * Source: eq. 5.1.
  *   in   theta[8] in rad, -5 to 5
  *   in   x[8] in m, 0 to 0.1
@@ -1452,9 +1454,8 @@ void awiwi_thumb_measured_lengths(const double theta_in[8], const double x_in[8]
 void awiwi_index_measured_lengths(const double theta_in[8], const double x_in[8], const double w_in[8], double h_out[8]);
 
 /*
- * Tendon lengths in the finger, of motor angles theta, elongations x and changes w of the lengths in
- * the wrist. All three count from the straight finger at which they were zeroed. The motor reels in
- * for positive theta.
+ * Tendon lengths in the finger from motor angles theta, elongations x and changes w of the lengths in
+ * the wrist. All three are zero at the straight finger. A positive theta winds the tendon up.
  * Source: eq. 5.1.
  *   in   theta[8] in rad, -5 to 5
  *   in   x[8] in m, 0 to 0.1
@@ -1465,9 +1466,8 @@ void awiwi_index_measured_lengths(const double theta_in[8], const double x_in[8]
 void awiwi_middle_measured_lengths(const double theta_in[8], const double x_in[8], const double w_in[8], double h_out[8]);
 
 /*
- * Tendon lengths in the finger, of motor angles theta, elongations x and changes w of the lengths in
- * the wrist. All three count from the straight finger at which they were zeroed. The motor reels in
- * for positive theta.
+ * Tendon lengths in the finger from motor angles theta, elongations x and changes w of the lengths in
+ * the wrist. All three are zero at the straight finger. A positive theta winds the tendon up.
  * Source: eq. 5.1.
  *   in   theta[6] in rad, -5 to 5
  *   in   x[6] in m, 0 to 0.1
@@ -1478,9 +1478,8 @@ void awiwi_middle_measured_lengths(const double theta_in[8], const double x_in[8
 void awiwi_ring_measured_lengths(const double theta_in[6], const double x_in[6], const double w_in[6], double h_out[6]);
 
 /*
- * Tendon lengths in the finger, of motor angles theta, elongations x and changes w of the lengths in
- * the wrist. All three count from the straight finger at which they were zeroed. The motor reels in
- * for positive theta.
+ * Tendon lengths in the finger from motor angles theta, elongations x and changes w of the lengths in
+ * the wrist. All three are zero at the straight finger. A positive theta winds the tendon up.
  * Source: eq. 5.1.
  *   in   theta[8] in rad, -5 to 5
  *   in   x[8] in m, 0 to 0.1
@@ -1491,7 +1490,7 @@ void awiwi_ring_measured_lengths(const double theta_in[6], const double x_in[6],
 void awiwi_fifth_measured_lengths(const double theta_in[8], const double x_in[8], const double w_in[8], double h_out[8]);
 
 /*
- * Kinetic energy of rotor and gear: half of B thd^2, with the inertia B that the output shaft feels.
+ * Kinetic energy of rotor and gear: half of B thd^2, with the inertia B reflected to the output shaft.
  * Source: eq. 3.1.
  *   in   thd[1] in rad/s, -20 to 20
  *   out  energy[1] in J
@@ -1500,8 +1499,7 @@ void awiwi_fifth_measured_lengths(const double theta_in[8], const double x_in[8]
 void awiwi_motor_energy(const double thd_in[1], double energy_out[1]);
 
 /*
- * Friction torque of motor and gear at the speed thd: what the motor must overcome, positive for
- * positive thd.
+ * Friction torque of motor and gear at the speed thd; it has the sign of thd and opposes the motor.
  * Source: eq. 3.8.
  *   in   thd[1] in rad/s, -20 to 20
  *   out  tau[1] in N m
@@ -1510,7 +1508,7 @@ void awiwi_motor_energy(const double thd_in[1], double energy_out[1]);
 void awiwi_motor_friction(const double thd_in[1], double tau_out[1]);
 
 /*
- * Slope of the friction torque; an explicit step of a simulation must stay below 2 B / damping.
+ * Slope of the friction torque; explicit integration needs steps shorter than 2 B / damping.
  * Source: eq. 3.8, differentiated.
  *   in   thd[1] in rad/s, -20 to 20
  *   out  damping[1] in N m s/rad
@@ -1519,7 +1517,7 @@ void awiwi_motor_friction(const double thd_in[1], double tau_out[1]);
 void awiwi_motor_damping(const double thd_in[1], double damping_out[1]);
 
 /*
- * Periodic disturbance torque of both shafts at the angle theta: what the motor must overcome.
+ * Periodic disturbance torque of both shafts at the angle theta; positive values oppose the motor.
  * Source: eq. 3.4, 3.5.
  *   in   theta[1] in rad, -5 to 5
  *   out  tau[1] in N m
@@ -1528,8 +1526,7 @@ void awiwi_motor_damping(const double thd_in[1], double damping_out[1]);
 void awiwi_motor_ripple(const double theta_in[1], double tau_out[1]);
 
 /*
- * Motor torque to feed forward against friction and ripple: the share of both that is safe to
- * compensate.
+ * Motor torque to feed forward against friction and ripple: the share `compensation` of both.
  * Source: section 3.2.
  *   in   theta[1] in rad, -5 to 5
  *   in   thd[1] in rad/s, -20 to 20
@@ -1570,20 +1567,21 @@ void awiwi_motor_torque(const double theta_in[1], const double thd_in[1], const 
  *   out  force[1] in N
  *   out  stiffness[1] in N/m
  * Returns 0 where the roller is clear of the motor's pulley and the roller is clear of the fixed
- * pulley and the tendon turns the lever towards its taut end and the spring is stretched; elsewhere 1,
+ * pulley and the tendon pulls the lever towards its taut end and the spring is stretched; elsewhere 1,
  * and what is not defined is NaN.
  * Cost: 38 add, 54 mul, 7 div, 3 sqrt, 1 sincos, 2 calls.
  */
 int awiwi_spring_lever(const double theta_in[1], double dL_out[1], double force_out[1], double stiffness_out[1]);
 
 /*
- * Tendon force at the elongation x, counted from the slack end of the lever's travel. A polynomial
- * that the check of the hand file has found within 1e-6 of the largest force from the lever's own.
+ * Tendon force at the elongation x, counted from the slack end of the lever's travel. A polynomial;
+ * checking the hand file ensures that it differs from the mechanism by less than 1e-6 of the largest
+ * force.
  * Source: figure 4.7.
  *   in   x[1] in m, 0 to 0.0100745
  *   out  f[1] in N
- * Returns 0 where the argument is within the lever's travel, give or take a hundredth; elsewhere 1,
- * and what is not defined is NaN.
+ * Returns 0 where the argument is within the lever's travel, with a margin of 0.4 %; elsewhere 1, and
+ * what is not defined is NaN.
  * Cost: 18 add, 18 mul.
  */
 int awiwi_spring_force(const double x_in[1], double f_out[1]);
@@ -1593,41 +1591,41 @@ int awiwi_spring_force(const double x_in[1], double f_out[1]);
  * Source: figure 4.7.
  *   in   x[1] in m, 0 to 0.0100745
  *   out  k[1] in N/m
- * Returns 0 where the argument is within the lever's travel, give or take a hundredth; elsewhere 1,
- * and what is not defined is NaN.
+ * Returns 0 where the argument is within the lever's travel, with a margin of 0.4 %; elsewhere 1, and
+ * what is not defined is NaN.
  * Cost: 18 add, 18 mul.
  */
 int awiwi_spring_stiffness(const double x_in[1], double k_out[1]);
 
 /*
- * Elongation at which the tendon's force is f: the inverse of the force.
+ * Elongation at which the tendon's force is f.
  * Source: figure 4.7.
  *   in   f[1] in N, 3.87595 to 100.149
  *   out  x[1] in m
- * Returns 0 where the argument is within the lever's travel, give or take a hundredth; elsewhere 1,
- * and what is not defined is NaN.
+ * Returns 0 where the argument is within the lever's travel, with a margin of 0.4 %; elsewhere 1, and
+ * what is not defined is NaN.
  * Cost: 18 add, 18 mul.
  */
 int awiwi_spring_elongation(const double f_in[1], double x_out[1]);
 
 /*
- * dL, force and stiffness of every tendon from its sensor: the design's, or its own where it was
- * calibrated.
+ * dL, force and stiffness of every tendon from its sensor, by the design or by the tendon's own
+ * calibration.
  * Source: section 4.1.
  *   in   readings[38] in 1, 410 to 3685
  *   out  dL[38] in m
  *   out  force[38] in N
  *   out  stiffness[38] in N/m
- * Returns 0 where the argument is within the lever's travel, give or take a hundredth; elsewhere 1,
- * and what is not defined is NaN.
+ * Returns 0 where the argument is within the lever's travel, with a margin of 0.4 %; elsewhere 1, and
+ * what is not defined is NaN.
  * Cost: 1062 add, 1062 mul, 37 calls.
  */
 int awiwi_calibration_readings(const double readings_in[38], double dL_out[38], double force_out[38], double stiffness_out[38]);
 
 /*
- * dL, force and stiffness of one sensor's counts by polynomials from the bench, coefficients from the
- * constant up. Their argument is (2 counts - ends[0] - ends[1]) / (ends[1] - ends[0]): -1 at the slack
- * end, 1 at the taut one.
+ * dL, force and stiffness at one sensor's counts by polynomials from the bench, constant coefficient
+ * first. The argument is (2 counts - ends[0] - ends[1]) / (ends[1] - ends[0]): -1 at the slack end, 1
+ * at the taut end.
  * Source: section 4.1.
  *   in   counts[1] in 1, 614.688 to 3480.31
  *   in   ends[2] in 1, from [205.3, 3480] to [614.7, 3890]
@@ -1637,8 +1635,8 @@ int awiwi_calibration_readings(const double readings_in[38], double dL_out[38], 
  *   out  dL[1] in m
  *   out  force[1] in N
  *   out  stiffness[1] in N/m
- * Returns 0 where the argument is within the lever's travel, give or take a hundredth; elsewhere 1,
- * and what is not defined is NaN.
+ * Returns 0 where the argument is within the lever's travel, with a margin of 0.4 %; elsewhere 1, and
+ * what is not defined is NaN.
  * Cost: 23 add, 19 mul, 1 div.
  */
 int awiwi_calibration_polynomials(const double counts_in[1], const double ends_in[2], const double length_powers_in[7], const double force_powers_in[7], const double stiffness_powers_in[7], double dL_out[1], double force_out[1], double stiffness_out[1]);
@@ -1653,7 +1651,7 @@ int awiwi_calibration_polynomials(const double counts_in[1], const double ends_i
 void awiwi_tendon_stretch(const double f_in[1], double x_out[1]);
 
 /*
- * Stiffness of a whole tendon: of the fibre, in series with its mechanism of stiffness k.
+ * Stiffness of a whole tendon: the fibre in series with a spring mechanism of stiffness k.
  * Source: section 4.3.
  *   in   k[1] in N/m, 1000 to 50000
  *   out  stiffness[1] in N/m
@@ -1662,8 +1660,7 @@ void awiwi_tendon_stretch(const double f_in[1], double x_out[1]);
 void awiwi_tendon_stiffness(const double k_in[1], double stiffness_out[1]);
 
 /*
- * Force lost in the guidings by a tendon that is pulled with the force f and bent by the angle bend in
- * all.
+ * Friction loss in the guidings of a tendon under the force f that they bend by the total angle bend.
  * Source: eq. 4.1.
  *   in   f[1] in N, 0 to 100
  *   in   bend[1] in rad, 0 to 6
@@ -1673,10 +1670,10 @@ void awiwi_tendon_stiffness(const double k_in[1], double stiffness_out[1]);
 void awiwi_guiding_friction(const double f_in[1], const double bend_in[1], double loss_out[1]);
 
 /*
- * Controller stiffness that, behind tendons of stiffness K_mech, makes the joints feel like K_eff.
- * Both are symmetric, their lower triangles are read. The tendons must be stiffer than what is to be
- * felt in every direction; where they are not, no positive definite controller exists. Stiffer by a
- * factor eps, as eq. 8.2 has it, gives eps / (eps - 1) K_eff.
+ * Controller stiffness K_imp that, in series with the tendons' joint stiffness K_mech, gives the
+ * stiffness K_eff. K_eff and K_mech are symmetric; only their lower triangles are read. K_mech must
+ * exceed K_eff in every direction, otherwise no positive definite K_imp exists. For K_mech = eps K_eff
+ * (eq. 8.2), K_imp is eps / (eps - 1) K_eff.
  * Source: eq. 8.1, with the condition of section 8.2 mended.
  *   in   K_eff[4][4] in N m/rad, from [0.2, -0.05, -0.05, -0.05, -0.05, 0.2, -0.05, -0.05, -0.05, -0.05, 0.2, -0.05, -0.05, -0.05, -0.05, 0.2] to [2, 0.05, 0.05, 0.05, 0.05, 2, 0.05, 0.05, 0.05, 0.05, 2, 0.05, 0.05, 0.05, 0.05, 2]
  *   in   K_mech[4][4] in N m/rad, from [4, -0.5, -0.5, -0.5, -0.5, 4, -0.5, -0.5, -0.5, -0.5, 4, -0.5, -0.5, -0.5, -0.5, 4] to [20, 0.5, 0.5, 0.5, 0.5, 20, 0.5, 0.5, 0.5, 0.5, 20, 0.5, 0.5, 0.5, 0.5, 20]
@@ -1690,8 +1687,8 @@ void awiwi_guiding_friction(const double f_in[1], const double bend_in[1], doubl
 int awiwi_stiffness_correction(const double K_eff_in[16], const double K_mech_in[16], double K_imp_out[16]);
 
 /*
- * The same for one joint, and by how much k_imp changes with k_mech: what a poor guess of the tendons
- * costs.
+ * Controller stiffness k_imp of one joint, and its sensitivity dk_imp/dk_mech to errors of the
+ * tendons' stiffness.
  * Source: eq. 8.1.
  *   in   k_eff[1] in N m/rad, 0.05 to 3
  *   in   k_mech[1] in N m/rad, 3.5 to 20
@@ -1704,9 +1701,9 @@ int awiwi_stiffness_correction(const double K_eff_in[16], const double K_mech_in
 int awiwi_stiffness_correction_scalar(const double k_eff_in[1], const double k_mech_in[1], double k_imp_out[1], double sensitivity_out[1]);
 
 /*
- * Friction torque of a motor that turned under the torque u against the load tau in the sample that
- * just ended. thd is the velocity at the end of that sample. The momentum is the observer's memory:
- * begin with that of the motor at rest, zero, and pass on what is returned. Stable for all gains and
+ * Friction torque of a motor under the torque u and the load tau during the sample that just ended.
+ * thd is the velocity at the end of that sample. momentum is the observer's memory: start with zero
+ * for a motor at rest, then pass the last momentum_next. The observer is stable for all gains and
  * periods.
  * Source: eq. 9.1, 9.2, mended, over one sample.
  *   in   momentum[1] in N m s, -0.05 to 0.05
@@ -1725,9 +1722,9 @@ int awiwi_stiffness_correction_scalar(const double k_eff_in[1], const double k_m
 int awiwi_friction_observer(const double momentum_in[1], const double u_in[1], const double tau_in[1], const double thd_in[1], const double B_in[1], const double gain_in[1], const double period_in[1], double momentum_next_out[1], double friction_out[1]);
 
 /*
- * Joint torques that make the joints feel like a spring K and a damper D about the desired motion. M,
- * C and gravity are those of the joints where they are; C must make dM/dt - 2 C skew-symmetric. It
- * acts on the desired velocity: so the joints stay passive.
+ * Joint torques that make the joints behave as a spring K and a damper D about the desired motion. M,
+ * C and gravity are those at the measured q and qd; dM/dt - 2 C must be skew-symmetric. C multiplies
+ * the desired velocity, so that the controlled joints are passive.
  * Source: eq. 11.4, 11.10, mended.
  *   in   M[4][4] in kg m^2, from [1e-07, -0.0001, -0.0001, -0.0001, -0.0001, 1e-07, -0.0001, -0.0001, -0.0001, -0.0001, 1e-07, -0.0001, -0.0001, -0.0001, -0.0001, 1e-07] to [0.0001, 0.0001, 0.0001, 0.0001, 0.0001, 0.0001, 0.0001, 0.0001, 0.0001, 0.0001, 0.0001, 0.0001, 0.0001, 0.0001, 0.0001, 0.0001]
  *   in   C[4][4] in N m s/rad, -0.001 to 0.001
@@ -1745,9 +1742,9 @@ int awiwi_friction_observer(const double momentum_in[1], const double u_in[1], c
 void awiwi_joint_impedance(const double M_in[16], const double C_in[16], const double gravity_in[4], const double q_in[4], const double qd_in[4], const double q_des_in[4], const double qd_des_in[4], const double qdd_des_in[4], const double K_in[16], const double D_in[16], double tau_out[4]);
 
 /*
- * Motor torque that brings a motor to the angle at which its tendon pulls with f_des; a spring and a
- * damper hold it. For joints that are slow against it: the law of the two time scales. friction is the
- * torque to compensate.
+ * Motor torque that moves a motor to the angle theta_des of the tendon force f_des, as a spring and a
+ * damper would. This is the fast loop of two time scales: the joints must be slow against it. friction
+ * is the torque to compensate.
  * Source: eq. 11.3, mended.
  *   in   theta[1] in rad, -10 to 10
  *   in   thd[1] in rad/s, -20 to 20
@@ -1765,9 +1762,10 @@ void awiwi_joint_impedance(const double M_in[16], const double C_in[16], const d
 int awiwi_motor_impedance(const double theta_in[1], const double thd_in[1], const double theta_des_in[1], const double f_des_in[1], const double friction_in[1], const double r_in[1], const double motor_kp_in[1], const double motor_kd_in[1], double tau_out[1]);
 
 /*
- * Motor torque that makes the error of a tendon's force die out as e'' + kd e' + kp e = 0, whatever
- * the joints do. The tendon has the stiffness k, with the slope dk/df, and is stretched at the rate
- * xd; hdd is the acceleration of its path, by which the joints stretch it.
+ * Motor torque that makes the force error of a tendon decay as e'' + kd e' + kp e = 0, for any motion
+ * of the joints. The tendon has the stiffness k with the slope dk/df, and its elongation has the rate
+ * xd. hdd is the second derivative of its path length, by which the joints stretch it. kp and kd are
+ * force_kp and force_kd.
  * Source: eq. 11.16, mended.
  *   in   f[1] in N, 0 to 120
  *   in   xd[1] in m/s, -0.2 to 0.2
@@ -1791,10 +1789,10 @@ int awiwi_motor_impedance(const double theta_in[1], const double thd_in[1], cons
 int awiwi_cascade(const double f_in[1], const double xd_in[1], const double stiffness_in[1], const double slope_in[1], const double hdd_in[1], const double f_des_in[1], const double fd_des_in[1], const double fdd_des_in[1], const double friction_in[1], const double r_in[1], const double B_in[1], const double force_kp_in[1], const double force_kd_in[1], double tau_out[1]);
 
 /*
- * Whether joint damping D and force loops kp, kd make a stable cascade: proved where the margin is
- * positive. The proof is the energy qd' M qd / 2 + q' K q / 2 + sum (S11 e^2 + 2 S12 e e' + S22 e'^2),
- * which falls. weight and omega choose it: force errors cost weight (e^2 + e'^2 / omega^2). A heavier
- * weight proves more, and bounds less.
+ * Stability of the cascade with joint damping D and force loops kp, kd: proved if the margin is
+ * positive. The proof is the falling energy qd' M qd / 2 + q' K q / 2 + sum (S11 e^2 + 2 S12 e e' +
+ * S22 e'^2). weight and omega choose it: force errors lose weight (e^2 + e'^2 / omega^2). A larger
+ * weight proves more, with a looser bound.
  * Source: eq. 11.17 to 11.21, mended.
  *   in   D[4][4] in N m s/rad, from [0.001, -0.02, -0.02, -0.02, -0.02, 0.001, -0.02, -0.02, -0.02, -0.02, 0.001, -0.02, -0.02, -0.02, -0.02, 0.001] to [0.1, 0.02, 0.02, 0.02, 0.02, 0.1, 0.02, 0.02, 0.02, 0.02, 0.1, 0.02, 0.02, 0.02, 0.02, 0.1]
  *   in   P[8][4] in m/rad, -0.03 to 0.03
@@ -1811,9 +1809,9 @@ int awiwi_cascade(const double f_in[1], const double xd_in[1], const double stif
 int awiwi_cascade_certificate(const double D_in[16], const double P_in[32], const double kp_in[8], const double kd_in[8], const double weight_in[1], const double omega_in[1], double margin_out[1], double S_out[24]);
 
 /*
- * Motor torque that brings the tendon force f to f_des: kp and kd on its error, estimates cancel the
- * rest. f_hat is the force whose torque is fed forward: the measured one cancels it, the desired one
- * adds no feedback.
+ * Motor torque that controls the tendon force f to f_des with gains kp and kd; friction and force are
+ * compensated. f_hat is the force whose torque is fed forward: the measured force, or the desired one,
+ * which adds no feedback.
  * Source: eq. 10.2, with the signs mended.
  *   in   f[1] in N, 0 to 120
  *   in   fd[1] in N/s, -5000 to 5000
@@ -1832,9 +1830,9 @@ int awiwi_cascade_certificate(const double D_in[16], const double P_in[32], cons
 int awiwi_tendon_force_pd(const double f_in[1], const double fd_in[1], const double f_des_in[1], const double fd_des_in[1], const double f_hat_in[1], const double friction_in[1], const double r_in[1], const double kp_in[1], const double kd_in[1], double tau_out[1]);
 
 /*
- * Motor torque that brings the tendon force to f_des as a motor of inertia b does on a spring of
- * omega0 and xi0. The gains (kp, kd) follow from the tendon's stiffness at the desired force and from
- * its rate, which is zero where the desired force rests.
+ * Motor torque that controls the tendon force to f_des with the frequency omega0 and the damping ratio
+ * xi0. The gains (kp, kd) follow from the motor's inertia b, the tendon's stiffness at the desired
+ * force and the rate of that stiffness, which is zero for a constant desired force.
  * Source: eq. 10.8 to 10.12, mended.
  *   in   f[1] in N, 0 to 120
  *   in   fd[1] in N/s, -5000 to 5000
@@ -1858,8 +1856,7 @@ int awiwi_tendon_force_pd(const double f_in[1], const double fd_in[1], const dou
 int awiwi_tendon_force_scheduled(const double f_in[1], const double fd_in[1], const double f_des_in[1], const double fd_des_in[1], const double f_hat_in[1], const double friction_in[1], const double r_in[1], const double b_in[1], const double stiffness_in[1], const double stiffness_rate_in[1], const double omega0_in[1], const double xi0_in[1], double tau_out[1], double gains_out[2]);
 
 /*
- * Gains of a motor that pulls against a grounded spring k: poles of frequency omega0 and damping ratio
- * xi0.
+ * Gains of a motor on a grounded spring k for poles of frequency omega0 and damping ratio xi0.
  * Source: eq. 12.7.
  *   in   b[1] in kg m^2, 0.0001 to 0.01
  *   in   dtheta[1] in N m s/rad, 0 to 0.1
@@ -1874,7 +1871,7 @@ int awiwi_tendon_force_scheduled(const double f_in[1], const double fd_in[1], co
 int awiwi_pole_placement_motor(const double b_in[1], const double dtheta_in[1], const double k_in[1], const double omega0_in[1], const double xi0_in[1], double K_out[2]);
 
 /*
- * Gains and torque of a motor on a tendon: optimal for the secant between theta and theta_des, in
+ * Optimal gains and torque of a motor on a tendon, by the secant between theta and theta_des, in
  * closed form. The tendon's torque is spring . (theta, theta^2, theta^3).
  * Source: eq. 14.4 to 14.9, mended.
  *   in   theta[1] in rad, 0 to 3
@@ -1894,8 +1891,7 @@ int awiwi_pole_placement_motor(const double b_in[1], const double dtheta_in[1], 
 int awiwi_sdre_tendon(const double theta_in[1], const double thd_in[1], const double theta_des_in[1], const double b_in[1], const double dtheta_in[1], const double spring_in[3], const double weights_in[2], const double R_in[1], double K_out[2], double u_out[1]);
 
 /*
- * Gains on (q, dq/dt, theta, dtheta/dt) that make a joint with a spring k two oscillators omega and
- * xi.
+ * Gains on (q, dq/dt, theta, dtheta/dt) of a joint with a spring k for two pole pairs of omega and xi.
  * Source: eq. 12.13 to 12.16, mended.
  *   in   m[1] in kg m^2, 3e-07 to 0.0001
  *   in   b[1] in kg m^2, 0.0001 to 0.01
@@ -1914,8 +1910,8 @@ int awiwi_sdre_tendon(const double theta_in[1], const double thd_in[1], const do
 int awiwi_pole_placement(const double m_in[1], const double b_in[1], const double k_in[1], const double dq_in[1], const double dtheta_in[1], const double omega_in[2], const double xi_in[2], double K_out[4]);
 
 /*
- * Motor torque u_des - K (x - x_des), where u_des holds the desired state; for optimal gains just as
- * well.
+ * Motor torque u_des - K (x - x_des), where u_des holds the desired state; for placed and optimal
+ * gains.
  * Source: eq. 12.2, 13.3, 14.12.
  *   in   K[4] in N m/rad, N m s/rad, from [-1e+04, -100, -1e+04, -100] to [1e+04, 100, 1e+04, 100]
  *   in   x[4] in rad, rad/s, from [-3, -50, -3, -50] to [3, 50, 3, 50]
@@ -1939,8 +1935,9 @@ void awiwi_pole_placement_law(const double K_in[4], const double x_in[4], const 
 void awiwi_secant_stiffness(const double spring_in[3], const double deflexion_in[1], const double deflexion_des_in[1], double k_out[1], double torque_out[1]);
 
 /*
- * Gains and torque of a joint with a spring: optimal for its secant between the state and the desired
- * one. K_last are the gains of the last tick: a guess, and what remains where there are no new ones.
+ * Optimal gains and torque of a joint with a spring, by its secant between the state and the desired
+ * state. K_last are the gains of the last tick: the initial guess, and the result if there is no
+ * solution.
  * Source: eq. 14.10 to 14.12, mended.
  *   in   m[1] in kg m^2, 3e-07 to 0.0001
  *   in   b[1] in kg m^2, 0.0001 to 0.01
@@ -1961,9 +1958,9 @@ int awiwi_sdre_joint(const double m_in[1], const double b_in[1], const double dq
 
 /*
  * Gains of u = -K x that minimise the integral of x'Q x + R u^2, and the least cost x'S x; in coherent
- * units. The residual is that of the Riccati equation for S, relative to its terms. Refused are a
- * plant that B cannot stabilise, costs that reward a motion, and costs that leave one for nothing that
- * does not decay by itself.
+ * units. The residual is that of the Riccati equation for S, relative to its terms. An error status is
+ * returned for a plant that B cannot stabilise, a cost that is negative for some motion, and a motion
+ * without cost that does not decay.
  * Source: eq. 13.1 to 13.5.
  *   in   A[4][4] in 1, -1e+07 to 1e+07
  *   in   B[4] in 1, -10000 to 10000
@@ -1989,7 +1986,7 @@ int awiwi_lqr(const double A_in[16], const double B_in[4], const double Q_in[16]
 int awiwi_backstepping_academic(const double x_in[2], const double k_in[2], double u_out[1]);
 
 /*
- * Energy of the example, its rate under the law, and the virtual control of x2.
+ * Lyapunov function of the example, its rate under the law, and the virtual control of x2.
  * Source: eq. 15.2, 15.6, 15.9, mended.
  *   in   x[2] in 1, from [-3, -10] to [3, 10]
  *   in   k[2] in 1, 0.01 to 10
@@ -2001,8 +1998,8 @@ int awiwi_backstepping_academic(const double x_in[2], const double k_in[2], doub
 void awiwi_backstepping_academic_lyapunov(const double x_in[2], const double k_in[2], double V_out[1], double Vdot_out[1], double controls_out[1]);
 
 /*
- * Motor torque that takes the link (q and three derivatives) to desired (q_d and four); scales of 1 as
- * printed.
+ * Motor torque that moves the link (motion: q, 3 derivatives) to desired (q_d, 4 derivatives); printed
+ * scales are 1.
  * Source: eq. 15.17 to 15.50.
  *   in   motion[4] in rad, rad/s, rad/s^2, rad/s^3, from [-2, -20, -2000, -2e+05] to [2, 20, 2000, 2e+05]
  *   in   desired[5] in rad, rad/s, rad/s^2, rad/s^3, rad/s^4, from [-2, -20, -2000, -2e+05, -2e+07] to [2, 20, 2000, 2e+05, 2e+07]
@@ -2018,8 +2015,8 @@ void awiwi_backstepping_academic_lyapunov(const double x_in[2], const double k_i
 int awiwi_backstepping_position(const double motion_in[4], const double desired_in[5], const double plant_in[3], const double rates_in[4], const double scales_in[3], double tau_m_out[1]);
 
 /*
- * Energy of the position law's errors, its rate under the law, and the virtual controls of q', q'' and
- * q'''.
+ * Lyapunov function of the position law, its rate under the law, and the virtual controls of q', q''
+ * and q'''.
  * Source: eq. 15.27 to 15.46.
  *   in   motion[4] in rad, rad/s, rad/s^2, rad/s^3, from [-2, -20, -2000, -2e+05] to [2, 20, 2000, 2e+05]
  *   in   desired[5] in rad, rad/s, rad/s^2, rad/s^3, rad/s^4, from [-2, -20, -2000, -2e+05, -2e+07] to [2, 20, 2000, 2e+05, 2e+07]
@@ -2035,9 +2032,10 @@ void awiwi_backstepping_position_lyapunov(const double motion_in[4], const doubl
 
 /*
  * Motor torque that gives the link the stiffness K_p and the damping K_d about desired (q_d and four
- * derivatives). state is (q, q', tau, tau') with the spring's torque tau, external the torque on the
- * link and its rate: left out, the static stiffness is wrong. plant is (link, motor, spring); gains
- * are (K_p, K_d, K_3, K_4); weights (C_t, C_s) are 1 as printed.
+ * derivatives). state is (q, q', tau, tau') with the spring's torque tau. external is the torque on
+ * the link and its rate; if these are left out, the static stiffness is wrong. plant is (link's
+ * inertia, motor's inertia, stiffness), gains are (K_p, K_d, K_3, K_4). The printed weights (C_t, C_s)
+ * are 1.
  * Source: eq. 15.51 to 15.70, mended.
  *   in   state[4] in rad, rad/s, N m, N m/s, from [-2, -20, -2, -200] to [2, 20, 2, 200]
  *   in   desired[5] in rad, rad/s, rad/s^2, rad/s^3, rad/s^4, from [-2, -20, -2000, -2e+05, -2e+07] to [2, 20, 2000, 2e+05, 2e+07]
@@ -2054,8 +2052,8 @@ void awiwi_backstepping_position_lyapunov(const double motion_in[4], const doubl
 int awiwi_backstepping_impedance(const double state_in[4], const double desired_in[5], const double external_in[2], const double plant_in[3], const double gains_in[4], const double weights_in[2], double tau_m_out[1]);
 
 /*
- * Energy of the impedance law, its rate under the law, and the virtual controls of tau and tau'.
- * Serves the law for nonlinear springs too: neither depends on the spring.
+ * Lyapunov function of the impedance law, its rate under the law, and the virtual controls of tau and
+ * tau'. It is that of the law for nonlinear springs too, as it does not depend on the spring.
  * Source: eq. 15.54, 15.57, 15.64, 15.66, mended.
  *   in   state[4] in rad, rad/s, N m, N m/s, from [-2, -20, -2, -200] to [2, 20, 2, 200]
  *   in   desired[5] in rad, rad/s, rad/s^2, rad/s^3, rad/s^4, from [-2, -20, -2000, -2e+05, -2e+07] to [2, 20, 2000, 2e+05, 2e+07]
@@ -2071,8 +2069,8 @@ int awiwi_backstepping_impedance(const double state_in[4], const double desired_
 void awiwi_backstepping_impedance_lyapunov(const double state_in[4], const double desired_in[5], const double external_in[2], const double plant_in[3], const double gains_in[4], const double weights_in[2], double V_out[1], double Vdot_out[1], double controls_out[2]);
 
 /*
- * The impedance law behind a nonlinear spring phi: tau = phi, and spring is (phi', phi'') at its
- * elongation. bodies are the inertias of link and motor.
+ * Motor torque of the impedance law behind a nonlinear spring phi: spring is (phi', phi'') at its
+ * elongation. state is (q, q', tau, tau') with tau = phi; bodies are the inertias of link and motor.
  * Source: eq. 15.71 to 15.81, mended.
  *   in   state[4] in rad, rad/s, N m, N m/s, from [-2, -20, -2, -200] to [2, 20, 2, 200]
  *   in   desired[5] in rad, rad/s, rad/s^2, rad/s^3, rad/s^4, from [-2, -20, -2000, -2e+05, -2e+07] to [2, 20, 2000, 2e+05, 2e+07]
@@ -2090,10 +2088,10 @@ void awiwi_backstepping_impedance_lyapunov(const double state_in[4], const doubl
 int awiwi_backstepping_nonlinear(const double state_in[4], const double desired_in[5], const double external_in[2], const double bodies_in[2], const double spring_in[2], const double gains_in[4], const double weights_in[2], double tau_m_out[1]);
 
 /*
- * Torques of both motors: impedance of the link and common torque of the springs, exact for all six
- * states. By motor: torques (tau, tau') of its spring, springs (phi', phi'') at its elongation,
- * tunings (K_3, K_4, C_t, C_s). inertias are (link, motor 1, motor 2), impedance is (K_p, K_d),
- * pretension the common torque with two derivatives.
+ * Torques of both motors for an impedance of the link and a common torque of the springs, exact for
+ * all six states. One row per motor: torques (tau, tau') of its spring, springs (phi', phi'') at its
+ * elongation, and tunings (K_3, K_4, C_t, C_s). inertias are (link, motor 1, motor 2), impedance is
+ * (K_p, K_d), and pretension is the common torque with two derivatives.
  * Source: eq. 15.82 to 15.106, mended.
  *   in   joint[2] in rad, rad/s, from [-2, -20] to [2, 20]
  *   in   torques[2][2] in N m, N m/s, from [0, -200, 0, -200] to [2, 200, 2, 200]
@@ -2116,8 +2114,8 @@ int awiwi_backstepping_nonlinear(const double state_in[4], const double desired_
 int awiwi_backstepping_antagonistic(const double joint_in[2], const double torques_in[4], const double desired_in[5], const double pretension_in[3], const double external_in[2], const double inertias_in[3], const double springs_in[4], const double impedance_in[2], const double tunings_in[8], double tau_m_out[2]);
 
 /*
- * Energy of the six states, its rate under the law, and the virtual controls of each motor's torque
- * and rate.
+ * Lyapunov function of the antagonistic law, its rate, and the virtual controls of each spring's
+ * torque and rate.
  * Source: eq. 15.88, 15.95, 15.97, 15.105, mended.
  *   in   joint[2] in rad, rad/s, from [-2, -20] to [2, 20]
  *   in   torques[2][2] in N m, N m/s, from [0, -200, 0, -200] to [2, 200, 2, 200]
@@ -2136,7 +2134,7 @@ int awiwi_backstepping_antagonistic(const double joint_in[2], const double torqu
 void awiwi_backstepping_antagonistic_lyapunov(const double joint_in[2], const double torques_in[4], const double desired_in[5], const double pretension_in[3], const double external_in[2], const double inertias_in[3], const double springs_in[4], const double impedance_in[2], const double tunings_in[8], double V_out[1], double Vdot_out[1], double controls_out[4]);
 
 /*
- * The printed decoupling of the motors, for comparison only: it takes the pretension for motion and
+ * The printed decoupling of the motors, for comparison only: it mistakes pretension for motion and
  * releases it.
  * Source: eq. 15.84 to 15.88, as printed.
  *   in   joint[2] in rad, rad/s, from [-2, -20] to [2, 20]
@@ -2160,9 +2158,9 @@ void awiwi_backstepping_antagonistic_lyapunov(const double joint_in[2], const do
 int awiwi_backstepping_antagonistic_decoupled(const double joint_in[2], const double torques_in[4], const double desired_in[5], const double pretension_in[3], const double external_in[2], const double inertias_in[3], const double springs_in[4], const double impedance_in[2], const double tunings_in[8], double tau_m_out[2]);
 
 /*
- * The impedance law as tau_m = -K (q, q', tau, tau') + h (tau_ext, tau_ext'), linear spring, q_d = 0.
- * K_cancelled are the gains for a plant whose spring's torque is cancelled: tau_m = (m + b) / m tau -
- * K_cancelled x.
+ * Gains of the impedance law written as tau_m = -K (q, q', tau, tau') + h (tau_ext, tau_ext'), for q_d
+ * = 0. The spring is linear. K_cancelled are the gains for a plant whose spring's torque is cancelled:
+ * tau_m = (m + b) / m tau - K_cancelled x.
  * Source: eq. 15.70, 16.1 to 16.3, mended.
  *   in   plant[3] in kg m^2, N m/rad, from [5e-07, 0.0001, 0.05] to [0.001, 0.01, 50]
  *   in   gains[4] in N m/rad, N m s/rad, 1/s, from [0.01, 0.0001, 0.1, 0.1] to [50, 1, 2000, 2000]
@@ -2175,7 +2173,7 @@ int awiwi_backstepping_antagonistic_decoupled(const double joint_in[2], const do
 void awiwi_backstepping_state_gains(const double plant_in[3], const double gains_in[4], const double weights_in[2], double K_out[4], double K_cancelled_out[4], double h_out[2]);
 
 /*
- * Slopes of K_cancelled by the gains K_p, K_d, K_3, K_4.
+ * Partial derivatives of K_cancelled by the gains K_p, K_d, K_3, K_4.
  * Source: eq. 16.3, mended and differentiated.
  *   in   plant[3] in kg m^2, N m/rad, from [5e-07, 0.0001, 0.05] to [0.001, 0.01, 50]
  *   in   gains[4] in N m/rad, N m s/rad, 1/s, from [0.01, 0.0001, 0.1, 0.1] to [50, 1, 2000, 2000]
@@ -2186,7 +2184,7 @@ void awiwi_backstepping_state_gains(const double plant_in[3], const double gains
 void awiwi_backstepping_state_gains_derivatives(const double plant_in[3], const double gains_in[4], const double weights_in[2], double dK_out[16]);
 
 /*
- * K_3 and K_4 that give tau and tau' the feedback gains K_opt, with (K_p, K_d) and the weights given.
+ * K_3 and K_4 for which tau and tau' have the feedback gains K_opt, for given (K_p, K_d) and weights.
  * Source: eq. 16.3, 16.4, solved.
  *   in   K_opt[4] in N m/rad, N m s/rad, 1, s, from [33.03, 0.693, 342, 3.33] to [40.37, 0.847, 418, 4.07]
  *   in   plant[3] in kg m^2, N m/rad, from [9.8e-05, 0.00196, 0.588] to [0.000102, 0.00204, 0.612]
@@ -2202,9 +2200,9 @@ void awiwi_backstepping_state_gains_derivatives(const double plant_in[3], const 
 int awiwi_optimal_backstepping_rates(const double K_opt_in[4], const double plant_in[3], const double impedance_in[2], const double weights_in[2], double rates_out[2]);
 
 /*
- * (K_3, K_4) and the weights (C_t, C_s) that give all four feedback gains K_opt exactly, with (K_p,
- * K_d) given. Some K_p and K_d do whenever the closed loop is stable and has two different pairs of
- * poles: near those of one pair.
+ * (K_3, K_4) and weights (C_t, C_s) for which all four feedback gains are exactly K_opt, for given
+ * (K_p, K_d). Whenever the closed loop is stable and has two different pairs of poles, a solution
+ * exists for some K_p and K_d near those of one pair.
  * Source: eq. 15.89, 15.97, 16.3, 16.4, solved.
  *   in   K_opt[4] in N m/rad, N m s/rad, 1, s, from [18.9, 0.819, 477, 0.279] to [23.1, 1.001, 583, 0.341]
  *   in   plant[3] in kg m^2, N m/rad, from [9.8e-05, 0.00196, 0.588] to [0.000102, 0.00204, 0.612]
@@ -2220,9 +2218,9 @@ int awiwi_optimal_backstepping_weights(const double K_opt_in[4], const double pl
 
 /*
  * (K_p, K_d) and (K_3, K_4) whose feedback gains are nearest to K_opt, by relative errors; start is a
- * guess. Status 0: they are equal. 1: no positive gains have them, these come nearest; or something
- * given is not positive, and start is returned. 2: these are the nearest found. 3: something given is
- * not a number; the result is zero.
+ * guess. Status 0: the feedback gains are equal. 1: no positive gains give K_opt, and the result is
+ * nearest to it; or an input is not positive, and the result is start. 2: not converged, the result is
+ * the best found. 3: an input is not a number, and the result is zero.
  * Source: eq. 16.4.
  *   in   K_opt[4] in N m/rad, N m s/rad, 1, s, 1e-09 to 1e+09
  *   in   plant[3] in kg m^2, N m/rad, from [5e-07, 0.0001, 0.05] to [0.001, 0.01, 50]
@@ -2236,10 +2234,10 @@ int awiwi_optimal_backstepping_weights(const double K_opt_in[4], const double pl
 int awiwi_optimal_backstepping(const double K_opt_in[4], const double plant_in[3], const double weights_in[2], const double start_in[4], double impedance_out[2], double rates_out[2]);
 
 /*
- * A motion and its first four derivatives, a sample later, on the way to the desired motion and its
- * derivatives. What is desired with all its derivatives is reached without error, and a jump after 1.7
- * times the delay. motion is the filter's memory: begin with where the joint is, at rest, and pass on
- * what is returned.
+ * Filtered motion (position and four derivatives) one sample later, moving to the desired motion. A
+ * motion that is given with all its derivatives is followed without error. A step settles after 1.7
+ * times the delay. motion is the filter's memory: start with the joint's position at rest, then pass
+ * the last output.
  * Source: Bessel's filter of fifth order.
  *   in   motion[5] in rad, rad/s, rad/s^2, rad/s^3, rad/s^4, from [-2, -20, -2000, -2e+05, -2e+07] to [2, 20, 2000, 2e+05, 2e+07]
  *   in   desired[5] in rad, rad/s, rad/s^2, rad/s^3, rad/s^4, from [-2, -20, -2000, -2e+05, -2e+07] to [2, 20, 2000, 2e+05, 2e+07]
@@ -2253,11 +2251,11 @@ int awiwi_optimal_backstepping(const double K_opt_in[4], const double plant_in[3
 int awiwi_reference_filter(const double motion_in[5], const double desired_in[5], const double delay_in[1], const double period_in[1], double motion_next_out[5]);
 
 /*
- * All that the laws of such a joint ask for, a sample ahead, from angles of motors, elongations and
- * torques. acted are the motors' torques of the sample that ended, acting those of the next;
- * bandwidths are of the link, the motors, the torques and the springs' scales. resistance is what the
- * motors must overcome, modelled what they would by the friction model alone. The memory begins with
- * angles at rest, the torques, and scales of 1.
+ * State of an antagonistic joint one sample ahead, from motor angles thetas, elongations stretches and
+ * torques. acted are the motor torques of the sample that ended, acting those of the next. bandwidths
+ * are those of the link, the motors, the torques and the scales of the springs. resistance is the
+ * estimated torque against each motor, modelled the part of it that the friction model explains. Start
+ * the memory with angles at rest, spring torques, and scales 1.
  * Source: eq. 15.82, observed.
  *   in   memory[13] in rad, rad/s, rad/s^2, N m, 1, from [-2, -20, -2000, -2, -20, -2000, -2, -20, -2000, 0, 0, 0, 0] to [2, 20, 2000, 2, 20, 2000, 2, 20, 2000, 2, 2, 2, 2]
  *   in   thetas[2] in rad, -2 to 2
@@ -2284,7 +2282,7 @@ int awiwi_reference_filter(const double motion_in[5], const double desired_in[5]
 void awiwi_antagonistic_observer(const double memory_in[13], const double thetas_in[2], const double stretches_in[2], const double measured_in[2], const double acted_in[2], const double acting_in[2], const double inertias_in[3], const double tendons_in[6], const double damping_in[1], const double friction_in[3], const double bandwidths_in[4], const double period_in[1], double memory_next_out[13], double joint_out[2], double motors_out[4], double torques_out[4], double springs_out[4], double load_out[1], double modelled_out[2], double resistance_out[2]);
 
 /*
- * State and motor torques of a desired motion, with springs that are linear about their elongations.
+ * State and motor torques for a desired motion, with springs that are linear about their elongations.
  * Source: eq. 15.82, solved for a desired motion.
  *   in   desired[5] in rad, rad/s, rad/s^2, rad/s^3, rad/s^4, from [-2, -20, -2000, -2e+05, -2e+07] to [2, 20, 2000, 2e+05, 2e+07]
  *   in   pretension[3] in N m, N m/s, N m/s^2, from [0, -10, -1000] to [1, 10, 1000]
@@ -2301,8 +2299,7 @@ void awiwi_antagonistic_observer(const double memory_in[13], const double thetas
 int awiwi_antagonistic_setpoint(const double desired_in[5], const double pretension_in[3], const double elongations_in[2], const double slopes_in[2], const double inertias_in[3], const double damping_in[1], double x_des_out[6], double u_des_out[2]);
 
 /*
- * Motor torques u_des - K (x - x_des), with the gains K = feedback, and what the motors must overcome
- * besides.
+ * Motor torques u_des - K (x - x_des), with the gains K = feedback, plus the resistance to compensate.
  * Source: eq. 12.2, 13.3, for two motors.
  *   in   x[6] in rad, rad/s, from [-3, -50, -3, -50, -3, -50] to [3, 50, 3, 50, 3, 50]
  *   in   x_des[6] in rad, rad/s, from [-3, -50, -3, -50, -3, -50] to [3, 50, 3, 50, 3, 50]
@@ -2315,8 +2312,8 @@ int awiwi_antagonistic_setpoint(const double desired_in[5], const double pretens
 void awiwi_antagonistic_feedback(const double x_in[6], const double x_des_in[6], const double u_des_in[2], const double feedback_in[12], const double resistance_in[2], double tau_m_out[2]);
 
 /*
- * Angle and speed of half the motors' difference, which moves the link, and of half their sum, which
- * pulls.
+ * Motor angles and speeds as half their difference (against), which moves the link, and half their sum
+ * (together).
  * Source: eq. 15.82, for equal motors.
  *   in   motors[2][2] in rad, rad/s, from [-2, -50, -2, -50] to [2, 50, 2, 50]
  *   out  against[2] in rad, rad/s
@@ -2326,7 +2323,7 @@ void awiwi_antagonistic_feedback(const double x_in[6], const double x_des_in[6],
 void awiwi_antagonistic_modes(const double motors_in[4], double against_out[2], double together_out[2]);
 
 /*
- * Torques of the springs that together pull the link with a torque, about a common pretension.
+ * Spring torques for a torque on the link and a common pretension.
  * Source: eq. 15.88.
  *   in   torque[1] in N m, -2 to 2
  *   in   pretension[3] in N m, N m/s, N m/s^2, from [0, -10, -1000] to [1, 10, 1000]
@@ -2336,8 +2333,8 @@ void awiwi_antagonistic_modes(const double motors_in[4], double against_out[2], 
 void awiwi_antagonistic_sharing(const double torque_in[1], const double pretension_in[3], double shares_out[2]);
 
 /*
- * The antagonistic law for a link with damping; springs, external torque and resistance are those
- * observed.
+ * The antagonistic law for a link with damping; springs, external torque and resistance come from the
+ * observer.
  * Source: eq. 15.82 to 15.106, mended, with the link's damping and an observer.
  *   in   joint[2] in rad, rad/s, from [-2, -20] to [2, 20]
  *   in   torques[2][2] in N m, N m/s, from [0, -200, 0, -200] to [2, 200, 2, 200]
@@ -2362,10 +2359,10 @@ void awiwi_antagonistic_sharing(const double torque_in[1], const double pretensi
 int awiwi_backstepping_adaptive(const double joint_in[2], const double torques_in[4], const double desired_in[5], const double pretension_in[3], const double external_in[2], const double inertias_in[3], const double springs_in[4], const double damping_in[1], const double impedance_in[2], const double tunings_in[8], const double resistance_in[2], double tau_m_out[2]);
 
 /*
- * A motor that winds up a tendon with a spring, the joint held: rates of x = (theta, theta'), and the
- * force f. path is what the joint takes of the tendon; motor is (inertia, pulley's radius), line the
- * spring's (k1, k2, k3) of f = k1 p + k2 p^2 + k3 p^3 where it is taut, friction is (steepness, level,
- * viscosity).
+ * A motor that winds up a tendon with a spring, at a fixed joint: rates of x = (theta, theta'), and
+ * the force f. path is the tendon's path length at the joint. motor is (inertia, pulley's radius),
+ * friction is (steepness, level, viscosity). line is (k1, k2, k3) of the spring's force f = k1 p + k2
+ * p^2 + k3 p^3 for elongations p > 0.
  * Source: eq. 10.1, mended; eq. 3.8.
  *   in   x[2] in rad, rad/s, from [-3, -50] to [3, 50]
  *   in   u[1] in N m, -3 to 3
@@ -2381,7 +2378,7 @@ void awiwi_plant_tendon(const double x_in[2], const double u_in[1], const double
 
 /*
  * A link behind a linear spring: rates of x = (q, q', theta, theta'), and the spring's torque tau with
- * its rate. plant is (link, motor, spring), damping what holds link and motor back.
+ * its rate. plant is (link's inertia, motor's inertia, stiffness), damping is that of link and motor.
  * Source: eq. 15.11, 15.12.
  *   in   x[4] in rad, rad/s, from [-3, -50, -3, -50] to [3, 50, 3, 50]
  *   in   u[1] in N m, -3 to 3
@@ -2395,8 +2392,7 @@ void awiwi_plant_tendon(const double x_in[2], const double u_in[1], const double
 void awiwi_plant_joint_linear(const double x_in[4], const double u_in[1], const double load_in[1], const double plant_in[3], const double damping_in[2], double xd_out[4], double tau_out[2]);
 
 /*
- * The same behind a spring phi(d) = k1 d + k3 d^3, with the coefficients curve; spring is (phi',
- * phi'').
+ * A link behind a spring phi(d) = k1 d + k3 d^3 with curve = (k1, k3); spring is (phi', phi'').
  * Source: eq. 15.71.
  *   in   x[4] in rad, rad/s, from [-3, -50, -3, -50] to [3, 50, 3, 50]
  *   in   u[1] in N m, -3 to 3
@@ -2412,10 +2408,10 @@ void awiwi_plant_joint_linear(const double x_in[4], const double u_in[1], const 
 void awiwi_plant_joint_nonlinear(const double x_in[4], const double u_in[1], const double load_in[1], const double bodies_in[2], const double curve_in[2], const double damping_in[2], double xd_out[4], double tau_out[2], double spring_out[2]);
 
 /*
- * A link between two tendons: rates of (q, q', theta1, theta1', theta2, theta2'); elongations and
- * torques of both. inertias are (link, motor 1, motor 2), a row of tendons is (k1, k2, k3) of phi = k1
- * p + k2 p^2 + k3 p^3, where p is the elongation theta1 - q or theta2 + q of a taut tendon; friction
- * of either motor is (steepness, level, viscosity).
+ * A link between two tendons: rates of (q, q', theta1, theta1', theta2, theta2'), elongations and
+ * spring torques. inertias are (link, motor 1, motor 2), a row of tendons is (k1, k2, k3) of phi = k1
+ * p + k2 p^2 + k3 p^3, where p is the elongation theta1 - q or theta2 + q if positive. friction of
+ * each motor is (steepness, level, viscosity).
  * Source: eq. 15.82, with friction and springs that only pull.
  *   in   x[6] in rad, rad/s, from [-3, -50, -3, -50, -3, -50] to [3, 50, 3, 50, 3, 50]
  *   in   u[2] in N m, -5 to 5
@@ -2432,8 +2428,8 @@ void awiwi_plant_joint_nonlinear(const double x_in[4], const double u_in[1], con
 void awiwi_plant_antagonistic(const double x_in[6], const double u_in[2], const double load_in[1], const double inertias_in[3], const double tendons_in[6], const double damping_in[1], const double friction_in[3], double xd_out[6], double stretches_out[2], double tau_out[2]);
 
 /*
- * What both springs of such a joint do at given elongations: a row (tau, tau') and a row (phi', phi'')
- * for each.
+ * Torque and rate (tau, tau'), slope and curvature (phi', phi'') of both springs of an antagonistic
+ * joint.
  * Source: eq. 15.71, 15.82.
  *   in   stretches[2] in rad, -1 to 2
  *   in   speeds[2] in rad/s, -50 to 50
@@ -2445,9 +2441,9 @@ void awiwi_plant_antagonistic(const double x_in[6], const double u_in[2], const 
 void awiwi_antagonistic_springs(const double stretches_in[2], const double speeds_in[2], const double tendons_in[6], double torques_out[4], double springs_out[4]);
 
 /*
- * Forces of a finger's tendons: path is what its joints take of each, slack where it begins to pull.
- * The first half of a finger's plant. Joint torques and the joints' acceleration follow from the
- * finger's own kernels.
+ * Forces of a finger's tendons: path is their length at the joints, slack the total length at which
+ * each gets taut. This is the first half of a finger's plant. Joint torques and accelerations follow
+ * from the finger's own kernels.
  * Source: section 5.1, eq. 10.1.
  *   in   thetas[8] in rad, -5 to 5
  *   in   path[8] in m, -0.03 to 0.03
@@ -2460,8 +2456,8 @@ void awiwi_antagonistic_springs(const double stretches_in[2], const double speed
 void awiwi_plant_finger_forces(const double thetas_in[8], const double path_in[8], const double slack_in[8], const double motor_in[2], const double line_in[3], double f_out[8]);
 
 /*
- * The other half: rates of (q, q', theta, theta') of four joints, which accelerate with qdd, and eight
- * motors.
+ * Second half of a finger's plant: rates of (q, q', theta, theta') of four joints with accelerations
+ * qdd, 8 motors.
  * Source: eq. 10.1, mended.
  *   in   qd[4] in rad/s, -50 to 50
  *   in   qdd[4] in rad/s^2, -10000 to 10000

@@ -17,7 +17,7 @@ from awiwi_gen.ir import passes
 from awiwi_gen.verify import physics
 
 ROOT = Path(__file__).resolve().parent.parent
-DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
 ONE_FINGER = Path(__file__).with_name("one_finger.toml").read_text(encoding="utf-8")
 
 
@@ -59,6 +59,16 @@ def test_every_file_that_is_named_exists(document):
 
     assert [link for link in links if not (document.parent / link).exists()] == []
     assert [path for path in paths if not (ROOT / path).exists()] == []
+
+
+def test_the_central_types_of_the_map_are_where_it_says():
+    rows = re.findall(r"^\| `(\w+)` \| `(awiwi_gen/[\w/.]+)` \|", text("docs/architecture.md"), re.MULTILINE)
+
+    assert len(rows) >= 8
+    for name, place in rows:
+        path = ROOT / place
+        files = path.rglob("*.py") if path.is_dir() else [path]
+        assert any(re.search(rf"^class {name}\b", file.read_text(), re.MULTILINE) for file in files), name
 
 
 def test_the_code_of_the_walk_through_is_the_code_of_the_project():

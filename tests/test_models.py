@@ -181,8 +181,8 @@ def test_four_bar_rates_are_the_derivatives_of_the_angles():
     bar = Tree(**FOUR_BAR, branch=1)
     loop = FourBar(bar, x)
     coupler, rocker = (ca.atan2(v[1], v[0]) for v in (loop.coupler, loop.rocker))
-    pairs = [(loop.rate, ca.jacobian(coupler, x)), (loop.rocker_rate, ca.jacobian(rocker, x)),
-             (loop.bend, ca.jacobian(loop.rate, x))]  # fmt: skip
+    pairs = [(loop.ratio, ca.jacobian(coupler, x)), (loop.rocker_ratio, ca.jacobian(rocker, x)),
+             (loop.ratio_derivative, ca.jacobian(loop.ratio, x))]  # fmt: skip
     for found, expected in pairs:
         both = ca.Function("both", [x], [found, expected])
         for crank in (0.4, 1.0, 1.7):

@@ -1,4 +1,4 @@
-"""Linear control of a joint between two tendons: where it shall be, state feedback, and shares of a torque."""
+"""Linear control of a joint between two tendons: desired state, state feedback, and distribution of a torque."""
 
 from __future__ import annotations
 
@@ -13,18 +13,19 @@ from awiwi_gen.definitions.plants import SIDES
 def antagonistic_setpoint(
     _: Any, desired: Matrix, pretension: Matrix, elongations: Matrix, slopes: Matrix, inertias: Matrix, damping: Matrix
 ) -> tuple[Matrix, Matrix, list[Expr]]:
-    """The state (q, q', theta1, theta1', theta2, theta2') of a desired motion, and the motors' torques that hold it.
+    """The state (q, q', theta1, theta1', theta2, theta2') of a desired motion, the motors' torques for it,
+    and the guards.
 
-    What the link needs is shared by both springs, which are linear about their ``elongations`` by the pretension.
+    Both springs share the torque on the link. They are linearised about their ``elongations`` under the pretension.
     """
     names = Derivation()
-    needed = names.name_all(inertias[0] * desired[2:, :] + damping[0] * desired[1:4, :])  # and two derivatives
+    load = names.name_all(inertias[0] * desired[2:, :] + damping[0] * desired[1:4, :])  # and two derivatives
     state, torques = [*desired[:2]], []
     for i, side in enumerate(SIDES):
-        state += [side * desired[n] + side * needed[n] / (2 * slopes[i]) for n in (0, 1)]
+        state += [side * desired[n] + side * load[n] / (2 * slopes[i]) for n in (0, 1)]
         state[-2] += elongations[i]
-        accelerated = side * (desired[2] + needed[2] / (2 * slopes[i]))
-        torques.append(pretension[0] + side * needed[0] / 2 + inertias[i + 1] * accelerated)
+        accelerated = side * (desired[2] + load[2] / (2 * slopes[i]))
+        torques.append(pretension[0] + side * load[0] / 2 + inertias[i + 1] * accelerated)
     return Matrix(state), Matrix(torques), [*slopes]
 
 
@@ -36,9 +37,9 @@ def antagonistic_feedback(
 
 
 def antagonistic_modes(_: Any, motors: Matrix) -> tuple[Matrix, Matrix]:
-    """What both motors do against each other and together: (angle, speed) of half their difference and half their sum."""
-    one, other = motors[:2, :], motors[2:, :]
-    return (one - other) / 2, (one + other) / 2
+    """Differential and common mode of both motors: (angle, speed) of half their difference and of half their sum."""
+    first, second = motors[:2, :], motors[2:, :]
+    return (first - second) / 2, (first + second) / 2
 
 
 def antagonistic_sharing(_: Any, torque: Matrix, pretension: Matrix) -> Matrix:

@@ -1,16 +1,18 @@
-"""What a joint between two tendons does, from its sensors; and a sample ahead, when the torque found now will act.
+"""Observer of a joint between two tendons: its state from its sensors, and one sample ahead, when the torque will act.
 
-Three motions are observed, of the link and of either motor, by one rule. A motion has a position p, a speed v, and an
-acceleration a that its model does not explain. Over a sample T, in which the model knows of s, a measurement y corrects
+Three motions are observed in the same way, of the link and of both motors. A motion has a position p, a speed v, and an
+acceleration a that its model does not explain. Over a sample T with the modelled acceleration s, the measurement y
+corrects it:
 
     p- = p + T v + T^2/2 (s + a)    v- = v + T (s + a)    e = y - p-
     p+ = p- + (1 - z^3) e           v+ = v- + 3/2 (1 - z)^2 (1 + z) e / T           a+ = a + (1 - z)^3 e / T^2
 
-so that all three errors die out with the triple pole z = exp(-w T), whatever the plant is. What is not explained is the
-load on the link, and of the motors whatever friction does beyond its model.
+All three errors vanish with the triple pole z = exp(-w T), for any plant. The unexplained acceleration comes from the
+load on the link, and for the motors from friction beyond its model.
 
-A tendon's torque is the measured one, smoothed: in between it follows the elongation by the spring's slope. How stiff
-the spring is, compared to its model phi, is learnt from the torque's ratio to phi; pretension shows it even at rest.
+A tendon's torque is the measured one, low-pass filtered; between samples it follows the elongation by the spring's slope.
+The scale of the spring relative to its model phi is estimated from the ratio of torque and phi. With pretension this
+works even at rest.
 """
 
 from __future__ import annotations
@@ -22,18 +24,18 @@ from sympy import Expr, Matrix, exp
 from awiwi_gen.definitions.naming import Derivation
 from awiwi_gen.definitions.plants import SIDES, pull, resistance, taut
 
-MOTORS, TORQUES, SCALES = (3, 6), (9, 10), (11, 12)  # where they are in the memory, behind the link
-FLOOR = 100  # a spring is learnt from where its elongation is above 1/FLOOR rad or so
+MOTORS, TORQUES, SCALES = (3, 6), (9, 10), (11, 12)  # indices in the memory, after those of the link
+FLOOR = 100  # a spring's scale is estimated where its elongation is above about 1/FLOOR rad
 
 
 def antagonistic_observer(
     _: Any, memory: Matrix, thetas: Matrix, stretches: Matrix, measured: Matrix, acted: Matrix, acting: Matrix,
     inertias: Matrix, tendons: Matrix, damping: Matrix, friction: Matrix, bandwidths: Matrix, period: Matrix,
 ) -> tuple[Any, ...]:  # fmt: skip
-    """The memory (13); ahead: joint (2), motors (4), torques (4), springs (4), load (1), modelled and resistance (2).
+    """The memory (13), and one sample ahead joint (2), motors (4), torques (4), springs (4), load (1) and two resistances.
 
-    The torques ``acted`` moved the motors in the sample that ended, ``acting`` will in the next. The last two outputs
-    are torques that the motors must overcome: by the model of friction, and in all.
+    The motor torques ``acted`` are those of the sample that ended, ``acting`` those of the next. The last two outputs (2
+    each) are the torques that resist the motors: by the friction model alone, and in total.
     """
     names, T = Derivation(), period[0]
     z = [names.name(exp(-w * T)) for w in bandwidths]
@@ -47,25 +49,25 @@ def antagonistic_observer(
     def pulled(torques: list[Expr], speed: Expr) -> Expr:
         return names.name((torques[0] - torques[1] - damping[0] * speed) / inertias[0])
 
-    def driven(i: int, motor: Expr, torque: Expr, speed: Expr) -> Expr:  # linearly implicit: friction may be steep
+    def driven(i: int, motor: Expr, torque: Expr, speed: Expr) -> Expr:  # linearly implicit, as friction may be steep
         steep = friction[0] * friction[1] / (1 + (friction[0] * speed) ** 2) + friction[2]
         return names.name((motor - torque - resistance(friction, speed)) / (inertias[i + 1] + T / 2 * steep))
 
-    felt, old = [memory[i] for i in TORQUES], memory[:3, :]
-    place = ((thetas[0] - stretches[0]) - (thetas[1] - stretches[1])) / 2
-    link = corrected(old, pulled(felt, old[1]), place, z[0])
+    last, old = [memory[i] for i in TORQUES], memory[:3, :]
+    angle = ((thetas[0] - stretches[0]) - (thetas[1] - stretches[1])) / 2
+    link = corrected(old, pulled(last, old[1]), angle, z[0])
     motors, torques, springs, scales = [], [], [], []
     for i, (start, side) in enumerate(zip(MOTORS, SIDES, strict=True)):
         before = memory[start : start + 3, :]
-        motor = corrected(before, driven(i, acted[i], felt[i], before[1]), thetas[i], z[1])
+        motor = corrected(before, driven(i, acted[i], last[i], before[1]), thetas[i], z[1])
         k1, k2, k3 = spring = tendons[3 * i : 3 * i + 3, :]
         p = names.name(taut(motor[0] - side * link[0]))
         slope, force, scale = names.name(k1 + p * (2 * k2 + 3 * p * k3)), names.name(pull(spring, p)), memory[SCALES[i]]
         moved = motor[0] - before[0] - side * (link[0] - old[0])
-        follows = names.name(felt[i] + scale * slope * moved)
+        follows = names.name(last[i] + scale * slope * moved)
         torque = names.name(follows + (1 - z[2]) * (measured[i] - follows))
-        learnt = (1 - z[3]) * force / (force**2 + (k1 / FLOOR) ** 2)
-        scale = names.name(scale + learnt * (torque - scale * force))
+        gain = (1 - z[3]) * force / (force**2 + (k1 / FLOOR) ** 2)
+        scale = names.name(scale + gain * (torque - scale * force))
         motors.append(motor)
         torques.append(torque)
         scales.append(scale)
@@ -80,12 +82,12 @@ def antagonistic_observer(
     known = Matrix([*link, *motors[0], *motors[1], *torques, *scales])
     load = inertias[0] * link[2]
     modelled = Matrix([resistance(friction, moving[1]) for moving in later])
-    besides = Matrix([-inertias[i + 1] * moving[2] for i, moving in enumerate(later)])
-    turning = Matrix([*later[0][:2], *later[1][:2]])
-    return known, joint[:2, :], turning, Matrix(pulls), Matrix(springs), load, modelled, modelled + besides
+    unmodelled = Matrix([-inertias[i + 1] * moving[2] for i, moving in enumerate(later)])
+    moved_motors = Matrix([*later[0][:2], *later[1][:2]])
+    return known, joint[:2, :], moved_motors, Matrix(pulls), Matrix(springs), load, modelled, modelled + unmodelled
 
 
 def _ahead(motion: Matrix, known: Expr, T: Expr) -> Matrix:
-    """A motion (p, v, a) a sample later, with the acceleration that is known besides."""
+    """A motion (p, v, a) a sample later; ``known`` is its modelled acceleration."""
     total = known + motion[2]
     return Matrix([motion[0] + T * motion[1] + T**2 / 2 * total, motion[1] + T * total, motion[2]])

@@ -11,13 +11,13 @@ from awiwi_gen.hand.lever import BEYOND
 def polynomials(
     _: Any, counts: Matrix, ends: Matrix, length_powers: Matrix, force_powers: Matrix, stiffness_powers: Matrix
 ) -> tuple[Expr, Expr, Expr, list[Expr]]:
-    """dL [m], force [N] and stiffness [N/m] at a reading: coefficients (constant first) times powers of its place.
+    """dL [m], force [N] and stiffness [N/m] at a reading: coefficients (constant first) times powers of x.
 
-    The place is -1 at the first of the sensor's two `ends` [counts], 1 at the second.
+    x is -1 at the first of the sensor's two `ends` [counts] and 1 at the second.
     """
-    place = (counts[0] - (ends[0] + ends[1]) / 2) / ((ends[1] - ends[0]) / 2)
+    x = (counts[0] - (ends[0] + ends[1]) / 2) / ((ends[1] - ends[0]) / 2)
 
     def value(powers: Matrix) -> Expr:
-        return sympy.Add(*(power * place**i for i, power in enumerate(powers)))
+        return sympy.Add(*(power * x**i for i, power in enumerate(powers)))
 
-    return value(length_powers), value(force_powers), value(stiffness_powers), [Rational(BEYOND) - place**2]
+    return value(length_powers), value(force_powers), value(stiffness_powers), [Rational(BEYOND) - x**2]

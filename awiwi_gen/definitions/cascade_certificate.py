@@ -1,14 +1,14 @@
-"""Whether a gain set of the cascade is proved stable (section 11.5, mended).
+"""A certificate that a gain set of the cascade is stable (section 11.5, mended).
 
-Joint damping D, force loops e'' + kd e' + kp e = 0, one for each tendon, and joints that their errors push: with
-xi = (e, e') and A' S + S A = -Q of each loop, the energy
+The joints have the damping D, each tendon has a force loop e'' + kd e' + kp e = 0, and the force errors act on the
+joints. With xi = (e, e') and A' S + S A = -Q for each loop, the energy
 
     V = qd' M qd / 2 + q' K q / 2 + sum xi' S xi        falls by  w' W w,  w = (qd, e, e')
 
-where W = [D, P'/2, 0; P/2, Q11, 0; 0, 0, Q22]. The printed V has no S, and its W (eq. 11.21) has -G where only
-something positive helps: it is never positive definite. Here Q = weight diag(1, 1/omega^2), so V falls where
-D - P' P / (4 weight) is positive definite. As S is positive definite with kp and kd, these three make the proof; a
-large enough weight always gives it, if the gains are positive.
+where W = [D, P'/2, 0; P/2, Q11, 0; 0, 0, Q22]. The printed V has no S, and its W (eq. 11.21) has -G in a place where it
+must be positive, so it is never positive definite. Here Q = weight diag(1, 1/omega^2), so V falls where
+D - P' P / (4 weight) is positive definite. S is positive definite if kp and kd are positive. With positive gains, a
+large enough weight always gives a proof.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ from awiwi_gen.definitions.symmetric_matrix import factors, least, symmetric
 def cascade_certificate(
     _: Any, D: Matrix, P: Matrix, kp: Matrix, kd: Matrix, weight: Matrix, omega: Matrix
 ) -> tuple[Expr, Matrix, list[Expr]]:
-    """Margin, and S11, S12 and S22 of every force loop (m x 3), and what must be positive; D and P row by row."""
+    """Margin, and S11, S12 and S22 of every force loop (m x 3), and the guards; D and P row by row."""
     derivation, n = Derivation(), int(sympy.sqrt(len(D)))
     damping, coupling = symmetric(D, n), Matrix(len(kp), n, list(P))
-    pushed = (coupling.T * coupling).applyfunc(lambda entry: derivation.name(entry / (4 * weight[0])))
-    _lower, pivots = factors(derivation.name_all(damping - pushed), derivation)
-    mean = derivation.name(sympy.Abs(damping.trace()) / n)  # a scale, without a sign of its own
+    loss = (coupling.T * coupling).applyfunc(lambda entry: derivation.name(entry / (4 * weight[0])))
+    _lower, pivots = factors(derivation.name_all(damping - loss), derivation)
+    mean = derivation.name(sympy.Abs(damping.trace()) / n)  # a positive scale
     spring = [derivation.name(gain / omega[0] ** 2) for gain in kp]
     shares = [pivot / mean for pivot in pivots] + spring + [gain / omega[0] for gain in kd]
     energy = Matrix([_energy(p, v, weight[0], omega[0]) for p, v in zip(kp, kd, strict=True)])

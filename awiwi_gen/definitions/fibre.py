@@ -1,4 +1,4 @@
-"""A tendon's fibre, and what its guidings take of its force (sections 4.1, 4.2).
+"""A tendon's fibre and the friction in its guidings (sections 4.1, 4.2).
 
 A `fibre` is the hand file's `Fibre` or its symbolic copy.
 """
@@ -20,8 +20,8 @@ def stiffness(fibre: Any, k: Matrix) -> Expr:
 
 
 def friction(fibre: Any, f: Matrix, bend: Matrix) -> Expr:
-    """Force [N] lost in guidings that bend a tendon, pulled with f [N], by an angle in all [rad] (eq. 4.1).
+    """Force [N] lost by friction in guidings that bend a tendon under the force f [N] by the total angle `bend` [rad].
 
-    Each small bend d alpha takes mu f d alpha, so what is lost is proportional to f: the printed constant C0 is it.
+    Each bend d alpha takes mu f d alpha, so the loss is proportional to f, which eq. 4.1 prints as a constant C0.
     """
     return f[0] * (1 - sympy.exp(-fibre.guiding * bend[0]))

@@ -9,12 +9,12 @@ from awiwi_gen.definitions.naming import Derivation
 
 
 def four_bar_angles(bar: Any, crank: Expr) -> tuple[Expr, Expr]:
-    """Angles of coupler and rocker [rad] when the crank stands at angle `crank` [rad].
+    """Angles of coupler and rocker [rad] for the angle `crank` [rad] of the crank.
 
-    The crank r2 turns about the origin, the rocker r4 about (r1, 0), the coupler r3 joins their ends. With e(t) the
-    direction at angle t, r2 e(t2) + r3 e(t3) = r1 e(0) + r4 e(t4). Without t3 this is E cos t4 + F sin t4 = G, where
-    (E, F) leads from the end of the crank to the rocker's pivot. Of its two roots, branch +1 is the one where the
-    rocker's end lies to the right of that line, seen along it; -1 is its mirror image.
+    The crank r2 rotates about the origin, the rocker r4 about (r1, 0), and the coupler r3 joins their ends. With e(t)
+    the direction at angle t, r2 e(t2) + r3 e(t3) = r1 e(0) + r4 e(t4). Elimination of t3 gives
+    E cos t4 + F sin t4 = G, where (E, F) leads from the end of the crank to the rocker's pivot. It has two roots: on
+    branch +1 the rocker's end lies to the right of that line, on branch -1 to its left.
     """
     east, north = bar.ground - bar.crank * sympy.cos(crank), -bar.crank * sympy.sin(crank)
     reach = (bar.coupler**2 - bar.rocker**2 - east**2 - north**2) / (2 * bar.rocker)
@@ -26,8 +26,8 @@ def four_bar_angles(bar: Any, crank: Expr) -> tuple[Expr, Expr]:
 def four_bar(bar: Any, q: Matrix) -> tuple[Any, ...]:
     """Coupler and rocker [rad, -pi to pi], their derivatives by the joint angle, the transmission; and the guard.
 
-    The transmission is the sine of the angle between coupler and rocker, positive on the linkage's branch. Where they
-    are in line it is zero and the linkage locks: the ratios grow without bound, and beyond the loop does not close.
+    The transmission is the sine of the angle between coupler and rocker, positive on the linkage's branch. It is zero
+    where they are in line. There the linkage locks: the ratios are infinite, and beyond it the loop does not close.
     """
     derivation, crank = Derivation(), q[0] + bar.reference
     coupler, rocker = (derivation.name(_principal(angle)) for angle in four_bar_angles(bar, crank))

@@ -1,7 +1,7 @@
-"""The tendons of the whole hand (eq. 5.1), finger by finger: each feels the joints of its own finger, and the wrist.
+"""The tendons of the whole hand (eq. 5.1), finger by finger: each depends on the joints of its finger, and on the wrist.
 
-`hand.blocks` tells which rows (tendons) and columns (joints) of the hand's arrays belong to which finger. Everything
-outside these blocks is zero here already, not after simplification, so no operation is ever spent on it.
+`hand.blocks` has the rows (tendons) and columns (joints) of the hand's arrays that belong to each finger. Everything
+outside these blocks is exactly zero, so no operation is spent on it.
 """
 
 from collections.abc import Callable
@@ -21,8 +21,8 @@ def tendon_lengths(hand: Hand, q: Matrix, wrist: Matrix | None = None) -> Any:
     fingers = Matrix.vstack(*_blocks(hand, tendons.tendon_lengths, q))
     if wrist is None:
         return fingers
-    passing, guards = wrists.tendon_lengths(hand.wrist, wrist[:1], wrist[1:])
-    return fingers + passing, guards
+    in_wrist, guards = wrists.tendon_lengths(hand.wrist, wrist[:1], wrist[1:])
+    return fingers + in_wrist, guards
 
 
 def coupling(hand: Hand, q: Matrix) -> Matrix:
@@ -41,7 +41,7 @@ def joint_stiffness(hand: Hand, q: Matrix, f: Matrix, k: Matrix) -> Matrix:
 
 
 def _blocks(hand: Hand, of_finger: Callable[..., Matrix], q: Matrix, *by_tendon: Matrix) -> list[Matrix]:
-    """A quantity of each finger, from its share of the joint angles and of the arrays over tendons."""
+    """A quantity of each finger, from its rows of the joint angles and of the arrays over tendons."""
     return [
         of_finger(hand.fingers[name], Matrix(q[joints]), *(Matrix(array[rows]) for array in by_tendon))
         for name, (rows, joints) in hand.blocks.items()

@@ -1,8 +1,8 @@
 """Joint impedance on top of tendon forces: two time scales and the cascade (chapter 11).
 
-The joint law is that of a passive controller: with C qd_des in it, and not C qd as in eq. 11.10, the error e obeys
-M e'' + (C + D) e' + K e = 0, and the energy e' M e' / 2 + e K e / 2 falls by e' D e'. Printed, C qd cancels the joints'
-own Coriolis torques, and e' dM/dt e' / 2 stays: nothing tells its sign.
+The joint law is a passive controller. It has C qd_des, not C qd as in eq. 11.10. So the error e obeys
+M e'' + (C + D) e' + K e = 0, and the energy e' M e' / 2 + e K e / 2 falls by e' D e'. As printed, C qd cancels the
+Coriolis torques of the joints and leaves e' dM/dt e' / 2, which may have either sign.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ def motor_impedance(
     _: Any, theta: Matrix, thd: Matrix, theta_des: Matrix, f_des: Matrix, friction: Matrix, r: Matrix, motor_kp: Matrix,
     motor_kd: Matrix,
 ) -> tuple[Expr, list[Expr]]:  # fmt: skip
-    """Motor torque [N m] of the fast loop (eq. 11.3, mended), and what must be positive.
+    """Motor torque [N m] of the fast loop (eq. 11.3, mended), and the guards.
 
-    What is fed forward is the desired force: feeding forward the measured one cancels the spring, so that nothing
-    but kp draws the motor to its place, and the energy of eq. 11.5 does not fall.
+    The desired force is fed forward. Feeding forward the measured force would cancel the spring: then only kp acts on
+    the motor's error, and the energy of eq. 11.5 does not fall.
     """
     tau = r[0] * f_des[0] + motor_kp[0] * (theta_des[0] - theta[0]) - motor_kd[0] * thd[0] + friction[0]
     return tau, [r[0], motor_kp[0], motor_kd[0]]
@@ -40,12 +40,12 @@ def cascade(
     _: Any, f: Matrix, xd: Matrix, stiffness: Matrix, slope: Matrix, hdd: Matrix, f_des: Matrix, fd_des: Matrix,
     fdd_des: Matrix, friction: Matrix, r: Matrix, B: Matrix, force_kp: Matrix, force_kd: Matrix,
 ) -> tuple[Expr, list[Expr]]:  # fmt: skip
-    """Motor torque [N m] that leaves e'' + force_kd e' + force_kp e = 0 of the force error (eq. 11.16), and its guards.
+    """Motor torque [N m] for the error dynamics e'' + force_kd e' + force_kp e = 0 (eq. 11.16), and the guards.
 
-    The elongation x = r theta + h grows by x'' = r theta'' + h''; the force by f' = k x', f'' = k x'' + dk/dx x'^2.
+    The elongation is x = r theta + h, so x'' = r theta'' + h''. The force has f' = k x' and f'' = k x'' + dk/dx x'^2.
     The stiffness is a function of the force, so dk/dx is its slope dk/df times k.
     """
     k = stiffness[0]
-    wanted = fdd_des[0] + force_kd[0] * (fd_des[0] - k * xd[0]) + force_kp[0] * (f_des[0] - f[0])
-    winding = (wanted / k - slope[0] * xd[0] ** 2 - hdd[0]) / r[0]
-    return B[0] * winding + r[0] * f[0] + friction[0], [k, r[0], B[0], force_kp[0], force_kd[0]]
+    fdd = fdd_des[0] + force_kd[0] * (fd_des[0] - k * xd[0]) + force_kp[0] * (f_des[0] - f[0])
+    thdd = (fdd / k - slope[0] * xd[0] ** 2 - hdd[0]) / r[0]
+    return B[0] * thdd + r[0] * f[0] + friction[0], [k, r[0], B[0], force_kp[0], force_kd[0]]

@@ -1,6 +1,6 @@
 """The polynomial through samples of a smooth function, by Newton's divided differences, in powers of its argument.
 
-Samples may be named expressions: the coefficients are then formulas too, and become numbers when the hand's numbers do.
+Samples may be named expressions. The coefficients are then formulas too, and constants once the hand's numbers are bound.
 """
 
 from collections.abc import Sequence
@@ -11,7 +11,7 @@ from awiwi_gen.definitions.naming import Derivation
 
 
 def coefficients(nodes: Sequence[Expr], values: Sequence[Expr], derivation: Derivation) -> list[Expr]:
-    """Coefficients, constant first, of the polynomial that takes the values at the nodes."""
+    """Coefficients, constant first, of the polynomial through the values at the nodes."""
     differences = list(values)
     for order in range(1, len(nodes)):
         for i in range(len(nodes) - 1, order - 1, -1):

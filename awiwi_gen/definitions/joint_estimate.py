@@ -1,4 +1,4 @@
-"""Joint angles from tendon lengths, and how sure they are (SymPy: normal equations by cofactors)."""
+"""Joint angles from tendon lengths, and their errors, by normal equations and cofactors."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Hand = Any
 
 
 def measured_lengths(hand: Hand, theta: Matrix, x: Matrix, w: Matrix | None = None) -> Matrix:
-    """Lengths h (m) [m] in the fingers, with what the pulleys reel in and the wrist takes away: h(0) + x - r theta - w.
+    """Lengths h (m) [m] in the fingers, h(0) + x - r theta - w: minus what pulleys and wrist take up.
 
     Motor angles theta (m) [rad], elongations x (m) [m] and wrist sections w (m) [m] count from the straight fingers.
     """
@@ -29,9 +29,9 @@ def measured_lengths(hand: Hand, theta: Matrix, x: Matrix, w: Matrix | None = No
 def joint_estimate(finger: Finger, h: Matrix, start: Matrix) -> Matrix:
     """Joint angles (n) [rad] whose lengths are nearest to h (m) [m], for constant couplings (eq. 5.15, mended).
 
-    The left inverse (P'P)^-1 P' acts on the change since the straight finger, h - h(0). No start is needed.
+    The left inverse (P'P)^-1 P' acts on the difference to the straight finger, h - h(0). No start is needed.
     """
-    left, _ = _left_inverse(coupling(finger, start))  # it is the same everywhere
+    left, _ = _left_inverse(coupling(finger, start))  # the coupling is constant
     return left * (h - tendon_lengths(finger, sympy.zeros(len(start), 1)))
 
 

@@ -1,12 +1,12 @@
 """Kinematics of a finger by its definition: transformations multiplied along the chain (eq. 5.2, 5.3, table 5.1).
 
 The frame of link i is T_i = T_(i-1) Trans(offset_(i-1)) R(turn_i) Rz(c_i), that of the fingertip lies one offset
-beyond the last. The chain angles c are functions of the n independent joint angles q: a coupled joint turns in
+beyond the last. The chain angles c are functions of the n independent joint angles q: a coupled joint rotates in
 proportion to its leader (eq. 5.16), and a four-bar counts twice, as its massless crank (angle q + reference, offset
 along the crank) and as its coupler, which is parallel to the turned frame at q = 0, or at the end of the joint's range
 that is nearest to it.
 
-Velocities are derivatives of positions, nothing else. Entries of results may be `Named` symbols.
+All velocities are derivatives of positions. Entries of results may be `Named` symbols.
 """
 
 from dataclasses import dataclass
@@ -36,11 +36,11 @@ class Frame:
 
 
 def joint_angles(finger: Finger, q: Matrix) -> dict[str, Expr]:
-    """Angle [rad] of every joint by name, coupled ones included; for a four-bar, what its crank has turned."""
+    """Angle [rad] of every joint by name, coupled ones included; for a four-bar, the rotation of its crank."""
     position = coordinates(finger)
     angles = {link.joint: q[position[link.joint]] for link in finger.links}
     for follower, leader in leaders(finger).items():
-        # The coupling tendon gives one pulley what it takes from the other: r_leader q_leader = r_follower q_follower.
+        # The coupling tendon keeps its length: r_leader q_leader = r_follower q_follower.
         angles[follower] = angles[leader] * radius(finger, leader) / radius(finger, follower)
     return angles
 
@@ -61,8 +61,8 @@ def jacobian(finger: Finger, q: Matrix) -> Matrix:
     tip = frames(finger, q, derivation)[-1]
     columns = []
     for angle in q:
-        turning = tip.axes.applyfunc(lambda entry, angle=angle: derivation.partial(entry, angle)) * tip.axes.T
-        columns.append([derivation.partial(x, angle) for x in tip.origin] + axial(turning))
+        skew = tip.axes.applyfunc(lambda entry, angle=angle: derivation.partial(entry, angle)) * tip.axes.T
+        columns.append([derivation.partial(x, angle) for x in tip.origin] + axial(skew))
     return Matrix(columns).T
 
 
@@ -72,7 +72,7 @@ def pose_and_jacobian(finger: Finger, q: Matrix) -> tuple[Matrix, Matrix]:
 
 
 def axial(skew: Matrix) -> list[Expr]:
-    """The vector w for which a skew matrix takes x to w x x."""
+    """The vector w of a skew-symmetric matrix: the matrix takes x to the cross product w x x."""
     return [skew[2, 1], skew[0, 2], skew[1, 0]]
 
 
@@ -80,26 +80,26 @@ def frames(finger: Finger, q: Matrix, derivation: Derivation) -> list[Frame]:
     """The base, then the frame of each link, then the fingertip."""
     angles = iter(_chain_angles(finger, q, derivation))
     chain = [Frame(sympy.eye(3), sympy.zeros(3, 1))]
-    unturned, angle, offset = sympy.eye(3), sympy.S.Zero, sympy.zeros(3, 1)
+    fixed, angle, offset = sympy.eye(3), sympy.S.Zero, sympy.zeros(3, 1)
     for link in finger.links:
         origin = chain[-1].point(offset)
-        # Rotations about one and the same axis are one rotation, by the sum of their angles.
+        # Rotations about the same axis are one rotation, by the sum of their angles.
         if link.turn != "none":
-            unturned, angle = chain[-1].axes * _turn(link.turn), sympy.S.Zero
+            fixed, angle = chain[-1].axes * _fixed_rotation(link.turn), sympy.S.Zero
         angle += next(angles)
         if link.four_bar is not None:
-            origin += unturned * rotation(angle) * Matrix([link.four_bar.crank, 0, 0])
+            origin += fixed * rotation(angle) * Matrix([link.four_bar.crank, 0, 0])
             angle += next(angles)
-        chain.append(Frame(derivation.name_all(unturned * rotation(angle)), derivation.name_all(origin)))
+        chain.append(Frame(derivation.name_all(fixed * rotation(angle)), derivation.name_all(origin)))
         offset = Matrix(link.offset)
     return [*chain, Frame(chain[-1].axes, chain[-1].point(offset))]
 
 
-def seats(finger: Finger, q: Matrix, derivation: Derivation) -> dict[str, Frame]:
-    """Joint -> the frame in which it turns: at the joint, after the fixed turn and before the joint's own rotation."""
+def joint_frames(finger: Finger, q: Matrix, derivation: Derivation) -> dict[str, Frame]:
+    """Joint -> the frame in which it rotates: at the joint, after its fixed rotation and before its own."""
     found, offset = {}, sympy.zeros(3, 1)
     for link, before in zip(finger.links, frames(finger, q, derivation)[:-2], strict=True):
-        found[link.joint] = Frame(before.axes * _turn(link.turn), before.point(offset))
+        found[link.joint] = Frame(before.axes * _fixed_rotation(link.turn), before.point(offset))
         offset = Matrix(link.offset)
     return found
 
@@ -110,8 +110,8 @@ def rotation(angle: Expr) -> Matrix:
     return Matrix([[c, -s, 0], [s, c, 0], [0, 0, 1]])
 
 
-def _turn(turn: str) -> Matrix:
-    """The fixed rotation (3 x 3) before a joint: quarter turns about one axis."""
+def _fixed_rotation(turn: str) -> Matrix:
+    """The fixed rotation (3 x 3) before a joint: a multiple of 90 degrees about one axis."""
     axis, quarters = quarter_turns(turn)
     order = [(k + 2 - axis) % 3 for k in range(3)]
     return rotation(quarters * sympy.pi / 2).extract(order, order)

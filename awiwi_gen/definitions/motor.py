@@ -3,8 +3,8 @@
     B thdd = tau - friction(thd) - ripple(theta) - r f
 
 with the torque tau of the motor and the force f of the tendon on the pulley of radius r (eq. 3.2, 3.5). Friction and
-ripple are what the motor must overcome: positive when they brake a positive motion. The printed equations add friction
-with the other sign; then it would drive the motion. A `motor` is the hand file's `Motor` or its symbolic copy.
+ripple are positive where they oppose a positive motion. The printed equations add friction with the other sign; then it
+would drive the motion. A `motor` is the hand file's `Motor` or its symbolic copy.
 """
 
 from typing import Any
@@ -14,7 +14,7 @@ from sympy import Expr, Matrix
 
 
 def reflected_inertia(motor: Any) -> Expr:
-    """B [kg m^2]: gear and rotor, which turns `gear_ratio` times as fast (eq. 3.1)."""
+    """B [kg m^2] of the gear and of the rotor, which rotates `gear_ratio` times as fast (eq. 3.1)."""
     return motor.rotor_inertia * motor.gear_ratio**2 + motor.gear_inertia
 
 
@@ -29,16 +29,16 @@ def friction(motor: Any, thd: Matrix) -> Expr:
 
 
 def damping(motor: Any, thd: Matrix) -> Expr:
-    """Slope of the friction torque [N m s/rad]: what decides how short the steps of a simulation must be."""
+    """Slope of the friction torque [N m s/rad]; it limits the step size of a simulation."""
     return sympy.diff(friction(motor, thd), thd[0])
 
 
 def ripple(motor: Any, theta: Matrix) -> Expr:
     """Torque [N m] of the periodic disturbances at the angle theta [rad] (eq. 3.4, 3.5)."""
-    turns = {"input": motor.gear_ratio, "output": sympy.S.One}
+    speed = {"input": motor.gear_ratio, "output": sympy.S.One}
     return sum(
         (
-            wave.amplitude * sympy.sin(wave.harmonic * turns[wave.shaft] * theta[0] + wave.phase)
+            wave.amplitude * sympy.sin(wave.harmonic * speed[wave.shaft] * theta[0] + wave.phase)
             for wave in motor.ripple
         ),
         sympy.S.Zero,
@@ -46,7 +46,7 @@ def ripple(motor: Any, theta: Matrix) -> Expr:
 
 
 def compensation(motor: Any, theta: Matrix, thd: Matrix) -> Expr:
-    """Motor torque [N m] that takes away a share of friction and ripple (section 3.2)."""
+    """Motor torque [N m] that compensates a share of friction and ripple (section 3.2)."""
     return motor.compensation * (friction(motor, thd) + ripple(motor, theta))
 
 

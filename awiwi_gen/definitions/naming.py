@@ -1,8 +1,7 @@
-"""Names for subexpressions, and derivatives that see through them.
+"""Named subexpressions, and derivatives through them.
 
 SymPy writes expressions as trees: a rotation used nine times is written nine times, and its derivative many times
-more. A `Named` symbol stands for such an expression and remembers it, so a derivation stays as small as the graph
-it describes.
+more. A `Named` symbol stands for a subexpression and holds its definition, so a derivation stays as small as its graph.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -13,13 +12,13 @@ from sympy import Expr
 
 
 class Named(sympy.Dummy):  # type: ignore[misc]
-    """A real symbol that stands for `definition`; whoever reads an expression looks the meaning up there."""
+    """A real symbol that stands for its `definition`; lowering to a graph replaces it."""
 
     __slots__ = ("definition",)
     definition: Expr
 
     def __new__(cls, name: str, definition: Expr) -> "Named":
-        """A new symbol, different from all others whatever their names."""
+        """A new symbol, different from all others, even of the same name."""
         named: Named = super().__new__(cls, name, real=True)
         named.definition = definition
         return named
@@ -28,7 +27,7 @@ class Named(sympy.Dummy):  # type: ignore[misc]
 class Derivation:
     """The names and the derivatives of one derivation.
 
-    Names are numbered from zero and SymPy sorts symbols by name, so the same derivation always spells the same
+    Names are numbered from zero and SymPy sorts symbols by name. So the same derivation always gives the same
     expressions, whatever was derived before it.
     """
 
@@ -38,7 +37,7 @@ class Derivation:
         self._known: dict[frozenset[tuple[Expr, Expr]], dict[Expr, Expr]] = {}
 
     def name(self, expr: Expr) -> Expr:
-        """A symbol standing for `expr`; atoms and negative atoms stand for themselves."""
+        """A symbol that stands for `expr`; atoms and negative atoms are returned as they are."""
         if expr.is_Atom or (expr.is_Mul and len(expr.args) == 2 and expr.args[0] == -1 and expr.args[1].is_Atom):
             return expr
         if expr not in self._names:
@@ -54,7 +53,7 @@ class Derivation:
         return self.along(expr, {symbol: sympy.S.One})
 
     def along(self, expr: Expr, rates: Mapping[Expr, Expr]) -> Expr:
-        """Rate of `expr` while symbols change at the given rates and all others stand still, through all names."""
+        """Rate of `expr` where symbols have the given rates and all others are constant, through all names."""
         return self._rate(expr, self._known.setdefault(frozenset(rates.items()), dict(rates)))
 
     def _rate(self, expr: Expr, known: dict[Expr, Expr]) -> Expr:
@@ -86,7 +85,7 @@ class Derivation:
         base, exponent = power.args
         if not exponent.is_Number:
             raise ValueError(f"{power} has an exponent that is not a number")
-        # Roots and reciprocals give their slopes by what was computed for themselves.
+        # Derivatives of roots and reciprocals use the root or reciprocal itself.
         if exponent is sympy.S.Half:
             return self.name(1 / self.name(power)) / 2, sympy.S.Zero
         if exponent is sympy.S.NegativeOne:
@@ -95,13 +94,13 @@ class Derivation:
 
 
 def _sum(terms: list[Expr]) -> Expr:
-    """A sum as it is written: graphs bring it into a normal form, for which SymPy would need ten times as long."""
+    """A sum without simplification: the graph has its own canonical form, and SymPy would need ten times as long."""
     parts = [part for term in terms if term for part in (term.args if term.is_Add else (term,))]
     return sympy.Add._from_args(parts, is_commutative=True) if len(parts) > 1 else parts[0] if parts else sympy.S.Zero
 
 
 def _product(*factors: Expr) -> Expr:
-    """A product as it is written, with one number at most, first, as SymPy's own products have it."""
+    """A product without simplification but for its numbers, which become one first factor, as in SymPy's own products."""
     number, others = sympy.S.One, []
     for factor in factors:
         for part in factor.args if factor.is_Mul else (factor,):
@@ -131,7 +130,7 @@ _SLOPES: dict[Any, Callable[..., tuple[Expr, ...]]] = {
 
 
 def definitions(expressions: Iterable[Expr]) -> list[tuple[Named, Expr]]:
-    """All names that `expressions` use, directly or not, with their meaning; each after the names it needs itself."""
+    """All names in `expressions`, direct or not, with their definitions; each after the names that it uses."""
     found: dict[Named, Expr] = {}
 
     def visit(expr: Expr) -> None:

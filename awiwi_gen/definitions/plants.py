@@ -1,12 +1,12 @@
-"""What laws are tried on: elastic joints and tendons with friction, by Newton's and Euler's equations.
+"""Plants for control laws: elastic joints and tendons with friction, by Newton's and Euler's equations.
 
-Angles and torques of motors are those that the joint sees: with its pulley r, on a joint's of radius R, a motor of
-inertia B feels like B (R / r)^2. So all that differs between the joints of a hand are numbers, and these are inputs.
-A tendon pulls or is slack. Its spring pulls with
+Angles and torques of motors are reflected to the joint: a motor of inertia B with a pulley r on a joint's pulley R has
+the reflected inertia B (R / r)^2. So joints of a hand differ by numbers only, and these are inputs. A tendon pulls or is
+slack. Its spring has the torque
 
-    phi(d) = k1 p + k2 p^2 + k3 p^3    where p = max(d, 0) is what the elongation d stretches
+    phi(d) = k1 p + k2 p^2 + k3 p^3    where p = max(d, 0) is the positive part of the elongation d
 
-and dry friction is the arc tangent of eq. 3.8, which at rest has a slope and no jump.
+and dry friction is the arc tangent of eq. 3.8, which is smooth at rest.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from sympy import Abs, Expr, Matrix
 
 from awiwi_gen.definitions.naming import Derivation
 
-SIDES = (1, -1)  # tendon 1 turns the link forward, tendon 2 turns it back
+SIDES = (1, -1)  # tendon 1 pulls the link forward, tendon 2 pulls it back
 
 
 def plant_tendon(
@@ -34,7 +34,7 @@ def plant_tendon(
 def plant_joint_linear(
     _: Any, x: Matrix, u: Matrix, load: Matrix, plant: Matrix, damping: Matrix
 ) -> tuple[Matrix, Matrix]:
-    """Rates of x = (q, q', theta, theta') behind a linear spring; its torque with the rate (eq. 15.11, 15.12)."""
+    """Rates of x = (q, q', theta, theta') behind a linear spring; its torque and the rate of that (eq. 15.11, 15.12)."""
     torques = plant[2] * Matrix([x[2] - x[0], x[3] - x[1]])
     return _joint(x, u, load, plant, damping, torques[0]), torques
 
@@ -66,7 +66,7 @@ def plant_antagonistic(
 
 
 def antagonistic_springs(_: Any, stretches: Matrix, speeds: Matrix, tendons: Matrix) -> tuple[Matrix, Matrix]:
-    """Of each spring its torque with the rate, and its slope and curvature; a slack one has those of no elongation."""
+    """Torque and its rate, slope and curvature of each spring; a slack one has those of elongation zero."""
     names = Derivation()
     torques, local = [], []
     for spring, stretch, speed in zip(_rows(tendons), stretches, speeds, strict=True):
@@ -88,8 +88,8 @@ def plant_finger(
     _: Any, qd: Matrix, qdd: Matrix, thds: Matrix, f: Matrix, u: Matrix, motor: Matrix, friction: Matrix
 ) -> Matrix:
     """Rates of (q, q', theta, theta') of a finger whose joints accelerate with qdd."""
-    wound = [(u[i] - resistance(friction, thds[i]) - motor[1] * f[i]) / motor[0] for i in range(len(u))]
-    return Matrix([*qd, *qdd, *thds, *wound])
+    thdds = [(u[i] - resistance(friction, thds[i]) - motor[1] * f[i]) / motor[0] for i in range(len(u))]
+    return Matrix([*qd, *qdd, *thds, *thdds])
 
 
 def resistance(friction: Matrix, speed: Expr) -> Expr:
@@ -98,7 +98,7 @@ def resistance(friction: Matrix, speed: Expr) -> Expr:
 
 
 def taut(stretch: Expr) -> Expr:
-    """What an elongation stretches: nothing where the tendon is slack."""
+    """The positive part of an elongation: zero where the tendon is slack."""
     return (stretch + Abs(stretch)) / 2
 
 

@@ -5,7 +5,7 @@ The flexible joint, with x = (q, dq/dt, theta, dtheta/dt):
     m q''     = -dq q' + k (theta - q)
     b theta'' = -dtheta theta' - k (theta - q) + u,   u = -K x
 
-All gains here are those of negative feedback; eq. 12.12 to 12.18 print alpha = -K.
+Gains are those of negative feedback; eq. 12.12 to 12.18 print alpha = -K.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def target(omega: Matrix, xi: Matrix) -> list[Expr]:
 def joint_gains(m: Expr, b: Expr, k: Expr, dq: Expr, dtheta: Expr, polynomial: list[Expr]) -> Matrix:
     """Gains K (4) that give the flexible joint the characteristic polynomial c0 to c3.
 
-    Eq. 12.15 solved from its last row up; its third row with k (m + b), where eq. 12.14 prints (m b/k) (m + b).
+    Eq. 12.15, solved from its last row up. Its third row has k (m + b), where eq. 12.14 prints (m b/k) (m + b).
     """
     c0, c1, c2, c3 = polynomial
     K4 = b * c3 - dtheta - dq * b / m
@@ -46,18 +46,18 @@ def joint_gains(m: Expr, b: Expr, k: Expr, dq: Expr, dtheta: Expr, polynomial: l
 
 
 def pole_placement_motor(_: Any, b: Matrix, dtheta: Matrix, k: Matrix, omega0: Matrix, xi0: Matrix) -> Any:
-    """Gains of the second-order plant, and what must be positive."""
+    """Gains of the second-order plant, and the guards."""
     return motor_gains(b[0], dtheta[0], k[0], omega0[0], xi0[0]), [b[0], omega0[0], xi0[0]]
 
 
 def pole_placement(
     _: Any, m: Matrix, b: Matrix, k: Matrix, dq: Matrix, dtheta: Matrix, omega: Matrix, xi: Matrix
 ) -> Any:
-    """Gains of the flexible joint, and what must be positive."""
+    """Gains of the flexible joint, and the guards."""
     K = joint_gains(m[0], b[0], k[0], dq[0], dtheta[0], target(omega, xi))
     return K, [m[0], b[0], k[0], *omega, *xi]
 
 
 def pole_placement_law(_: Any, K: Matrix, x: Matrix, x_des: Matrix, u_des: Matrix) -> Expr:
-    """Torque [N m] at the state x (4): u_des holds the desired state, -K draws towards it."""
+    """Torque [N m] at the state x (4): u_des holds the desired state, and -K acts on the error."""
     return u_des[0] - (K.T * (x - x_des))[0]

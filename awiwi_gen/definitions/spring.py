@@ -1,12 +1,12 @@
 """The lever spring by its definition: lengths, and the principle of virtual work (table 4.1, figure 4.6).
 
 The tendon runs from the motor's pulley over the roller on the lever to the fixed pulley; dL is its length between the
-two. A lever that turns by d theta takes -d dL of it out of the mechanism and stretches the spring by ds, so
+two pulleys. A lever rotation d theta shortens it by -d dL and stretches the spring by ds, so
 
     f = -K (s - s0) (ds/d theta) / (d dL/d theta)        k = -(df/d theta) / (d dL/d theta)
 
-Pulleys have signed radii, positive where the tendon turns to the left. A `spring` is the hand file's `Spring` or its
-symbolic copy. An `angle` is a symbol, to differentiate by, whatever it stands for.
+Pulleys have signed radii, positive where the tendon bends to the left. A `spring` is the hand file's `Spring` or its
+symbolic copy. An `angle` is a symbol, since results are differentiated by it.
 """
 
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ from awiwi_gen.definitions.naming import Derivation
 
 @dataclass(frozen=True)
 class Pose:
-    """Of one lever angle: dL [m], force [N] and stiffness [N/m] of the tendon, and what must be positive for them."""
+    """dL [m], force [N] and stiffness [N/m] of the tendon at one lever angle, and the guards that must be positive."""
 
     length: Expr
     force: Expr
@@ -30,7 +30,8 @@ class Pose:
 
 @dataclass(frozen=True)
 class Run:
-    """A straight run of the tendon: the pulleys' line of centres, and the length [m] of their common tangent."""
+    """A straight run of the tendon: `chord` is the line of centres of two pulleys, `gap` the difference of their radii,
+    `length` [m] that of their common tangent."""
 
     chord: tuple[Expr, Expr]
     square: Expr
@@ -38,10 +39,10 @@ class Run:
     gap: Expr
 
     def angle_from(self, other: "Run") -> Expr:
-        """Angle [rad] from another run's direction to this one's; a tangent leans against its line of centres."""
+        """Angle [rad] from another run's direction to this one's; each is tilted against its line of centres."""
         (x, y), (u, v) = self.chord, other.chord
-        lean, other_lean = sympy.atan2(self.gap, self.length), sympy.atan2(other.gap, other.length)
-        return sympy.atan2(u * y - v * x, u * x + v * y) - (lean - other_lean)
+        tilt, other_tilt = sympy.atan2(self.gap, self.length), sympy.atan2(other.gap, other.length)
+        return sympy.atan2(u * y - v * x, u * x + v * y) - (tilt - other_tilt)
 
 
 def lever(spring: Any, theta: Matrix) -> tuple[Expr, Expr, Expr, list[Expr]]:
@@ -63,7 +64,7 @@ def pose_at(spring: Any, angle: Expr, derivation: Derivation) -> Pose:
 
 
 def path(spring: Any, angle: Expr, derivation: Derivation) -> Expr:
-    """dL [m]: both runs, what lies on the roller, and what the outer pulleys took up since the slack end."""
+    """dL [m]: both runs, the arc on the roller, and what the outer pulleys have wound up since the slack end."""
     before, after = runs(spring, angle, derivation)
     slack_before, slack_after = runs(spring, spring.slack, derivation)
     first, second = before.angle_from(slack_before), after.angle_from(slack_after)
@@ -92,8 +93,8 @@ def radii(spring: Any) -> tuple[Expr, Expr, Expr]:
 
 
 def spring_length(spring: Any, angle: Expr, derivation: Derivation) -> Expr:
-    """s [m]: from the anchor to the point of the lever where the spring is hooked in."""
-    turned = angle + spring.spring_angle
-    x = spring.pivot[0] + spring.spring_arm * sympy.cos(turned) - spring.anchor[0]
-    y = spring.pivot[1] + spring.spring_arm * sympy.sin(turned) - spring.anchor[1]
+    """s [m]: from the anchor to the point of the lever where the spring is attached."""
+    hook = angle + spring.spring_angle
+    x = spring.pivot[0] + spring.spring_arm * sympy.cos(hook) - spring.anchor[0]
+    y = spring.pivot[1] + spring.spring_arm * sympy.sin(hook) - spring.anchor[1]
     return derivation.name(sympy.sqrt(derivation.name(x) ** 2 + derivation.name(y) ** 2))

@@ -1,9 +1,10 @@
-"""The lever spring as its tendon and its sensor know it: force and stiffness without a lever angle.
+"""The lever spring's curves: force and stiffness over the elongation or over the sensor's reading.
 
-The angle that joins elongation and force in closed form cannot be eliminated in closed form. So the mechanism is
-evaluated at Chebyshev points of its travel and polynomials through these samples take its place, as the calibration
-polynomials of section 4.1 do. The samples are formulas of the hand's numbers; the coefficients become constants with
-them. Arguments run from -1 at the slack end to 1 at the taut one; far beyond, polynomials mean nothing: guards tell.
+Elongation and force are both closed forms of the lever angle, but the angle cannot be eliminated in closed form. So the
+mechanism is evaluated at Chebyshev points of its travel, and polynomials through these samples replace it, as the
+calibration polynomials of section 4.1 do. The samples are formulas of the hand's numbers; the coefficients become
+constants when the numbers are bound. A polynomial's argument is -1 at the slack end and 1 at the taut end; guards refuse
+arguments far beyond.
 """
 
 from collections.abc import Callable
@@ -17,7 +18,7 @@ from awiwi_gen.definitions.spring import Pose, pose_at
 from awiwi_gen.hand.lever import BEYOND, CURVE_NODES, READING_NODES, chebyshev
 
 Quantity = Callable[[Pose, Pose], Expr]
-"""Something about a pose, given the slack pose too."""
+"""A function of a pose and of the pose at the slack end."""
 
 
 def force(spring: Any, x: Matrix) -> tuple[Expr, list[Expr]]:
@@ -38,14 +39,14 @@ def elongation(spring: Any, f: Matrix) -> tuple[Expr, list[Expr]]:
 def readings(spring: Any, readings: Matrix) -> tuple[Matrix, Matrix, Matrix, list[Expr]]:
     """dL [m], force [N] and stiffness [N/m] of each tendon (m) from its sensor's readings (m), linear in the angle."""
     derivation = Derivation("c")
-    own = spring.calibrated
-    powers = {tendon: _powers_of_readings(each, derivation) for tendon, each in {None: spring, **own}.items()}
+    calibrated = spring.calibrated
+    powers = {tendon: _powers_of_readings(each, derivation) for tendon, each in {None: spring, **calibrated}.items()}
     rows, farthest = [], Rational(0)
     for tendon, count in enumerate(readings):
-        sensor = own.get(tendon, spring).sensor
-        place = _place(count, sensor.slack, sensor.taut, derivation)
-        rows.append([horner(each, place, derivation) for each in powers.get(tendon, powers[None])])
-        farthest = derivation.name((farthest + place**2 + Abs(farthest - place**2)) / 2)  # the larger of the two
+        sensor = calibrated.get(tendon, spring).sensor
+        x = _normalised(count, sensor.slack, sensor.taut, derivation)
+        rows.append([horner(each, x, derivation) for each in powers.get(tendon, powers[None])])
+        farthest = derivation.name((farthest + x**2 + Abs(farthest - x**2)) / 2)  # the larger of the two
     table = Matrix(rows)
     return table[:, 0], table[:, 1], table[:, 2], [BEYOND - farthest]
 
@@ -62,12 +63,14 @@ def _curve(spring: Any, argument: Expr, over: Quantity, of: Quantity) -> tuple[E
     derivation = Derivation("e")
     slack, taut = (_pose(spring, Rational(end), derivation) for end in (0, 1))
 
-    def place(value: Expr) -> Expr:
-        return _place(value, over(slack, slack), over(taut, slack), derivation)
+    def normalised(value: Expr) -> Expr:
+        return _normalised(value, over(slack, slack), over(taut, slack), derivation)
 
     poses = [_pose(spring, share, derivation) for share in chebyshev(CURVE_NODES)]
-    powers = coefficients([place(over(pose, slack)) for pose in poses], [of(pose, slack) for pose in poses], derivation)
-    return horner(powers, place(argument), derivation), [BEYOND - place(argument) ** 2]
+    powers = coefficients(
+        [normalised(over(pose, slack)) for pose in poses], [of(pose, slack) for pose in poses], derivation
+    )
+    return horner(powers, normalised(argument), derivation), [BEYOND - normalised(argument) ** 2]
 
 
 def _elongation(pose: Pose, slack: Pose) -> Expr:
@@ -80,6 +83,6 @@ def _pose(spring: Any, share: Any, derivation: Derivation) -> Pose:
     return pose_at(spring, angle, derivation)
 
 
-def _place(value: Expr, slack: Expr, taut: Expr, derivation: Derivation) -> Expr:
-    """Where a value lies between those of both ends: from -1 to 1."""
+def _normalised(value: Expr, slack: Expr, taut: Expr, derivation: Derivation) -> Expr:
+    """A value scaled linearly to -1 at the slack end and 1 at the taut end."""
     return derivation.name((2 * value - slack - taut) / (taut - slack))

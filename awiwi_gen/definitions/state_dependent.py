@@ -1,7 +1,7 @@
 """Optimal gains on a spring whose stiffness depends on the state (chapter 14).
 
-A spring's torque is phi(x) = s1 x + s2 x^2 + s3 x^3. Between a state and where it is to go, the secant replaces the
-slope: then A(x) x is the plant itself and not its linearisation. The source says "joint stiffness" and means that.
+A spring's torque is phi(x) = s1 x + s2 x^2 + s3 x^3. The secant between the state and the desired state replaces the
+slope: then A(x) x is the plant itself and not its linearisation. The source calls the secant "joint stiffness".
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ def torque(spring: Matrix, x: Expr) -> Expr:
 
 
 def secant(spring: Matrix, x: Expr, y: Expr) -> Expr:
-    """(phi(x) - phi(y))/(x - y) [N m/rad], divided beforehand: where x = y it is the slope."""
+    """(phi(x) - phi(y))/(x - y) [N m/rad] with the division carried out; for x = y it is the slope."""
     s1, s2, s3 = spring
     return s1 + s2 * (x + y) + s3 * (x * (x + y) + y**2)
 
@@ -26,7 +26,7 @@ def secant(spring: Matrix, x: Expr, y: Expr) -> Expr:
 def motor_regulator(b: Expr, k: Expr, dtheta: Expr, weights: Matrix, R: Expr) -> Matrix:
     """Optimal gains (2) of b x'' = -dtheta x' - k x + u for the cost weights . (x^2, x'^2) + R u^2.
 
-    With k K1 and b K1 for two entries of S, the equation's diagonal (eq. 13.5) says
+    With k K1 and b K1 for two entries of S, the diagonal of the Riccati equation (eq. 13.5) is
         K1^2 + 2 k K1 = weights[0]/R,   K2^2 + 2 dtheta K2 = 2 b K1 + weights[1]/R.
     """
     w1, w2 = weights / R
@@ -44,7 +44,7 @@ def sdre_tendon(
     _: Any, theta: Matrix, thd: Matrix, theta_des: Matrix, b: Matrix, dtheta: Matrix, spring: Matrix, weights: Matrix,
     R: Matrix,
 ) -> tuple[Matrix, Expr, list[Expr]]:  # fmt: skip
-    """Gains (2), motor torque [N m], and what must be positive."""
+    """Gains (2), motor torque [N m], and the guards."""
     k = secant(spring, theta[0], theta_des[0])
     K = motor_regulator(b[0], k, dtheta[0], weights, R[0])
     u = torque(spring, theta_des[0]) - K[0] * (theta[0] - theta_des[0]) - K[1] * thd[0]

@@ -1,12 +1,11 @@
 """The controller's stiffness that makes a joint feel as stiff as desired (chapter 8).
 
-The controller acts through the tendons, so both deflect: K_eff^-1 = K_imp^-1 + K_mech^-1 (eq. 8.1). Then
+The controller acts through the tendons, so their compliances add: K_eff^-1 = K_imp^-1 + K_mech^-1 (eq. 8.1). Then
 
     K_imp = K_eff + K_eff (K_mech - K_eff)^-1 K_eff
 
-is positive definite where K_eff and K_mech - K_eff are. That K_eff is, as section 8.2 asks for, is not enough: a
-controller of -3 behind tendons of 1 feels like 1.5, and its motor runs away. Where tendons and desire are equally
-stiff, K_imp is infinite: its inverse vanishes.
+is positive definite where K_eff and K_mech - K_eff are. Section 8.2 asks only for K_eff to be so, which is not enough: a
+controller of -3 behind tendons of 1 gives 1.5, and is unstable. Where K_mech equals K_eff, K_imp is infinite.
 """
 
 from __future__ import annotations
@@ -32,6 +31,6 @@ def stiffness_correction(_: Any, K_eff: Matrix, K_mech: Matrix) -> Any:
 
 
 def stiffness_correction_scalar(_: Any, k_eff: Matrix, k_mech: Matrix) -> Any:
-    """k_imp [N m/rad] of one joint, how it changes per change of k_mech, and what must be positive."""
+    """k_imp [N m/rad] of one joint, its derivative by k_mech, and the guards."""
     share = k_eff[0] / (k_mech[0] - k_eff[0])
     return share * k_mech[0], -(share**2), [k_eff[0], k_mech[0] - k_eff[0]]

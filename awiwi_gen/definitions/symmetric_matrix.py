@@ -1,4 +1,4 @@
-"""Symmetric matrices as kernels take them, and whether they are positive definite (SymPy)."""
+"""Symmetric matrices, and whether they are positive definite, by Cholesky's factorisation."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ def symmetric(entries: Matrix, n: int) -> Matrix:
 
 
 def factors(matrix: Matrix, derivation: Derivation) -> tuple[Matrix, list[Expr]]:
-    """L, with ones on its diagonal, and d of matrix = L diag(d) L': Cholesky without roots.
+    """L, with ones on its diagonal, and d of matrix = L diag(d) L': Cholesky's factorisation without roots.
 
-    The matrix is positive definite where all pivots d are positive, and only there.
+    The matrix is positive definite if and only if all pivots d are positive.
     """
     n = matrix.rows
     lower, pivots = sympy.eye(n), [sympy.S.Zero] * n
@@ -36,11 +36,11 @@ def solve_lower(lower: Matrix, right: Matrix, derivation: Derivation) -> Matrix:
     solution = right.copy()
     for i in range(lower.rows):
         for k in range(right.cols):
-            known = sum(lower[i, j] * solution[j, k] for j in range(i))
-            solution[i, k] = derivation.name(right[i, k] - known)
+            done = sum(lower[i, j] * solution[j, k] for j in range(i))
+            solution[i, k] = derivation.name(right[i, k] - done)
     return solution
 
 
 def least(values: list[Expr], derivation: Derivation) -> Expr:
-    """The least of several values."""
+    """The smallest of several values."""
     return reduce(lambda a, b: derivation.name((a + b - sympy.Abs(a - b)) / 2), values)

@@ -1,7 +1,7 @@
 """Stiffness of whole tendons over their forces: lever spring and fibre in series (section 4.3, figure 4.7).
 
-As for the spring's other curves, a polynomial goes through samples of the mechanism. What it is differentiated to is
-exactly its slope, so that who follows the curve by Newton's method follows what is computed.
+As for the spring's other curves, a polynomial goes through samples of the mechanism. The slope and the curvature are its
+exact derivatives, so Newton's method on the curve converges.
 """
 
 from typing import Any
@@ -27,26 +27,26 @@ def tendon_stiffness(elastic: Any, tension: Matrix) -> tuple[Matrix, Matrix, Mat
             curves[id(spring)] = _Curve(spring, elastic.fibre, derivation)
         curve = curves[id(spring)]
         rows.append(curve.at(force))
-        place = curve.place(force)
-        farthest = derivation.name((farthest + place**2 + abs(farthest - place**2)) / 2)  # the larger of the two
+        x = curve.normalised(force)
+        farthest = derivation.name((farthest + x**2 + abs(farthest - x**2)) / 2)  # the larger of the two
     table = Matrix(rows)
     return table[:, 0], table[:, 1], table[:, 2], [BEYOND - farthest]
 
 
 def _linear(limits: Any, tension: Matrix) -> tuple[Matrix, Matrix, Matrix, list[Expr]]:
-    """Between the limits of stiffness, from no force to the largest: for hands that tell nothing of their springs."""
+    """For hands without springs: stiffness grows linearly between its limits, from force zero to the largest force."""
     slope = (limits.tendon_stiffness_high - limits.tendon_stiffness_low) / limits.tendon_force
     k = tension.applyfunc(lambda force: limits.tendon_stiffness_low + slope * force)
     count = len(tension)
-    places = [2 * force / limits.tendon_force - 1 for force in tension]
+    arguments = [2 * force / limits.tendon_force - 1 for force in tension]
     farthest = Rational(0)
-    for place in places:
-        farthest = (farthest + place**2 + abs(farthest - place**2)) / 2
+    for x in arguments:
+        farthest = (farthest + x**2 + abs(farthest - x**2)) / 2
     return k, Matrix([slope] * count), Matrix([0] * count), [BEYOND - farthest]
 
 
 class _Curve:
-    """The polynomial of one mechanism; its argument runs from -1 at the slack end to 1 at the taut one."""
+    """The polynomial of one mechanism; its argument is -1 at the slack end and 1 at the taut end."""
 
     def __init__(self, spring: Any, strand: Any, derivation: Derivation) -> None:
         def pose(share: Any) -> Any:
@@ -58,15 +58,15 @@ class _Curve:
         self.slack, self.taut = (pose(Rational(end)).force for end in (0, 1))
         poses = [pose(Rational(share)) for share in chebyshev(READING_NODES)]
         whole = [fibre.stiffness(strand, [p.stiffness]) if strand else p.stiffness for p in poses]
-        self.powers = [coefficients([self.place(p.force) for p in poses], whole, derivation)]
+        self.powers = [coefficients([self.normalised(p.force) for p in poses], whole, derivation)]
         for _ in range(2):
             self.powers.append([derivation.name(i * power) for i, power in enumerate(self.powers[-1])][1:])
 
-    def place(self, force: Expr) -> Expr:
-        """Where a force lies between the ends."""
+    def normalised(self, force: Expr) -> Expr:
+        """A force scaled linearly to -1 at the slack end and 1 at the taut end."""
         return self.derivation.name((2 * force - self.slack - self.taut) / (self.taut - self.slack))
 
     def at(self, force: Expr) -> list[Expr]:
         """The polynomial and its first two derivatives by the force."""
-        place, scale = self.place(force), self.derivation.name(2 / (self.taut - self.slack))
-        return [horner(powers, place, self.derivation) * scale**order for order, powers in enumerate(self.powers)]
+        x, scale = self.normalised(force), self.derivation.name(2 / (self.taut - self.slack))
+        return [horner(powers, x, self.derivation) * scale**order for order, powers in enumerate(self.powers)]

@@ -1,19 +1,19 @@
 """Tendon lengths of a finger and what follows from them by differentiation (eq. 5.5 to 5.13, 5.20 to 5.23).
 
-h is the length of the tendons' paths in the finger, P = dh/dq. Tendons pull, so their forces f make the torques
-tau = -P' f, and the joints' stiffness is -d tau/dq.
+h are the lengths of the tendons' paths in the finger, and P = dh/dq. Tendons pull, so forces f cause the joint torques
+tau = -P' f. The joint stiffness is -d tau/dq.
 """
 
 import sympy
 from sympy import Expr, Matrix
 
-from awiwi_gen.definitions.kinematics import joint_angles, seats
+from awiwi_gen.definitions.kinematics import joint_angles, joint_frames
 from awiwi_gen.definitions.naming import Derivation
 from awiwi_gen.structure import Finger, radius, sense
 
 
 def tendon_lengths(finger: Finger, q: Matrix) -> Matrix:
-    """Path lengths h (m) [m]: what rolls on pulleys (eq. 5.5) plus the spans of tensegrity joints (eq. 5.20, 5.22)."""
+    """Path lengths h (m) [m]: arcs on pulleys (eq. 5.5) and straight spans of tensegrity joints (eq. 5.20, 5.22)."""
     return _lengths(finger, q, Derivation())
 
 
@@ -29,7 +29,7 @@ def coupling_derivative(finger: Finger, q: Matrix) -> list[Matrix]:
 
 
 def joint_torque(finger: Finger, q: Matrix, f: Matrix) -> Matrix:
-    """Joint torques -P' f (n) [N m] of tendon forces f (m) [N] (eq. 5.8): tendons do work as they shorten."""
+    """Joint torques -P' f (n) [N m] of tendon forces f (m) [N] (eq. 5.8); a tendon does work as it gets shorter."""
     return -coupling(finger, q).T * f
 
 
@@ -42,12 +42,13 @@ def joint_torque_and_stiffness(finger: Finger, q: Matrix, f: Matrix, k: Matrix) 
     """Joint torques (n) [N m] and -d tau/dq (n x n) [N m/rad], from one derivation of P."""
     derivation = Derivation()
     p = _coupling(finger, q, derivation)
-    bends = _second_derivatives(p, q, derivation)
-    return -p.T * f, sum((force * bend for force, bend in zip(f, bends, strict=True)), p.T * sympy.diag(*k) * p)
+    hessians = _second_derivatives(p, q, derivation)
+    geometric = (force * hessian for force, hessian in zip(f, hessians, strict=True))
+    return -p.T * f, sum(geometric, p.T * sympy.diag(*k) * p)
 
 
 def _lengths(finger: Finger, q: Matrix, derivation: Derivation) -> Matrix:
-    angles, seat = joint_angles(finger, q), seats(finger, q, derivation)
+    angles, frames = joint_angles(finger, q), joint_frames(finger, q, derivation)
     lengths: list[Expr] = []
     for tendon in finger.tendons:
         length = tendon.rest
@@ -55,8 +56,8 @@ def _lengths(finger: Finger, q: Matrix, derivation: Derivation) -> Matrix:
             sign, joint = sense(over)
             length += sign * radius(finger, joint) * angles[joint]
         if tendon.span is not None:
-            run = seat[tendon.span.joint].point(Matrix(tendon.span.to)) - Matrix(tendon.span.from_)
-            length += derivation.name(sympy.sqrt(sum(x**2 for x in derivation.name_all(run))))
+            span = frames[tendon.span.joint].point(Matrix(tendon.span.to)) - Matrix(tendon.span.from_)
+            length += derivation.name(sympy.sqrt(sum(x**2 for x in derivation.name_all(span))))
         lengths.append(length)
     return Matrix(lengths)
 
@@ -67,7 +68,7 @@ def _coupling(finger: Finger, q: Matrix, derivation: Derivation) -> Matrix:
 
 
 def _second_derivatives(p: Matrix, q: Matrix, derivation: Derivation) -> list[Matrix]:
-    def bend(row: Matrix) -> Matrix:
+    def hessian(row: Matrix) -> Matrix:
         return Matrix(len(q), len(q), lambda j, k: derivation.partial(row[min(j, k)], q[max(j, k)]))
 
-    return [bend(p.row(i)) for i in range(p.rows)]
+    return [hessian(p.row(i)) for i in range(p.rows)]

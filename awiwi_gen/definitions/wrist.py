@@ -1,10 +1,10 @@
 """The wrist by its definition: three bars, solved one after the other by angles (chapter 6, eq. 6.1 to 6.9).
 
-A wrist is anything with the attributes a0[3], a[3], b[3], palm[3] and tendons[i].forearm[3], .palm[3]; `hand.wrist`
-tells where they lie. q71 and q73 are the internal angles [rad]. Frame {0}: origin B0, x distal, y from B0 to C0.
+A wrist is anything with the attributes a0[3], a[3], b[3], palm[3] and tendons[i].forearm[3], .palm[3], which
+`hand/wrist.py` describes. q71 and q73 are the internal angles [rad]. Frame {0}: origin B0, x distal, y from B0 to C0.
 
-The plane of the side bars contains B0C0 and is turned about it by q71; in it, B and C run on circles about B0 and C0.
-Eq. 6.1 prints one centre for both, 6.2 loses it too; with C0 = (0, D) all of 6.3 and 6.4 follows.
+The plane of the side bars contains B0C0 and is rotated about it by q71. In it, B and C move on circles about B0 and C0.
+Eq. 6.1 prints one centre for both, and so does 6.2; with C0 = (0, D) all of 6.3 and 6.4 follows.
 """
 
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ Wrist = Any
 
 @dataclass(frozen=True)
 class Palm:
-    """The palm triangle (3 x 1 each, m, in {0}), M amid B and C, and what must be positive for it to exist."""
+    """The palm triangle (3 x 1 each, m, in {0}), M in the middle of BC, and the guards that must be positive."""
 
     a: Matrix
     b: Matrix
@@ -66,7 +66,7 @@ def _palm(wrist: Wrist, q71: Expr, q73: Expr, derivation: Derivation) -> Palm:
     normal = Matrix([-sympy.sin(q71), 0, sympy.cos(q71)])
     across = Matrix([0, 1, 0])
     t_b = sympy.pi / 2 - q73
-    # The second root of eq. 6.3; the first is the plain parallelogram, whose palm does not turn.
+    # The second root of eq. 6.3; the first is the parallelogram that is not crossed, whose palm does not rotate.
     t_c = derivation.name(sympy.atan2(
         (width**2 + side**2) * sympy.sin(t_b) - 2 * side * width, (side**2 - width**2) * sympy.cos(t_b)))  # fmt: skip
     b = derivation.name_all(side * (sympy.cos(t_b) * along + sympy.sin(t_b) * across))
@@ -80,15 +80,15 @@ def _palm(wrist: Wrist, q71: Expr, q73: Expr, derivation: Derivation) -> Palm:
     middle = sum((p - q) ** 2 for p, q in zip(wrist.a, wrist.a0, strict=True))
     reach = derivation.name((x**2 + y**2 + z**2 + height**2 - middle) / (2 * height))
     distance = derivation.name(sympy.sqrt(y**2 + z**2))
-    # Eq. 6.7 says y cos t_a + z sin t_a = reach. The root with the plus is the one whose bar AA0 is crossed.
+    # Eq. 6.7: y cos t_a + z sin t_a = reach. The root with the plus sign has the bar AA0 crossed.
     t_a = derivation.name(sympy.atan2(z, y) + sympy.acos(reach / distance))
     circle = derivation.name_all(Matrix([0, height * sympy.cos(t_a), height * sympy.sin(t_a)]))
-    a = derivation.name_all((b + c) / 2 + axes * circle)  # 6.8 prints the matrix of 6.6; it takes the inverse
+    a = derivation.name_all((b + c) / 2 + axes * circle)  # 6.8 prints the matrix of 6.6, but needs its inverse
     return Palm(a, b, c, [sympy.sin(q73), 2 * height * z, 4 * (distance**2 - reach**2)])
 
 
 def _pose(wrist: Wrist, palm: Palm, derivation: Derivation) -> Matrix:
-    """y along CB, z along AM: parallel to {0} in the neutral pose, in which the hand file tells the origin."""
+    """y along CB, z along AM: parallel to {0} in the neutral pose, for which the hand file has the origin."""
     y = (palm.b - palm.c) / wrist.b[1]
     z = (palm.m - palm.a) / (wrist.b[2] - wrist.a[2])
     axes = derivation.name_all(Matrix.hstack(y.cross(z), y, z))

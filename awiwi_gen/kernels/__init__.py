@@ -1,4 +1,4 @@
-"""The public C interface and nothing else: which kernels a hand has."""
+"""The public C interface: the kernels of a hand."""
 
 from __future__ import annotations
 

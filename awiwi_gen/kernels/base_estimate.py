@@ -1,7 +1,8 @@
-"""The mended algorithm 1 of section 5.4: base joints by a gradient search, for fingers with straight spans.
+"""Algorithm 1 of section 5.4, mended: base joints by a gradient search, for fingers with straight spans.
 
-Straight spans depend on the joints between their two ends only, so their lengths alone tell where these are. The
-kernel `joint_estimate` finds all joints at once, in fewer rounds; this is the search of the source, for comparison.
+The length of a straight span depends only on the joints between its two ends, so these joints follow from the spans
+alone. The kernel `joint_estimate` finds all joints at once, in fewer iterations; this is the source's search, for
+comparison.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ TRIALS = 50  # as in algorithm 1; figure 5.17 shows that 15 are enough for noisy
 
 @dataclass(frozen=True)
 class Base:
-    """Which tendons of a finger are straight spans, and which joint angles these depend on."""
+    """The tendons of a finger that have straight spans, and the joint angles that these depend on, by index."""
 
     spans: tuple[int, ...]
     joints: tuple[int, ...]
@@ -30,27 +31,27 @@ of_base: Family[Base] = Family()
 
 
 def base_kernels(hand: Hand, name: str, finger: Finger) -> list[Kernel]:
-    """The kernels of a finger's tensegrity base, if it has one."""
+    """The kernels of a finger's tensegrity base; none if it has no such base."""
     base = base_of(finger)
     if not base.spans:
         return []
     whole = input_ports(hand, finger, Size(len(finger.joints), len(finger.tendons), len(finger.links)))
-    ports = {"h": chosen(whole["h"], base.spans), "start": chosen(whole["start"], base.joints)}
+    ports = {"h": subset(whole["h"], base.spans), "start": subset(whole["start"], base.joints)}
     return of_base.kernels(name, finger, f"fingers.{name}", finger.structure(), ports, base)
 
 
 def base_of(finger: Finger) -> Base:
-    """The spans, and the joints between them and the palm; no spans where these tendons also see joints beyond."""
+    """The spans, and the joints between them and the palm; empty if the tendons of spans run over other joints too."""
     order = [link.joint for link in finger.links]
     spans = tuple(i for i, tendon in enumerate(finger.tendons) if tendon.span)
     ends = [order.index(tendon.span.joint) for tendon in finger.tendons if tendon.span]
     leaders = [finger.leaders.get(joint, joint) for joint in order[: max(ends, default=0)]]
     joints = tuple(i for i, joint in enumerate(finger.joints) if joint in leaders)
-    rolled = {finger.leaders.get(over[1:], over[1:]) for i in spans for over in finger.tendons[i].over}
-    return Base(spans, joints) if rolled <= set(leaders) and len(joints) <= len(spans) else Base((), ())
+    on_pulleys = {finger.leaders.get(over[1:], over[1:]) for i in spans for over in finger.tendons[i].over}
+    return Base(spans, joints) if on_pulleys <= set(leaders) and len(joints) <= len(spans) else Base((), ())
 
 
-def chosen(port: Port, elements: tuple[int, ...]) -> Port:
+def subset(port: Port, elements: tuple[int, ...]) -> Port:
     """Some elements of a port, with their ranges."""
     bounds = port.bounds()
     low, high = zip(*(bounds[i] for i in elements), strict=True)
@@ -58,7 +59,7 @@ def chosen(port: Port, elements: tuple[int, ...]) -> Port:
 
 
 def gradient_search(finger: Finger) -> Solver:
-    """Algorithm 1, its step from the curvature at the start."""
+    """Algorithm 1, with a step length from the curvature at the start."""
     base, (low, high) = base_of(finger), joint_limits(finger)
     return Solver(
         template="base_estimate.c.j2",

@@ -1,6 +1,6 @@
-"""The kernels that make a law work on a joint between two tendons: its reference, its observer, and laws to compare.
+"""The kernels around the law of a joint between two tendons: reference filter, observer, and other laws to compare.
 
-Angles and torques of motors are those that the joint sees; arrays over the motors have one row for each.
+Angles and torques of motors are reflected to the joint. Arrays over the motors have one row for each motor.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ of_pair: Family[None] = Family()
 
 
 def antagonistic_laws() -> list[Kernel]:
-    """All kernels of this file; they need no hand."""
-    return of_pair.kernels("", Parameterless(), "control", {}, OWN, None)
+    """All kernels of this file; they read no number of a hand."""
+    return of_pair.kernels("", Parameterless(), "control", {}, INPUTS, None)
 
 
 MOTIONS = MOTION[:3] * 3
-PULLED = (Nm, Nm)
+SPRING_TORQUES = (Nm, Nm)
 STIFF = plants.STIFFNESS, plants.DAMPING
-OWN = {
+INPUTS = {
     **{name: PORTS[name] for name in ("joint", "torques", "external", "pretension", "inertias", "springs")},
     **{name: PORTS[name] for name in ("impedance", "tunings")},
     **{name: plants.PAIR[name] for name in ("stretches", "tendons", "damping")},
@@ -33,7 +33,7 @@ OWN = {
     "delay": Port((), s, 0.005, 0.1),
     "period": Port((), s, 1e-4, 1e-2),
     "memory": box(
-        (*MOTIONS, *PULLED, one, one), (-2.0, -20.0, -2e3) * 3 + (0.0,) * 4, (2.0, 20.0, 2e3) * 3 + (2.0,) * 4
+        (*MOTIONS, *SPRING_TORQUES, one, one), (-2.0, -20.0, -2e3) * 3 + (0.0,) * 4, (2.0, 20.0, 2e3) * 3 + (2.0,) * 4
     ),
     "thetas": Port((2,), rad, -2.0, 2.0),
     "measured": Port((2,), Nm, 0.0, 2.0),
@@ -60,16 +60,16 @@ OWN = {
     guards=positive("the delay", "the period"),
 )
 def reference_filter(_: Any, motion: Any, desired: Any, delay: Any, period: Any) -> Any:
-    """A motion and its first four derivatives, a sample later, on the way to the desired motion and its derivatives.
+    """Filtered motion (position and four derivatives) one sample later, moving to the desired motion.
 
-    What is desired with all its derivatives is reached without error, and a jump after 1.7 times the delay. motion is
-    the filter's memory: begin with where the joint is, at rest, and pass on what is returned.
+    A motion that is given with all its derivatives is followed without error. A step settles after 1.7 times the delay.
+    motion is the filter's memory: start with the joint's position at rest, then pass the last output.
     """
 
 
 @of_pair(
     lambda _: {
-        "memory_next": Port((13,), (*MOTIONS, *PULLED, one, one)),
+        "memory_next": Port((13,), (*MOTIONS, *SPRING_TORQUES, one, one)),
         "joint": Port((2,), MOTION[:2]),
         "motors": Port((2, 2), MOTION[:2] * 2),
         "torques": Port((2, 2), TORQUES[:2] * 2),
@@ -85,11 +85,11 @@ def antagonistic_observer(
     _: Any, memory: Any, thetas: Any, stretches: Any, measured: Any, acted: Any, acting: Any,
     inertias: Any, tendons: Any, damping: Any, friction: Any, bandwidths: Any, period: Any,
 ) -> Any:  # fmt: skip
-    """All that the laws of such a joint ask for, a sample ahead, from angles of motors, elongations and torques.
+    """State of an antagonistic joint one sample ahead, from motor angles thetas, elongations stretches and torques.
 
-    acted are the motors' torques of the sample that ended, acting those of the next; bandwidths are of the link, the
-    motors, the torques and the springs' scales. resistance is what the motors must overcome, modelled what they would
-    by the friction model alone. The memory begins with angles at rest, the torques, and scales of 1.
+    acted are the motor torques of the sample that ended, acting those of the next. bandwidths are those of the link, the
+    motors, the torques and the scales of the springs. resistance is the estimated torque against each motor, modelled
+    the part of it that the friction model explains. Start the memory with angles at rest, spring torques, and scales 1.
     """
 
 
@@ -102,12 +102,12 @@ def antagonistic_observer(
 def antagonistic_setpoint(
     _: Any, desired: Any, pretension: Any, elongations: Any, slopes: Any, inertias: Any, damping: Any
 ) -> Any:
-    """State and motor torques of a desired motion, with springs that are linear about their elongations."""
+    """State and motor torques for a desired motion, with springs that are linear about their elongations."""
 
 
 @of_pair(lambda _: {"tau_m": Port((2,), Nm)}, "eq. 12.2, 13.3, for two motors", subject="antagonistic_linear")
 def antagonistic_feedback(_: Any, x: Any, x_des: Any, u_des: Any, feedback: Any, resistance: Any) -> Any:
-    """Motor torques u_des - K (x - x_des), with the gains K = feedback, and what the motors must overcome besides."""
+    """Motor torques u_des - K (x - x_des), with the gains K = feedback, plus the resistance to compensate."""
 
 
 @of_pair(
@@ -116,12 +116,12 @@ def antagonistic_feedback(_: Any, x: Any, x_des: Any, u_des: Any, feedback: Any,
     subject="antagonistic_linear",
 )
 def antagonistic_modes(_: Any, motors: Any) -> Any:
-    """Angle and speed of half the motors' difference, which moves the link, and of half their sum, which pulls."""
+    """Motor angles and speeds as half their difference (against), which moves the link, and half their sum (together)."""
 
 
 @of_pair(lambda _: {"shares": Port((2,), Nm)}, "eq. 15.88", subject="antagonistic_linear")
 def antagonistic_sharing(_: Any, torque: Any, pretension: Any) -> Any:
-    """Torques of the springs that together pull the link with a torque, about a common pretension."""
+    """Spring torques for a torque on the link and a common pretension."""
 
 
 @of_pair(
@@ -134,4 +134,4 @@ def backstepping_adaptive(
     _: Any, joint: Any, torques: Any, desired: Any, pretension: Any, external: Any, inertias: Any, springs: Any,
     damping: Any, impedance: Any, tunings: Any, resistance: Any,
 ) -> Any:  # fmt: skip
-    """The antagonistic law for a link with damping; springs, external torque and resistance are those observed."""
+    """The antagonistic law for a link with damping; springs, external torque and resistance come from the observer."""

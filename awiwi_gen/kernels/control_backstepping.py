@@ -1,8 +1,8 @@
 """The kernels of the backstepping laws (chapter 15).
 
-One law serves every joint of a hand, so plants and gains are inputs. A law answers with status 1 where its proof ends:
-at an inertia, a stiffness, a gain or a weight that is not positive, or not a number. Beside each law stands its
-Lyapunov function, with the rate that the law gives it: what a simulation watches fall.
+One law serves every joint of a hand, so plants and gains are inputs. A law returns status 1 where its proof does not
+hold: for an inertia, a stiffness, a gain or a weight that is not positive, or not a number. Each law has a kernel for its
+Lyapunov function and the rate of that under the law, which a simulation can monitor.
 """
 
 from __future__ import annotations
@@ -17,18 +17,18 @@ backstepping: Family[None] = Family("backstepping.laws")
 
 
 def backstepping_laws() -> list[Kernel]:
-    """All kernels of chapter 15; they need no hand."""
+    """All kernels of chapter 15; they read no number of a hand."""
     return backstepping.kernels("", Parameterless(), "control", {}, PORTS, None)
 
 
 def box(units: tuple[Unit, ...], low: tuple[float, ...], high: tuple[float, ...], rows: int = 1) -> Port:
-    """A port of mixed units; with several rows, one after the other of the same kind."""
+    """A port of mixed units; several rows have the same units and ranges."""
     shape = (rows, len(units)) if rows > 1 else (len(units),)
     return Port(shape, units * rows, low * rows, high * rows)
 
 
 def symmetric(units: tuple[Unit, ...], limits: tuple[float, ...]) -> Port:
-    """A port whose elements may have either sign."""
+    """A port with ranges that are symmetric about zero."""
     return box(units, tuple(-limit for limit in limits), limits)
 
 
@@ -63,7 +63,7 @@ PORTS = {
 
 
 def positive(*names: str) -> tuple[str, ...]:
-    """What a law is guarded by, in words."""
+    """The guards of a law in words."""
     return tuple(f"{name} is positive" for name in names)
 
 
@@ -86,11 +86,11 @@ def torques_of_motors(_: None) -> dict[str, Port]:
 
 
 def lyapunov(energy: Unit, power: Unit, controls: Port) -> dict[str, Port]:
-    """V, its rate under the law, and the virtual controls on the way to it."""
+    """V, its rate under the law, and the virtual controls."""
     return {"V": Port((), energy), "Vdot": Port((), power), "controls": controls}
 
 
-# -- the example, and a joint in its link's derivatives ----------------------------------------------------
+# -- the example, and a joint by its link's derivatives ----------------------------------------------------
 
 
 @backstepping(lambda _: {"u": Port((), one)}, "eq. 15.1 to 15.10, mended", guards=positive("k1", "k2"))
@@ -100,7 +100,7 @@ def backstepping_academic(_: Any, x: Any, k: Any) -> Any:
 
 @backstepping(lambda _: lyapunov(one, one, Port((), one)), "eq. 15.2, 15.6, 15.9, mended")
 def backstepping_academic_lyapunov(_: Any, x: Any, k: Any) -> Any:
-    """Energy of the example, its rate under the law, and the virtual control of x2."""
+    """Lyapunov function of the example, its rate under the law, and the virtual control of x2."""
 
 
 @backstepping(
@@ -109,7 +109,7 @@ def backstepping_academic_lyapunov(_: Any, x: Any, k: Any) -> Any:
     guards=positive(*PLANT, "k1", "k2", "k3", "k4", "c2", "c3", "c4"),
 )
 def backstepping_position(_: Any, motion: Any, desired: Any, plant: Any, rates: Any, scales: Any) -> Any:
-    """Motor torque that takes the link (q and three derivatives) to desired (q_d and four); scales of 1 as printed."""
+    """Motor torque that moves the link (motion: q, 3 derivatives) to desired (q_d, 4 derivatives); printed scales are 1."""
 
 
 @backstepping(
@@ -117,7 +117,7 @@ def backstepping_position(_: Any, motion: Any, desired: Any, plant: Any, rates: 
     "eq. 15.27 to 15.46",
 )
 def backstepping_position_lyapunov(_: Any, motion: Any, desired: Any, plant: Any, rates: Any, scales: Any) -> Any:
-    """Energy of the position law's errors, its rate under the law, and the virtual controls of q', q'' and q'''."""
+    """Lyapunov function of the position law, its rate under the law, and the virtual controls of q', q'' and q'''."""
 
 
 # -- impedance of a joint behind one spring ----------------------------------------------------------------
@@ -133,9 +133,9 @@ def backstepping_impedance(
 ) -> Any:
     """Motor torque that gives the link the stiffness K_p and the damping K_d about desired (q_d and four derivatives).
 
-    state is (q, q', tau, tau') with the spring's torque tau, external the torque on the link and its rate: left out,
-    the static stiffness is wrong. plant is (link, motor, spring); gains are (K_p, K_d, K_3, K_4); weights (C_t, C_s)
-    are 1 as printed.
+    state is (q, q', tau, tau') with the spring's torque tau. external is the torque on the link and its rate; if these
+    are left out, the static stiffness is wrong. plant is (link's inertia, motor's inertia, stiffness), gains are
+    (K_p, K_d, K_3, K_4). The printed weights (C_t, C_s) are 1.
     """
 
 
@@ -146,9 +146,9 @@ def backstepping_impedance(
 def backstepping_impedance_lyapunov(
     _: Any, state: Any, desired: Any, external: Any, plant: Any, gains: Any, weights: Any
 ) -> Any:
-    """Energy of the impedance law, its rate under the law, and the virtual controls of tau and tau'.
+    """Lyapunov function of the impedance law, its rate under the law, and the virtual controls of tau and tau'.
 
-    Serves the law for nonlinear springs too: neither depends on the spring.
+    It is that of the law for nonlinear springs too, as it does not depend on the spring.
     """
 
 
@@ -160,9 +160,9 @@ def backstepping_impedance_lyapunov(
 def backstepping_nonlinear(
     _: Any, state: Any, desired: Any, external: Any, bodies: Any, spring: Any, gains: Any, weights: Any
 ) -> Any:
-    """The impedance law behind a nonlinear spring phi: tau = phi, and spring is (phi', phi'') at its elongation.
+    """Motor torque of the impedance law behind a nonlinear spring phi: spring is (phi', phi'') at its elongation.
 
-    bodies are the inertias of link and motor.
+    state is (q, q', tau, tau') with tau = phi; bodies are the inertias of link and motor.
     """
 
 
@@ -174,10 +174,11 @@ def backstepping_antagonistic(
     _: Any, joint: Any, torques: Any, desired: Any, pretension: Any, external: Any,
     inertias: Any, springs: Any, impedance: Any, tunings: Any,
 ) -> Any:  # fmt: skip
-    """Torques of both motors: impedance of the link and common torque of the springs, exact for all six states.
+    """Torques of both motors for an impedance of the link and a common torque of the springs, exact for all six states.
 
-    By motor: torques (tau, tau') of its spring, springs (phi', phi'') at its elongation, tunings (K_3, K_4, C_t, C_s).
-    inertias are (link, motor 1, motor 2), impedance is (K_p, K_d), pretension the common torque with two derivatives.
+    One row per motor: torques (tau, tau') of its spring, springs (phi', phi'') at its elongation, and tunings
+    (K_3, K_4, C_t, C_s). inertias are (link, motor 1, motor 2), impedance is (K_p, K_d), and pretension is the common
+    torque with two derivatives.
     """
 
 
@@ -189,7 +190,7 @@ def backstepping_antagonistic_lyapunov(
     _: Any, joint: Any, torques: Any, desired: Any, pretension: Any, external: Any,
     inertias: Any, springs: Any, impedance: Any, tunings: Any,
 ) -> Any:  # fmt: skip
-    """Energy of the six states, its rate under the law, and the virtual controls of each motor's torque and rate."""
+    """Lyapunov function of the antagonistic law, its rate, and the virtual controls of each spring's torque and rate."""
 
 
 @backstepping(torques_of_motors, "eq. 15.84 to 15.88, as printed", guards=positive(*PAIR))
@@ -197,4 +198,4 @@ def backstepping_antagonistic_decoupled(
     _: Any, joint: Any, torques: Any, desired: Any, pretension: Any, external: Any,
     inertias: Any, springs: Any, impedance: Any, tunings: Any,
 ) -> Any:  # fmt: skip
-    """The printed decoupling of the motors, for comparison only: it takes the pretension for motion and releases it."""
+    """The printed decoupling of the motors, for comparison only: it mistakes pretension for motion and releases it."""

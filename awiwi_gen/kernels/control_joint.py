@@ -1,7 +1,7 @@
 """The kernels of joint control: stiffness correction, friction observer, impedance, and the cascade.
 
-All their parameters are inputs, so they know no hand. Matrices are of four joints: fewer joints take the first ones,
-and the others get numbers that keep to themselves, such as those of a unit matrix.
+All their parameters are inputs, so they read no number of a hand. Matrices are for four joints. With fewer joints use the
+first rows and columns, and fill the others so that they do not interact, for example with the identity matrix.
 """
 
 from __future__ import annotations
@@ -25,19 +25,21 @@ def joint_laws() -> list[Kernel]:
 
 
 def matrix(unit: Unit, low: float, high: float, beside: float) -> Port:
-    """A matrix over the joints with entries from low to high on its diagonal, and up to `beside` next to it."""
-    on = [i == j for i in range(JOINTS) for j in range(JOINTS)]
-    lows, highs = (tuple(end if here else other for here in on) for end, other in ((low, -beside), (high, beside)))
+    """A matrix over the joints: diagonal entries from low to high, other entries up to `beside` in magnitude."""
+    diagonal = [i == j for i in range(JOINTS) for j in range(JOINTS)]
+    lows, highs = (
+        tuple(end if here else other for here in diagonal) for end, other in ((low, -beside), (high, beside))
+    )
     return Port((JOINTS, JOINTS), unit, lows, highs)
 
 
 def vector(unit: Unit, limit: float) -> Port:
-    """A number for every joint."""
+    """One number per joint."""
     return Port((JOINTS,), unit, -limit, limit)
 
 
 PORTS = {
-    # stiffnesses: every matrix in these ranges has a dominant diagonal, and so has their difference
+    # every stiffness matrix in these ranges is diagonally dominant, and so is their difference
     "K_eff": matrix(STIFFNESS, 0.2, 2.0, 0.05),
     "K_mech": matrix(STIFFNESS, 4.0, 20.0, 0.5),
     "k_eff": Port((), STIFFNESS, 0.05, 3.0),
@@ -105,11 +107,10 @@ def pivots(of: str) -> tuple[str, ...]:
     guards=pivots("K_eff") + pivots("K_mech - K_eff"),
 )
 def stiffness_correction(_: Any, K_eff: Any, K_mech: Any) -> Any:
-    """Controller stiffness that, behind tendons of stiffness K_mech, makes the joints feel like K_eff.
+    """Controller stiffness K_imp that, in series with the tendons' joint stiffness K_mech, gives the stiffness K_eff.
 
-    Both are symmetric, their lower triangles are read. The tendons must be stiffer than what is to be felt in every
-    direction; where they are not, no positive definite controller exists. Stiffer by a factor eps, as eq. 8.2 has it,
-    gives eps / (eps - 1) K_eff.
+    K_eff and K_mech are symmetric; only their lower triangles are read. K_mech must exceed K_eff in every direction,
+    otherwise no positive definite K_imp exists. For K_mech = eps K_eff (eq. 8.2), K_imp is eps / (eps - 1) K_eff.
     """
 
 
@@ -120,7 +121,7 @@ def stiffness_correction(_: Any, K_eff: Any, K_mech: Any) -> Any:
     guards=positive("k_eff", "k_mech - k_eff"),
 )
 def stiffness_correction_scalar(_: Any, k_eff: Any, k_mech: Any) -> Any:
-    """The same for one joint, and by how much k_imp changes with k_mech: what a poor guess of the tendons costs."""
+    """Controller stiffness k_imp of one joint, and its sensitivity dk_imp/dk_mech to errors of the tendons' stiffness."""
 
 
 # -- chapter 9 ----------------------------------------------------------------------------------------------
@@ -133,10 +134,10 @@ def stiffness_correction_scalar(_: Any, k_eff: Any, k_mech: Any) -> Any:
     guards=positive("the motor's inertia", "the gain", "the period"),
 )
 def friction_observer(_: Any, momentum: Any, u: Any, tau: Any, thd: Any, B: Any, gain: Any, period: Any) -> Any:
-    """Friction torque of a motor that turned under the torque u against the load tau in the sample that just ended.
+    """Friction torque of a motor under the torque u and the load tau during the sample that just ended.
 
-    thd is the velocity at the end of that sample. The momentum is the observer's memory: begin with that of the motor
-    at rest, zero, and pass on what is returned. Stable for all gains and periods.
+    thd is the velocity at the end of that sample. momentum is the observer's memory: start with zero for a motor at
+    rest, then pass the last momentum_next. The observer is stable for all gains and periods.
     """
 
 
@@ -147,10 +148,10 @@ def friction_observer(_: Any, momentum: Any, u: Any, tau: Any, thd: Any, B: Any,
 def joint_impedance(
     _: Any, M: Any, C: Any, gravity: Any, q: Any, qd: Any, q_des: Any, qd_des: Any, qdd_des: Any, K: Any, D: Any
 ) -> Any:
-    """Joint torques that make the joints feel like a spring K and a damper D about the desired motion.
+    """Joint torques that make the joints behave as a spring K and a damper D about the desired motion.
 
-    M, C and gravity are those of the joints where they are; C must make dM/dt - 2 C skew-symmetric. It acts on the
-    desired velocity: so the joints stay passive.
+    M, C and gravity are those at the measured q and qd; dM/dt - 2 C must be skew-symmetric. C multiplies the desired
+    velocity, so that the controlled joints are passive.
     """
 
 
@@ -163,9 +164,9 @@ def joint_impedance(
 def motor_impedance(
     _: Any, theta: Any, thd: Any, theta_des: Any, f_des: Any, friction: Any, r: Any, motor_kp: Any, motor_kd: Any
 ) -> Any:
-    """Motor torque that brings a motor to the angle at which its tendon pulls with f_des; a spring and a damper hold it.
+    """Motor torque that moves a motor to the angle theta_des of the tendon force f_des, as a spring and a damper would.
 
-    For joints that are slow against it: the law of the two time scales. friction is the torque to compensate.
+    This is the fast loop of two time scales: the joints must be slow against it. friction is the torque to compensate.
     """
 
 
@@ -181,10 +182,10 @@ def cascade(
     _: Any, f: Any, xd: Any, stiffness: Any, slope: Any, hdd: Any, f_des: Any, fd_des: Any, fdd_des: Any, friction: Any,
     r: Any, B: Any, force_kp: Any, force_kd: Any,
 ) -> Any:  # fmt: skip
-    """Motor torque that makes the error of a tendon's force die out as e'' + kd e' + kp e = 0, whatever the joints do.
+    """Motor torque that makes the force error of a tendon decay as e'' + kd e' + kp e = 0, for any motion of the joints.
 
-    The tendon has the stiffness k, with the slope dk/df, and is stretched at the rate xd; hdd is the acceleration of
-    its path, by which the joints stretch it.
+    The tendon has the stiffness k with the slope dk/df, and its elongation has the rate xd. hdd is the second
+    derivative of its path length, by which the joints stretch it. kp and kd are force_kp and force_kd.
     """
 
 
@@ -198,8 +199,8 @@ def cascade(
     guards=positive("the weight", "the frequency omega"),
 )
 def cascade_certificate(_: Any, D: Any, P: Any, kp: Any, kd: Any, weight: Any, omega: Any) -> Any:
-    """Whether joint damping D and force loops kp, kd make a stable cascade: proved where the margin is positive.
+    """Stability of the cascade with joint damping D and force loops kp, kd: proved if the margin is positive.
 
-    The proof is the energy qd' M qd / 2 + q' K q / 2 + sum (S11 e^2 + 2 S12 e e' + S22 e'^2), which falls. weight and
-    omega choose it: force errors cost weight (e^2 + e'^2 / omega^2). A heavier weight proves more, and bounds less.
+    The proof is the falling energy qd' M qd / 2 + q' K q / 2 + sum (S11 e^2 + 2 S12 e e' + S22 e'^2). weight and omega
+    choose it: force errors lose weight (e^2 + e'^2 / omega^2). A larger weight proves more, with a looser bound.
     """

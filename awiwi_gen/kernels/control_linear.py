@@ -1,6 +1,6 @@
 """The kernels of the linear laws: tendon force, pole placement, optimal and state-dependent gains.
 
-All their parameters are inputs, so that the units of a hand share one kernel. Gains K are those of u = -K x.
+All their parameters are inputs, so that all joints and tendons of a hand share one kernel. Gains K are those of u = -K x.
 """
 
 from __future__ import annotations
@@ -98,9 +98,9 @@ PLANT = {
 def tendon_force_pd(
     _: Any, f: Any, fd: Any, f_des: Any, fd_des: Any, f_hat: Any, friction: Any, r: Any, kp: Any, kd: Any
 ) -> Any:
-    """Motor torque that brings the tendon force f to f_des: kp and kd on its error, estimates cancel the rest.
+    """Motor torque that controls the tendon force f to f_des with gains kp and kd; friction and force are compensated.
 
-    f_hat is the force whose torque is fed forward: the measured one cancels it, the desired one adds no feedback.
+    f_hat is the force whose torque is fed forward: the measured force, or the desired one, which adds no feedback.
     """
 
 
@@ -117,10 +117,10 @@ def tendon_force_scheduled(
     _: Any, f: Any, fd: Any, f_des: Any, fd_des: Any, f_hat: Any, friction: Any,
     r: Any, b: Any, stiffness: Any, stiffness_rate: Any, omega0: Any, xi0: Any,
 ) -> Any:  # fmt: skip
-    """Motor torque that brings the tendon force to f_des as a motor of inertia b does on a spring of omega0 and xi0.
+    """Motor torque that controls the tendon force to f_des with the frequency omega0 and the damping ratio xi0.
 
-    The gains (kp, kd) follow from the tendon's stiffness at the desired force and from its rate, which is zero where
-    the desired force rests.
+    The gains (kp, kd) follow from the motor's inertia b, the tendon's stiffness at the desired force and the rate of
+    that stiffness, which is zero for a constant desired force.
     """
 
 
@@ -134,7 +134,7 @@ def tendon_force_scheduled(
     guards=positive("the motor's inertia", "the target's frequency", "the target's damping ratio"),
 )
 def pole_placement_motor(_: Any, b: Any, dtheta: Any, k: Any, omega0: Any, xi0: Any) -> Any:
-    """Gains of a motor that pulls against a grounded spring k: poles of frequency omega0 and damping ratio xi0."""
+    """Gains of a motor on a grounded spring k for poles of frequency omega0 and damping ratio xi0."""
 
 
 @of_joint(
@@ -147,19 +147,19 @@ def pole_placement_motor(_: Any, b: Any, dtheta: Any, k: Any, omega0: Any, xi0: 
     ),
 )  # fmt: skip
 def pole_placement(_: Any, m: Any, b: Any, k: Any, dq: Any, dtheta: Any, omega: Any, xi: Any) -> Any:
-    """Gains on (q, dq/dt, theta, dtheta/dt) that make a joint with a spring k two oscillators omega and xi."""
+    """Gains on (q, dq/dt, theta, dtheta/dt) of a joint with a spring k for two pole pairs of omega and xi."""
 
 
 @of_joint(lambda _: {"u": TORQUE}, "eq. 12.2, 13.3, 14.12", subject="pole_placement")
 def pole_placement_law(_: Any, K: Any, x: Any, x_des: Any, u_des: Any) -> Any:
-    """Motor torque u_des - K (x - x_des), where u_des holds the desired state; for optimal gains just as well."""
+    """Motor torque u_des - K (x - x_des), where u_des holds the desired state; for placed and optimal gains."""
 
 
 # -- optima -------------------------------------------------------------------------------------------------
 
 
 def doubling(_: Any, doublings: int = 32) -> Solver:
-    """The Riccati equation of any plant with one input."""
+    """The solver of the Riccati equation of any plant with one input."""
     return Solver(
         template="lqr.c.j2",
         problem="riccati",
@@ -174,7 +174,7 @@ def doubling(_: Any, doublings: int = 32) -> Solver:
 
 
 def descent(_: Any, steps: int = 32) -> Solver:
-    """The optimum of a joint with a spring."""
+    """The solver for the optimal gains of a joint with a spring."""
     return Solver(
         template="sdre_joint.c.j2",
         problem="joint regulator",
@@ -196,8 +196,8 @@ def descent(_: Any, steps: int = 32) -> Solver:
 def lqr(_: Any, A: Any, B: Any, Q: Any, R: Any) -> Any:
     """Gains of u = -K x that minimise the integral of x'Q x + R u^2, and the least cost x'S x; in coherent units.
 
-    The residual is that of the Riccati equation for S, relative to its terms. Refused are a plant that B cannot
-    stabilise, costs that reward a motion, and costs that leave one for nothing that does not decay by itself.
+    The residual is that of the Riccati equation for S, relative to its terms. An error status is returned for a plant
+    that B cannot stabilise, a cost that is negative for some motion, and a motion without cost that does not decay.
     """
 
 
@@ -219,7 +219,7 @@ def secant_stiffness(_: Any, spring: Any, deflexion: Any, deflexion_des: Any) ->
 def sdre_tendon(
     _: Any, theta: Any, thd: Any, theta_des: Any, b: Any, dtheta: Any, spring: Any, weights: Any, R: Any
 ) -> Any:
-    """Gains and torque of a motor on a tendon: optimal for the secant between theta and theta_des, in closed form.
+    """Optimal gains and torque of a motor on a tendon, by the secant between theta and theta_des, in closed form.
 
     The tendon's torque is spring . (theta, theta^2, theta^3).
     """
@@ -229,7 +229,7 @@ def sdre_tendon(
 def sdre_joint(
     _: Any, m: Any, b: Any, dq: Any, dtheta: Any, spring: Any, weights: Any, R: Any, K_last: Any, x: Any, x_des: Any
 ) -> Any:
-    """Gains and torque of a joint with a spring: optimal for its secant between the state and the desired one.
+    """Optimal gains and torque of a joint with a spring, by its secant between the state and the desired state.
 
-    K_last are the gains of the last tick: a guess, and what remains where there are no new ones.
+    K_last are the gains of the last tick: the initial guess, and the result if there is no solution.
     """

@@ -1,9 +1,9 @@
 """The kernels of chapter 16: the impedance law as a state feedback, and its gains from feedback gains.
 
-Feedback gains belong to the plant of table 16.1, whose spring's torque is cancelled: any linear method gives such
-gains, and what it asks for can be had in three ways. With the weights free, K_p and K_d are chosen and the rest follows
-in closed form. With the weights given, K_p and K_d leave two of the four gains to be matched, in closed form too; all
-four take an iteration, and need not exist.
+Feedback gains belong to the plant of table 16.1, whose spring's torque is cancelled; any linear method gives them. The
+law's gains follow in one of three ways. With K_p and K_d given and the weights free, all four feedback gains are matched
+in closed form. With the weights given too, two of the four are matched, in closed form. With the weights given and K_p
+and K_d free, matching all four takes an iteration, and a solution need not exist.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ from awiwi_gen.units import Unit, one, s
 
 FEEDBACK = (STIFFNESS, DAMPING, one, s)
 EXTERNAL = (one, s)
-REACH = 1e6  # how many times the start, or how small a part of it, a gain may be
-MATCHED = 1 << 14  # roundings of a feedback gain: what counts as equal
+REACH = 1e6  # a gain may differ from the start by this factor
+MATCHED = 1 << 14  # feedback gains within this many rounding errors count as equal
 
 feedback: Family[None] = Family("backstepping.gains")
 by_rates: Family[None] = Family("backstepping.gains")
@@ -37,8 +37,8 @@ by_iteration: Family[None] = Family()
 
 
 def optimal_laws() -> list[Kernel]:
-    """All kernels of chapter 16; they need no hand."""
-    families = ((feedback, PORTS), (by_rates, ROUND_RATES), (by_weights, ROUND_WEIGHTS), (by_iteration, WIDE))
+    """All kernels of chapter 16; they read no number of a hand."""
+    families = ((feedback, PORTS), (by_rates, RATES_INPUTS), (by_weights, WEIGHTS_INPUTS), (by_iteration, WIDE))
     return [
         kernel
         for family, ports in families
@@ -47,18 +47,19 @@ def optimal_laws() -> list[Kernel]:
 
 
 def around(units: tuple[Unit, ...], values: tuple[float, ...], share: float) -> Port:
-    """A port about known values, up to a share of them."""
+    """A port with ranges about given values, by a share of each."""
     return box(units, tuple(v * (1 - share) for v in values), tuple(v * (1 + share) for v in values))
 
 
-# Where gains exist is no box. These lie inside, about K_3 = 1000 and K_4 = 100, and about C_t = 0.07 and C_s = 1.3e-5.
-ROUND_RATES = {
+# The gains for which a solution exists form no box. These boxes lie inside, about K_3 = 1000, K_4 = 100, C_t = 0.07 and
+# C_s = 1.3e-5.
+RATES_INPUTS = {
     "K_opt": around(FEEDBACK, (36.7, 0.77, 380.0, 3.7), 0.1),
     "plant": around((INERTIA, INERTIA, STIFFNESS), (1e-4, 2e-3, 0.6), 0.02),
     "impedance": around((STIFFNESS, DAMPING), (0.1, 1e-3), 0.3),
     "weights": around(WEIGHTS, (10.0, 0.01), 0.3),
 }
-ROUND_WEIGHTS = {
+WEIGHTS_INPUTS = {
     "K_opt": around(FEEDBACK, (21.0, 0.91, 530.0, 0.31), 0.1),
     "plant": around((INERTIA, INERTIA, STIFFNESS), (1e-4, 2e-3, 0.6), 0.02),
     "impedance": around((STIFFNESS, DAMPING), (1.0, 9.2e-4), 0.1),
@@ -77,9 +78,10 @@ WIDE = PORTS | {
     "eq. 15.70, 16.1 to 16.3, mended",
 )
 def backstepping_state_gains(_: Any, plant: Any, gains: Any, weights: Any) -> Any:
-    """The impedance law as tau_m = -K (q, q', tau, tau') + h (tau_ext, tau_ext'), linear spring, q_d = 0.
+    """Gains of the impedance law written as tau_m = -K (q, q', tau, tau') + h (tau_ext, tau_ext'), for q_d = 0.
 
-    K_cancelled are the gains for a plant whose spring's torque is cancelled: tau_m = (m + b) / m tau - K_cancelled x.
+    The spring is linear. K_cancelled are the gains for a plant whose spring's torque is cancelled:
+    tau_m = (m + b) / m tau - K_cancelled x.
     """
 
 
@@ -88,7 +90,7 @@ def backstepping_state_gains(_: Any, plant: Any, gains: Any, weights: Any) -> An
     "eq. 16.3, mended and differentiated",
 )
 def backstepping_state_gains_derivatives(_: Any, plant: Any, gains: Any, weights: Any) -> Any:
-    """Slopes of K_cancelled by the gains K_p, K_d, K_3, K_4."""
+    """Partial derivatives of K_cancelled by the gains K_p, K_d, K_3, K_4."""
 
 
 @by_rates(
@@ -100,7 +102,7 @@ def backstepping_state_gains_derivatives(_: Any, plant: Any, gains: Any, weights
     ),
 )
 def optimal_backstepping_rates(_: Any, K_opt: Any, plant: Any, impedance: Any, weights: Any) -> Any:
-    """K_3 and K_4 that give tau and tau' the feedback gains K_opt, with (K_p, K_d) and the weights given."""
+    """K_3 and K_4 for which tau and tau' have the feedback gains K_opt, for given (K_p, K_d) and weights."""
 
 
 @by_weights(
@@ -109,14 +111,15 @@ def optimal_backstepping_rates(_: Any, K_opt: Any, plant: Any, impedance: Any, w
     guards=positive(*PLANT, "K_p", "K_d", "C_t", "K_3", "K_4", "C_s"),
 )
 def optimal_backstepping_weights(_: Any, K_opt: Any, plant: Any, impedance: Any) -> Any:
-    """(K_3, K_4) and the weights (C_t, C_s) that give all four feedback gains K_opt exactly, with (K_p, K_d) given.
+    """(K_3, K_4) and weights (C_t, C_s) for which all four feedback gains are exactly K_opt, for given (K_p, K_d).
 
-    Some K_p and K_d do whenever the closed loop is stable and has two different pairs of poles: near those of one pair.
+    Whenever the closed loop is stable and has two different pairs of poles, a solution exists for some K_p and K_d near
+    those of one pair.
     """
 
 
 def newton(_: Any, iterations: int = 40) -> Solver:
-    """Levenberg's and Marquardt's steps towards all four feedback gains, in parts of what is wanted."""
+    """The solver for all four feedback gains: Levenberg-Marquardt steps on their relative errors."""
     return Solver(
         template="optimal_backstepping.c.j2",
         problem="gain matching",
@@ -140,6 +143,7 @@ def newton(_: Any, iterations: int = 40) -> Solver:
 def optimal_backstepping(_: Any, K_opt: Any, plant: Any, weights: Any, start: Any) -> Any:
     """(K_p, K_d) and (K_3, K_4) whose feedback gains are nearest to K_opt, by relative errors; start is a guess.
 
-    Status 0: they are equal. 1: no positive gains have them, these come nearest; or something given is not positive,
-    and start is returned. 2: these are the nearest found. 3: something given is not a number; the result is zero.
+    Status 0: the feedback gains are equal. 1: no positive gains give K_opt, and the result is nearest to it; or an
+    input is not positive, and the result is start. 2: not converged, the result is the best found. 3: an input is not a
+    number, and the result is zero.
     """

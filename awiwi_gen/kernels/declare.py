@@ -1,8 +1,8 @@
-"""How kernels are declared: one decorated function each, collected in the family of the parts that have it.
+"""Declaration of kernels: one decorated function each, collected in the family of the parts that have it.
 
-A kernel's argument names choose its input ports, its name (after the part's) is the C symbol, its docstring the
+A kernel's argument names choose its input ports, its name (after the part's) is the C symbol, and its docstring is the
 documentation. The function has no body: the mathematics is in the function of the same name in the module ``subject``
-of both wings, `definitions/` (SymPy) and `witnesses/` (CasADi). These are imported when a kernel is derived, not before.
+of both wings, `definitions/` (SymPy) and `witnesses/` (CasADi). They are imported only when a kernel is derived.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ Declaration = Callable[..., Any]
 
 @dataclass(frozen=True)
 class Template(Generic[Size]):
-    """A kernel before it knows its part."""
+    """A kernel declaration, of which each part of the hand makes a kernel."""
 
     name: str
     outputs: Callable[[Size], dict[str, Port]]
@@ -35,7 +35,7 @@ class Template(Generic[Size]):
     def kernel(
         self, prefix: str, part: Any, path: str, structure: Mapping[str, Any], ports: Mapping[str, Port], size: Size
     ) -> Kernel:
-        """The kernel of one part. An argument that the part has no port for is left out, so it needs a default."""
+        """The kernel of one part. An argument without a port is left out; the routes need a default for it."""
         solver = self.solver(part)
         routes = {library: Route(f"{wing}.{self.subject}", self.name) for library, wing in WINGS.items()}
         return Kernel(
@@ -58,9 +58,9 @@ def straight_line(part: Any) -> None:
 
 
 class Family(Generic[Size]):
-    """The kernels that all parts of one kind have; an instance is the decorator that declares one more.
+    """The kernels of all parts of one kind. An instance is the decorator that declares a kernel.
 
-    ``subject`` is the module of both wings that derives them, where a kernel does not name another.
+    ``subject`` is the module of both wings that derives them, unless a kernel names another.
     """
 
     def __init__(self, subject: str = "") -> None:
@@ -75,9 +75,9 @@ class Family(Generic[Size]):
         guards: tuple[str, ...] = (),
         solver: Callable[[Any], Solver | None] = straight_line,
     ) -> Callable[[Declaration], Declaration]:
-        """Declare a kernel: its outputs for a part of some size, its source, and the module that derives it.
+        """Declare a kernel: its outputs for the size of a part, its source, and the module that derives it.
 
-        For parts that ``solver`` returns a solver for, the kernel iterates instead and needs no derivation.
+        If ``solver`` returns a solver for a part, the kernel iterates and has no derivation.
         """
 
         def declare(function: Declaration) -> Declaration:
@@ -96,16 +96,16 @@ class Family(Generic[Size]):
 
 
 class Parameterless:
-    """The part of kernels that read no number of the hand: all their parameters are inputs."""
+    """The part of kernels whose parameters are all inputs: it has no numbers."""
 
     def quantities(self) -> dict[str, Any]:
-        """None."""
+        """No numbers."""
         return {}
 
     def structure(self) -> dict[str, Any]:
-        """All such parts are alike."""
+        """The same for all such parts."""
         return {}
 
     def symbolic(self, leaf: Callable[..., Any]) -> Parameterless:
-        """Itself: there is nothing to name."""
+        """The part itself, as it has no numbers."""
         return self

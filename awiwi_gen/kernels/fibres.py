@@ -1,4 +1,4 @@
-"""The kernels of a tendon's fibre and of the guidings it rubs in."""
+"""The kernels of a tendon's fibre and of its guidings."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def fibre_kernels(hand: Hand, fibre: Fibre) -> list[Kernel]:
 
 
 def fibre_ports(hand: Hand, fibre: Fibre) -> dict[str, Port]:
-    """The ports an argument name stands for, with the ranges of this hand."""
+    """The input ports by argument name, with the ranges of this hand."""
     limits = hand.limits
     return {
         "f": Port((), N, 0.0, float(limits.tendon_force)),
@@ -39,9 +39,9 @@ def stretch(fibre: Any, f: Any) -> Any:
 
 @of_fibre(lambda _: {"stiffness": Port((), N / m)}, "section 4.3")
 def stiffness(fibre: Any, k: Any) -> Any:
-    """Stiffness of a whole tendon: of the fibre, in series with its mechanism of stiffness k."""
+    """Stiffness of a whole tendon: the fibre in series with a spring mechanism of stiffness k."""
 
 
 @of_guidings(lambda _: {"loss": Port((), N)}, "eq. 4.1")
 def friction(fibre: Any, f: Any, bend: Any) -> Any:
-    """Force lost in the guidings by a tendon that is pulled with the force f and bent by the angle bend in all."""
+    """Friction loss in the guidings of a tendon under the force f that they bend by the total angle bend."""

@@ -1,4 +1,4 @@
-"""The kernels every finger has, written once for all of them."""
+"""The kernels of every finger, declared once for all fingers."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from awiwi_gen.units import J, N, Unit, kg, m, one, rad, s
 
 @dataclass(frozen=True)
 class Size:
-    """How large a finger's arrays are: independent joints, tendons, links."""
+    """Sizes of a finger's arrays: independent joints, tendons, links."""
 
     joints: int
     tendons: int
@@ -24,7 +24,7 @@ class Size:
 
 per_finger: Family[Size] = Family()
 
-STIFFEST = 50.0  # [N m/rad]; beyond what tendons give any joint of a hand
+STIFFEST = 50.0  # [N m/rad]; more than the tendons of a hand give a joint
 
 
 def finger_kernels(hand: Hand, name: str, finger: Finger) -> list[Kernel]:
@@ -35,7 +35,7 @@ def finger_kernels(hand: Hand, name: str, finger: Finger) -> list[Kernel]:
 
 
 def input_ports(hand: Hand, finger: Finger, size: Size) -> dict[str, Port]:
-    """The ports an argument name stands for, with the ranges of this hand."""
+    """The input ports by argument name, with the ranges of this hand."""
     n, limits = (size.joints,), hand.limits
     low, high = joint_limits(finger)
     slack, taut = force_range(hand)
@@ -62,7 +62,7 @@ def input_ports(hand: Hand, finger: Finger, size: Size) -> dict[str, Port]:
 
 
 def force_range(hand: Hand) -> tuple[float, float]:
-    """Tendon forces [N] at which the stiffness of every tendon is known: those of its spring, or up to the limit."""
+    """Range of tendon forces [N] that every spring's curve covers; without springs, from zero to the hand's limit."""
     if hand.spring is None:
         return 0.0, float(hand.limits.tendon_force)
     levers = [Lever(spring) for spring in (hand.spring, *hand.spring.calibrated.values())]
@@ -77,40 +77,40 @@ def joint_limits(finger: Finger) -> tuple[tuple[float, ...], tuple[float, ...]]:
 
 
 def length_range(finger: Finger, tendon: Tendon) -> tuple[float, float]:
-    """Bounds of a tendon's path length over all poses [m]: pulleys at their limits, spans from nought to stretched."""
+    """Bounds of a tendon's path length over all poses [m]: joints at their limits, spans from zero to their longest."""
     rest, reach = float(tendon.rest), 0.0
     limits = dict(zip(finger.joints, zip(*joint_limits(finger), strict=True), strict=True))
     for over in tendon.over:
         joint = over[1:]
-        leader = finger.leaders.get(joint, joint)  # a coupled pulley turns as much tendon as its leader's
+        leader = finger.leaders.get(joint, joint)  # the arcs on the pulleys of follower and leader are equal
         reach += float(finger.radii[leader]) * max(map(abs, limits[leader]))
     if tendon.span is None:
         return rest - reach, rest + reach
     points = (tendon.span.from_, tendon.span.to, *(link.offset for link in finger.links))
-    stretched = sum(sum(float(x) ** 2 for x in point) ** 0.5 for point in points)
-    return rest - reach, rest + reach + stretched
+    longest = sum(sum(float(x) ** 2 for x in point) ** 0.5 for point in points)
+    return rest - reach, rest + reach + longest
 
 
 POSE = (one, one, one, m) * 3 + (one,) * 4
 
 
 def jacobian_port(size: Size) -> Port:
-    """Velocity and angular velocity of a tip per unit velocity of each joint."""
+    """Velocity and angular velocity of the fingertip per unit velocity of each joint."""
     return Port((6, size.joints), (m / rad,) * (3 * size.joints) + (rad / rad,) * (3 * size.joints))
 
 
 def torque(size: Size) -> Port:
-    """A generalised force for every joint."""
+    """One torque per joint."""
     return Port((size.joints,), N * m)
 
 
 def inertia(size: Size) -> Port:
-    """A joint-space inertia."""
+    """A joint-space mass matrix."""
     return Port((size.joints, size.joints), kg * m**2)
 
 
 def stiffness(size: Size) -> Port:
-    """Torques per change of the joint angles."""
+    """Derivatives of joint torques by joint angles."""
     return Port((size.joints, size.joints), N * m / rad)
 
 
@@ -129,7 +129,7 @@ def fingertip_pose(finger: Any, q: Any) -> Any:
 
 @per_finger(lambda z: {"T": Port((z.links, 4, 4), POSE * z.links)}, "eq. 5.2", subject="kinematics")
 def link_poses(finger: Any, q: Any) -> Any:
-    """Pose of every link frame (at its joint, turning with the link) in the finger's base frame."""
+    """Pose of every link frame (origin at its joint, fixed to the link) in the finger's base frame."""
 
 
 @per_finger(
@@ -147,7 +147,7 @@ def jacobian(finger: Any, q: Any) -> Any:
     subject="kinematics",
 )
 def pose_and_jacobian(finger: Any, q: Any) -> Any:
-    """Pose of the fingertip and its Jacobian, both in base axes, in one call that shares their work."""
+    """Pose of the fingertip and its Jacobian, both in base axes, in one call with fewer operations."""
 
 
 # -- dynamics ---------------------------------------------------------------------------------------------
@@ -160,12 +160,12 @@ def mass_matrix(finger: Any, q: Any) -> Any:
 
 @per_finger(lambda z: {"C": coriolis(z)}, "eq. 2.17", subject="dynamics")
 def coriolis_matrix(finger: Any, q: Any, qd: Any) -> Any:
-    """Coriolis matrix of Christoffel symbols, so that dM/dt - 2 C is skew-symmetric."""
+    """Coriolis matrix by Christoffel symbols, so that dM/dt - 2 C is skew-symmetric."""
 
 
 @per_finger(lambda z: {"gravity": torque(z)}, "eq. 2.17, 5.4", subject="dynamics")
 def gravity(finger: Any, q: Any, g: Any) -> Any:
-    """Joint torques that hold the finger still against gravity g (in base axes)."""
+    """Joint torques that hold the finger at rest against gravity g (in base axes)."""
 
 
 @per_finger(lambda z: {"bias": torque(z)}, "eq. 2.17", subject="dynamics")
@@ -192,7 +192,7 @@ def forward_dynamics(finger: Any, q: Any, qd: Any, tau: Any, g: Any) -> Any:
 
 @per_finger(lambda z: {"M": inertia(z), "C": coriolis(z), "gravity": torque(z)}, "eq. 2.17", subject="dynamics")
 def dynamics(finger: Any, q: Any, qd: Any, g: Any) -> Any:
-    """Mass matrix, Coriolis matrix and gravity torques in one call that shares their work."""
+    """Mass matrix, Coriolis matrix and gravity torques in one call with fewer operations."""
 
 
 @per_finger(lambda z: {"kinetic": Port((), J), "potential": Port((), J)}, "eq. 2.16, 5.4", subject="dynamics")
@@ -205,7 +205,7 @@ def energy(finger: Any, q: Any, qd: Any, g: Any) -> Any:
 
 @per_finger(lambda z: {"h": Port((z.tendons,), m)}, "eq. 5.5, 5.18, 5.22", subject="tendons")
 def tendon_lengths(finger: Any, q: Any) -> Any:
-    """Length of every tendon's path in the finger, from its routing."""
+    """Path length of every tendon in the finger, by its routing."""
 
 
 @per_finger(lambda z: {"P": Port((z.tendons, z.joints), m / rad)}, "eq. 5.6, 5.9, 5.21", subject="tendons")
@@ -229,7 +229,7 @@ def joint_torque(finger: Any, q: Any, f: Any) -> Any:
 
 @per_finger(lambda z: {"K": stiffness(z)}, "eq. 5.12, 5.23", subject="tendons")
 def joint_stiffness(finger: Any, q: Any, f: Any, k: Any) -> Any:
-    """Joint stiffness -d tau/dq felt through tendons of stiffness k that pull with forces f."""
+    """Joint stiffness -d tau/dq of tendons with the stiffnesses k and the forces f."""
 
 
 @per_finger(
@@ -238,14 +238,14 @@ def joint_stiffness(finger: Any, q: Any, f: Any, k: Any) -> Any:
     subject="tendons",
 )
 def joint_torque_and_stiffness(finger: Any, q: Any, f: Any, k: Any) -> Any:
-    """Joint torques and joint stiffness of the tendons in one call that shares their work."""
+    """Joint torques and joint stiffness of the tendons in one call with fewer operations."""
 
 
-# -- where the joints are ---------------------------------------------------------------------------------
+# -- joint angles from tendon lengths ---------------------------------------------------------------------
 
 
 def nonlinear_estimate(finger: Finger, iterations: int = 24) -> Solver | None:
-    """Straight spans make the coupling depend on the pose: the estimate then iterates."""
+    """The solver of fingers with straight spans, whose coupling depends on the pose; None for other fingers."""
     if all(tendon.span is None for tendon in finger.tendons):
         return None
     low, high = joint_limits(finger)
@@ -269,7 +269,7 @@ def nonlinear_estimate(finger: Finger, iterations: int = 24) -> Solver | None:
     solver=nonlinear_estimate,
 )
 def joint_estimate(finger: Any, h: Any, start: Any) -> Any:
-    """Joint angles whose tendon lengths are nearest to the measured h; start is the last estimate."""
+    """Joint angles whose tendon lengths are nearest to the measured h (least squares); start is the last estimate."""
 
 
 @per_finger(
@@ -278,4 +278,4 @@ def joint_estimate(finger: Any, h: Any, start: Any) -> Any:
     subject="joint_estimate",
 )
 def joint_estimate_error(finger: Any, q: Any, noise: Any) -> Any:
-    """Error of the joint estimate: covariance for lengths of standard deviation noise, worst for errors up to noise."""
+    """Errors of the joint estimate: covariance for lengths with standard deviation noise, worst for errors up to noise."""

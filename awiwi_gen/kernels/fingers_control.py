@@ -1,4 +1,4 @@
-"""What a finger's tendons can do for its joints: their stiffness, and their forces for a torque and a stiffness."""
+"""Stiffness of a finger's tendons, and their forces for a joint torque and a joint stiffness."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ SEARCHES, INVERSIONS = 3 * 97, 66  # evaluations of the curve in the worst case,
 
 @dataclass(frozen=True)
 class Elastic:
-    """What makes a finger's tendons elastic: springs and fibres of the hand, or limits where it tells of no springs.
+    """The elastic elements of a finger's tendons: springs and fibres of the hand, or its limits if it has no springs.
 
-    `tendons` are the finger's, counted through the hand.
+    `tendons` are the indices of the finger's tendons in the hand.
     """
 
     hand: Any
@@ -32,9 +32,9 @@ class Elastic:
 
     @property
     def springs(self) -> list[Any]:
-        """The mechanism of every tendon."""
-        own = self.hand.spring.calibrated
-        return [own.get(tendon, self.hand.spring) for tendon in self.tendons]
+        """The spring mechanism of every tendon."""
+        calibrated = self.hand.spring.calibrated
+        return [calibrated.get(tendon, self.hand.spring) for tendon in self.tendons]
 
     @property
     def fibre(self) -> Any:
@@ -52,17 +52,21 @@ class Elastic:
         return found
 
     def symbolic(self, leaf: Any) -> Elastic:
-        """The same with `leaf(path, quantity)` in the place of each number."""
+        """A copy with `leaf(path, quantity)` instead of each number."""
         return replace(self, hand=self.hand.symbolic(leaf))
 
     def structure(self) -> dict[str, Any]:
-        """All that is not a number."""
+        """Everything but the numbers."""
         spring = self.hand.spring
-        own = [tendon if spring and tendon in spring.calibrated else None for tendon in self.tendons]
-        return {"spring": spring and spring.structure(), "fibre": bool(self.fibre), "own springs of tendons": own}
+        calibrated = [tendon if spring and tendon in spring.calibrated else None for tendon in self.tendons]
+        return {
+            "spring": spring and spring.structure(),
+            "fibre": bool(self.fibre),
+            "calibrated tendons": calibrated,
+        }
 
     def range(self) -> tuple[float, float]:
-        """Forces [N] between which the stiffness of every tendon is known."""
+        """Range of forces [N] that every tendon's curve covers."""
         if self.limits:
             return 0.0, float(self.limits.tendon_force)
         levers = [Lever(spring) for spring in self.springs]
@@ -86,10 +90,10 @@ def elastic_kernels(hand: Hand, name: str, finger: Finger) -> list[Kernel]:
         "k": Port((tendons,), N / m), "slope": Port((tendons,), one / m), "curvature": Port((tendons,), one / (N * m)),
     },
     "figure 4.7, section 4.3",
-    guards=("every tension is on its spring's curve, give or take a hundredth",),
+    guards=("every tension is on its spring's curve, with a margin of 0.4 %",),
 )  # fmt: skip
 def tendon_stiffness(elastic: Any, tension: Any) -> Any:
-    """Stiffness of every tendon that is pulled with a tension: spring and fibre in series, and its derivatives.
+    """Stiffness of every tendon at its tension, spring and fibre in series, and its derivatives.
 
     slope and curvature are dk/df and d2k/df2.
     """
@@ -99,7 +103,7 @@ def tendon_stiffness(elastic: Any, tension: Any) -> Any:
 
 
 def senses(finger: Finger, tendon: Tendon) -> Counter[str]:
-    """How often, and in which sense, a tendon rolls on the pulleys of each independent joint."""
+    """Signed number of pulleys of each independent joint that a tendon runs over."""
     found: Counter[str] = Counter()
     for over in tendon.over:
         found[finger.leaders.get(over[1:], over[1:])] += 1 if over[0] == "+" else -1
@@ -114,7 +118,7 @@ def moved(finger: Finger, tendon: Tendon) -> set[str]:
 
 
 def groups(finger: Finger) -> list[list[int]]:
-    """The tendons, those that share joints together."""
+    """The tendons in groups; tendons that share a joint are in one group."""
     found: list[tuple[set[str], list[int]]] = []
     for i, tendon in enumerate(finger.tendons):
         joints, members = moved(finger, tendon), [i]
@@ -126,15 +130,15 @@ def groups(finger: Finger) -> list[list[int]]:
 
 
 def antagonists(finger: Finger, group: list[int]) -> list[tuple[int, int]]:
-    """A group as one or two pairs of opposite couplings that are independent of each other; none if it is not that."""
-    left, pairs = list(group), []
-    while left:
-        first = left.pop(0)
-        own = senses(finger, finger.tendons[first])
-        second = next((i for i in left if _opposite(own, senses(finger, finger.tendons[i]))), None)
-        if second is None or not own or any(finger.tendons[i].span for i in (first, second)):
+    """A group as one or two independent pairs of tendons with opposite couplings; empty if it is not such a group."""
+    rest, pairs = list(group), []
+    while rest:
+        first = rest.pop(0)
+        signs = senses(finger, finger.tendons[first])
+        second = next((i for i in rest if _opposite(signs, senses(finger, finger.tendons[i]))), None)
+        if second is None or not signs or any(finger.tendons[i].span for i in (first, second)):
             return []
-        left.remove(second)
+        rest.remove(second)
         pairs.append((first, second))
     if len(pairs) == 2:
         a, b = (senses(finger, finger.tendons[first]) for first, _ in pairs)
@@ -148,18 +152,18 @@ def _opposite(a: Counter[str], b: Counter[str]) -> bool:
 
 
 def distribution(finger: Finger) -> Solver:
-    """Formulas for the tendons that are antagonistic pairs, a search for the others."""
+    """Closed forms for antagonistic pairs of tendons, a search for all others."""
     pairs: list[tuple[int, int, int]] = []
     searched: list[int] = []
     for group in groups(finger):
         found, first = antagonists(finger, group), len(pairs)
         pairs += [(a, b, first + (len(found) - 1 - i)) for i, (a, b) in enumerate(found)]
         searched += [] if found else group
-    bent = any(tendon.span for tendon in finger.tendons)
+    spans = any(tendon.span for tendon in finger.tendons)
     return Solver(
         template="tendon_distribution.c.j2",
         problem="distribution",
-        uses=("coupling", "tendon_stiffness", *(["coupling_derivative"] if bent else [])),
+        uses=("coupling", "tendon_stiffness", *(["coupling_derivative"] if spans else [])),
         equations=tuple(range(len(finger.tendons))),
         unknowns=tuple(range(len(finger.joints))),
         arrays={},
@@ -176,8 +180,8 @@ def distribution(finger: Finger) -> Solver:
 
 @per_finger(lambda z: {"f": Port((z.tendons,), N)}, "eq. 7.2, 7.6, mended", solver=distribution)
 def tendon_distribution(finger: Any, q: Any, tau: Any, K: Any, f_min: Any, f_max: Any) -> Any:
-    """Tendon forces from f_min to f_max that give the joint torque tau and come nearest to the joint stiffness K.
+    """Tendon forces from f_min to f_max for the joint torque tau and the nearest possible joint stiffness to K.
 
-    The torque is exact where the limits allow it, else the nearest (AWIWI_INFEASIBLE). The stiffness is the nearest
-    of all with that torque, by the sum of the squares of the errors of all entries (the squared Frobenius norm).
+    The torque is exact if the limits allow it, otherwise the nearest possible one (status AWIWI_INFEASIBLE). Of all
+    forces with that torque, the result has the least error of the stiffness in the Frobenius norm.
     """

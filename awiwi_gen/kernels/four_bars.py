@@ -1,4 +1,4 @@
-"""The kernels of four-bar linkages: for every link that rides on a coupler, as the fifth finger's metacarpal does."""
+"""The kernels of four-bar linkages, one set per link that is mounted on a coupler, as the fifth metacarpal is."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def four_bar_kernels(name: str, finger: Finger) -> list[Kernel]:
 
 
 def joint_port(link: Link) -> Port:
-    """The angle of the joint that turns the crank."""
+    """The angle of the joint that drives the crank."""
     return Port((), rad, float(link.low or 0), float(link.high or 0))
 
 
@@ -46,7 +46,7 @@ def joint_port(link: Link) -> Port:
     guards=("the loop closes",),
 )
 def four_bar(bar: Any, q: Any) -> Any:
-    """Angles of coupler and rocker at a joint angle, and their turns per turn of the joint.
+    """Angles of coupler and rocker at a joint angle, and their derivatives by it, the ratios.
 
-    The transmission is the sine of the angle between coupler and rocker: where it is zero the linkage locks.
+    The transmission is the sine of the angle between coupler and rocker; at zero the linkage locks.
     """

@@ -1,7 +1,7 @@
-"""What the motors and springs of a finger's tendons, and the wrist, tell about its tendon lengths (eq. 5.1).
+"""Tendon lengths of a finger from its motors, its springs and the wrist (eq. 5.1).
 
-The finger, the wrist and the motor's pulley take of a tendon's length l0; more than that stretches it, by
-h + w + r theta - l0. Here this is solved for h, which `joint_estimate` turns into joint angles.
+The path in the finger, the path in the wrist and the motor's pulley share a tendon of length l0; the rest is its
+elongation, h + w + r theta - l0. Solved for h, this is the input of `joint_estimate`.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ of_driven: Family[int] = Family("joint_estimate")  # sized by the number of tend
 
 
 def measured_kernels(hand: Hand) -> list[Kernel]:
-    """The kernels of every finger together with the motors behind it: of a hand with this finger only."""
+    """The kernels of every finger with its motors: each is that of a hand with this finger only."""
     alone = {name: hand.model_copy(update={"fingers": {name: hand.fingers[name]}}) for name in hand.fingers}
     return [
         kernel
@@ -28,7 +28,7 @@ def measured_kernels(hand: Hand) -> list[Kernel]:
 
 
 def measured_ports(hand: Hand) -> dict[str, Port]:
-    """Motor angles, elongations, and what the wrist takes of the tendons, with the ranges of this hand."""
+    """Motor angles, elongations and path lengths in the wrist, with the ranges of this hand."""
     shape, limits = (hand.tendons,), hand.limits
     longest = float(limits.tendon_force) / float(limits.tendon_stiffness_low)
     ports = {"x": Port(shape, m, 0.0, longest)}
@@ -42,7 +42,7 @@ def measured_ports(hand: Hand) -> dict[str, Port]:
 
 @of_driven(lambda tendons: {"h": Port((tendons,), m)}, "eq. 5.1")
 def measured_lengths(hand: Any, theta: Any, x: Any, w: Any = None) -> Any:
-    """Tendon lengths in the finger, of motor angles theta, elongations x and changes w of the lengths in the wrist.
+    """Tendon lengths in the finger from motor angles theta, elongations x and changes w of the lengths in the wrist.
 
-    All three count from the straight finger at which they were zeroed. The motor reels in for positive theta.
+    All three are zero at the straight finger. A positive theta winds the tendon up.
     """

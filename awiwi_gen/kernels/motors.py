@@ -18,7 +18,7 @@ def motor_kernels(hand: Hand, motor: Motor) -> list[Kernel]:
 
 
 def motor_ports(hand: Hand, motor: Motor) -> dict[str, Port]:
-    """The ports an argument name stands for, with the ranges of this motor."""
+    """The input ports by argument name, with the ranges of this motor."""
 
     def symmetric(unit: Unit, limit: Any) -> Port:
         return Port((), unit, -float(limit), float(limit))
@@ -37,27 +37,27 @@ TORQUE = {"tau": Port((), N * m)}
 
 @of_motor(lambda _: {"energy": Port((), J)}, "eq. 3.1")
 def energy(motor: Any, thd: Any) -> Any:
-    """Kinetic energy of rotor and gear: half of B thd^2, with the inertia B that the output shaft feels."""
+    """Kinetic energy of rotor and gear: half of B thd^2, with the inertia B reflected to the output shaft."""
 
 
 @of_motor(lambda _: TORQUE, "eq. 3.8")
 def friction(motor: Any, thd: Any) -> Any:
-    """Friction torque of motor and gear at the speed thd: what the motor must overcome, positive for positive thd."""
+    """Friction torque of motor and gear at the speed thd; it has the sign of thd and opposes the motor."""
 
 
 @of_motor(lambda _: {"damping": Port((), N * m * s / rad)}, "eq. 3.8, differentiated")
 def damping(motor: Any, thd: Any) -> Any:
-    """Slope of the friction torque; an explicit step of a simulation must stay below 2 B / damping."""
+    """Slope of the friction torque; explicit integration needs steps shorter than 2 B / damping."""
 
 
 @of_motor(lambda _: TORQUE, "eq. 3.4, 3.5")
 def ripple(motor: Any, theta: Any) -> Any:
-    """Periodic disturbance torque of both shafts at the angle theta: what the motor must overcome."""
+    """Periodic disturbance torque of both shafts at the angle theta; positive values oppose the motor."""
 
 
 @of_motor(lambda _: TORQUE, "section 3.2")
 def compensation(motor: Any, theta: Any, thd: Any) -> Any:
-    """Motor torque to feed forward against friction and ripple: the share of both that is safe to compensate."""
+    """Motor torque to feed forward against friction and ripple: the share `compensation` of both."""
 
 
 @of_motor(lambda _: {"thdd": Port((), rad / s**2)}, "eq. 3.2, 3.5")

@@ -1,7 +1,7 @@
-"""The plants that laws are tried on (chapters 10 to 15), as the rates of their states: what a simulation integrates.
+"""The plants of control laws (chapters 10 to 15), as the rates of their states, which a simulation integrates.
 
-All their numbers are inputs. Beside a plant's rates come the quantities that sensors see. What a law believes of its
-springs, and an observer of motions, are kernels of the same kind.
+All their parameters are inputs. A plant also returns the quantities that sensors measure. The springs of an antagonistic
+joint, as a law models them, are a kernel of the same kind.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from awiwi_gen.units import N, Unit, kg, m, rad, s
 
 
 def plant_kernels() -> list[Kernel]:
-    """All plants; they need no hand."""
+    """All plants; they read no number of a hand."""
     return [
         kernel
         for family, ports in ((of_tendon, TENDON), (of_joint, JOINT), (of_pair, PAIR), (of_finger, FINGER))
@@ -32,7 +32,7 @@ MOTION, RATES = (rad, rad / s), (rad / s, rad / s**2)
 
 
 def box(units: tuple[Unit, ...], low: tuple[float, ...], high: tuple[float, ...], rows: int = 1) -> Port:
-    """A port of mixed units; with several rows, one after the other of the same kind."""
+    """A port of mixed units; several rows have the same units and ranges."""
     return Port((rows, len(units)) if rows > 1 else (len(units),), units * rows, low * rows, high * rows)
 
 
@@ -42,7 +42,7 @@ def state(bodies: int) -> Port:
 
 
 def rates(bodies: int) -> Port:
-    """What a state changes by."""
+    """Rates of the angle and speed of each body."""
     return Port((2 * bodies,), RATES * bodies)
 
 
@@ -74,7 +74,7 @@ PAIR = FRICTION | {
     "stretches": Port((2,), rad, -1.0, 2.0),
     "speeds": Port((2,), rad / s, -50.0, 50.0),
 }
-JOINTS, TENDONS = 4, 8  # of the fingers that the last plant is for
+JOINTS, TENDONS = 4, 8  # of the finger of the last plant
 FINGER = FRICTION | {
     **{name: TENDON[name] for name in ("motor", "line")},
     "thetas": Port((TENDONS,), rad, -5.0, 5.0),
@@ -92,10 +92,10 @@ TORQUES, LOCAL = (TORQUE, TORQUE / s), (STIFFNESS, TORQUE / rad**2)
 
 @of_tendon(lambda _: {"xd": rates(1), "f": Port((), N)}, "eq. 10.1, mended; eq. 3.8")
 def plant_tendon(_: Any, x: Any, u: Any, path: Any, motor: Any, line: Any, friction: Any) -> Any:
-    """A motor that winds up a tendon with a spring, the joint held: rates of x = (theta, theta'), and the force f.
+    """A motor that winds up a tendon with a spring, at a fixed joint: rates of x = (theta, theta'), and the force f.
 
-    path is what the joint takes of the tendon; motor is (inertia, pulley's radius), line the spring's (k1, k2, k3) of
-    f = k1 p + k2 p^2 + k3 p^3 where it is taut, friction is (steepness, level, viscosity).
+    path is the tendon's path length at the joint. motor is (inertia, pulley's radius), friction is (steepness, level,
+    viscosity). line is (k1, k2, k3) of the spring's force f = k1 p + k2 p^2 + k3 p^3 for elongations p > 0.
     """
 
 
@@ -106,7 +106,7 @@ def plant_tendon(_: Any, x: Any, u: Any, path: Any, motor: Any, line: Any, frict
 def plant_joint_linear(_: Any, x: Any, u: Any, load: Any, plant: Any, damping: Any) -> Any:
     """A link behind a linear spring: rates of x = (q, q', theta, theta'), and the spring's torque tau with its rate.
 
-    plant is (link, motor, spring), damping what holds link and motor back.
+    plant is (link's inertia, motor's inertia, stiffness), damping is that of link and motor.
     """
 
 
@@ -115,7 +115,7 @@ def plant_joint_linear(_: Any, x: Any, u: Any, load: Any, plant: Any, damping: A
     "eq. 15.71",
 )
 def plant_joint_nonlinear(_: Any, x: Any, u: Any, load: Any, bodies: Any, curve: Any, damping: Any) -> Any:
-    """The same behind a spring phi(d) = k1 d + k3 d^3, with the coefficients curve; spring is (phi', phi'')."""
+    """A link behind a spring phi(d) = k1 d + k3 d^3 with curve = (k1, k3); spring is (phi', phi'')."""
 
 
 @of_pair(
@@ -125,10 +125,10 @@ def plant_joint_nonlinear(_: Any, x: Any, u: Any, load: Any, bodies: Any, curve:
 def plant_antagonistic(
     _: Any, x: Any, u: Any, load: Any, inertias: Any, tendons: Any, damping: Any, friction: Any
 ) -> Any:
-    """A link between two tendons: rates of (q, q', theta1, theta1', theta2, theta2'); elongations and torques of both.
+    """A link between two tendons: rates of (q, q', theta1, theta1', theta2, theta2'), elongations and spring torques.
 
     inertias are (link, motor 1, motor 2), a row of tendons is (k1, k2, k3) of phi = k1 p + k2 p^2 + k3 p^3, where p is
-    the elongation theta1 - q or theta2 + q of a taut tendon; friction of either motor is (steepness, level, viscosity).
+    the elongation theta1 - q or theta2 + q if positive. friction of each motor is (steepness, level, viscosity).
     """
 
 
@@ -137,17 +137,17 @@ def plant_antagonistic(
     "eq. 15.71, 15.82",
 )
 def antagonistic_springs(_: Any, stretches: Any, speeds: Any, tendons: Any) -> Any:
-    """What both springs of such a joint do at given elongations: a row (tau, tau') and a row (phi', phi'') for each."""
+    """Torque and rate (tau, tau'), slope and curvature (phi', phi'') of both springs of an antagonistic joint."""
 
 
 @of_finger(lambda _: {"f": Port((TENDONS,), N)}, "section 5.1, eq. 10.1")
 def plant_finger_forces(_: Any, thetas: Any, path: Any, slack: Any, motor: Any, line: Any) -> Any:
-    """Forces of a finger's tendons: path is what its joints take of each, slack where it begins to pull.
+    """Forces of a finger's tendons: path is their length at the joints, slack the total length at which each gets taut.
 
-    The first half of a finger's plant. Joint torques and the joints' acceleration follow from the finger's own kernels.
+    This is the first half of a finger's plant. Joint torques and accelerations follow from the finger's own kernels.
     """
 
 
 @of_finger(lambda _: {"xd": Port((len(FINGER_RATES),), FINGER_RATES)}, "eq. 10.1, mended")
 def plant_finger(_: Any, qd: Any, qdd: Any, thds: Any, f: Any, u: Any, motor: Any, friction: Any) -> Any:
-    """The other half: rates of (q, q', theta, theta') of four joints, which accelerate with qdd, and eight motors."""
+    """Second half of a finger's plant: rates of (q, q', theta, theta') of four joints with accelerations qdd, 8 motors."""

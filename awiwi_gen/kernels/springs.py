@@ -1,4 +1,4 @@
-"""The kernels of the lever springs and of the sensors on their levers."""
+"""The kernels of the lever springs and of their angle sensors."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ of_spring: Family[None] = Family("spring_curve")
 of_sensors: Family[int] = Family("spring_curve")  # sized by the number of tendons
 of_bench: Family[None] = Family("calibration")
 
-WITHIN = ("the argument is within the lever's travel, give or take a hundredth",)
+WITHIN = ("the argument is within the lever's travel, with a margin of 0.4 %",)
 
 
 def spring_kernels(hand: Hand, spring: Spring) -> list[Kernel]:
-    """All kernels of the spring, which is the same for all tendons, and of its sensors, which may differ."""
+    """All kernels of the spring, which all tendons share, and of its sensors, which may differ."""
     structure = {"spring": spring.structure(), "tendons": hand.tendons}
     ports, bench = spring_ports(spring), bench_ports(spring)
     sensors = {"readings": reading_port(spring, hand.tendons)}
@@ -30,7 +30,7 @@ def spring_kernels(hand: Hand, spring: Spring) -> list[Kernel]:
 
 
 def spring_ports(spring: Spring) -> dict[str, Port]:
-    """Lever angle, elongation and force: each has the range that the lever's travel gives it."""
+    """Lever angle, elongation and force, with the ranges of the lever's travel."""
     lever = Lever(spring)
     return {
         "theta": Port((), rad, *sorted((lever.slack, lever.taut))),
@@ -41,14 +41,14 @@ def spring_ports(spring: Spring) -> dict[str, Port]:
 
 def reading_port(spring: Spring, tendons: int) -> Port:
     """The readings of all sensors [counts]."""
-    own = spring.calibrated
-    sensors = [own.get(tendon, spring).sensor for tendon in range(tendons)]
+    calibrated = spring.calibrated
+    sensors = [calibrated.get(tendon, spring).sensor for tendon in range(tendons)]
     ends = [sorted((float(sensor.slack), float(sensor.taut))) for sensor in sensors]
     return Port((tendons,), one, tuple(low for low, _ in ends), tuple(high for _, high in ends))
 
 
 def bench_ports(spring: Spring) -> dict[str, Port]:
-    """One reading, the sensor's ends, which may lie a sixteenth of the travel from those designed, and coefficients."""
+    """One reading, the sensor's ends, up to a sixteenth of the travel off the designed ones, and coefficients."""
     lever = Lever(spring)
     slack, taut = float(spring.sensor.slack), float(spring.sensor.taut)
     play, (low, high) = abs(taut - slack) / 16, sorted((slack, taut))
@@ -64,7 +64,7 @@ def bench_ports(spring: Spring) -> dict[str, Port]:
 
 
 def tendon_state(shape: tuple[int, ...]) -> dict[str, Port]:
-    """What a lever tells of its tendon."""
+    """The tendon's length in the mechanism, its force and its stiffness."""
     return {"dL": Port(shape, m), "force": Port(shape, N), "stiffness": Port(shape, N / m)}
 
 
@@ -75,7 +75,7 @@ def tendon_state(shape: tuple[int, ...]) -> dict[str, Port]:
     guards=(
         "the roller is clear of the motor's pulley",
         "the roller is clear of the fixed pulley",
-        "the tendon turns the lever towards its taut end",
+        "the tendon pulls the lever towards its taut end",
         "the spring is stretched",
     ),
 )
@@ -87,7 +87,7 @@ def lever(spring: Any, theta: Any) -> Any:
 def force(spring: Any, x: Any) -> Any:
     """Tendon force at the elongation x, counted from the slack end of the lever's travel.
 
-    A polynomial that the check of the hand file has found within 1e-6 of the largest force from the lever's own.
+    A polynomial; checking the hand file ensures that it differs from the mechanism by less than 1e-6 of the largest force.
     """
 
 
@@ -98,17 +98,17 @@ def stiffness(spring: Any, x: Any) -> Any:
 
 @of_spring(lambda _: {"x": Port((), m)}, "figure 4.7", guards=WITHIN)
 def elongation(spring: Any, f: Any) -> Any:
-    """Elongation at which the tendon's force is f: the inverse of the force."""
+    """Elongation at which the tendon's force is f."""
 
 
 @of_sensors(lambda tendons: tendon_state((tendons,)), "section 4.1", guards=WITHIN)
 def readings(spring: Any, readings: Any) -> Any:
-    """dL, force and stiffness of every tendon from its sensor: the design's, or its own where it was calibrated."""
+    """dL, force and stiffness of every tendon from its sensor, by the design or by the tendon's own calibration."""
 
 
 @of_bench(lambda _: tendon_state(()), "section 4.1", guards=WITHIN)
 def polynomials(_: Any, counts: Any, ends: Any, length_powers: Any, force_powers: Any, stiffness_powers: Any) -> Any:
-    """dL, force and stiffness of one sensor's counts by polynomials from the bench, coefficients from the constant up.
+    """dL, force and stiffness at one sensor's counts by polynomials from the bench, constant coefficient first.
 
-    Their argument is (2 counts - ends[0] - ends[1]) / (ends[1] - ends[0]): -1 at the slack end, 1 at the taut one.
+    The argument is (2 counts - ends[0] - ends[1]) / (ends[1] - ends[0]): -1 at the slack end, 1 at the taut end.
     """

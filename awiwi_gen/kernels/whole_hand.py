@@ -1,8 +1,8 @@
 """The tendons of the whole hand: 38 of them and 19 joints in the Awiwi hand, in the order of its fingers.
 
-Arrays over all joints and all tendons keep the structure of the hand: `Hand.blocks` tells the rows and columns of each
-finger. Outside these blocks the coupling and the stiffness are zero: written, but never computed. The fingers' tendons
-do not feel each other's joints, and the wrist moves tendons only: its two columns are those of `wrist_coupling`.
+`Hand.blocks` has the rows (tendons) and columns (joints) of each finger. Outside these blocks the coupling and the
+stiffness are constant zeros, since a finger's tendons do not depend on the joints of other fingers. The wrist changes
+tendon lengths only; its coupling has two columns of its own, in `wrist_coupling`.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def hand_kernels(hand: Hand) -> list[Kernel]:
 
 
 def joined(ports: list[Port]) -> Port:
-    """One port after the other, as one vector."""
+    """Several ports joined into one vector."""
     low, high = zip(*(bound for port in ports for bound in port.bounds()), strict=True)
     return Port((len(low),), tuple(unit for port in ports for unit in port.units), low, high)
 
@@ -44,7 +44,7 @@ def joined(ports: list[Port]) -> Port:
     guards=BARS_CLOSE,
 )
 def tendon_lengths(hand: Any, q: Any, wrist: Any = None) -> Any:
-    """Length of every tendon's path in its finger and in the wrist, whose internal angles are wrist = (q71, q73)."""
+    """Path length of every tendon in its finger and in the wrist, at its internal angles wrist = (q71, q73)."""
 
 
 @of_hand(lambda z: {"P": Port((z.tendons, z.joints), m / rad)}, "eq. 5.6, 5.9, 5.21")
@@ -62,4 +62,4 @@ def joint_torque(hand: Any, q: Any, f: Any) -> Any:
     "eq. 5.12, 5.23",
 )
 def joint_stiffness(hand: Any, q: Any, f: Any, k: Any) -> Any:
-    """Joint stiffness -d tau/dq through tendons of stiffness k that pull with forces f; zero outside the blocks."""
+    """Joint stiffness -d tau/dq of tendons with the stiffnesses k and the forces f; zero outside the blocks."""

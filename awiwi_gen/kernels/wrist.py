@@ -1,4 +1,4 @@
-"""The kernels of the wrist: from its two internal angles to the palm and to the tendons' lengths."""
+"""The kernels of the wrist: palm pose and tendon lengths from its two internal angles."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from awiwi_gen.kernels.fingers import POSE
 from awiwi_gen.units import m, rad
 
 BARS_CLOSE = (
-    "the side bars are short of the line B0C0 (q73 between 0 and pi)",
-    "their plane is short of A0",
-    "bar AA0 reaches",
+    "q73 is between 0 and pi",
+    "the plane of the side bars has not passed A0",
+    "bar AA0 closes the loop",
 )
 
 of_wrist: Family[int] = Family("wrist")  # sized by the number of tendons
@@ -41,7 +41,7 @@ def palm_pose(wrist: Any, q71: Any, q73: Any) -> Any:
 
 @of_wrist(lambda tendons: {"h": Port((tendons,), m)}, "eq. 6.9", guards=BARS_CLOSE)
 def tendon_lengths(wrist: Any, q71: Any, q73: Any) -> Any:
-    """Length of every tendon's straight run through the wrist."""
+    """Length of every tendon's straight path through the wrist."""
 
 
 @of_wrist(

@@ -1,4 +1,4 @@
-"""The same in the pair's two modes: against each other the motors move the link, together they pull."""
+"""Linear control of a joint between two tendons, by its differential mode, which moves the link, and common mode."""
 
 from __future__ import annotations
 
@@ -7,19 +7,19 @@ from typing import Any
 import casadi as ca
 from casadi import SX
 
-MIX = ca.DM([[1, 1], [1, -1]])  # (together, against) to (motor 1, motor 2)
+MIX = ca.DM([[1, 1], [1, -1]])  # (common, differential) mode to (motor 1, motor 2)
 
 
 def antagonistic_setpoint(
     _: Any, desired: SX, pretension: SX, elongations: SX, slopes: SX, inertias: SX, damping: SX
 ) -> tuple[SX, SX, list[SX]]:
-    """State and torques of a desired motion: motors follow from the link by its own equation, differentiated."""
+    """State and torques of a desired motion: the link's motion as a polynomial of time, differentiated."""
     time = ca.SX.sym("t")
-    powers = [SX(1), time, time**2 / 2, time * time**2 / 6, time**2 * time**2 / 24]
-    q = sum((d * p for d, p in zip(ca.vertsplit(desired), powers, strict=True)), SX(0))
-    against = (inertias[0] * _rate(_rate(q, time), time) + damping * _rate(q, time)) / 2
-    springs = MIX @ ca.vertcat(pretension[0], against)
-    strain = ca.vertcat(against, -against) / slopes
+    taylor = [SX(1), time, time**2 / 2, time * time**2 / 6, time**2 * time**2 / 24]
+    q = sum((d * p for d, p in zip(ca.vertsplit(desired), taylor, strict=True)), SX(0))
+    differential = (inertias[0] * _rate(_rate(q, time), time) + damping * _rate(q, time)) / 2
+    springs = MIX @ ca.vertcat(pretension[0], differential)
+    strain = ca.vertcat(differential, -differential) / slopes
     motors = elongations + strain + ca.vertcat(q, -q)
     speeds = _rate(motors, time)
     torques = springs + inertias[1:] * _rate(speeds, time)
@@ -39,7 +39,7 @@ def antagonistic_feedback(_: Any, x: SX, x_des: SX, u_des: SX, feedback: SX, res
 
 
 def antagonistic_modes(_: Any, motors: SX) -> tuple[SX, SX]:
-    """Angle and speed against each other, and together."""
+    """(Angle, speed) of the differential and of the common mode."""
     modes = MIX @ ca.reshape(motors, 2, 2).T / 2
     return modes[1, :].T, modes[0, :].T
 

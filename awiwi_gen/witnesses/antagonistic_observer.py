@@ -1,4 +1,4 @@
-"""The same observer with matrices: three chains of integrators side by side, forces as gradients of energies."""
+"""The observer with matrices: three chains of integrators side by side, forces as gradients of energies."""
 
 from __future__ import annotations
 
@@ -17,25 +17,25 @@ def antagonistic_observer(
     _: Any, memory: SX, thetas: SX, stretches: SX, measured: SX, acted: SX, acting: SX,
     inertias: SX, tendons: SX, damping: SX, friction: SX, bandwidths: SX, period: SX,
 ) -> tuple[SX, ...]:  # fmt: skip
-    """One sample: the memory (13), and what the law is told; a column of motions for the link and each motor."""
+    """One sample: the memory (13) and the law's inputs. Matrices of motions have a column for the link and each motor."""
     bodies = (inertias, damping, friction, period)
     poles = ca.exp(-bandwidths * period)
-    before, felt, scales = ca.reshape(memory[:9], 3, 3), memory[9:11], memory[11:]
+    before, last, scales = ca.reshape(memory[:9], 3, 3), memory[9:11], memory[11:]
     seen = ca.horzcat(ca.dot(ca.SX([1, -1]), thetas - stretches) / 2, thetas.T)
-    predicted = _moved(before, acted, felt, *bodies)
+    predicted = _moved(before, acted, last, *bodies)
     gains = ca.horzcat(*(_gains(poles[i], period) for i in (0, 1, 1)))
     present = predicted + gains * ca.repmat(seen - predicted[0, :], 3, 1)
 
-    places, changes = LENGTHENED @ present[0, :].T, LENGTHENED @ (present - before)[0, :].T
-    torques, learnt, local = SX(2, 1), SX(2, 1), SX(2, 2)
+    elongations, changes = LENGTHENED @ present[0, :].T, LENGTHENED @ (present - before)[0, :].T
+    torques, new_scales, local = SX(2, 1), SX(2, 1), SX(2, 2)
     for i in (0, 1):
-        force, slope, curvature = gradients(pulling(tendons[3 * i :]), taut(places[i]))
-        expected = felt[i] + scales[i] * slope * changes[i]
+        force, slope, curvature = gradients(pulling(tendons[3 * i :]), taut(elongations[i]))
+        expected = last[i] + scales[i] * slope * changes[i]
         torques[i] = poles[2] * expected + (1 - poles[2]) * measured[i]
         weight = force / (force**2 + (tendons[3 * i] / FLOOR) ** 2)
-        certain = (1 - poles[3]) * weight * force
-        learnt[i] = (1 - certain) * scales[i] + (1 - poles[3]) * weight * torques[i]
-        local[:, i] = learnt[i] * ca.vertcat(slope, curvature)
+        confidence = (1 - poles[3]) * weight * force
+        new_scales[i] = (1 - confidence) * scales[i] + (1 - poles[3]) * weight * torques[i]
+        local[:, i] = new_scales[i] * ca.vertcat(slope, curvature)
 
     ahead = _moved(present, acting, torques, *bodies)
     values = torques + local[0, :].T * (LENGTHENED @ (ahead - present)[0, :].T)
@@ -43,7 +43,7 @@ def antagonistic_observer(
     modelled = ca.vertcat(*(_friction(friction, ahead[1, i])[0] for i in (1, 2)))
     unexplained = inertias * ahead[2, :].T
     return (
-        ca.vertcat(ca.vec(present), torques, learnt),
+        ca.vertcat(ca.vec(present), torques, new_scales),
         ahead[:2, 0],
         ca.vec(ahead[:2, 1:]),
         ca.vec(ca.horzcat(values, rates).T),
@@ -55,7 +55,7 @@ def antagonistic_observer(
 
 
 def _moved(motions: SX, motors: SX, torques: SX, inertias: SX, damping: SX, friction: SX, period: SX) -> SX:
-    """Motions (3, 3) a sample later: each position follows its speed, each speed the acceleration."""
+    """Motions (3, 3) a sample later: positions integrate speeds, and speeds accelerations."""
     forces = ca.vertcat(0, motors) - LENGTHENED.T @ torques
     resisting = ca.vertcat(damping * motions[1, 0], *(_friction(friction, motions[1, i])[0] for i in (1, 2)))
     steep = ca.vertcat(0, *(_friction(friction, motions[1, i])[1] for i in (1, 2)))
@@ -67,7 +67,7 @@ def _moved(motions: SX, motors: SX, torques: SX, inertias: SX, damping: SX, fric
 
 
 def _gains(pole: SX, period: SX) -> SX:
-    """By which an error of position corrects a motion: so that det(x - (1 - gains (1, 0, 0)) F) is (x - pole)^3."""
+    """Observer gains (3) for which det(x - (1 - gains (1, 0, 0)) F) is (x - pole)^3."""
     position = 1 - pole * pole**2
     acceleration = position - 3 * pole * (1 - pole)
     speed = 3 * (1 - pole) - position - acceleration / 2
@@ -78,5 +78,5 @@ def _friction(numbers: SX, speed: SX) -> tuple[SX, SX]:
     """Friction torque at a speed, and its slope."""
     v = ca.SX.sym("v")
     torque = ca.gradient(dry(numbers, v), v)
-    found = ca.substitute([torque, ca.gradient(torque, v)], [v], [speed])
-    return found[0], found[1]
+    values = ca.substitute([torque, ca.gradient(torque, v)], [v], [speed])
+    return values[0], values[1]

@@ -12,10 +12,10 @@ from awiwi_gen.hand.lever import BEYOND
 def polynomials(
     _: Any, counts: SX, ends: SX, length_powers: SX, force_powers: SX, stiffness_powers: SX
 ) -> tuple[SX, SX, SX, list[SX]]:
-    """dL [m], force [N] and stiffness [N/m] at a reading, of which the place is -1 and 1 at the two `ends`."""
-    place = ((counts - ends[0]) + (counts - ends[1])) / (ends[1] - ends[0])
+    """dL [m], force [N] and stiffness [N/m] at a reading, scaled to -1 and 1 at the two `ends`."""
+    x = ((counts - ends[0]) + (counts - ends[1])) / (ends[1] - ends[0])
 
     def value(powers: SX) -> SX:
-        return reduce(lambda total, power: total * place + power, reversed(ca.vertsplit(powers)))
+        return reduce(lambda total, power: total * x + power, reversed(ca.vertsplit(powers)))
 
-    return value(length_powers), value(force_powers), value(stiffness_powers), [float(BEYOND) - place**2]
+    return value(length_powers), value(force_powers), value(stiffness_powers), [float(BEYOND) - x**2]

@@ -1,4 +1,4 @@
-"""The certificate of the cascade by minors and by Cramer's rule on the Lyapunov equation (CasADi)."""
+"""The certificate of the cascade by minors, and by Cramer's rule on the Lyapunov equation."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from awiwi_gen.witnesses.symmetric_matrix import least, pivots, symmetric
 
 
 def cascade_certificate(_: Any, D: SX, P: SX, kp: SX, kd: SX, weight: SX, omega: SX) -> tuple[SX, SX, list[SX]]:
-    """Margin, and S11, S12 and S22 of every force loop (m x 3), and what must be positive; D and P row by row."""
+    """Margin, and S11, S12 and S22 of every force loop (m x 3), and the guards; D and P row by row."""
     n, m = isqrt(D.numel()), kp.numel()
     damping, coupling = symmetric(D, n), ca.reshape(P, n, m).T
     shares = [pivot * n / ca.fabs(ca.trace(damping)) for pivot in pivots(_least_loss(damping, coupling, weight))]
@@ -22,7 +22,7 @@ def cascade_certificate(_: Any, D: SX, P: SX, kp: SX, kd: SX, weight: SX, omega:
 
 
 def _least_loss(damping: SX, coupling: SX, weight: SX) -> SX:
-    """The quadratic form of qd (n x n) that the loss of energy cannot fall below, whatever the force errors are."""
+    """The quadratic form (n x n) of qd that bounds the loss of energy from below, over all force errors."""
     qd, e = SX.sym("qd", damping.shape[0]), SX.sym("e", coupling.shape[0])
     loss = ca.bilin(damping, qd, qd) + ca.dot(coupling @ qd, e) + weight * ca.dot(e, e)
     worst = ca.substitute(-ca.gradient(loss, e), e, SX.zeros(e.numel())) / ca.gradient(ca.sum1(ca.gradient(loss, e)), e)
@@ -30,7 +30,7 @@ def _least_loss(damping: SX, coupling: SX, weight: SX) -> SX:
 
 
 def _energy(kp: SX, kd: SX, weight: SX, omega: SX) -> SX:
-    """S11, S12, S22 that make the energy xi' S xi fall by weight (e^2 + e'^2 / omega^2) along the loop."""
+    """S11, S12, S22 for which the energy xi' S xi falls by weight (e^2 + e'^2 / omega^2) along the loop."""
     e, ed, S = SX.sym("e"), SX.sym("ed"), SX.sym("S", 3)
     energy = S[0] * e**2 + 2 * S[1] * e * ed + S[2] * ed**2
     rate = ca.jacobian(energy, e) * ed + ca.jacobian(energy, ed) * (-kd * ed - kp * e)
@@ -39,9 +39,9 @@ def _energy(kp: SX, kd: SX, weight: SX, omega: SX) -> SX:
                        ca.gradient(ca.gradient(balance, ed), ed) / 2)  # fmt: skip
     matrix, rest = ca.jacobian(terms, S), -ca.substitute(terms, S, SX.zeros(3))
 
-    def replaced(column: int) -> SX:
+    def cramer(column: int) -> SX:
         columns = ca.horzsplit(matrix)
         columns[column] = rest
         return ca.det(ca.horzcat(*columns)) / ca.det(matrix)
 
-    return ca.vertcat(*(replaced(column) for column in range(3)))
+    return ca.vertcat(*(cramer(column) for column in range(3)))

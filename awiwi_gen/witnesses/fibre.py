@@ -1,4 +1,4 @@
-"""A tendon's fibre from its elastic energy, and its guidings taken as two halves, one after the other."""
+"""A tendon's fibre from its elastic energy, and the friction in its guidings as that of two halves in series."""
 
 from typing import Any
 
@@ -18,7 +18,7 @@ def stiffness(fibre: Any, k: SX) -> SX:
 
 
 def friction(fibre: Any, f: SX, bend: SX) -> SX:
-    """Force [N] lost in guidings that bend a tendon, pulled with f [N], by an angle in all [rad] (eq. 4.1)."""
+    """Force [N] lost by friction in guidings that bend a tendon under f [N] by the total angle `bend` [rad] (eq. 4.1)."""
     half = ca.exp(bend * (SX(fibre.guiding) / -2))
     return f * (1 - half) + f * half * (1 - half)
 

@@ -9,14 +9,14 @@ Vector = tuple[SX, SX]
 
 
 class FourBar:
-    """A four-bar whose crank, at the origin, stands at angle `crank` [rad] from the line to the rocker's pivot.
+    """A four-bar whose crank, at the origin, has the angle `crank` [rad] from the line to the rocker's pivot.
 
     Crank a, coupler b and rocker d close the loop a + b = ground + d. Coupler and rocker stand over the diagonal
     from the end of the crank to the rocker's pivot; `area`, twice that of their triangle, is positive on branch +1,
     where the rocker's end lies to the right of the diagonal.
 
-    `coupler` and `rocker` are the unit vectors along b and d; `rate` and `rocker_rate` are their turns per turn of the
-    crank, and `bend` is the derivative of `rate` by the crank's angle.
+    `coupler` and `rocker` are the unit vectors along b and d. `ratio` and `rocker_ratio` are the derivatives of their
+    angles by the crank's angle, and `ratio_derivative` is that of `ratio`.
     """
 
     def __init__(self, bar: Any, crank: SX) -> None:
@@ -33,13 +33,13 @@ class FourBar:
         self.coupler: Vector = (b[0] / bar.coupler, b[1] / bar.coupler)
         self.rocker: Vector = (d[0] / bar.rocker, d[1] / bar.rocker)
 
-        # Velocity of the loop, a' + b' t3' = d' t4' where x' is x turned by a quarter: its components along b and d,
-        # in terms of areas, then those of its derivative. (The area of b and d is that of the triangle, reversed.)
+        # Velocity of the loop, a' + b' t3' = d' t4', where a', b', d' are a, b, d rotated by 90 degrees: its components
+        # along b and d, as areas, then those of its derivative. (The area of b and d is minus that of the triangle.)
         crank_coupler = a[0] * b[1] - a[1] * b[0]
-        self.rate = (crank_coupler + bar.ground * a[1]) / area
-        self.rocker_rate = crank_coupler / area
-        centripetal = (bar.coupler**2 - along) * self.rate**2 - (bar.rocker * self.rocker_rate) ** 2
-        self.bend = -(a[0] * d[0] + a[1] * d[1] + centripetal) / area
+        self.ratio = (crank_coupler + bar.ground * a[1]) / area
+        self.rocker_ratio = crank_coupler / area
+        centripetal = (bar.coupler**2 - along) * self.ratio**2 - (bar.rocker * self.rocker_ratio) ** 2
+        self.ratio_derivative = -(a[0] * d[0] + a[1] * d[1] + centripetal) / area
 
 
 def four_bar(bar: Any, q: SX) -> tuple[Any, ...]:
@@ -54,8 +54,8 @@ def four_bar(bar: Any, q: SX) -> tuple[Any, ...]:
     return (
         ca.atan2(coupler_y, coupler_x),
         ca.atan2(rocker_y, rocker_x),
-        loop.rate,
-        loop.rocker_rate,
+        loop.ratio,
+        loop.rocker_ratio,
         bar.branch * (coupler_y * rocker_x - coupler_x * rocker_y),
         [heron],
     )

@@ -1,4 +1,4 @@
-"""The tendons of the whole hand by automatic differentiation of one vector of lengths; blocks are found, not placed."""
+"""The tendons of the whole hand by automatic differentiation of one vector of lengths, whose sparsity gives the blocks."""
 
 from typing import Any
 
@@ -15,8 +15,8 @@ def tendon_lengths(hand: Hand, q: SX, wrist: SX | None = None) -> Any:
     """Path lengths (m) [m] in the fingers and, if the hand has one, in the wrist at its angles (2); then its guards."""
     if wrist is None:
         return _lengths(hand, q)
-    passing, guards = wrists.tendon_lengths(hand.wrist, wrist[0], wrist[1])
-    return _lengths(hand, q) + passing, guards
+    in_wrist, guards = wrists.tendon_lengths(hand.wrist, wrist[0], wrist[1])
+    return _lengths(hand, q) + in_wrist, guards
 
 
 def coupling(hand: Hand, q: SX) -> SX:
@@ -25,12 +25,12 @@ def coupling(hand: Hand, q: SX) -> SX:
 
 
 def joint_torque(hand: Hand, q: SX, f: SX) -> SX:
-    """Joint torques (n) [N m]: the work of all tendons, -f h, per joint angle (eq. 5.8)."""
+    """Joint torques (n) [N m]: gradient of the tendons' work -f h (eq. 5.8)."""
     return -ca.densify(ca.gradient(ca.dot(f, _lengths(hand, q)), q))
 
 
 def joint_stiffness(hand: Hand, q: SX, f: SX, k: SX) -> SX:
-    """-d tau/dq (n x n) [N m/rad] (eq. 5.12, 5.23): how the torques fall while tendons of stiffness k stretch by dh."""
+    """-d tau/dq (n x n) [N m/rad] (eq. 5.12, 5.23): coupling' diag(k) coupling plus the change of the coupling."""
     h = _lengths(hand, q)
     coupling = ca.jacobian(h, q)
     geometric = ca.jacobian(ca.gradient(ca.dot(f, h), q), q)

@@ -1,4 +1,4 @@
-"""The value of the polynomial through samples, by Neville's scheme: it never learns the coefficients."""
+"""The value of the polynomial through samples, by Neville's scheme, which needs no coefficients."""
 
 from collections.abc import Sequence
 
@@ -6,7 +6,7 @@ from casadi import SX
 
 
 def interpolate(nodes: Sequence[SX], values: Sequence[SX], argument: SX) -> SX:
-    """What the polynomial that takes the values at the nodes is at the argument."""
+    """Value at the argument of the polynomial through the values at the nodes."""
     row = list(values)
     for order in range(1, len(nodes)):
         for i in range(len(nodes) - order):

@@ -1,4 +1,4 @@
-"""Joint angles from tendon lengths, and how sure they are (CasADi: orthogonal factorisation)."""
+"""Joint angles from tendon lengths, and their errors, by QR factorisation."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ Hand = Any
 
 
 def measured_lengths(hand: Hand, theta: SX, x: SX, w: SX | None = None) -> SX:
-    """Lengths h (m) [m] at which the tendons' elongation h + w + r theta - l0 is x (eq. 5.1): one step of Newton's
-    method from zero, which is exact."""
+    """Lengths h (m) [m] for which the elongation h + w + r theta - l0 is x (eq. 5.1): one step of Newton's method
+    from zero, exact as the equation is linear."""
     fingers = hand.fingers.values()
     slack = ca.vertcat(*(tendon_lengths(finger, SX.zeros(len(finger.joints))) for finger in fingers))
     h = SX.sym("h", slack.numel())
-    reeled = hand.motor.pulley * theta
-    excess = h + reeled - slack - x + (0 if w is None else w)
+    wound = hand.motor.pulley * theta
+    excess = h + wound - slack - x + (0 if w is None else w)
     return -ca.solve(ca.jacobian(excess, h), ca.substitute(excess, h, SX.zeros(h.numel())))
 
 

@@ -1,4 +1,4 @@
-"""Kinematics of a finger by recursion along the chain: velocities are axes times levers, nothing is differentiated."""
+"""Kinematics of a finger by recursion along the chain: velocities are axis x lever, without derivatives."""
 
 import casadi as ca
 from casadi import SX
@@ -14,7 +14,7 @@ def link_poses(finger: Finger, q: SX) -> list[SX]:
     assembly = assemble(finger, q)
     origin, poses = SX.zeros(3), {}
     for joint, axes in zip(assembly.joints, assembly.axes(), strict=True):
-        poses[joint.link] = _pose(axes @ joint.rotation, origin + axes @ (joint.axis * joint.slid))
+        poses[joint.link] = _pose(axes @ joint.rotation, origin + axes @ (joint.axis * joint.shift))
         origin = origin + axes @ joint.offset
     return list(poses.values())
 
@@ -33,8 +33,8 @@ def jacobian(finger: Finger, q: SX) -> SX:
     for joint, axes in reversed(list(zip(assembly.joints, assembly.axes(), strict=True))):
         lever = joint.offset + lever
         column = ca.vertcat(axes @ ca.cross(joint.axis, lever), axes @ joint.axis)
-        result[:, joint.coordinate] += joint.rate * column
-        lever = joint.back(lever)
+        result[:, joint.coordinate] += joint.ratio * column
+        lever = joint.inward(lever)
     return result
 
 
@@ -43,13 +43,13 @@ def pose_and_jacobian(finger: Finger, q: SX) -> tuple[SX, SX]:
     return fingertip_pose(finger, q), jacobian(finger, q)
 
 
-def seat_point(finger: Finger, q: SX, joint: str, local: SX) -> SX:
-    """Base coordinates (3) [m] of a point (3) that `joint` does not move, given in the frame it turns in."""
+def point_before_joint(finger: Finger, q: SX, name: str, local: SX) -> SX:
+    """Base coordinates (3) [m] of a point (3) [m] given in the frame before the rotation of joint `name`."""
     assembly = assemble(finger, q)
-    index = next(i for i, link in enumerate(finger.links) if link.joint == joint)
-    before = [one for one in assembly.joints if one.link < index]
-    local = local + _Z * assembly.joints[len(before)].slid
-    if before and before[-1].turn is None:
+    index = next(i for i, link in enumerate(finger.links) if link.joint == name)
+    before = [joint for joint in assembly.joints if joint.link < index]
+    local = local + _Z * assembly.joints[len(before)].shift
+    if before and before[-1].next_rotation is None:
         local = before[-1].rotation @ local
     return assembly.base_point(len(before), local)
 

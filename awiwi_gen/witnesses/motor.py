@@ -1,7 +1,7 @@
 """A motor with its gear from energies alone: inertias and torques are derivatives, found automatically.
 
-Rotor and gear store kinetic energy, friction dissipates by a function of the speed (Rayleigh's), and each ripple is a
-potential the shafts turn in. Harmonics of one shaft come from the sine and cosine of its angle, by de Moivre.
+Rotor and gear store kinetic energy, friction has Rayleigh's dissipation function, and each ripple a potential of the
+shaft's angle. Harmonics of one shaft come from the sine and cosine of its angle, by de Moivre's formula.
 """
 
 from typing import Any
@@ -37,19 +37,19 @@ def ripple(motor: Any, theta: SX) -> SX:
 
 
 def compensation(motor: Any, theta: SX, thd: SX) -> SX:
-    """Motor torque [N m] that takes away a share of friction and ripple."""
+    """Motor torque [N m] that compensates a share of friction and ripple."""
     share = SX(motor.compensation)
     return share * friction(motor, thd) + share * ripple(motor, theta)
 
 
 def torque(motor: Any, theta: SX, thd: SX, thdd: SX, f: SX) -> SX:
-    """Motor torque [N m] of a motion: rate of the momentum, and all that is overcome."""
+    """Motor torque [N m] of a motion: rate of the momentum plus friction, ripple and load."""
     momentum = ca.gradient(energy(motor, thd), thd)
     return ca.jtimes(momentum, thd, thdd) + _resistance(motor, theta, thd, f)
 
 
 def acceleration(motor: Any, theta: SX, thd: SX, tau: SX, f: SX) -> SX:
-    """Acceleration [rad/s^2] under a motor torque: the momentum changes by what is not overcome."""
+    """Acceleration [rad/s^2] under a motor torque: the remaining torque changes the momentum."""
     inertia = ca.hessian(energy(motor, thd), thd)[0]
     return (tau - _resistance(motor, theta, thd, f)) / inertia
 

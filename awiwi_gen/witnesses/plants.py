@@ -1,7 +1,7 @@
-"""The same plants from energies: all forces are gradients, of what is stored and of what is dissipated.
+"""Plants for control laws from energies: all forces are gradients of stored energies and of dissipation functions.
 
-With the kinetic energy T of the velocities v, the springs' energy V, Rayleigh's dissipation D and the torques Q from
-outside, Lagrange's equations read (d2T/dv2) v' = Q - dV/dx - dD/dv: no inertia here depends on the position.
+With the kinetic energy T of the velocities v, the springs' energy V, Rayleigh's dissipation D and external torques Q,
+Lagrange's equations are (d2T/dv2) v' = Q - dV/dx - dD/dv, as the inertias do not depend on the position.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from casadi import SX
 
 def plant_tendon(_: Any, x: SX, u: SX, path: SX, motor: SX, line: SX, friction: SX) -> tuple[SX, SX]:
     """Rates of (theta, theta'), and the force of the tendon."""
-    place, speed = x[0], x[1]
-    stretch = motor[1] * place + path
+    position, speed = x[0], x[1]
+    stretch = motor[1] * position + path
     force = gradients(pulling(line), taut(stretch))[0]
-    outside = u - ca.jacobian(stretch, place) * force
-    return _rates(speed, motor[0], dry(friction, speed), outside), force
+    external = u - ca.jacobian(stretch, position) * force
+    return _rates(speed, motor[0], dry(friction, speed), external), force
 
 
 def plant_joint_linear(part: Any, x: SX, u: SX, load: SX, plant: SX, damping: SX) -> tuple[SX, SX]:
@@ -29,28 +29,28 @@ def plant_joint_linear(part: Any, x: SX, u: SX, load: SX, plant: SX, damping: SX
 
 def plant_joint_nonlinear(_: Any, x: SX, u: SX, load: SX, bodies: SX, curve: SX, damping: SX) -> tuple[SX, SX, SX]:
     """Rates of (q, q', theta, theta'), torque of the spring and its rate, slope and curvature."""
-    place, speed = x[0::2], x[1::2]
-    stretch = place[1] - place[0]
+    position, speed = x[0::2], x[1::2]
+    stretch = position[1] - position[0]
     torque, slope, curvature = gradients(lambda d: 6 * curve[0] * d**2 + 3 * curve[1] * (d**2) ** 2, stretch)
-    outside = ca.vertcat(load, u) - ca.jacobian(stretch, place).T * torque
-    rates = _rates(speed, bodies, ca.dot(damping, speed**2) / 2, outside)
-    return rates, ca.vertcat(torque, slope * ca.jtimes(stretch, place, speed)), ca.vertcat(slope, curvature)
+    external = ca.vertcat(load, u) - ca.jacobian(stretch, position).T * torque
+    rates = _rates(speed, bodies, ca.dot(damping, speed**2) / 2, external)
+    return rates, ca.vertcat(torque, slope * ca.jtimes(stretch, position, speed)), ca.vertcat(slope, curvature)
 
 
 def plant_antagonistic(
     _: Any, x: SX, u: SX, load: SX, inertias: SX, tendons: SX, damping: SX, friction: SX
 ) -> tuple[SX, SX, SX]:
     """Rates of (q, q', theta1, theta1', theta2, theta2'), elongation and torque of both springs."""
-    place, speed = x[0::2], x[1::2]
-    stretches = ca.vertcat(place[1] - place[0], place[2] + place[0])
+    position, speed = x[0::2], x[1::2]
+    stretches = ca.vertcat(position[1] - position[0], position[2] + position[0])
     torques = ca.vertcat(*(gradients(pulling(tendons[3 * i :]), taut(stretches[i]))[0] for i in (0, 1)))
-    outside = ca.vertcat(load, u) - ca.jacobian(stretches, place).T @ torques
+    external = ca.vertcat(load, u) - ca.jacobian(stretches, position).T @ torques
     dissipated = damping * speed[0] ** 2 / 2 + dry(friction, speed[1]) + dry(friction, speed[2])
-    return _rates(speed, inertias, dissipated, outside), stretches, torques
+    return _rates(speed, inertias, dissipated, external), stretches, torques
 
 
 def antagonistic_springs(_: Any, stretches: SX, speeds: SX, tendons: SX) -> tuple[SX, SX]:
-    """Of each spring its torque with the rate, its slope and curvature."""
+    """Torque and its rate, slope and curvature of each spring."""
     torques, local = [], []
     for i in (0, 1):
         torque, slope, curvature = gradients(pulling(tendons[3 * i :]), taut(stretches[i]))
@@ -73,11 +73,11 @@ def plant_finger(_: Any, qd: SX, qdd: SX, thds: SX, f: SX, u: SX, motor: SX, fri
     return ca.vertcat(qd, qdd, thds, ca.solve(ca.jacobian(momentum, thds), forces))
 
 
-def _rates(speed: SX, inertias: SX, dissipated: SX, outside: SX) -> SX:
-    """Each place's rate and its speed's, one after the other."""
+def _rates(speed: SX, inertias: SX, dissipated: SX, external: SX) -> SX:
+    """Rates of position and speed of each body, one body after the other."""
     kinetic = ca.dot(inertias, speed**2) / 2
     momentum = ca.diag(ca.hessian(kinetic, speed)[0])
-    accelerated = (outside - ca.gradient(dissipated, speed)) / momentum
+    accelerated = (external - ca.gradient(dissipated, speed)) / momentum
     return ca.vec(ca.horzcat(speed, accelerated).T)
 
 
@@ -89,17 +89,17 @@ def dry(friction: SX, speed: SX) -> SX:
 
 
 def pulling(spring: SX) -> Callable[[SX], SX]:
-    """Twelve times the energy [J] of a spring (k1, k2, k3) by what it is stretched: no coefficient is rounded."""
+    """Twelve times the energy [J] of a spring (k1, k2, k3) over its stretch; the factor keeps coefficients integer."""
     return lambda p: 6 * spring[0] * p**2 + 4 * spring[1] * p * p**2 + 3 * spring[2] * (p**2) ** 2
 
 
 def taut(stretch: SX) -> SX:
-    """What an elongation stretches; the energy of less than nothing is none."""
+    """The positive part of an elongation: zero where the tendon is slack."""
     return (ca.sqrt(stretch**2) + stretch) / 2
 
 
 def gradients(energy12: Callable[[SX], SX], at: SX) -> tuple[SX, SX, SX]:
-    """The first three derivatives of an energy at some place, from twelve times that energy."""
+    """The first three derivatives of an energy at a position, from twelve times that energy."""
     d = ca.SX.sym("d")
     first = ca.gradient(energy12(d), d)
     second = ca.gradient(first, d)

@@ -1,4 +1,4 @@
-"""The same filter as a differential equation, over one sample by the classical method of Runge and Kutta."""
+"""The reference filter as a linear differential equation, over one sample by the classical Runge-Kutta method."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ COEFFICIENTS = (945, 945, 420, 105, 15)
 
 def reference_filter(_: Any, motion: SX, desired: SX, delay: SX, period: SX) -> tuple[SX, list[SX]]:
     """The motion (5) a sample later."""
-    towards, still = SX(5, 5), SX(5, 5)
+    error, goal = SX(5, 5), SX(5, 5)
     for i in range(4):
-        towards[i, i + 1] = still[i, i + 1] = 1
+        error[i, i + 1] = goal[i, i + 1] = 1
     for i, coefficient in enumerate(COEFFICIENTS):
         rate = SX(1)
         for _power in range(5 - i):
             rate = rate / delay
-        towards[4, i] = -coefficient * rate
-    return _stages(towards, motion - desired, period) + _stages(still, desired, period), [delay, period]
+        error[4, i] = -coefficient * rate
+    return _runge_kutta(error, motion - desired, period) + _runge_kutta(goal, desired, period), [delay, period]
 
 
-def _stages(matrix: SX, start: SX, step: SX) -> SX:
+def _runge_kutta(matrix: SX, start: SX, step: SX) -> SX:
     slopes = [matrix @ start]
     for reach in (step / 2, step / 2, step):
         slopes.append(matrix @ (start + reach * slopes[-1]))

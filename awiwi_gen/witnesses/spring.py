@@ -1,8 +1,8 @@
-"""The lever spring by the balance of moments about its pivot, with vectors; nothing is differentiated.
+"""The lever spring by the balance of moments about its pivot, with vectors and without derivatives.
 
-The tendon pulls at the roller along both runs, u1 towards it and u2 away from it; the spring pulls at its hook. When
-the lever turns, a run of length t turns by what its moving end goes sideways, over t: so the bend of dL, and with it
-the stiffness, is found without derivatives. Arcs are angles between directions.
+The tendon pulls at the roller along both runs, u1 towards it and u2 away from it. The spring pulls at its hook. When
+the lever rotates, a run of length t rotates by the sideways motion of its end divided by t. This gives the second
+derivative of dL, and so the stiffness. Arcs are angles between directions.
 """
 
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from casadi import SX
 
 @dataclass(frozen=True)
 class Pose:
-    """Of one lever angle: dL [m], force [N] and stiffness [N/m] of the tendon, and what must be positive for them."""
+    """dL [m], force [N] and stiffness [N/m] of the tendon at one lever angle, and the guards that must be positive."""
 
     length: SX
     force: SX
@@ -43,26 +43,26 @@ def pose_at(spring: Any, angle: SX) -> Pose:
     arm, hook = spring.arm * _direction(angle), spring.spring_arm * _direction(angle + spring.spring_angle)
     before, after = _runs(spring, pivot + arm)
 
-    # Of the tendon: slope and bend of dL per lever angle. The roller moves across its arm.
+    # Tendon: first and second derivative of dL by the lever angle. The roller moves across its arm.
     leverage = _cross(arm, before.direction - after.direction)
     sideways1, sideways2 = ca.dot(arm, before.direction), ca.dot(arm, after.direction)
-    bend = sideways1**2 / before.length + sideways2**2 / after.length - (sideways1 - sideways2)
+    curvature = sideways1**2 / before.length + sideways2**2 / after.length - (sideways1 - sideways2)
 
-    # Of the spring: its stretch, and slope and bend of that.
+    # Spring: its stretch, with first and second derivative.
     pull = ca.vertcat(*spring.anchor) - pivot - hook
     distance = ca.norm_2(pull)
     stretch = distance - spring.free_length
     slope = -_cross(hook, pull) / distance
-    curve = (spring.spring_arm**2 + ca.dot(pull, hook) - slope**2) / distance
+    slope_derivative = (spring.spring_arm**2 + ca.dot(pull, hook) - slope**2) / distance
 
     force = -spring.rate * stretch * slope / leverage
-    stiffness = (spring.rate * (slope**2 + stretch * curve) + force * bend) / leverage**2
+    stiffness = (spring.rate * (slope**2 + stretch * slope_derivative) + force * curvature) / leverage**2
     guards = [before.square, after.square, leverage * (spring.slack - spring.taut), stretch]
     return Pose(_path(spring, before, after), force, stiffness, guards)
 
 
 def _path(spring: Any, before: Run, after: Run) -> SX:
-    """dL [m]: runs, what lies on the roller, and what the outer pulleys took up since the slack end."""
+    """dL [m]: both runs, the arc on the roller, and what the outer pulleys have wound up since the slack end."""
     slack_before, slack_after = _runs(spring, ca.vertcat(*spring.pivot) + spring.arm * _direction(SX(spring.slack)))
     first = _angle(slack_before.direction, before.direction)
     second = _angle(slack_after.direction, after.direction)
@@ -79,7 +79,7 @@ def _runs(spring: Any, centre: SX) -> tuple[Run, Run]:
 
 
 def _run(chord: SX, gap: SX) -> Run:
-    """The common tangent of two circles: it leans against the line of centres by the difference of their radii."""
+    """The common tangent of two circles: it is tilted against the line of centres by the difference of their radii."""
     across = ca.dot(chord, chord)
     square = across - gap**2
     length = ca.sqrt(square)

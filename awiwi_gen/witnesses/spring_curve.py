@@ -1,4 +1,4 @@
-"""The lever spring's curves by another road: samples from the balance of moments, Neville's scheme between them."""
+"""The lever spring's curves: samples by the balance of moments, Neville's scheme between them."""
 
 from collections.abc import Callable
 from typing import Any
@@ -31,12 +31,14 @@ def elongation(spring: Any, f: SX) -> tuple[SX, list[SX]]:
 def readings(spring: Any, readings: SX) -> tuple[SX, SX, SX, list[SX]]:
     """dL [m], force [N] and stiffness [N/m] of each tendon (m) from its sensor's readings (m)."""
     shares = [SX(float(share)) for share in chebyshev(READING_NODES)]
-    own = spring.calibrated
-    samples = {tendon: [_pose(each, share) for share in shares] for tendon, each in {None: spring, **own}.items()}
+    calibrated = spring.calibrated
+    samples = {
+        tendon: [_pose(each, share) for share in shares] for tendon, each in {None: spring, **calibrated}.items()
+    }
     columns: list[list[SX]] = [[], [], []]
     farthest = SX(0)
     for tendon, count in enumerate(ca.vertsplit(readings)):
-        sensor = own.get(tendon, spring).sensor
+        sensor = calibrated.get(tendon, spring).sensor
         share = (count - sensor.slack) / (sensor.taut - sensor.slack)
         poses = samples.get(tendon, samples[None])
         curves = ([pose.length for pose in poses], [pose.force for pose in poses], [pose.stiffness for pose in poses])
@@ -53,8 +55,8 @@ def _curve(spring: Any, argument: SX, over: Quantity, of: Quantity) -> tuple[SX,
     poses = [_pose(spring, SX(float(share))) for share in chebyshev(CURVE_NODES)]
     nodes = [over(pose, slack) for pose in poses]
     first, last = over(slack, slack), over(taut, slack)
-    place = (2 * argument - first - last) / (last - first)
-    return interpolate(nodes, [of(pose, slack) for pose in poses], argument), [float(BEYOND) - place**2]
+    normalised = (2 * argument - first - last) / (last - first)
+    return interpolate(nodes, [of(pose, slack) for pose in poses], argument), [float(BEYOND) - normalised**2]
 
 
 def _elongation(pose: Pose, slack: Pose) -> SX:

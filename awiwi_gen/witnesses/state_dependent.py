@@ -1,8 +1,8 @@
-"""Optimal gains on a spring whose stiffness depends on the state, without a Riccati equation (CasADi).
+"""Optimal gains on a spring whose stiffness depends on the state, by spectral factorisation.
 
-A spring's law of the matrix (x 1; 0 y) has its torques at x and y on the diagonal, and the secant beside them. The
-optimal loop's polynomial c is the stable factor of c(s) c(-s) = a(s) a(-s) + the states' share of the cost; the gains
-are what c exceeds a by.
+The spring's polynomial of the matrix (x 1; 0 y) has its torques at x and y on the diagonal and the secant beside them.
+The closed loop's polynomial c is the stable factor of c(s) c(-s) = a(s) a(-s) + the states' share of the cost. The gains
+are the difference of c and the open loop's polynomial a.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from casadi import SX
 
 
 def secant_stiffness(_: Any, spring: SX, deflexion: SX, deflexion_des: SX) -> tuple[SX, SX]:
-    """Secant between two deflexions, and the torque at the second: entries of the spring's law of a matrix (Opitz)."""
+    """Secant between two deflexions, and the torque at the second, by the spring's polynomial of a matrix (Opitz)."""
     both = ca.vertcat(ca.horzcat(deflexion, 1), ca.horzcat(0, deflexion_des))
     torque = SX.zeros(2, 2)
     for coefficient in reversed(ca.vertsplit(spring)):
@@ -25,7 +25,7 @@ def secant_stiffness(_: Any, spring: SX, deflexion: SX, deflexion_des: SX) -> tu
 def sdre_tendon(
     _: Any, theta: SX, thd: SX, theta_des: SX, b: SX, dtheta: SX, spring: SX, weights: SX, R: SX
 ) -> tuple[SX, SX, list[SX]]:
-    """Gains (2), motor torque [N m], and what must be positive."""
+    """Gains (2), motor torque [N m], and the guards."""
     k, hold = secant_stiffness(_, spring, theta, theta_des)
     a0, a1 = k / b, dtheta / b
     c0 = ca.sqrt(a0**2 + weights[0] / (R * b**2))

@@ -1,4 +1,4 @@
-"""Symmetric matrices by their minors (CasADi): another road to what Cholesky says of them."""
+"""Symmetric matrices, and whether they are positive definite, by their leading minors."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ def symmetric(entries: SX, n: int) -> SX:
 
 
 def pivots(matrix: SX) -> list[SX]:
-    """Quotients of successive leading minors: all positive where the matrix is positive definite, and only there."""
+    """Quotients of successive leading minors: all positive if and only if the matrix is positive definite."""
     minors = [ca.det(matrix[:k, :k]) for k in range(1, matrix.shape[0] + 1)]
     return [minors[0], *(high / low for low, high in itertools.pairwise(minors))]
 
 
 def least(values: list[SX]) -> SX:
-    """The least of several values: half of what their sum exceeds their difference by."""
+    """The smallest of several values; of two, half their sum minus half the absolute difference."""
     return reduce(lambda a, b: (a + b) / 2 - ca.fabs(a - b) / 2, values)

@@ -1,4 +1,4 @@
-"""Stiffness of whole tendons over their forces by the balance of moments, Neville's scheme and its derivatives."""
+"""Stiffness of whole tendons over their forces, by the balance of moments and by Neville's scheme and its derivatives."""
 
 from typing import Any
 
@@ -31,15 +31,15 @@ def tendon_stiffness(elastic: Any, tension: SX) -> tuple[SX, SX, SX, list[SX]]:
 
 
 def _between(limits: Any, tension: SX) -> tuple[SX, SX, SX, list[SX]]:
-    """Without springs: the two limits of stiffness, each weighed by the nearness of its end of the forces."""
-    most = limits.tendon_force
+    """For hands without springs: the two limits of stiffness, weighted by the distance of the force from its ends."""
+    largest = limits.tendon_force
     columns: list[list[SX]] = [[], [], []]
     farthest = SX(0)
     for force in ca.vertsplit(tension):
-        k = (limits.tendon_stiffness_low * (most - force) + limits.tendon_stiffness_high * force) / most
+        k = (limits.tendon_stiffness_low * (largest - force) + limits.tendon_stiffness_high * force) / largest
         for column, value in zip(columns, (k, ca.gradient(k, force), ca.hessian(k, force)[0]), strict=True):
             column.append(value)
-        distance = ((force + force - most) / most) ** 2
+        distance = ((force + force - largest) / largest) ** 2
         farthest = (farthest + distance + ca.fabs(farthest - distance)) / 2
     k, slope, curvature = (ca.vertcat(*column) for column in columns)
     return k, slope, curvature, [float(BEYOND) - farthest]

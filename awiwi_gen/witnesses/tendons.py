@@ -1,14 +1,13 @@
-"""Tendons of a finger by automatic differentiation: torques and stiffnesses as derivatives of an energy.
+"""Tendons of a finger by automatic differentiation: torques and stiffnesses are derivatives of an energy.
 
-Only the lengths are written down; the points between which tendons run straight come from the recursion along the
-chain.
+Only the lengths are written down. The end points of straight spans come from the recursion along the chain.
 """
 
 import casadi as ca
 from casadi import SX
 
 from awiwi_gen.structure import Finger, coordinates, leaders, radius, sense
-from awiwi_gen.witnesses.kinematics import seat_point
+from awiwi_gen.witnesses.kinematics import point_before_joint
 
 
 def tendon_lengths(finger: Finger, q: SX) -> SX:
@@ -19,10 +18,10 @@ def tendon_lengths(finger: Finger, q: SX) -> SX:
         length = SX(tendon.rest)
         for over in tendon.over:
             sign, joint = sense(over)
-            # On a follower's pulley rolls what rolls on its leader's: the coupling tendon makes their arcs equal.
+            # The coupling tendon makes the arcs on the follower's and the leader's pulley equal.
             length += sign * radius(finger, follows.get(joint, joint)) * q[position[joint]]
         if tendon.span is not None:
-            end = seat_point(finger, q, tendon.span.joint, ca.vertcat(*tendon.span.to))
+            end = point_before_joint(finger, q, tendon.span.joint, ca.vertcat(*tendon.span.to))
             length += ca.norm_2(end - ca.vertcat(*tendon.span.from_))
         lengths.append(length)
     return ca.vertcat(*lengths)
@@ -39,18 +38,18 @@ def coupling_derivative(finger: Finger, q: SX) -> list[SX]:
 
 
 def joint_torque(finger: Finger, q: SX, f: SX) -> SX:
-    """Joint torques (n) [N m] of tendon forces f (m) [N]: the work of the tendons, -f h, per joint angle (eq. 5.8)."""
+    """Joint torques (n) [N m] of tendon forces f (m) [N]: gradient of the tendons' work -f h (eq. 5.8)."""
     return -ca.densify(ca.gradient(ca.dot(f, tendon_lengths(finger, q)), q))
 
 
 def joint_stiffness(finger: Finger, q: SX, f: SX, k: SX) -> SX:
     """-d tau/dq (n x n) [N m/rad] (eq. 5.12, 5.23): Hessian of the energy in tendons of stiffnesses k (m) [N/m]."""
     h = tendon_lengths(finger, q)
-    here = SX.sym("here", h.numel())
-    stretch = h - here
+    fixed = SX.sym("fixed", h.numel())
+    stretch = h - fixed
     energy = ca.dot(f, stretch) + ca.dot(k, stretch**2) / 2
-    stiffness = ca.substitute(ca.hessian(energy, q)[0], here, h)
-    # The stretch is zero here, but only a second reading of the shared expression sees it.
+    stiffness = ca.substitute(ca.hessian(energy, q)[0], fixed, h)
+    # The stretch is zero now; CasADi simplifies it only when the expression is evaluated again after cse.
     arguments = ca.symvar(stiffness)
     return ca.densify(ca.Function("stiffness", arguments, [ca.cse(stiffness)])(*arguments))
 

@@ -1,7 +1,7 @@
-"""The wrist by algebra alone: no angle is solved for, one square root decides; couplings by automatic differentiation.
+"""The wrist by algebra, without inverse trigonometric functions; couplings by automatic differentiation.
 
-Everything happens in axes that turn with q71: e1 in the plane of the side bars, e2 along B0C0, e3 normal to both. There
-C is a rational function of B, and A is found from the foot of A0 in the plane that halves BC.
+All is computed in axes that rotate with q71: e1 in the plane of the side bars, e2 along B0C0, e3 normal to both. There
+C is a rational function of B, and A follows from the foot of A0 in the plane that bisects BC.
 """
 
 from dataclasses import dataclass
@@ -15,9 +15,9 @@ Wrist = Any
 
 @dataclass(frozen=True)
 class Palm:
-    """The palm in the turning axes: points b, c, m and unit vectors x, y, z of the palm frame (3 each).
+    """The palm in the rotating axes: points b, c, m and unit vectors x, y, z of the palm frame (3 each).
 
-    `axes` takes the turning axes to those of {0}; what `guards` lists must be positive for the palm to exist.
+    `axes` takes the rotating axes to those of {0}. The `guards` must be positive for the palm to exist.
     """
 
     b: SX
@@ -73,19 +73,19 @@ def _palm(wrist: Wrist, q71: SX, q73: SX) -> Palm:
     c = (stretch * b[0], stretch * (b[1] - width))
     y = ((b[0] - c[0]) / width, (b[1] - c[1]) / width)
 
-    # Eq. 6.7, doubled as 2 M is B + C. From M, the foot of A0 in the plane that halves BC lies at `off` along
-    # (y[1], -y[0], 0) and `away` along e3. A lies at `reach` towards it and at `swing` across.
+    # Eq. 6.7, doubled as 2 M is B + C. From M, the foot of A0 in the plane that bisects BC lies at `off` along
+    # (y[1], -y[0], 0) and at `away` along e3. A lies at `reach` towards the foot and at `across` normal to that.
     away = c71 * (2 * wrist.a0[2]) - s71 * (2 * wrist.a0[0])
     run = (c71 * (2 * wrist.a0[0]) + s71 * (2 * wrist.a0[2]) - (b[0] + c[0]), 2 * wrist.a0[1] - (b[1] + c[1]))
     off = run[0] * y[1] - run[1] * y[0]
     middle = sum((p - q) ** 2 for p, q in zip(wrist.a, wrist.a0, strict=True))
     reach = (run[0] ** 2 + run[1] ** 2 + away**2 + 4 * (height**2 - middle)) / (4 * height)
     distance_squared = off**2 + away**2
-    swing_squared = distance_squared - reach**2
-    swing = ca.sqrt(swing_squared)
-    # z, from A to M, makes the same angle with the way back from the foot.
-    tilt = (swing * away - reach * off) / distance_squared
-    rise = -(swing * off + reach * away) / distance_squared
+    across_squared = distance_squared - reach**2
+    across = ca.sqrt(across_squared)
+    # z, from A to M, makes the same angle with the line from the foot to M.
+    tilt = (across * away - reach * off) / distance_squared
+    rise = -(across * off + reach * away) / distance_squared
     return Palm(
         b=ca.vertcat(*b, 0),
         c=ca.vertcat(*c, 0),
@@ -93,12 +93,12 @@ def _palm(wrist: Wrist, q71: SX, q73: SX) -> Palm:
         y=ca.vertcat(*y, 0),
         z=ca.vertcat(tilt * y[1], -tilt * y[0], rise),
         axes=axes,
-        guards=[ca.sin(q73), height * away, swing_squared],
+        guards=[ca.sin(q73), height * away, across_squared],
     )
 
 
 def _origin(wrist: Wrist, palm: Palm) -> SX:
-    """The palm frame's origin in the turning axes; the palm frame is parallel to {0} in the neutral pose."""
+    """The palm frame's origin in the rotating axes; the palm frame is parallel to {0} in the neutral pose."""
     drawn = (wrist.palm[0] - wrist.b[0], wrist.palm[1] - wrist.b[1] / 2, wrist.palm[2] - wrist.b[2])
     origin: SX = palm.m + drawn[0] * palm.x + drawn[1] * palm.y + drawn[2] * palm.z
     return origin
@@ -107,17 +107,17 @@ def _origin(wrist: Wrist, palm: Palm) -> SX:
 def _lengths(wrist: Wrist, q71: SX, q73: SX) -> tuple[SX, list[SX]]:
     """Each square is expanded about the feet of the tendon's points in the plane y = 0 of either frame.
 
-    Tendons that share pulley axles, as all of one layer do, share these feet: what is left of each is a constant and
-    three products with its places along the two axles.
+    Tendons that share pulley axles, as all of one layer do, share these feet. The rest of each is a constant and three
+    products with its positions along the two axles.
     """
     palm = _palm(wrist, q71, q73)
     origin, back = _origin(wrist, palm), palm.axes.T
     lengths = []
     for tendon in wrist.tendons:
-        (x, place, z), (palm_x, palm_place, palm_z) = tendon.forearm, tendon.palm
+        (x, y, z), (palm_x, palm_y, palm_z) = tendon.forearm, tendon.palm
         feet = origin + palm_x * palm.x + palm_z * palm.z - back @ ca.vertcat(x, 0, z)
         common = ca.dot(feet, feet)
-        across = palm_place * (2 * ca.dot(feet, palm.y)) - place * (2 * feet[1])
-        along = place * palm_place * (2 * palm.y[1])
-        lengths.append(ca.sqrt(common + (place**2 + palm_place**2) + across - along))
+        sideways = palm_y * (2 * ca.dot(feet, palm.y)) - y * (2 * feet[1])
+        along = y * palm_y * (2 * palm.y[1])
+        lengths.append(ca.sqrt(common + (y**2 + palm_y**2) + sideways - along))
     return ca.vertcat(*lengths), palm.guards

@@ -1,13 +1,12 @@
-"""The antagonistic backstepping law for a joint that its model does not quite describe.
+"""The antagonistic backstepping law for a joint with model errors.
 
-Of the law of section 15.5 it keeps the recursion over all six states. It adds what keeps that law from working on a
-real joint: the link's own damping d_q, which must not count as an outer torque that the link gives way to; springs
-whose slopes are learnt; and torques that the motors must overcome, estimated and cancelled. With e = q - q_d the link
-is to obey
+It has the recursion of section 15.5 over all six states, and adds what a real joint needs: the link's damping d_q, which
+must not count as an external torque; estimated slopes of the springs; and estimated torques that resist the motors,
+which are cancelled. With e = q - q_d the link is to obey
 
     m e'' + (K_d + d_q) e' + K_p e = tau_ext
 
-and if the torques d to be overcome are estimated by d^, the energy V of errors e_t and e_s changes by
+If the estimate of the resisting torques d is d^, the energy V of errors e_t and e_s has the rate
 
     V' = - (K_d + d_q) e'^2 - sum (C_t K_3 e_t^2 + C_s K_4 e_s^2) + e' tau_ext + sum C_s e_s (phi' / b) (d^ - d)
 """
@@ -28,9 +27,9 @@ def adaptive_law(
     joint: Matrix, torques: Matrix, desired: Matrix, pretension: Matrix, external: Matrix, inertias: Matrix,
     springs: Matrix, damping: Expr, impedance: Matrix, tunings: Matrix,
 ) -> Law:  # fmt: skip
-    """The law for motors that nothing but their springs holds back.
+    """The law for motors without resistance.
 
-    As in `backstepping_laws.antagonistic_law`, but for the damping: torques (tau, tau'), springs (phi', phi'') and
+    As `laws.antagonistic_law`, with the damping of the link added: torques (tau, tau'), springs (phi', phi'') and
     tunings (K_3, K_4, C_t, C_s) have a row for each motor.
     """
     m = inertias[0]
@@ -49,11 +48,11 @@ def adaptive_law(
         Level(rate, Matrix(drifts), diag(*gains)),
     ]
     error, speed = joint - desired[:2, :]
-    moving = m * desired[2] + damping * desired[1] - impedance[0] * error - impedance[1] * speed
+    link_torque = m * desired[2] + damping * desired[1] - impedance[0] * error - impedance[1] * speed
     signals = {a: b for given in (desired, external, pretension) for a, b in pairwise(given)}
     start = Start(
         levels=2,
-        target=Matrix([pretension[0] + side * moving / 2 for side in SIDES]),
+        target=Matrix([pretension[0] + side * link_torque / 2 for side in SIDES]),
         energy=(m * speed**2 + impedance[0] * error**2) / 2,
         rate=speed * external[0] - (impedance[1] + damping) * speed**2,
         signals=signals,
@@ -65,6 +64,6 @@ def backstepping_adaptive(
     _: Any, joint: Matrix, torques: Matrix, desired: Matrix, pretension: Matrix, external: Matrix, inertias: Matrix,
     springs: Matrix, damping: Matrix, impedance: Matrix, tunings: Matrix, resistance: Matrix,
 ) -> tuple[Matrix, list[Expr]]:  # fmt: skip
-    """Torques of both motors [N m], and what must be positive."""
+    """Torques (2) [N m] of both motors, and the guards."""
     law = adaptive_law(joint, torques, desired, pretension, external, inertias, springs, damping[0], impedance, tunings)
     return law.control + resistance, [*inertias, springs[0], springs[2], *impedance, *tunings]

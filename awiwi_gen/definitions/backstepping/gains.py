@@ -1,13 +1,13 @@
-"""The impedance law as a state feedback, and back: gains of the law for given feedback gains (chapter 16).
+"""The impedance law as a state feedback, and the gains of the law for given feedback gains (chapter 16).
 
-Under the law the link obeys, with the errors of torque and of its rate eliminated,
+With the errors of torque and torque rate eliminated, the link obeys under the law
 
     (m s^2 + K_d s + K_p) (s^2 + sigma s + pi) + s (s + K_4) / C_t = m s^4 + c4 m s^3 + c3 m s^2 + c2 s + c1
     sigma = K_3 + K_4            pi = K_3 K_4 + C_t / C_s
 
 and tau'' = -c1 q - c2 q' - c3 tau - c4 tau'. So the feedback gains are K = (b / k) (c1, c2, c3, c4) for a plant whose
-spring's torque is cancelled, tau'' = (k / b) u, as in table 16.1; without this cancellation (m + b) / m comes off the
-third. Equation 16.3 prints these gains with a wrong constant there.
+spring's torque is cancelled, tau'' = (k / b) u, as in table 16.1; without this cancellation the
+third is less by (m + b) / m. Equation 16.3 prints a wrong constant there.
 """
 
 from typing import NamedTuple
@@ -31,18 +31,20 @@ def backstepping_state_gains(_: object, plant: Matrix, gains: Matrix, weights: M
     stiffness, damping, fast, slow = gains
     names = Derivation()
     total, product = names.name(fast + slow), names.name(fast * slow + weights[0] / weights[1])
-    held = names.name((damping * total + stiffness + 1 / weights[0]) / m)
+    from_link = names.name((damping * total + stiffness + 1 / weights[0]) / m)
     coefficients = Matrix(
         [
             stiffness * product,
             damping * product + stiffness * total + slow / weights[0],
-            product + held,
+            product + from_link,
             total + damping / m,
         ]
     )
     linearised = names.name_all(b / k * coefficients)
     return Feedback(
-        linearised - Matrix([0, 0, (m + b) / m, 0]), linearised, Matrix([b / m - b / k * held, -b * damping / (k * m)])
+        linearised - Matrix([0, 0, (m + b) / m, 0]),
+        linearised,
+        Matrix([b / m - b / k * from_link, -b * damping / (k * m)]),
     )
 
 
@@ -54,10 +56,10 @@ def backstepping_state_gains_derivatives(_: object, plant: Matrix, gains: Matrix
 def optimal_backstepping_rates(
     _: object, K_opt: Matrix, plant: Matrix, impedance: Matrix, weights: Matrix
 ) -> tuple[Matrix, list[Expr]]:
-    """K_3 and K_4 for which the law has the wanted gains of tau and tau', with K_p and K_d given.
+    """K_3 and K_4 for which the law has the desired gains of tau and tau', for given K_p and K_d; and the guards.
 
-    They are the roots of r^2 - sigma r + (pi - C_t / C_s). Positive where they exist: all that is given but the gains,
-    the square of half their difference, their sum, their product.
+    They are the roots of r^2 - sigma r + (pi - C_t / C_s). Guards are the plant, impedance and weights, the square of
+    half the roots' difference, their sum and their product.
     """
     m, b, k = plant
     stiffness, damping = impedance
@@ -66,18 +68,18 @@ def optimal_backstepping_rates(
     product = names.name(
         k / b * K_opt[2] - weights[0] / weights[1] - (damping * total + stiffness + 1 / weights[0]) / m
     )
-    apart = names.name(total**2 / 4 - product)
-    larger = names.name(total / 2 + sqrt(apart))
-    return Matrix([larger, product / larger]), [*plant, *impedance, *weights, apart, total, product]
+    spread = names.name(total**2 / 4 - product)
+    larger = names.name(total / 2 + sqrt(spread))
+    return Matrix([larger, product / larger]), [*plant, *impedance, *weights, spread, total, product]
 
 
 def optimal_backstepping_weights(
     _: object, K_opt: Matrix, plant: Matrix, impedance: Matrix
 ) -> tuple[Matrix, Matrix, list[Expr]]:
-    """K_3, K_4 and the weights C_t, C_s for which the law has all four wanted gains, with K_p and K_d given.
+    """K_3, K_4 and the weights C_t, C_s for which the law has all four desired gains, for given K_p and K_d; guards.
 
-    Coefficient by coefficient each is found from those before it, without a root; positive where they exist: all that
-    is given but the gains, 1 / C_t, K_3, K_4, C_t / C_s.
+    Each follows from those before it, coefficient by coefficient, without roots. Guards are the plant, the impedance,
+    1 / C_t, K_3, K_4 and C_t / C_s.
     """
     m, b, k = plant
     stiffness, damping = impedance

@@ -1,9 +1,9 @@
-"""The laws of chapter 15: their chains, and the starts that the recursion continues from.
+"""The laws of chapter 15: their chains, and the starts of the recursion.
 
 Every joint law makes the link a mass on a spring and a damper about a moving target, m e'' + K_d e' + K_p e = tau_ext
 with e = q - q_d, up to errors that vanish. Its energy V is that of this mass and this spring, plus the errors' squares.
-Arguments are columns: ``desired`` q_d and its four derivatives, ``external`` the torque on the link and its rate.
-Whoever measures the link's acceleration rather than that torque passes m q'' minus the torques of the springs.
+Arguments are columns: ``desired`` q_d and its four derivatives, ``external`` the torque on the link and its rate. If the
+link's acceleration is measured instead of that torque, pass m q'' minus the torques of the springs.
 """
 
 from itertools import pairwise
@@ -15,15 +15,15 @@ from awiwi_gen.definitions.naming import Derivation
 
 ONE = Matrix([1])
 ZERO = Matrix([0])
-SIDES = (1, -1)  # a positive torque of motor 1 turns the link forward, one of motor 2 turns it back
+SIDES = (1, -1)  # a positive torque of motor 1 pulls the link forward, one of motor 2 pulls it back
 SHARES = Matrix(SIDES) / 2  # of each motor in the torque on the link (eq. 15.88)
 
 
 def academic_law(x: Matrix, k: Matrix) -> Law:
     """The example of section 15.1: x1' = -x1^3 + x1^2 + x2, x2' = u, with the gains k1 and k2.
 
-    The first virtual control leaves -x1^3 alone, for it helps (eq. 15.2). The control ends in -x1:
-    eq. 15.10 lacks it.
+    The first virtual control does not cancel -x1^3, which stabilises (eq. 15.2). The control has the term -x1, which
+    eq. 15.10 lacks.
     """
     first = x[0]
     chain = [Level(x[:1, :], Matrix([first**2 - first**3]), ONE), Level(x[1:, :], ZERO, ONE)]
@@ -32,16 +32,16 @@ def academic_law(x: Matrix, k: Matrix) -> Law:
 
 
 def position_law(motion: Matrix, desired: Matrix, plant: Matrix, rates: Matrix, scales: Matrix) -> Law:
-    """Flexible joint by its link's position and three derivatives (eq. 15.20 to 15.50), each level on its own.
+    """Flexible joint by its link's position and three derivatives (eq. 15.20 to 15.50), each a level of its own.
 
-    ``rates`` are k1 .. k4, ``scales`` weigh the errors 2 to 4 against the first.
+    ``rates`` are k1 .. k4, ``scales`` the weights of errors 2 to 4 relative to the first.
     """
     m, b, k = plant
     drifts = [ZERO, ZERO, ZERO, Matrix([-k * (b + m) / (b * m) * motion[2]])]
     gains = [ONE, ONE, ONE, Matrix([k / (b * m)])]
     chain = [Level(motion[i : i + 1, :], drifts[i], gains[i]) for i in range(4)]
     tunings = [Tuning(Matrix([rate]), Matrix([scale])) for rate, scale in zip(rates, [1, *scales], strict=True)]
-    return backstep(chain, Start(0, desired[:1, :], signals=_flow(desired)), tunings, Derivation())
+    return backstep(chain, Start(0, desired[:1, :], signals=_rates(desired)), tunings, Derivation())
 
 
 def impedance_law(
@@ -54,17 +54,17 @@ def impedance_law(
 def nonlinear_law(
     state: Matrix, desired: Matrix, external: Matrix, plant: Matrix, spring: Matrix, gains: Matrix, weights: Matrix
 ) -> Law:
-    """The same behind a spring of any characteristic phi (eq. 15.71 to 15.81), known by its local slope and curvature.
+    """Impedance of a joint behind a spring of any characteristic phi (eq. 15.71 to 15.81), by its slope and curvature.
 
-    The value phi itself is the state tau. Only a positive slope is needed; the curvature may be zero.
+    The value of phi is the state tau. Only a positive slope is needed; the curvature may be zero.
     """
     m, b = plant[0], plant[1]
     joint, torque = state[:2, :], state[2:, :]
-    stretch = _stretch(torque[0], torque[1], b, spring[0], spring[1], (torque[0] + external[0]) / m)
+    drift = _spring_drift(torque[0], torque[1], b, spring[0], spring[1], (torque[0] + external[0]) / m)
     chain = [
         *_link(joint, external, Matrix([[1 / m]]), m),
         Level(torque[:1, :], ZERO, ONE),
-        Level(torque[1:, :], Matrix([stretch]), Matrix([spring[0] / b])),
+        Level(torque[1:, :], Matrix([drift]), Matrix([spring[0] / b])),
     ]
     start = _impedance(joint, desired, external, m, gains[:2, :], ONE, ZERO)
     tunings = [Tuning(gains[i : i + 1, :], weights[i - 2 : i - 1, :]) for i in (2, 3)]
@@ -75,21 +75,21 @@ def antagonistic_law(
     joint: Matrix, torques: Matrix, desired: Matrix, pretension: Matrix, external: Matrix,
     inertias: Matrix, springs: Matrix, impedance: Matrix, tunings: Matrix,
 ) -> Law:  # fmt: skip
-    """Joint between two motors, each behind a spring of its own (section 15.5), as one chain of six states.
+    """Joint between two motors, each behind its own spring (section 15.5), as one chain of six states.
 
-    Both levels of torques are vectors, so the recursion takes the true acceleration of the link and no motor neglects
-    the other. ``inertias`` are m, b1, b2; ``pretension`` is the wanted common torque with two derivatives. The others
-    have a row for each motor: its spring's torque phi1(theta1 - q) or phi2(theta2 + q) with the rate, slope and
+    Both levels of torques are vectors, so the recursion uses the true acceleration of the link, by both motors.
+    ``inertias`` are m, b1, b2; ``pretension`` is the desired common torque with two derivatives. The other arguments
+    have a row for each motor: its spring's torque phi1(theta1 - q) or phi2(theta2 + q) with its rate, slope and
     curvature of phi, and (K_3, K_4, C_t, C_s).
     """
     m = inertias[0]
     torque, rate = torques[0::2, :], torques[1::2, :]
     accelerated = (torque[0] - torque[1] + external[0]) / m
-    stretch = [_stretch_of(i, torques, inertias, springs, accelerated) for i in (0, 1)]
+    drift = [_spring_drift_of(i, torques, inertias, springs, accelerated) for i in (0, 1)]
     chain = [
         *_link(joint, external, Matrix([SIDES]) / m, m),
         Level(torque, Matrix([0, 0]), diag(1, 1)),
-        Level(rate, Matrix(stretch), diag(*(springs[2 * i] / inertias[i + 1] for i in (0, 1)))),
+        Level(rate, Matrix(drift), diag(*(springs[2 * i] / inertias[i + 1] for i in (0, 1)))),
     ]
     start = _impedance(joint, desired, external, m, impedance, SHARES, pretension)
     return backstep(chain, start, [Tuning(tunings[i::4, :], tunings[i + 2 :: 4, :]) for i in (0, 1)], Derivation())
@@ -99,21 +99,21 @@ def decoupled_laws(
     joint: Matrix, torques: Matrix, desired: Matrix, pretension: Matrix, external: Matrix,
     inertias: Matrix, springs: Matrix, impedance: Matrix, tunings: Matrix,
 ) -> list[Law]:  # fmt: skip
-    """The printed shortcut, a law per motor that believes to be alone with the link (eq. 15.84 to 15.88).
+    """The printed decoupling: a law per motor that neglects the other motor (eq. 15.84 to 15.88).
 
-    Only the spring's equation is freed of the other motor's torque (eq. 15.84). The link's keeps it, and the motor does
-    not know (eq. 15.86): it takes its own pretension for an acceleration and lets it go.
+    The other motor's torque is removed from the spring's equation (eq. 15.84), but not from the link's (eq. 15.86). So
+    each law takes its pretension for an acceleration of the link, and releases it.
     """
     m = inertias[0]
     accelerated = (torques[0] - torques[2] + external[0]) / m
     laws = []
     for i, side in enumerate(SIDES):
-        own, tuning = torques[2 * i : 2 * i + 2, :], tunings[4 * i : 4 * i + 4, :]
-        stretch = _stretch_of(i, torques, inertias, springs, accelerated)
+        torque, tuning = torques[2 * i : 2 * i + 2, :], tunings[4 * i : 4 * i + 4, :]
+        drift = _spring_drift_of(i, torques, inertias, springs, accelerated)
         chain = [
             *_link(joint, external, Matrix([[side / m]]), m),
-            Level(own[:1, :], ZERO, ONE),
-            Level(own[1:, :], Matrix([stretch]), Matrix([springs[2 * i] / inertias[i + 1]])),
+            Level(torque[:1, :], ZERO, ONE),
+            Level(torque[1:, :], Matrix([drift]), Matrix([springs[2 * i] / inertias[i + 1]])),
         ]
         start = _impedance(joint, desired, external, m, impedance, SHARES[i : i + 1, :], pretension)
         steps = [Tuning(tuning[j : j + 1, :], tuning[j + 2 : j + 3, :]) for j in (0, 1)]
@@ -121,11 +121,11 @@ def decoupled_laws(
     return laws
 
 
-# -- what the kernels return: controls with their guards; energies with their rates and virtual controls -----------
+# -- the kernels: controls with their guards; energies with their rates and virtual controls -----------------------
 
 
 def backstepping_academic(_: object, x: Matrix, k: Matrix) -> tuple[Matrix, list[Expr]]:
-    """u of the example, and the gains that must be positive."""
+    """u of the example, and the guards."""
     return academic_law(x, k).control, [*k]
 
 
@@ -220,21 +220,23 @@ def _impedance(
         target=shares * torque + pretension[0] * Matrix([1] * len(shares)),
         energy=(m * speed**2 + stiffness * error**2) / 2,
         rate=speed * external[0] - damping * speed**2,
-        signals={**_flow(desired), **_flow(external), **_flow(pretension)},
+        signals={**_rates(desired), **_rates(external), **_rates(pretension)},
     )
 
 
-def _stretch(torque: Expr, rate: Expr, b: Expr, slope: Expr, curvature: Expr, accelerated: Expr) -> Expr:
-    """Second derivative of a spring's torque when its motor gives none (eq. 15.74)."""
+def _spring_drift(torque: Expr, rate: Expr, b: Expr, slope: Expr, curvature: Expr, accelerated: Expr) -> Expr:
+    """Second derivative of a spring's torque for a motor torque of zero (eq. 15.74)."""
     return curvature * (rate / slope) ** 2 - slope * (torque / b + accelerated)
 
 
-def _stretch_of(i: int, torques: Matrix, inertias: Matrix, springs: Matrix, accelerated: Expr) -> Expr:
-    """The same for one spring of a pair, on whose side the link accelerates."""
+def _spring_drift_of(i: int, torques: Matrix, inertias: Matrix, springs: Matrix, accelerated: Expr) -> Expr:
+    """The same for spring ``i`` of a pair."""
     j = 2 * i
-    return _stretch(torques[j], torques[j + 1], inertias[i + 1], springs[j], springs[j + 1], SIDES[i] * accelerated)
+    return _spring_drift(
+        torques[j], torques[j + 1], inertias[i + 1], springs[j], springs[j + 1], SIDES[i] * accelerated
+    )
 
 
-def _flow(derivatives: Matrix) -> dict[Expr, Expr]:
+def _rates(derivatives: Matrix) -> dict[Expr, Expr]:
     """Each derivative is the rate of the one before it."""
     return dict(pairwise(derivatives))

@@ -2,17 +2,17 @@
 
 A chain is a sequence of levels, each driven by the next one and the last by the control u:
 
-    x_i' = drift_i + gain_i x_(i+1)                 drift and gain may depend on x_1 .. x_i and on outer signals
+    x_i' = drift_i + gain_i x_(i+1)                 drift and gain may depend on x_1 .. x_i and on external signals
 
-Some first levels, perhaps none, are stabilised by hand: a virtual control for the level behind them, and an energy that
-then does not grow. The recursion does the rest. A level has a target, so it has an error z = x - target; the energy
-grows by a weighted square of it, and the next level's target takes the error down at a chosen rate k while it pays
-back the power that the error feeds into the levels before. What remains is
+The first levels, if any, are stabilised by hand: by a virtual control for the next level, and an energy that then does
+not grow. The recursion does the rest. Each level has a target and an error z = x - target. A weighted square of the
+error is added to the energy. The next level's target makes the error decay at a chosen rate k, and cancels the power
+that the error feeds into the levels before. The result is
 
     V = V_start + sum c z^2 / 2          V' = V'_start - sum c k z^2
 
-The printed laws have the weights c = 1, which only fit together once everything is measured in SI numbers; as inputs
-with units, weights let every kernel pass the dimension check, and give gains the freedom that chapter 16 needs.
+The printed laws have weights c = 1, which have no units and hold for SI numbers only. As inputs with units, the weights
+let every kernel pass the dimension check, and give the gains the freedom that chapter 16 needs.
 """
 
 from collections.abc import Mapping, Sequence
@@ -38,7 +38,7 @@ class Level:
 
 @dataclass(frozen=True)
 class Tuning:
-    """How fast each error of a level is to vanish [1/s], and what its square weighs in the energy; both (n, 1)."""
+    """Decay rate [1/s] of each error of a level, and the weight of its square in the energy; both (n, 1)."""
 
     rates: Matrix
     weights: Matrix
@@ -46,9 +46,9 @@ class Tuning:
 
 @dataclass(frozen=True)
 class Start:
-    """What stabilises the first ``levels``: the target of the level behind them, their energy and its rate on target.
+    """What stabilises the first ``levels``: the target of the next level, their energy, and its rate on target.
 
-    A target that moves is stabilised like one at rest as soon as the rates of its symbols are given as ``signals``.
+    ``signals`` has the rate of each symbol of a target that moves.
     """
 
     levels: int
@@ -60,7 +60,7 @@ class Start:
 
 @dataclass(frozen=True)
 class Law:
-    """What the recursion finds: a target and an error per level, the control, the energy V and its rate V'."""
+    """Result of the recursion: a target and an error per level, the control, the energy V and its rate V'."""
 
     targets: tuple[Matrix, ...]
     errors: tuple[Matrix, ...]
@@ -70,15 +70,15 @@ class Law:
 
 
 def backstep(chain: Sequence[Level], start: Start, tunings: Sequence[Tuning], names: Derivation) -> Law:
-    """Virtual controls, errors, control and Lyapunov function of a chain, one tuning per level behind the start.
+    """Virtual controls, errors, control and Lyapunov function of a chain, with one tuning per level after the start.
 
-    Everything is expressed in the names of a derivation, so a target is written once and differentiated once.
+    All results use the names of one derivation, so a target is written once and differentiated once.
     """
     flow = dict(start.signals)
     for level, following in pairwise(chain):
         flow |= zip(level.x, level.drift + level.gain * following.x, strict=True)
     energy, rate, target = start.energy, start.rate, start.target
-    fed = _power_into(chain[start.levels - 1], energy, names) if start.levels else S.Zero * target
+    power_in = _power_into(chain[start.levels - 1], energy, names) if start.levels else S.Zero * target
     targets, errors = [], []
     for level, tuning in zip(chain[start.levels :], tunings, strict=True):
         error = names.name_all(level.x - target)
@@ -88,10 +88,10 @@ def backstep(chain: Sequence[Level], start: Start, tunings: Sequence[Tuning], na
         rate -= sum(c * k * z**2 for c, k, z in zip(tuning.weights, tuning.rates, error, strict=True))
         decay = [
             names.along(wanted, flow) - k * z - power / c
-            for wanted, k, c, z, power in zip(target, tuning.rates, tuning.weights, error, fed, strict=True)
+            for wanted, k, c, z, power in zip(target, tuning.rates, tuning.weights, error, power_in, strict=True)
         ]
         target = names.name_all(level.gain.LUsolve(Matrix(decay) - level.drift))
-        fed = level.gain.T * Matrix([c * z for c, z in zip(tuning.weights, error, strict=True)])
+        power_in = level.gain.T * Matrix([c * z for c, z in zip(tuning.weights, error, strict=True)])
     return Law(tuple(targets), tuple(errors), target, energy, rate)
 
 

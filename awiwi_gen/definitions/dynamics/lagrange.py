@@ -19,7 +19,7 @@ _NO_GRAVITY = sympy.zeros(3, 1)
 
 
 def energy(finger: Finger, q: Matrix, qd: Matrix, g: Matrix) -> tuple[Expr, Expr]:
-    """Kinetic and potential energy [J] (eq. 5.4); potential zero is a mass at the origin of the base."""
+    """Kinetic and potential energy [J] (eq. 5.4); the potential of a mass at the base frame's origin is zero."""
     lagrangian = _lagrangian(finger, q, qd, g)
     return lagrangian.kinetic, lagrangian.potential
 
@@ -35,7 +35,7 @@ def coriolis_matrix(finger: Finger, q: Matrix, qd: Matrix) -> Matrix:
 
 
 def gravity(finger: Finger, q: Matrix, g: Matrix) -> Matrix:
-    """Joint torques (n) [N m] that hold the finger still: gradient of the potential energy."""
+    """Joint torques (n) [N m] that hold the finger at rest: gradient of the potential energy."""
     return _lagrangian(finger, q, _velocities(q), g).gravity()
 
 
@@ -121,8 +121,8 @@ def _lagrangian(finger: Finger, q: Matrix, qd: Matrix, g: Matrix) -> _Lagrangian
     for link, frame in zip(finger.links, frames(finger, q, derive)[1:-1], strict=True):
         centre = derive.name_all(frame.point(Matrix(link.com)))
         velocity = centre.applyfunc(lambda x: derive.along(x, motion))
-        turning = frame.axes.T * frame.axes.applyfunc(lambda x: derive.along(x, motion))
-        spin = derive.name_all(Matrix(axial(turning)))
+        skew = frame.axes.T * frame.axes.applyfunc(lambda x: derive.along(x, motion))
+        spin = derive.name_all(Matrix(axial(skew)))
         kinetic += (link.mass * velocity.dot(velocity) + spin.dot(_tensor(link.inertia) * spin)) / 2
         potential -= link.mass * g.dot(centre)
     return _Lagrangian(kinetic, potential, q, qd, derive)
@@ -144,7 +144,7 @@ def _tensor(inertia: Any) -> Matrix:
 
 
 def cofactor_matrix(matrix: Matrix, derive: Derivation) -> Matrix:
-    """The cofactors (n x n) of a symmetric matrix; each minor is expanded along its first row, once."""
+    """The cofactors (n x n) of a symmetric matrix; each minor is expanded along its first row and computed once."""
     known: dict[tuple[tuple[int, ...], tuple[int, ...]], Expr] = {((), ()): sympy.S.One}
 
     def minor(rows: tuple[int, ...], columns: tuple[int, ...]) -> Expr:

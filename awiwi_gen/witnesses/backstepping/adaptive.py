@@ -1,4 +1,4 @@
-"""The same law from the closed loop that it makes: all errors but one eliminated, solved for its highest derivative."""
+"""The adaptive law by inverse dynamics: the closed loop with all errors but one eliminated, solved for the motor."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ def backstepping_adaptive(
     jerk = (net[1] - damping * accelerated) / m
     motion = ca.vertcat(joint, accelerated, jerk)
     error = motion - desired[:4]
-    moving = m * desired[2:] + damping * desired[1:4] - impedance[0] * error[:3] - impedance[1] * error[1:]
+    link_torque = m * desired[2:] + damping * desired[1:4] - impedance[0] * error[:3] - impedance[1] * error[1:]
     motors = []
     for i, side in enumerate(sides):
         fast, slow, link, last = ca.vertsplit(tunings[4 * i : 4 * i + 4])
         slope, curvature = springs[2 * i], springs[2 * i + 1]
-        target = pretension + side * moving / 2
+        target = pretension + side * link_torque / 2
         t, dt = torques[2 * i] - target[0], torques[2 * i + 1] - target[1]
         decay = (fast + slow) * dt + (fast * slow + link / last) * t + side * (error[2] + slow * error[1]) / link
-        wanted = target[2] - decay
-        winding = side * accelerated + (wanted - curvature * (torques[2 * i + 1] / slope) ** 2) / slope
-        motors.append(torques[2 * i] + inertias[i + 1] * winding + resistance[i])
+        torque_dd = target[2] - decay
+        theta_dd = side * accelerated + (torque_dd - curvature * (torques[2 * i + 1] / slope) ** 2) / slope
+        motors.append(torques[2 * i] + inertias[i + 1] * theta_dd + resistance[i])
     positive = (inertias, springs[::2], impedance, tunings)
     return ca.vertcat(*motors), [x for parameters in positive for x in ca.vertsplit(parameters)]

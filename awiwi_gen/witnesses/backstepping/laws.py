@@ -1,8 +1,8 @@
-"""The laws of chapter 15 without a recursion: from the closed loop that they make, by inverse dynamics.
+"""The laws of chapter 15 without a recursion: from their closed loop, by inverse dynamics.
 
-Eliminating all errors but one from a closed loop leaves a differential equation for what is left of it. Solved for the
-highest derivative, it says which motion of the motor is wanted; the motor's own equation then gives its torque.
-Energies are differentiated along the plant under that torque, automatically.
+Eliminating all errors but one from the closed loop leaves a differential equation for that one. Solved for its highest
+derivative, it gives the desired motion of the motor, and the motor's own equation gives the torque. Energies are
+differentiated along the plant under that torque, automatically.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ SIDES = (1, -1)
 
 
 def backstepping_academic(_: object, x: SX, k: SX) -> tuple[SX, list[SX]]:
-    """Control of the example (eq. 15.10): the error of x2 must change at -k2 z2 - x1."""
+    """Control of the example (eq. 15.10): the error of x2 has the rate -k2 z2 - x1."""
     error = _academic_error(x, k)
-    still = ca.jtimes(error, x, ca.vertcat(_academic_drift(x), 0))
-    control = (-k[1] * error - x[0] - still) / ca.jacobian(error, x)[1]
+    drift = ca.jtimes(error, x, ca.vertcat(_academic_drift(x), 0))
+    control = (-k[1] * error - x[0] - drift) / ca.jacobian(error, x)[1]
     return control, ca.vertsplit(k)
 
 
@@ -39,8 +39,8 @@ def _academic_error(x: SX, k: SX) -> SX:
 def backstepping_position(_: object, motion: SX, desired: SX, plant: SX, rates: SX, scales: SX) -> tuple[SX, list[SX]]:
     """Motor torque for the fourth derivative that the characteristic polynomial of the errors asks for (eq. 15.17)."""
     m, b, k = ca.vertsplit(plant)
-    wanted = desired[4] - ca.dot(_error_polynomials(rates, scales)[-1][:4], motion - desired[:4])
-    control = b * m / k * wanted + (b + m) * motion[2]
+    highest = desired[4] - ca.dot(_error_polynomials(rates, scales)[-1][:4], motion - desired[:4])
+    control = b * m / k * highest + (b + m) * motion[2]
     return control, [*ca.vertsplit(plant), *ca.vertsplit(rates), *ca.vertsplit(scales)]
 
 
@@ -87,7 +87,7 @@ def backstepping_nonlinear(
     m, b = bodies[0], bodies[1]
     accelerated, jerk = (state[2] + external[0]) / m, (state[3] + external[1]) / m
     motion = ca.vertcat(state[:2], accelerated, jerk)
-    pull, _target = _wanted(1, SX(1), motion, state[2:], desired, SX(0), m, gains[:2], gains[2:], weights)
+    pull, _target = _closed_loop(1, SX(1), motion, state[2:], desired, SX(0), m, gains[:2], gains[2:], weights)
     control = _motor_torque(state[2], state[3], pull, b, spring[0], spring[1], accelerated)
     return control, [*ca.vertsplit(bodies), spring[0], *ca.vertsplit(gains), *ca.vertsplit(weights)]
 
@@ -101,7 +101,7 @@ def backstepping_impedance_lyapunov(
     accelerated = (state[2] + external[0]) / m
     flow = ca.vertcat(state[1], accelerated, state[3], k * ((motor - state[2]) / b - accelerated))
     motion = ca.vertcat(state[:2], accelerated, (state[3] + external[1]) / m)
-    _pull, target = _wanted(1, SX(1), motion, state[2:], desired, SX(0), m, gains[:2], gains[2:], weights)
+    _pull, target = _closed_loop(1, SX(1), motion, state[2:], desired, SX(0), m, gains[:2], gains[2:], weights)
     errors = state[2:] - target
     energy = _link_energy(state[:2], desired, m, gains[0]) + ca.dot(weights, errors**2) / 2
     rate = ca.jtimes(energy, state, flow)
@@ -111,18 +111,20 @@ def backstepping_impedance_lyapunov(
 
 def backstepping_antagonistic(
     _: object, joint: SX, torques: SX, desired: SX, pretension: SX, external: SX,
-    inertias: SX, springs: SX, impedance: SX, tunings: SX, alone: bool = False,
+    inertias: SX, springs: SX, impedance: SX, tunings: SX, neglect_other: bool = False,
 ) -> tuple[SX, list[SX]]:  # fmt: skip
-    """Torques of both motors (eq. 15.104, mended); ``alone`` if each believes that only it moves the link."""
+    """Torques of both motors (eq. 15.104, mended); each alone with the link if ``neglect_other``."""
     accelerated = _link_motion(joint, torques, external, inertias[0])[2]
     motors = []
     for i, side in enumerate(SIDES):
-        motion = _link_motion(joint, torques, external, inertias[0], i if alone else None)
-        own, spring, tuning = _row(torques, i), _row(springs, i), _row(tunings, i)
-        pull, _target = _wanted(
-            side, SX(0.5), motion, own, desired, pretension, inertias[0], impedance, tuning[:2], tuning[2:]
+        motion = _link_motion(joint, torques, external, inertias[0], i if neglect_other else None)
+        torque, spring, tuning = _row(torques, i), _row(springs, i), _row(tunings, i)
+        pull, _target = _closed_loop(
+            side, SX(0.5), motion, torque, desired, pretension, inertias[0], impedance, tuning[:2], tuning[2:]
         )
-        motors.append(_motor_torque(own[0], own[1], pull, inertias[i + 1], spring[0], spring[1], side * accelerated))
+        motors.append(
+            _motor_torque(torque[0], torque[1], pull, inertias[i + 1], spring[0], spring[1], side * accelerated)
+        )
     positive = (inertias, springs[::2], impedance, tunings)
     return ca.vertcat(*motors), [x for parameters in positive for x in ca.vertsplit(parameters)]
 
@@ -133,7 +135,7 @@ def backstepping_antagonistic_decoupled(
 ) -> tuple[SX, list[SX]]:  # fmt: skip
     """Torques of both motors by the printed decoupling (eq. 15.84 to 15.86)."""
     return backstepping_antagonistic(
-        part, joint, torques, desired, pretension, external, inertias, springs, impedance, tunings, alone=True
+        part, joint, torques, desired, pretension, external, inertias, springs, impedance, tunings, neglect_other=True
     )
 
 
@@ -148,51 +150,60 @@ def backstepping_antagonistic_lyapunov(
     motion = _link_motion(joint, torques, external, inertias[0])
     energy, targets, flow = _link_energy(joint, desired, inertias[0], impedance[0]), [], []
     for i, side in enumerate(SIDES):
-        own, spring, tuning = _row(torques, i), _row(springs, i), _row(tunings, i)
-        _pull, target = _wanted(
-            side, SX(0.5), motion, own, desired, pretension, inertias[0], impedance, tuning[:2], tuning[2:]
+        torque, spring, tuning = _row(torques, i), _row(springs, i), _row(tunings, i)
+        _pull, target = _closed_loop(
+            side, SX(0.5), motion, torque, desired, pretension, inertias[0], impedance, tuning[:2], tuning[2:]
         )
-        energy += ca.dot(tuning[2:], (own - target) ** 2) / 2
+        energy += ca.dot(tuning[2:], (torque - target) ** 2) / 2
         targets.append(target)
-        twisted = (motors[i] - own[0]) / inertias[i + 1] - side * motion[2]
-        flow += [own[1], spring[1] * (own[1] / spring[0]) ** 2 + spring[0] * twisted]
+        stretch_dd = (motors[i] - torque[0]) / inertias[i + 1] - side * motion[2]
+        flow += [torque[1], spring[1] * (torque[1] / spring[0]) ** 2 + spring[0] * stretch_dd]
     rate = ca.jtimes(energy, joint, motion[1:3]) + ca.jtimes(energy, torques, ca.vertcat(*flow))
     rate += sum(ca.jtimes(energy, signal, _shifted(signal)) for signal in (desired, pretension, external))
     return energy, rate, ca.vertcat(*targets)
 
 
 def _row(pair: SX, i: int) -> SX:
-    """What belongs to one motor of two."""
+    """The row of one motor of two."""
     half = pair.numel() // 2
     return pair[i * half : (i + 1) * half]
 
 
-def _link_motion(joint: SX, torques: SX, external: SX, m: SX, alone: int | None = None) -> SX:
-    """The link's position and three derivatives under both torques, or under that of one motor alone."""
-    pull = sum((side * _row(torques, i) for i, side in enumerate(SIDES) if alone in (None, i)), external)
+def _link_motion(joint: SX, torques: SX, external: SX, m: SX, only: int | None = None) -> SX:
+    """The link's position and three derivatives under both torques, or under that of motor ``only``."""
+    pull = sum((side * _row(torques, i) for i, side in enumerate(SIDES) if only in (None, i)), external)
     return ca.vertcat(joint, pull / m)
 
 
-def _wanted(
-    side: int, share: SX, motion: SX, own: SX, desired: SX, pretension: SX, m: SX, impedance: SX, rates: SX, weights: SX
+def _closed_loop(
+    side: int,
+    share: SX,
+    motion: SX,
+    torque: SX,
+    desired: SX,
+    pretension: SX,
+    m: SX,
+    impedance: SX,
+    rates: SX,
+    weights: SX,
 ) -> tuple[SX, SX]:
     """Second derivative of a spring's torque in closed loop, and the targets of that torque and of its rate.
 
-    ``own`` is the torque and its rate, ``motion`` the link's position and three derivatives. With the error e = q - q_d
+    ``torque`` is the torque and its rate, ``motion`` the link's position and three derivatives. With the error e = q - q_d
     of the link, the error t of the torque obeys (D + K_4)(t' + K_3 t + side e' / C_t) + (C_t / C_s) t = 0.
     """
     error = motion - desired[:4]
     offset = ca.vertcat(pretension, SX(3, 1))[:3]
     target = offset + side * share * (m * desired[2:] - impedance[0] * error[:3] - impedance[1] * error[1:])
     fast, slow = rates[0], rates[1]
-    t, dt = own[0] - target[0], own[1] - target[1]
+    t, dt = torque[0] - target[0], torque[1] - target[1]
     decay = (fast + slow) * dt + (fast * slow + weights[0] / weights[1]) * t
     pull = target[2] - decay - side * (error[2] + slow * error[1]) / weights[0]
     return pull, ca.vertcat(target[0], target[1] - fast * t - side * error[1] / weights[0])
 
 
 def _motor_torque(torque: SX, rate: SX, pull: SX, b: SX, slope: SX, curvature: SX, accelerated: SX) -> SX:
-    """What the motor must give for a second derivative of its spring's torque (eq. 15.74)."""
+    """The motor torque for a second derivative ``pull`` of its spring's torque (eq. 15.74)."""
     return torque + b * (accelerated + (pull - curvature * (rate / slope) ** 2) / slope)
 
 
@@ -201,5 +212,5 @@ def _link_energy(joint: SX, desired: SX, m: SX, stiffness: SX) -> SX:
 
 
 def _shifted(derivatives: SX) -> SX:
-    """Each derivative is the rate of the one before it; the last one's rate never matters."""
+    """Each derivative is the rate of the one before it; the last one's rate is not used."""
     return ca.vertcat(derivatives[1:], 0)

@@ -1,17 +1,17 @@
 """A finger prepared for recursion: every number in the axes where it costs least.
 
-*Axes that turn late.* Consecutive joints about one axis add their angles, so their bodies are described in common
-working axes, those in which the first of them turns. Vectors are rotated only where the axis changes direction.
+*Working axes.* Consecutive joints about one axis add their angles. Their bodies are described in common working axes,
+those before the first of these joints. Vectors are rotated only where the axis changes direction.
 
 *Mass moments.* A body is m, h = integral of r dm and S = integral of r r' dm about its joint. They are linear in the
 mass distribution, so composite bodies are sums; the inertia tensor is trace(S) 1 - S.
 
-*Joints that slide.* A joint's place on its axis is free, so it is put where the offset from the joint before has no
-component along the axis. Offsets between parallel joints become planar.
+*Joints shifted along their axes.* A joint may sit anywhere on its axis. It is put where the offset from the joint
+before has no component along the axis. So offsets between parallel joints become planar.
 
-*Mass moved towards the palm.* What lies on a joint's axis does not notice the joint turning, so m, h_z and S_zz are
-given to the body before: the energies stay the same, hence the dynamics. Three of ten numbers per link become zero, and
-so does the mass of every composite body.
+*Mass moved towards the palm.* A rotation about an axis does not move the mass on that axis. So m, h_z and S_zz of a
+body are given to the body before it. The energies stay the same, hence the dynamics. Three of the ten inertial
+parameters of a link become zero, and so does the mass of every composite body.
 """
 
 from collections.abc import Iterator, Sequence
@@ -29,7 +29,7 @@ _ZERO, _Z = SX(0), SX([0, 0, 1])
 
 @dataclass(frozen=True)
 class Moments:
-    """Mass moments of a body: m [kg], h (3) [kg m], S (3 x 3) [kg m^2], and the trace of S, which rotations keep."""
+    """Mass moments of a body: m [kg], h (3) [kg m], S (3 x 3) [kg m^2], and the trace of S, constant under rotations."""
 
     mass: SX
     first: SX
@@ -56,21 +56,23 @@ class Moments:
             self.trace + 2 * ca.trace(mixed) + ca.trace(squared),
         )
 
-    def turned(self, rotation: SX) -> "Moments":
+    def rotated(self, rotation: SX) -> "Moments":
         """The same body in other axes."""
         return Moments(self.mass, rotation @ self.first, rotation @ self.second @ rotation.T, self.trace)
 
-    def turned_about_z(self, c: SX, s: SX) -> "Moments":
-        """`turned` by the angle with this cosine and sine: 8 products for S, by the double angle, instead of 24."""
+    def rotated_about_z(self, c: SX, s: SX) -> "Moments":
+        """`rotated` by the angle with this cosine and sine: 8 products for S, by the double angle, instead of 24."""
         x, y, z = ca.vertsplit(self.first)
         xx, xy, xz, yy, yz, zz = (self.second[i, j] for i, j in ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)))
-        swing = (xx - yy) * c - 2 * xy * s
+        difference = (xx - yy) * c - 2 * xy * s
         first = (c * x - s * y, s * x + c * y, z)
-        second = _symmetric(yy + c * swing, xx - c * swing, zz, xy + s * swing, c * xz - s * yz, s * xz + c * yz)
+        second = _symmetric(
+            yy + c * difference, xx - c * difference, zz, xy + s * difference, c * xz - s * yz, s * xz + c * yz
+        )
         return Moments(self.mass, ca.vertcat(*first), second, self.trace)
 
     def split(self) -> tuple["Moments", "Moments"]:
-        """What does not notice a turn about z, as mass on the z axis, and the rest."""
+        """The part that a rotation about z does not change, as mass on the z axis, and the rest."""
         z = SX.zeros(3, 3)
         z[2, 2] = 1
         axis = Moments(self.mass, z @ self.first, z @ self.second @ z, self.second[2, 2])
@@ -87,153 +89,167 @@ class Moments:
 class Joint:
     """One joint of the chain and the body it moves, in the body's working axes.
 
-    The chain angle changes with coordinate number `coordinate` at `rate`, which itself changes at `bend`. Where the
-    next joint turns about another axis, the working axes turn with this joint, by the angle with cosine and sine
-    `spin`, and then by the `turn` (3 x 3) of the next; otherwise they are those before the joint, and `turn` is
-    None. In them, `axis` (3) is the joint's, `offset` (3) [m] leads to the next joint, and `rotation` (3 x 3) takes
-    the body's own axes to them; in its own, these are `own_offset` and `own_body`. The body is link number `link`, or
-    its crank. Its frame lies on the axis, `slid` [m] beyond the joint.
+    The joint's angle is a function of coordinate number `coordinate`, with the derivative `ratio` and the second
+    derivative `ratio_derivative`. If the next joint has another axis, the working axes rotate with this joint, by the
+    angle with cosine and sine `cos_sin`, and then by `next_rotation` (3 x 3), the fixed rotation of the next joint.
+    Otherwise they are the axes before the joint, and `next_rotation` is None.
+
+    In working axes, `axis` (3) is the joint's axis, `offset` (3) [m] leads to the next joint, and `rotation` (3 x 3)
+    takes the link's own axes to the working axes. `link_offset` and `link_body` are offset and body in the link's own
+    axes. The body is link number `link`, or its crank. The link's frame lies on the axis, `shift` [m] beyond the joint.
     """
 
     coordinate: int
-    rate: SX
-    bend: SX
-    spin: Vector
-    turn: SX | None
+    ratio: SX
+    ratio_derivative: SX
+    cos_sin: Vector
+    next_rotation: SX | None
     axis: SX
     offset: SX
     body: Moments
     rotation: SX
     link: int
-    slid: SX
-    own_offset: SX
-    own_body: Moments
+    shift: SX
+    link_offset: SX
+    link_body: Moments
 
-    def forth(self, vectors: SX) -> SX:
-        """Vectors (columns) in the axes before the joint, in working axes."""
-        return vectors if self.turn is None else self.turn.T @ (_about_z(self.spin).T @ vectors)
+    def outward(self, vectors: SX) -> SX:
+        """Vectors (columns) of the axes before the joint, in working axes."""
+        return vectors if self.next_rotation is None else self.next_rotation.T @ (_about_z(self.cos_sin).T @ vectors)
 
-    def back(self, vectors: SX) -> SX:
-        """Vectors (columns) in working axes, in the axes before the joint."""
-        return vectors if self.turn is None else _about_z(self.spin) @ (self.turn @ vectors)
+    def inward(self, vectors: SX) -> SX:
+        """Vectors (columns) of the working axes, in the axes before the joint."""
+        return vectors if self.next_rotation is None else _about_z(self.cos_sin) @ (self.next_rotation @ vectors)
 
-    def body_back(self, body: Moments) -> Moments:
-        """A body in working axes, in the axes before the joint."""
-        return body if self.turn is None else body.turned(self.turn).turned_about_z(*self.spin)
+    def body_inward(self, body: Moments) -> Moments:
+        """A body of the working axes, in the axes before the joint."""
+        return body if self.next_rotation is None else body.rotated(self.next_rotation).rotated_about_z(*self.cos_sin)
 
 
 @dataclass(frozen=True)
 class Assembly:
     """The joints of a finger's chain, base to tip.
 
-    `turn` (3 x 3) takes base vectors to the axes before the first joint. `ballast` (3) [kg m], in base axes, is the
-    first moment of the mass that was moved into the palm.
+    `base_rotation` (3 x 3) takes base vectors to the axes before the first joint. `palm_moment` (3) [kg m], in base
+    axes, is the first moment of the mass that was moved into the palm.
     """
 
-    turn: SX
+    base_rotation: SX
     joints: list[Joint]
-    ballast: SX
+    palm_moment: SX
 
     def axes(self) -> list[SX]:
         """Rotations (3 x 3) from each joint's working axes to the base."""
-        axes = [self.turn.T]
+        axes = [self.base_rotation.T]
         for joint in self.joints:
-            axes.append(joint.forth(axes[-1].T).T)
+            axes.append(joint.outward(axes[-1].T).T)
         return axes[1:]
 
     def base_point(self, count: int, point: SX) -> SX:
         """Base coordinates (3) [m] of a point (3) given from the end of the first `count` joints, in working axes."""
         for joint in reversed(self.joints[:count]):
-            point = joint.back(joint.offset + point)
-        return self.turn.T @ point
+            point = joint.inward(joint.offset + point)
+        return self.base_rotation.T @ point
 
 
 @dataclass(frozen=True)
 class _Part:
-    """A joint of the chain as the file gives it: a fixed turn, then a turn about z.
+    """A joint of the chain as the hand file gives it: a fixed rotation, then a rotation about z.
 
-    The latter is `angle`, or for the coupler of a four-bar the angle with cosine and sine `direction`, from the
-    turned frame.
+    The angle about z is `angle`, or for the coupler of a four-bar the angle with cosine and sine `cos_sin`.
     """
 
     coordinate: int
-    turn: SX | None
+    fixed_rotation: SX | None
     angle: SX
-    direction: Vector | None
-    rate: SX
-    bend: SX
+    cos_sin: Vector | None
+    ratio: SX
+    ratio_derivative: SX
     offset: SX
     body: Moments
     link: int
-    slid: SX = _ZERO
+    shift: SX = _ZERO
 
 
 def assemble(finger: Finger, q: SX) -> Assembly:
     """All that recursions need at joint angles q (n) [rad]."""
-    parts = list(_slid(list(_parts(finger, q))))
-    bodies, ballast = _lightened(parts)
+    parts = list(_shifted(list(_parts(finger, q))))
+    bodies, palm_moment = _masses_moved_inward(parts)
     joints: list[Joint] = []
     start, angle = (SX(1), SX(0)), SX(0)
     for part, body, following in zip(parts, bodies, [*parts[1:], None], strict=True):
-        if part.turn is not None:
+        if part.fixed_rotation is not None:
             start, angle = (SX(1), SX(0)), SX(0)
         angle += part.angle
-        if part.direction is not None:
-            start, angle = part.direction, SX(0)
-        spin = _sum_of_angles(start, (ca.cos(angle), ca.sin(angle)))
-        turn = following.turn if following is not None else None
-        place = (part.link, part.slid, part.offset, body)
-        if turn is None:
-            rotation, axis, body = _about_z(spin), _Z, body.turned_about_z(*spin)
+        if part.cos_sin is not None:
+            start, angle = part.cos_sin, SX(0)
+        cos_sin = _sum_of_angles(start, (ca.cos(angle), ca.sin(angle)))
+        next_rotation = following.fixed_rotation if following is not None else None
+        in_link = (part.link, part.shift, part.offset, body)
+        if next_rotation is None:
+            rotation, axis, body = _about_z(cos_sin), _Z, body.rotated_about_z(*cos_sin)
         else:
-            rotation, axis, body = turn.T, turn.T @ _Z, body.turned(turn.T)
+            rotation, axis, body = next_rotation.T, next_rotation.T @ _Z, body.rotated(next_rotation.T)
         offset = rotation @ part.offset
-        joints.append(Joint(part.coordinate, part.rate, part.bend, spin, turn, axis, offset, body, rotation, *place))
-    first = parts[0].turn
-    return Assembly(SX.eye(3) if first is None else first.T, joints, ballast)
+        joints.append(
+            Joint(
+                part.coordinate,
+                part.ratio,
+                part.ratio_derivative,
+                cos_sin,
+                next_rotation,
+                axis,
+                offset,
+                body,
+                rotation,
+                *in_link,
+            )
+        )
+    first = parts[0].fixed_rotation
+    return Assembly(SX.eye(3) if first is None else first.T, joints, palm_moment)
 
 
 def _parts(finger: Finger, q: SX) -> Iterator[_Part]:
     position, follows = coordinates(finger), leaders(finger)
     for index, link in enumerate(finger.links):
         coordinate = position[link.joint]
-        own, turn, offset, body = q[coordinate], _turn(link.turn), ca.vertcat(*link.offset), _body(link)
+        angle, fixed, offset, body = q[coordinate], _fixed_rotation(link.turn), ca.vertcat(*link.offset), _body(link)
         if link.four_bar is None:
             ratio = SX(1)
             if link.joint in follows:
                 ratio = SX(radius(finger, follows[link.joint])) / radius(finger, link.joint)
-            yield _Part(coordinate, turn, ratio * own, None, ratio, SX(0), offset, body, index)
+            yield _Part(coordinate, fixed, ratio * angle, None, ratio, SX(0), offset, body, index)
         else:
-            crank = own + link.four_bar.reference
+            crank = angle + link.four_bar.reference
             start = SX(link.start + link.four_bar.reference)
             now, (c, s) = FourBar(link.four_bar, crank), FourBar(link.four_bar, start).coupler
             arm = ca.vertcat(link.four_bar.crank, 0, 0)
-            yield _Part(coordinate, turn, crank, None, SX(1), SX(0), arm, Moments.none(), index)
-            turned = _sum_of_angles(now.coupler, (c, -s))
-            yield _Part(coordinate, None, SX(0), turned, now.rate - 1, now.bend, offset, body, index)
+            yield _Part(coordinate, fixed, crank, None, SX(1), SX(0), arm, Moments.none(), index)
+            relative = _sum_of_angles(now.coupler, (c, -s))
+            yield _Part(coordinate, None, SX(0), relative, now.ratio - 1, now.ratio_derivative, offset, body, index)
 
 
-def _slid(parts: Sequence[_Part]) -> Iterator[_Part]:
-    """The parts, with each joint moved along its axis to where the offset before it has no component along it."""
-    slid = SX(0)
+def _shifted(parts: Sequence[_Part]) -> Iterator[_Part]:
+    """The parts, each joint shifted along its axis to where the offset before it has no component along that axis."""
+    shift = SX(0)
     for part, following in zip(parts, [*parts[1:], None], strict=True):
-        offset, body = part.offset + _Z * slid, part.body.moved(_Z * slid)
-        own = slid
+        offset, body = part.offset + _Z * shift, part.body.moved(_Z * shift)
+        before = shift
         if following is not None:
-            axis = _Z if following.turn is None else following.turn @ _Z
-            slid = ca.dot(axis, offset)
-            offset = offset - axis * slid
-        yield replace(part, offset=offset, body=body, slid=own)
+            axis = _Z if following.fixed_rotation is None else following.fixed_rotation @ _Z
+            shift = ca.dot(axis, offset)
+            offset = offset - axis * shift
+        yield replace(part, offset=offset, body=body, shift=before)
 
 
-def _lightened(parts: Sequence[_Part]) -> tuple[list[Moments], SX]:
-    """The parts' bodies, each with its mass moved to the body before, and the first moment that arrives in the palm."""
+def _masses_moved_inward(parts: Sequence[_Part]) -> tuple[list[Moments], SX]:
+    """The parts' bodies, each with its mass moved to the body before, and the first moment moved into the palm."""
     bodies, moved = [], Moments.none()
     for part, before in zip(reversed(parts), [*reversed(parts[:-1]), None], strict=True):
         moved, rest = (part.body + moved).split()
         bodies.append(rest)
-        if part.turn is not None:
-            moved = moved.turned(part.turn)
+        if part.fixed_rotation is not None:
+            moved = moved.rotated(part.fixed_rotation)
         if before is not None:
             moved = moved.moved(before.offset)
     return bodies[::-1], moved.first
@@ -251,9 +267,9 @@ def _symmetric(xx: SX, yy: SX, zz: SX, xy: SX, xz: SX, yz: SX) -> SX:
     return ca.vertcat(ca.horzcat(xx, xy, xz), ca.horzcat(xy, yy, yz), ca.horzcat(xz, yz, zz))
 
 
-def _about_z(spin: Vector) -> SX:
+def _about_z(cos_sin: Vector) -> SX:
     """Rotation (3 x 3) about z by the angle with this cosine and sine."""
-    c, s = spin
+    c, s = cos_sin
     return ca.vertcat(ca.horzcat(c, -s, 0), ca.horzcat(s, c, 0), ca.horzcat(0, 0, 1))
 
 
@@ -262,8 +278,8 @@ def _sum_of_angles(one: Vector, other: Vector) -> Vector:
     return one[0] * other[0] - one[1] * other[1], one[1] * other[0] + one[0] * other[1]
 
 
-def _turn(turn: str) -> SX | None:
-    """The fixed rotation (3 x 3) before a joint, a signed permutation; None for none."""
+def _fixed_rotation(turn: str) -> SX | None:
+    """The fixed rotation (3 x 3) before a joint, a signed permutation; None if there is none."""
     axis, quarters = quarter_turns(turn)
     if not quarters:
         return None

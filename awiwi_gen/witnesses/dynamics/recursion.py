@@ -1,8 +1,10 @@
-"""Kinematics and dynamics of a finger by recursion along the chain: the route that makes fast code.
+"""Dynamics of a finger by recursion along the chain, the route with the fewest operations.
 
-Nothing is differentiated here: velocities are axes times levers, torques come from Newton and Euler, the mass
-matrix and the Coriolis matrix from composite bodies.
+A finger whose last joints are parallel is a planar chain in a rotating plane (`planar_chain`). For all others, torques
+come from Newton's and Euler's equations, and the mass matrix and the Coriolis matrix from composite bodies.
 """
+
+from collections.abc import Callable
 
 import casadi as ca
 from casadi import SX
@@ -11,7 +13,9 @@ from awiwi_gen.structure import Finger
 from awiwi_gen.witnesses.dynamics.assembly import Assembly, assemble
 from awiwi_gen.witnesses.dynamics.composite_bodies import mass_and_coriolis
 from awiwi_gen.witnesses.dynamics.newton_euler import torques, weight
-from awiwi_gen.witnesses.dynamics.planar_chain import TurningPlane, turning_plane
+from awiwi_gen.witnesses.dynamics.planar_chain import RotatingPlane, rotating_plane
+
+PlanarTorques = Callable[[RotatingPlane, list[SX], list[SX], SX], list[SX]]
 
 
 def mass_matrix(finger: Finger, q: SX) -> SX:
@@ -20,12 +24,12 @@ def mass_matrix(finger: Finger, q: SX) -> SX:
 
 
 def coriolis_matrix(finger: Finger, q: SX, qd: SX) -> SX:
-    """C (n x n) [N m s], the one with Christoffel symbols, so that dM/dt - 2 C is skew."""
+    """C (n x n) [N m s] by Christoffel symbols, so that dM/dt - 2 C is skew-symmetric."""
     return _mass_and_coriolis(assemble(finger, q), qd)[1]
 
 
 def gravity(finger: Finger, q: SX, g: SX) -> SX:
-    """Joint torques (n) [N m] that hold the finger still."""
+    """Joint torques (n) [N m] that hold the finger at rest."""
     return _weight(assemble(finger, q), g, q.numel())
 
 
@@ -42,19 +46,19 @@ def inverse_dynamics(finger: Finger, q: SX, qd: SX, qdd: SX, g: SX) -> SX:
 def inverse_dynamics_derivatives(finger: Finger, q: SX, qd: SX, qdd: SX, g: SX) -> tuple[SX, SX]:
     """Partial derivatives (n x n each) of the inverse dynamics by q [N m/rad] and by qd [N m s/rad]: automatic.
 
-    They come from torques for which each vector of a body is rotated on its own: longer, but with shorter derivatives.
+    The torques are written in the form with the shortest derivatives.
     """
-    tau = _torques(assemble(finger, q), qd, qdd, g, once=False)
+    tau = _torques(assemble(finger, q), qd, qdd, g, RotatingPlane.torques_to_differentiate)
     return ca.jacobian(tau, q), ca.jacobian(tau, qd)
 
 
 def forward_dynamics(finger: Finger, q: SX, qd: SX, tau: SX, g: SX) -> SX:
     """Joint accelerations (n) [rad/s^2] that joint torques tau cause: M qdd = tau - bias (eq. 2.1)."""
-    assembly, none = assemble(finger, q), SX.zeros(q.numel())
-    plane = turning_plane(assembly)
-    if plane is not None and all(joint.rate.is_one() for joint in assembly.joints):
+    assembly, zero = assemble(finger, q), SX.zeros(q.numel())
+    plane = rotating_plane(assembly)
+    if plane is not None and all(joint.ratio.is_one() for joint in assembly.joints):
         return _solve_absolute(plane, qd, tau, g)
-    return _solve(_mass_and_coriolis(assembly, none)[0], tau - _torques(assembly, qd, none, g))
+    return _solve(_mass_and_coriolis(assembly, zero)[0], tau - _torques(assembly, qd, zero, g))
 
 
 def dynamics(finger: Finger, q: SX, qd: SX, g: SX) -> tuple[SX, SX, SX]:
@@ -64,72 +68,73 @@ def dynamics(finger: Finger, q: SX, qd: SX, g: SX) -> tuple[SX, SX, SX]:
 
 
 def energy(finger: Finger, q: SX, qd: SX, g: SX) -> tuple[SX, SX]:
-    """Kinetic and potential energy [J] (eq. 5.4); potential zero is a mass at the origin of the base."""
+    """Kinetic and potential energy [J] (eq. 5.4); the potential of a mass at the base frame's origin is zero."""
     assembly = assemble(finger, q)
-    potential, down = -ca.dot(g, assembly.ballast), assembly.turn @ g
+    potential, down = -ca.dot(g, assembly.palm_moment), assembly.base_rotation @ g
     for joint in assembly.joints:
-        down = joint.forth(down)
+        down = joint.outward(down)
         potential -= ca.dot(down, joint.body.first)
     return _kinetic_energy(assembly, qd), potential
 
 
 def _kinetic_energy(assembly: Assembly, qd: SX) -> SX:
-    plane = turning_plane(assembly)
+    plane = rotating_plane(assembly)
     if plane is not None:
-        return plane.kinetic_energy(ca.vertsplit(_ways(assembly, qd)[0] @ qd))
+        return plane.kinetic_energy(ca.vertsplit(_joint_jacobian(assembly, qd)[0] @ qd))
     mass = mass_and_coriolis(assembly, SX.zeros(qd.numel()))[0]
     each_pair_once = ca.triu(mass) - ca.diag(ca.diag(mass)) / 2
     return ca.dot(qd, each_pair_once @ qd)
 
 
 def _mass_and_coriolis(assembly: Assembly, qd: SX) -> tuple[SX, SX]:
-    plane = turning_plane(assembly)
+    plane = rotating_plane(assembly)
     if plane is None:
         return mass_and_coriolis(assembly, qd)
-    ways, bends = _ways(assembly, qd)
-    mass = plane.mass(alone=qd.is_zero())
-    coriolis = plane.coriolis(ca.vertsplit(ways @ qd))
-    return ca.triu2symm(ca.triu(ways.T @ mass @ ways)), ways.T @ (coriolis @ ways + mass @ bends)
+    jacobian, jacobian_rate = _joint_jacobian(assembly, qd)
+    mass = plane.mass() if qd.is_zero() else plane.mass_beside_coriolis()
+    coriolis = plane.coriolis(ca.vertsplit(jacobian @ qd))
+    joint_mass = ca.triu2symm(ca.triu(jacobian.T @ mass @ jacobian))
+    return joint_mass, jacobian.T @ (coriolis @ jacobian + mass @ jacobian_rate)
 
 
-def _torques(assembly: Assembly, qd: SX, qdd: SX, g: SX, once: bool = True) -> SX:
-    plane = turning_plane(assembly)
+def _torques(assembly: Assembly, qd: SX, qdd: SX, g: SX, planar: PlanarTorques = RotatingPlane.torques) -> SX:
+    plane = rotating_plane(assembly)
     if plane is None:
         return torques(assembly, qd, qdd, g)
-    ways, bends = _ways(assembly, qd)
-    speeds, rates = ways @ qd, ways @ qdd + bends @ qd
-    return ways.T @ ca.vertcat(*plane.torques(ca.vertsplit(speeds), ca.vertsplit(rates), g, once=once))
+    jacobian, jacobian_rate = _joint_jacobian(assembly, qd)
+    speeds, accelerations = jacobian @ qd, jacobian @ qdd + jacobian_rate @ qd
+    return jacobian.T @ ca.vertcat(*planar(plane, ca.vertsplit(speeds), ca.vertsplit(accelerations), g))
 
 
 def _weight(assembly: Assembly, g: SX, n: int) -> SX:
-    plane = turning_plane(assembly)
+    plane = rotating_plane(assembly)
     if plane is None:
         return weight(assembly, g, n)
-    return _ways(assembly, SX.zeros(n))[0].T @ ca.vertcat(*plane.gravity(g))
+    return _joint_jacobian(assembly, SX.zeros(n))[0].T @ ca.vertcat(*plane.gravity(g))
 
 
-def _ways(assembly: Assembly, qd: SX) -> tuple[SX, SX]:
-    """How joints follow coordinates (joints x n): their speeds per unit speed, and the rates of these."""
-    ways, bends = SX(len(assembly.joints), qd.numel()), SX(len(assembly.joints), qd.numel())
+def _joint_jacobian(assembly: Assembly, qd: SX) -> tuple[SX, SX]:
+    """Jacobian (joints x n) of the joints' angles by the coordinates, and its time derivative."""
+    jacobian, jacobian_rate = SX(len(assembly.joints), qd.numel()), SX(len(assembly.joints), qd.numel())
     for index, joint in enumerate(assembly.joints):
-        ways[index, joint.coordinate] = joint.rate
-        if not joint.bend.is_zero():
-            bends[index, joint.coordinate] = joint.bend * qd[joint.coordinate]
-    return ways, bends
+        jacobian[index, joint.coordinate] = joint.ratio
+        if not joint.ratio_derivative.is_zero():
+            jacobian_rate[index, joint.coordinate] = joint.ratio_derivative * qd[joint.coordinate]
+    return jacobian, jacobian_rate
 
 
-def _solve_absolute(plane: TurningPlane, qd: SX, tau: SX, g: SX) -> SX:
-    """Accelerations of the absolute angles, of whose mass matrix the diagonal is constant, and their differences."""
-    n, start = qd.numel(), 1 if plane.lead else 0
+def _solve_absolute(plane: RotatingPlane, qd: SX, tau: SX, g: SX) -> SX:
+    """Joint accelerations, solved for absolute angles: the diagonal of their mass matrix is constant."""
+    n, start = qd.numel(), plane.start
     differences = SX.eye(n)
     for joint in range(start, n - 1):
         differences[joint, joint + 1] = -1
-    torque = plane.torques(ca.vertsplit(qd), [SX(0)] * n, g, absolute=True)
+    torque = plane.absolute_bias(ca.vertsplit(qd), g)
     return differences.T @ _solve(plane.absolute_mass(), differences @ tau - ca.vertcat(*torque))
 
 
 def _solve(mass: SX, torque: SX) -> SX:
-    """x with M x = torque, by M = U D U' with unit upper U: the last pivot, which comes first, does not depend on q."""
+    """x with M x = torque, by M = U D U' with unit upper triangular U: the first pivot, M[n, n], does not depend on q."""
     n = torque.numel()
     mass, x, upper = SX(mass), SX(torque), SX.zeros(n, n)
     inverse = [SX(0)] * n
