@@ -86,7 +86,7 @@ gravity = "{self.random.choice([9.81, 1.62])} m/s^2"
 source = "assumed"
 """
         parts = "".join(text for text, _ in fingers) + self.wrist(tendons) + self.actuators(tendons)
-        head = f'prefix = "{self.random.choice(["claw", "h"])}"\nname = "Random hand"\n'
+        head = 'prefix = "claw"\nname = "Random hand"\n'
         return f"# {', '.join(sorted(self.used))}\n{head}{limits}{parts}"
 
     def wrist(self, tendons: int) -> str:
@@ -94,7 +94,8 @@ source = "assumed"
             return ""
         x, y, z = (self.scale * self.between(0.95, 1.05) * side for side in (50, 42, 36))
         rows = [
-            f"    {{ forearm = {self.point((2, 6), (5, 36), (6, 30))}, palm = {self.point((-6, -2), (-14, 18), (-12, 12))} }},\n"
+            f"    {{ forearm = {self.point((2, 6), (5, 36), (6, 30))}, "
+            f"palm = {self.point((-6, -2), (-14, 18), (-12, 12))} }},\n"
             for _ in range(tendons)
         ]
         return f"""
@@ -119,7 +120,9 @@ rotor_inertia = "{b(1e-7, 5e-7):.3g} kg m^2"
 gear_inertia = "{b(5e-7, 5e-6):.3g} kg m^2"
 gear_ratio = "{b(10, 100):.4g}"
 pulley = "4 mm"
-friction = {{ steepness = "{b(2, 30):.3g} s/rad", level = "{b(0.1, 1):.3g} N m", viscosity = "{b(0.01, 0.1):.3g} N m s/rad" }}
+friction.steepness = "{b(2, 30):.3g} s/rad"
+friction.level = "{b(0.1, 1):.3g} N m"
+friction.viscosity = "{b(0.01, 0.1):.3g} N m s/rad"
 compensation = "{b(0.5, 0.95):.3g}"
 travel = "{b(0.5, 3):.3g} rad"
 velocity = "{b(5, 30):.3g} rad/s"

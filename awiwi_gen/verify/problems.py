@@ -24,6 +24,7 @@ Array = np.ndarray[Any, Any]
 
 NOISE = 2.5e-4  # error of a measured length [m]
 ROUNDS = 100  # of Gauss-Newton at 256 bits, at most: the residual is small, so a round gains a digit or more
+LEAST_EIGENVALUE = 0.01  # of P'P at any pose, relative to the largest at all: below it spans do not determine joints
 LAST_STEP = 1e-40  # largest step [rad] after which another would not change the result as two doubles
 
 
@@ -125,22 +126,24 @@ class GradientSearch(LeastSquares):
     """
 
     def solve(self, inputs: Mapping[str, Array]) -> Reference:
-        """The minima near the starts; where the trials are too few for these, no increase of the cost."""
-        exact = super().solve(inputs)
-        if self.converges(exact.high["q"]):
-            return exact
+        """The minima near the starts; where the trials need not reach these, no increase of the cost."""
+        if self.converges(inputs["start"]):
+            return super().solve(inputs)
         return reference({"increase": [[arb(0)] * len(inputs["start"])]})
 
     def converges(self, q: Array) -> bool:
-        """Whether a gradient descent with the same number of trials is within the tolerance of all minima q.
+        """Whether the spans determine the joints at all poses q, and a descent gets there within its trials.
 
-        A trial of length s times the gradient leaves 1 - s lambda of the error along an eigenvector of P'P with the
-        eigenvalue lambda. The search begins with s = 2 / trace(P'P) and halves it where the cost grows.
+        A trial of the length 2 / trace(P'P) times the gradient leaves 1 - 2 lambda / trace of the error along an
+        eigenvector of P'P with the eigenvalue lambda; of a single unknown it turns the sign of the error and no more.
+        Where an eigenvalue vanishes inside the range, two poses have the same lengths.
         """
-        _, P = self.model(q)
+        _, P = self.model(q.astype(np.float64))
         values = np.linalg.eigvalsh(np.swapaxes(P, 1, 2) @ P)
+        if not values.min() > LEAST_EIGENVALUE * values.max():
+            return False
         shares = values / values.sum(axis=1, keepdims=True)
-        left = np.min([np.abs(1 - step * shares).max(axis=1) for step in (2, 1)], axis=0) ** self.solver.iterations
+        left = np.abs(1 - 2 * shares) ** self.solver.iterations
         return bool(left.max() < min(self.solver.tolerance.values()))
 
     def observed(self, inputs: Mapping[str, Array], found: Any) -> Mapping[str, Array]:

@@ -1,0 +1,52 @@
+"""Random legal hands go the whole way: generated, compiled and proved. `tests/torture_hands.py` tries many more."""
+
+from __future__ import annotations
+
+import pytest
+import random_hands
+
+from awiwi_gen.hand import Hand
+from awiwi_gen.pipeline import Job, generate, verify
+
+SMALL = {
+    "one joint, alike tendons": (1, {"alike", "motor", "ripple", "wrist"}),
+    "one joint on a four-bar": (1, {"four-bar without zero", "spring", "units", "fibre"}),
+    "two joints, a span": (2, {"spans", "narrow range", "axial mass"}),
+    "a coupled joint, a narrow range": (2, {"couplings", "narrow range", "fibre"}),
+    "fewest tendons": (2, {"fewest", "range without zero", "four-bar"}),
+}
+
+
+def proof(text: str, directory, only: str = "*"):
+    job = Job(Hand.parse(text), only=only)
+    generate(job, directory)
+    return verify(job, directory)
+
+
+@pytest.mark.parametrize("name", SMALL)
+def test_a_small_random_hand_is_proved(name, tmp_path):
+    links, features = SMALL[name]
+    found = proof(random_hands.hand(1, links, features), tmp_path / "generated")
+
+    assert [verdict for verdict in found.verdicts if not verdict.passed] == []
+    assert [law for law in found.laws if not law.passed] == []
+
+
+@pytest.mark.parametrize("only", ["one_gravity", "one_mass_matrix", "one_joint_estimate*"])
+def test_kernels_of_a_finger_with_eight_links_are_proved(only, tmp_path):
+    text = random_hands.hand(3, 8, {"couplings", "crossed"})
+
+    assert text.count("[[fingers.one.links]]") == 8
+    assert proof(text, tmp_path / "generated", only).passed
+
+
+def test_equal_seeds_give_equal_hands_and_others_differ():
+    texts = [random_hands.hand(seed) for seed in (5, 5, 6)]
+
+    assert texts[0] == texts[1] != texts[2]
+
+
+def test_random_hands_are_of_all_kinds():
+    kinds = set().union(*(random_hands.kinds(random_hands.hand(seed)) for seed in range(40)))
+
+    assert kinds == set(random_hands.FEATURES)
