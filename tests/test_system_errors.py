@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import signal
 import subprocess
@@ -16,6 +17,7 @@ import pytest
 import awiwi_gen
 from awiwi_gen import parallel
 from awiwi_gen.build import load
+from awiwi_gen.emit.exchange import exchange, staging
 from awiwi_gen.errors import OutputError
 from awiwi_gen.pipeline import Job, cached_tree, generate, state
 
@@ -37,11 +39,11 @@ def run(*words: object, stdout=subprocess.PIPE, **env: str) -> subprocess.Comple
 
 
 def sentence(done: subprocess.CompletedProcess[str]) -> str:
-    """The one line on standard error."""
+    """The one line on standard error, apart from those on progress."""
     assert done.returncode == 2, done.stderr
-    assert "Traceback" not in done.stderr
-    assert len(done.stderr.splitlines()) == 1
-    return done.stderr.strip()
+    lines = [line for line in done.stderr.splitlines() if not line.endswith(" done")]
+    assert len(lines) == 1, done.stderr
+    return lines[0]
 
 
 # ------------------------------------------------------------------------------------------------- caches and places
@@ -84,7 +86,7 @@ def mounted(kind: str, place: Path, options: str):
 
 @linux
 def test_a_full_cache_is_one_sentence_and_nothing_is_replaced(tmp_path):
-    with mounted("tmpfs", tmp_path / "disk", "size=64k") as disk:
+    with mounted("tmpfs", tmp_path / "disk", "size=16k") as disk:
         said = sentence(run("generate", *SMALL, "-o", tmp_path / "c", AWIWI_GEN_CACHE=str(disk)))
 
     assert "cannot be written: no space left on device" in said
@@ -104,50 +106,46 @@ def test_a_full_disk_leaves_the_old_directory(tmp_path):
 
 
 @linux
-def test_a_cache_that_no_program_may_run_from_is_enough(tmp_path, monkeypatch):
+def test_a_cache_that_no_program_may_run_from_is_enough(tmp_path):
+    generate(Job(awiwi_gen.Hand.load(ONE_FINGER), only="jaw_tendon_lengths"), tmp_path / "c")
     with mounted("tmpfs", tmp_path / "disk", "noexec") as disk:
-        done = run("call", "jaw_tendon_lengths", "q=0.1,0.2", "--hand", ONE_FINGER, AWIWI_GEN_CACHE=str(disk / "cache"))
+        done = run("build", "-o", tmp_path / "c", AWIWI_GEN_CACHE=str(disk / "cache"))
         assert done.returncode == 0, done.stderr
-        said = sentence(
-            run("call", "jaw_tendon_lengths", "q=0,0", "--hand", ONE_FINGER, AWIWI_GEN_CACHE=str(disk / "cache"),
-                TMPDIR=str(disk))
-        )  # fmt: skip
+        said = sentence(run("build", "-o", tmp_path / "c", AWIWI_GEN_CACHE=str(disk / "cache"), TMPDIR=str(disk)))
         assert said.startswith("the compiled library cannot be loaded (")
         assert said.endswith("set TMPDIR to a folder that has space and is not mounted noexec")
 
 
 @linux
 def test_a_directory_in_the_lower_layer_of_a_container_is_replaced(tmp_path):
-    lower, upper, work = (tmp_path / name for name in ("lower", "upper", "work"))
-    upper.mkdir()
-    work.mkdir()
-    job = Job(awiwi_gen.Hand.load(ONE_FINGER), only="jaw_tendon_lengths")
-    generate(job, lower / "generated")
-    wider = Job(job.hand, only="jaw_[tm]*")
-    with (
-        mounted("tmpfs", tmp_path / "layers", "rw") as layers,
-        mounted("overlay", tmp_path / "merged", f"lowerdir={lower},upperdir={layers / 'u'},workdir={layers / 'w'}")
-        if [(layers / name).mkdir() for name in ("u", "w")]
-        else None as merged,
-    ):
-        place = merged / "generated"
-        manifest = place / "manifest.json"
-        whole = Job(job.hand)
-        assert generate(whole, place)
-        assert state(whole, place).fresh
-        assert manifest.exists()
-        assert [path.name for path in merged.iterdir()] == ["generated"]
-    assert state(job, lower / "generated").fresh
-    assert wider.hand is job.hand
+    lower, layers, merged = (tmp_path / name for name in ("lower", "layers", "merged"))
+    old, new = (Job(awiwi_gen.Hand.load(ONE_FINGER), only=only) for only in ("jaw_tendon_lengths", "*"))
+    generate(old, lower / "generated")
+    with mounted("tmpfs", layers, "rw"):
+        for name in ("upper", "work"):
+            (layers / name).mkdir()
+        with mounted("overlay", merged, f"lowerdir={lower},upperdir={layers / 'upper'},workdir={layers / 'work'}"):
+            if exchangeable(merged / "generated"):
+                pytest.skip("this kernel swaps directories of lower layers")
+            assert generate(new, merged / "generated")
+            assert state(new, merged / "generated").fresh
+            assert [path.name for path in merged.iterdir()] == ["generated"]
+    assert state(old, lower / "generated").fresh
+
+
+def exchangeable(directory: Path) -> bool:
+    with staging(directory) as other:
+        return exchange(other, directory) and exchange(other, directory)
 
 
 # ------------------------------------------------------------------------------------------------- standard output
 
 
+PRINTING = [("check", *SMALL[:2]), ("generate", *SMALL, "-o", "c"), ("explain", "jaw_energy", *SMALL[:2])]
+
+
 @linux
-@pytest.mark.parametrize(
-    "words", [("check", *SMALL[:2]), ("generate", *SMALL, "-o", "c"), ("explain", "jaw_energy", *SMALL[:2])]
-)
+@pytest.mark.parametrize("words", PRINTING, ids=lambda words: words[0])
 def test_a_full_standard_output_is_one_sentence(tmp_path, monkeypatch, words):
     monkeypatch.chdir(tmp_path)
     with open("/dev/full", "w") as full:
@@ -267,7 +265,7 @@ def suicide(number: int) -> None:
 
 def test_a_killed_worker_is_one_sentence():
     with pytest.raises(
-        OutputError, match="^derive: a worker process was killed, perhaps for lack of memory; run it again$"
+        OutputError, match=r"^derive: a worker process was killed, perhaps for lack of memory; run it again$"
     ):
         parallel.run("derive", suicide, [1, 2], parallel.silent)
 
@@ -275,14 +273,13 @@ def test_a_killed_worker_is_one_sentence():
 def failing(number: int) -> None:
     if number:
         raise OutputError("no")
-    long_work(60)
+    long_work(3600)
 
 
 def test_a_failure_does_not_wait_for_the_others():
-    start = os.times().elapsed
-    with pytest.raises(OutputError, match="^no$"):
+    with pytest.raises(OutputError, match=r"^no$"):
         parallel.run("derive", failing, [0, 1], parallel.silent)
-    assert os.times().elapsed - start < 60
+    assert not multiprocessing.active_children()  # the other one, which would take an hour
 
 
 def test_a_program_that_loads_a_library_survives_what_is_done_to_the_cache(tmp_path, monkeypatch):
@@ -306,7 +303,6 @@ def test_killed_at_any_moment_generate_leaves_the_old_or_the_new(tmp_path):
         hands[name] = tmp_path / f"{name}.toml"
         hands[name].write_text(ONE_FINGER.read_text().replace('"9 mm"', f'"{radius}"'))
     jobs = {name: Job(awiwi_gen.Hand.load(path), only="jaw_t*") for name, path in hands.items()}
-    start = time.monotonic()
     for job in (*jobs.values(), jobs["old"]):
         generate(job, directory)
     words = ["generate", "--only", "jaw_t*", "-o", directory, "--hand"]
