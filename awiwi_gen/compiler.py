@@ -161,7 +161,8 @@ def _answer(command: tuple[str, ...], *arguments: str, required: bool = True) ->
     except (OSError, ValueError, subprocess.SubprocessError) as error:
         if not required:
             return ""
-        raise NoCompilerError(f"no C compiler: {shlex.join(command)} does not work ({error}); {FIX}") from None
+        words = (getattr(error, "stderr", "") or str(error)).strip().partition("\n")[0]
+        raise NoCompilerError(f"no C compiler: {shlex.join(command)} does not work ({words}); {FIX}") from None
 
 
 def _content(path: str) -> str:

@@ -73,7 +73,8 @@ def running(
                 progress(stage, len(items) - len(waiting) - len(active), len(items))
 
         try:
-            start()
+            with _interrupt_blocked():  # until the new processes ignore it
+                start()
             yield finish
         except BrokenProcessPool:
             raise OutputError(
@@ -81,12 +82,25 @@ def running(
             ) from None
         except BaseException:
             parent.close()  # which ends the workers at once
-            pool.shutdown(wait=False, cancel_futures=True)
+            pool.shutdown(cancel_futures=True)
             raise
         finally:
             alive.close()
             pool.shutdown()
             parent.close()
+
+
+@contextmanager
+def _interrupt_blocked() -> Iterator[None]:
+    """Delay an interrupt; processes that are started inside are not interrupted at all."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _end_with_parent(alive: Connection, parent: Connection) -> None:

@@ -425,7 +425,7 @@ def test_a_library_is_a_mapping_of_its_kernels(lib):
     with pytest.raises(KeyError, match="did you mean index_mass_matrix"):
         _ = lib["index_mas_matrix"]
     assert "index_mass" not in lib
-    with pytest.raises(AttributeError, match="this hand has no kernel 'index_mass'; did you mean .*index_mass_matrix"):
+    with pytest.raises(AttributeError, match=r"this hand has no kernel 'index_mass'; did you mean .*index_mass_matrix"):
         _ = lib.index_mass
 
 
