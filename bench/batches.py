@@ -66,7 +66,7 @@ class Loops:
             self._compile("kernel", kernel, PORTABLE),
             self._compile("samples", batch + self._loop("samples", self._called("batch", by_element=False)), vectors),
             self._compile("elements", self._loop("elements", self._called("batch", by_element=True)), vectors),
-            *(self._compile(path.stem, path.read_text(encoding="utf-8"), PORTABLE) for path in tree.glob("trig.c")),
+            self._compile("sincos", (CSRC / "sincos.c").read_text(encoding="utf-8"), PORTABLE),
         ]
         made = scratch / f"{quantity.name}.so"
         compiler().run("-shared", *objects, "-o", str(made), "-lm")
@@ -81,7 +81,7 @@ class Loops:
     def _sines(self) -> str:
         """Our sine and cosine by the names that CasADi calls."""
         function = "#define {0}(x) awiwi_sincos(x).{0}\n"
-        return f'#include <math.h>\n#include "trig.h"\n{function.format("sin")}{function.format("cos")}'
+        return f'#include <math.h>\n#include "sincos.h"\n{function.format("sin")}{function.format("cos")}'
 
     def _loop(self, name: str, statement: str) -> str:
         """A C function that does a statement with the arrays of n samples again and again."""

@@ -45,16 +45,9 @@
 #error "awiwi: arithmetic must be in the declared type (FLT_EVAL_METHOD 0): on 32-bit x86 add -msse2 -mfpmath=sse"
 #endif
 
-#if defined(__GNUC__)
-#define AWIWI_REQUIRE(condition, name, sentence) __extension__ _Static_assert(condition, sentence)
-#else
-#define AWIWI_REQUIRE(condition, name, sentence) typedef char awiwi_requires_##name[(condition) ? 1 : -1]
-#endif
-
-AWIWI_REQUIRE(sizeof(awiwi_real) * CHAR_BIT == AWIWI_REAL_BITS, size_of_real,
-              "awiwi: the scalar type does not have the size that real.h states");
-AWIWI_REQUIRE(sizeof(1.0) == sizeof(double), double_constants,
-              "awiwi: compile without -fsingle-precision-constant: it rounds the constants to float");
+/* The preprocessor knows no sizeof; where one is wrong, the compiler names the array that has a negative size. */
+typedef char awiwi_real_must_have_the_size_that_real_h_states[sizeof(awiwi_real) * CHAR_BIT == AWIWI_REAL_BITS ? 1 : -1];
+typedef char awiwi_compile_without_fsingle_precision_constant[sizeof(1.0) == sizeof(double) ? 1 : -1];
 
 /* -- contraction ---------------------------------------------------------------------------------------------------- */
 
@@ -65,6 +58,13 @@ AWIWI_REQUIRE(sizeof(1.0) == sizeof(double), double_constants,
 #pragma STDC FP_CONTRACT OFF
 #elif defined(__GNUC__)
 #pragma GCC optimize("fp-contract=off")
+/* gcc 12 makes fused instructions of a sum beside a difference all the same, so on x86 it may not use any. */
+#if defined(__AVX512F__)
+#pragma GCC target("no-avx512f")
+#endif
+#if defined(__FMA__)
+#pragma GCC target("no-fma")
+#endif
 #elif defined(_MSC_VER)
 #pragma fp_contract(off)
 #endif
