@@ -56,7 +56,7 @@ class Solver:
     which of their tendons and joints take part. ``arrays`` become C constants, ``strings`` go to the template as
     they are. ``problem`` names what is solved, so that verification knows well-posed inputs and their exact
     solution; a compiled result may differ from that by ``tolerance`` of the largest, per scalar type.
-    ``iterations`` counts the calls of the used kernels in the worst case.
+    ``iterations`` counts the calls of the used kernels in the worst case, but for those called ``once``.
     """
 
     template: str
@@ -68,6 +68,7 @@ class Solver:
     strings: Mapping[str, str]
     iterations: int
     tolerance: Mapping[str, float]
+    once: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

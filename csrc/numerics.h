@@ -8,7 +8,7 @@
 
 #include "real.h"
 
-/* -- flags ---------------------------------------------------------------------------------------------------------- */
+/* -- flags --------------------------------------------------------------------------------------------------------- */
 
 #if defined(__FAST_MATH__) || defined(_M_FP_FAST)
 #error "awiwi: compile without -ffast-math, -Ofast or /fp:fast: they change results and remove the checks for NaN"
@@ -20,13 +20,13 @@
 #error "awiwi: compile without -fassociative-math and -funsafe-math-optimizations: sums must keep their order"
 #endif
 #if defined(__RECIPROCAL_MATH__)
-#error "awiwi: compile without -freciprocal-math and -funsafe-math-optimizations: quotients must be rounded once"
+#error "awiwi: compile without -freciprocal-math and -funsafe-math-optimizations: quotients are rounded once"
 #endif
 #if defined(__NO_SIGNED_ZEROS__)
 #error "awiwi: compile without -fno-signed-zeros: atan2 reads the sign of zero"
 #endif
 
-/* -- types ---------------------------------------------------------------------------------------------------------- */
+/* -- types --------------------------------------------------------------------------------------------------------- */
 
 #if CHAR_BIT != 8 || INT_MAX < 2147483647
 #error "awiwi: the target needs bytes of 8 bits and int of at least 32 bits"
@@ -46,10 +46,11 @@
 #endif
 
 /* The preprocessor knows no sizeof; where one is wrong, the compiler names the array that has a negative size. */
-typedef char awiwi_real_must_have_the_size_that_real_h_states[sizeof(awiwi_real) * CHAR_BIT == AWIWI_REAL_BITS ? 1 : -1];
+typedef char
+    awiwi_real_must_have_the_size_that_real_h_states[sizeof(awiwi_real) * CHAR_BIT == AWIWI_REAL_BITS ? 1 : -1];
 typedef char awiwi_compile_without_fsingle_precision_constant[sizeof(1.0) == sizeof(double) ? 1 : -1];
 
-/* -- contraction ---------------------------------------------------------------------------------------------------- */
+/* -- contraction --------------------------------------------------------------------------------------------------- */
 
 /* a*b + c must round twice: results are verified that way, and twofold.h depends on it. Compilers contract it to one
  * fused operation by default; no macro tells, so each file says no. AWIWI_ALLOW_CONTRACTION lets the flags decide. */
