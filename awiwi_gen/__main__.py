@@ -192,9 +192,11 @@ def list_(
     if as_json:
         print_json(entries)
         return 0
+    from awiwi_gen.ir.cost import operations_text
+
     rows = [
         (e["name"], ", ".join(p["name"] for p in e["inputs"]), ", ".join(p["name"] for p in e["outputs"]),
-         str(e["cost"]["operations"]), e["source"])
+         operations_text(e), e["source"])
         for e in entries
     ]  # fmt: skip
     print_table(("kernel", "inputs", "outputs", "operations", "source"), rows)

@@ -7,6 +7,7 @@ from typing import Any
 from awiwi_gen.emit.c import Printer
 from awiwi_gen.emit.options import Options
 from awiwi_gen.errors import unknown
+from awiwi_gen.ir.cost import operations_text
 from awiwi_gen.ir.graph import Graph
 from awiwi_gen.ir.passes import optimise
 from awiwi_gen.kernel import Port
@@ -76,7 +77,7 @@ def explanation_lines(told: dict[str, Any]) -> list[str]:
             shape = "".join(f"[{n}]" for n in port["shape"])
             lines.append(f"  {side[:-1]:9}  {name}{shape} in {port['unit']}")
     counts = ", ".join(f"{n} {what}" for what, n in told["cost"].items() if n and what != "operations")
-    lines += [f"  cost       {told['cost']['operations']} operations ({counts or 'only moves'}), route {told['route']}"]
+    lines += [f"  cost       {operations_text(told)} operations ({counts or 'only moves'}), route {told['route']}"]
     lines += [f"  returns 1 unless {guard}" for guard in told["guards"]]
     lines += [
         "",

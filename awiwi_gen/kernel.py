@@ -72,7 +72,7 @@ class Solver:
     indices of the tendons and joints that take part. ``arrays`` become C constants, ``strings`` go to the template
     unchanged. ``problem`` names an entry of `verify.problems.PROBLEMS`, which draws well-posed inputs and has their exact
     solutions; a compiled result may differ from these by ``tolerance`` of the largest element, per scalar type.
-    ``iterations`` is the number of calls of the used kernels in the worst case.
+    ``iterations`` is the number of calls of the used kernels in the worst case; those in ``once`` are called once.
     """
 
     template: str
@@ -84,6 +84,7 @@ class Solver:
     strings: Mapping[str, str]
     iterations: int
     tolerance: Mapping[str, float]
+    once: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

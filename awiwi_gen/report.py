@@ -9,6 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from awiwi_gen.emit.tree import State
+from awiwi_gen.ir.cost import operations_text
 
 if TYPE_CHECKING:
     from awiwi_gen.pipeline import Proof
@@ -34,12 +35,12 @@ def _finite(value: Any) -> Any:
 
 def proof_rows(verdicts: Iterable[Verdict], manifest: Mapping[str, Any]) -> list[tuple[str, ...]]:
     """The table of the proof sheet, one row per kernel."""
-    costs = {entry["name"]: entry["cost"] for entry in manifest["kernels"]}
+    entries = {entry["name"]: entry for entry in manifest["kernels"]}
     return [
         (
             v.name,
-            str(costs[v.name]["operations"]),
-            str(costs[v.name]["sincos"]),
+            operations_text(entries[v.name]),
+            str(entries[v.name]["cost"]["sincos"]),
             f"{v.worst_ulp:.3g}",
             f"{v.worst_scaled_error:.1e}",
             f"{v.agreement:.0e}",

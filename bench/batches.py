@@ -3,7 +3,7 @@
 python bench/batches.py
 
 One finger's mass matrix, inverse and forward dynamics, with the textbook's recursions for CasADi as in `bench.peers`. All
-loops are in one process and take turns; medians, and ratios to CasADi's loop, as nanoseconds drift with the machine. Time
+loops are in one process and alternate; medians, and ratios to CasADi's loop, as nanoseconds drift with the machine. Time
 is the processor's, which others on the machine do not lengthen much; for all cores it is the wall's, which they do.
 `samples` lie one after another, `elements` have an array each. `CasADi, elements` is CasADi's program put into our
 loop for vector units, with our sine in place of the C library's. Python's results come in fresh memory, but `with out=`.
@@ -66,7 +66,7 @@ class Loops:
             self._compile("kernel", kernel, PORTABLE),
             self._compile("samples", batch + self._loop("samples", self._called("batch", by_element=False)), vectors),
             self._compile("elements", self._loop("elements", self._called("batch", by_element=True)), vectors),
-            *(self._compile(path.stem, path.read_text(encoding="utf-8"), PORTABLE) for path in tree.glob("trig.c")),
+            self._compile("sincos", (CSRC / "sincos.c").read_text(encoding="utf-8"), PORTABLE),
         ]
         made = scratch / f"{quantity.name}.so"
         compiler().run("-shared", *objects, "-o", str(made), "-lm")
@@ -81,7 +81,7 @@ class Loops:
     def _sines(self) -> str:
         """Our sine and cosine by the names that CasADi calls."""
         function = "#define {0}(x) awiwi_sincos(x).{0}\n"
-        return f'#include <math.h>\n#include "trig.h"\n{function.format("sin")}{function.format("cos")}'
+        return f'#include <math.h>\n#include "sincos.h"\n{function.format("sin")}{function.format("cos")}'
 
     def _loop(self, name: str, statement: str) -> str:
         """A C function that does a statement with the arrays of n samples again and again."""
@@ -107,16 +107,16 @@ class Loops:
         return f"{self.function}_{suffix}(n, {', '.join(f'{port}, {steps[port]}' for port in self.sizes)});"
 
     def runs(self, n: int, times: int) -> dict[str, Callable[[], Any]]:
-        """What takes turns, by name: all over the same n samples, ``times`` in a row."""
+        """The contenders by name: all over the same n samples, ``times`` in a row."""
         draw = np.random.default_rng(7)
         arrays = {port: draw.uniform(-1, 1, (n, size)) for port, size in self.sizes.items()}
         if "g" in arrays:
             arrays["g"][:] = arrays["g"][0]
-        turned = {port: array if port == "g" else np.ascontiguousarray(array.T) for port, array in arrays.items()}
+        by_rows = {port: array if port == "g" else np.ascontiguousarray(array.T) for port, array in arrays.items()}
 
         def loop(name: str) -> Callable[[], None]:
             function = getattr(self.c, f"loop_{name}")
-            used = turned if name in ("ported", "elements") else arrays
+            used = by_rows if name in ("ported", "elements") else arrays
             addresses = [array.ctypes for array in used.values()]  # these keep their arrays
             return lambda: function(
                 ctypes.c_long(times), ctypes.c_long(n), *(a.data_as(ctypes.c_void_p) for a in addresses)
@@ -124,7 +124,7 @@ class Loops:
 
         def python(threads: int, by_element: bool, reused: bool = False) -> Callable[[], None]:
             given = [port["name"] for port in self.entry["inputs"]]
-            arguments = [arrays[p][0] if p == "g" else turned[p].T if by_element else arrays[p] for p in given]
+            arguments = [arrays[p][0] if p == "g" else by_rows[p].T if by_element else arrays[p] for p in given]
 
             out = self.kernel(*arguments) if reused else None
 
@@ -155,7 +155,7 @@ TITLES = {
 
 
 def measure(runs: dict[str, Callable[[], Any]], rounds: int, evaluations: int) -> dict[str, float]:
-    """Median nanoseconds of one evaluation, by name; all take turns."""
+    """Median nanoseconds of one evaluation, by name; measured alternately."""
     times: dict[str, list[float]] = {name: [] for name in runs}
     for number in range(rounds + 1):
         for name, run in runs.items():

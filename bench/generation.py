@@ -2,7 +2,7 @@
 
 Run by `make bench`. Every run is a new process, as a user starts it, with a cache and a directory of its own. Wall
 times depend on the machine and on what else it does, processor times less; nothing here fails when they grow. A second
-table tells in which stages the runs from nothing and after a changed radius spend their time.
+table shows in which stages the runs from nothing and after a changed radius spend their time.
 """
 
 from __future__ import annotations
@@ -148,8 +148,8 @@ def main() -> None:
     prove = ("generate", "--verify")
     with tempfile.TemporaryDirectory(prefix="awiwi-bench-") as scratch:
         bench = Bench(Path(scratch))
-        bench.measure("cold: nothing kept", chosen.cold, *prove, before=lambda _: bench.forget("cache", "c"))
-        bench.measure("warm: kept results, new directory", chosen.runs, *prove, before=lambda _: bench.forget("c"))
+        bench.measure("cold: empty cache", chosen.cold, *prove, before=lambda _: bench.forget("cache", "c"))
+        bench.measure("warm: filled cache, new directory", chosen.runs, *prove, before=lambda _: bench.forget("c"))
         bench.measure("one pulley radius changed", chosen.runs, *prove, before=bench.change_radius)
         bench.measure("unchanged", chosen.runs, *prove)
         bench.measure("check", chosen.runs, "check")

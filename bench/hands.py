@@ -24,7 +24,7 @@ def packaged() -> Hand:
 
 
 def random_hand(path: Path) -> Hand:
-    """Write a hand of one finger with random turns, offsets, masses, full inertias, pulleys and tendons; read it."""
+    """Write a hand of one finger with random rotations, offsets, masses, full inertias, pulleys and tendons; read it."""
     draw = random.Random(SEED)  # noqa: S311 - a hand, no secret
     joints = ["first", "second", "third", "fourth"]
 
@@ -35,7 +35,7 @@ def random_hand(path: Path) -> Hand:
         f'{{ joint = "{j}", radius = "{draw.uniform(4, 10):.2f} mm", source = "assumed" }}' for j in joints
     )
     lines = [LIMITS, f"[fingers.{FINGER}]", f"pulleys = [{radii}]", "tendons = ["]
-    for number in range(8):  # two to pull each joint both ways, which also pass some of the joints before it
+    for number in range(8):  # two pull each joint in both directions, and also pass some of the joints before it
         own = number // 2
         passed = [f"{draw.choice('+-')}{joint}" for joint in joints[:own] if draw.random() < 0.6]
         over = ", ".join(f'"{joint}"' for joint in [*passed, f"{'+-'[number % 2]}{joints[own]}"])
@@ -105,7 +105,7 @@ def spec(hand: Hand) -> dict[str, Any]:
 
 
 def _turn(turn: str) -> list[list[int]]:
-    """A fixed turn as a matrix of 0 and +-1."""
+    """A fixed rotation as a matrix of 0 and +-1."""
     axis, quarters = quarter_turns(turn)
     cosine, sine = ((1, 0), (0, 1), (-1, 0), (0, -1))[quarters % 4]
     matrix = [[int(i == j) for j in range(3)] for i in range(3)]

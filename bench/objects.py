@@ -19,7 +19,7 @@ VARIANTS: dict[str, tuple[str, ...]] = {
     "portable": ("-O2", "-ffp-contract=off"),
     "O3": ("-O3", "-ffp-contract=off", *LENIENT),
     "avx2": ("-O3", "-march=x86-64-v3", "-ffp-contract=off", *LENIENT),
-    "avx2+fma": ("-O3", "-march=x86-64-v3", "-ffp-contract=fast", *LENIENT),
+    "avx2+fma": ("-O3", "-march=x86-64-v3", "-ffp-contract=fast", "-DAWIWI_ALLOW_CONTRACTION", *LENIENT),
 }
 # What is in a shared object is inlined as it would be in a program.
 SHARED = ("-fPIC", "-fno-semantic-interposition")

@@ -41,7 +41,7 @@ def run(directory: Path, rounds: int, peers: tuple[str, ...] = PEERS) -> tuple[d
 
 
 def _peer(peer: str, place: Path) -> list[dict[str, Any]]:
-    """A peer's contender, or none and a line that tells why."""
+    """A peer's contender, or none and the reason."""
     directory = place / peer
     directory.mkdir(parents=True, exist_ok=True)
     command = [str(PYTHON), "-m", "bench.peers", peer, str(place / "finger.json"), str(directory)]

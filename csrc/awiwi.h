@@ -1,5 +1,5 @@
-/* The one header of the firmware interface. Preprocessed, it is also what Python is told.
- * Every function takes one sample; for many at once on a host with vector units see docs/compiler.md. */
+/* The one header of the firmware interface; preprocessed, it is also the declaration for Python.
+ * Every function takes one sample; for batches on a host with vector units see docs/compiler.md. */
 #ifndef AWIWI_H
 #define AWIWI_H
 

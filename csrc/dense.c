@@ -40,9 +40,9 @@ void awiwi_product(int n, const awiwi_real *A, const awiwi_real *B, awiwi_real *
 static void exchange(int m, awiwi_real *a, awiwi_real *b)
 {
     for (int j = 0; j < m; j++) {
-        const awiwi_real kept = a[j];
+        const awiwi_real saved = a[j];
         a[j] = b[j];
-        b[j] = kept;
+        b[j] = saved;
     }
 }
 

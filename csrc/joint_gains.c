@@ -7,7 +7,7 @@
    so that c0 is known and, in units of time that make it 1, c3^2 = g3 + 2 c2, c1^2 = g1 + 2 c2 and
    F(c2) = c2^2 + 2 - g2 - 2 c1 c3 = 0. F is convex; its largest zero is the stable factor; and since c1 c3 is at most
    (t c3^2 + c1^2/t)/2, a zero of a parabola bounds it from above for any t > 0, closely if t is near c1/c3. From there
-   Newton's method comes down without fail. A last gain only says where to start. */
+   Newton's method converges from above without fail. A last gain only says where to start. */
 #include "numerics.h"
 
 #include <tgmath.h>
@@ -35,13 +35,13 @@ static awiwi_real root(awiwi_real x)
 
 static scaled scale(const awiwi_joint *j, const awiwi_real *q, awiwi_real R)
 {
-    const awiwi_real cost = 1 / (R * j->b * j->b), sum = sqrt((q[0] + q[2]) * cost);
-    const awiwi_real rate2 = sqrt(j->k / j->m * sum), time2 = 1 / rate2, time = sqrt(time2);
+    const awiwi_real cost = 1 / (R * j->motor * j->motor), sum = sqrt((q[0] + q[2]) * cost);
+    const awiwi_real rate2 = sqrt(j->spring / j->link * sum), time2 = 1 / rate2, time = sqrt(time2);
     return (scaled){.time = time,
-                    .link = j->k / j->m * time2,
-                    .motor = j->k / j->b * time2,
-                    .brake = j->dq / j->m * time,
-                    .drag = j->dtheta / j->b * time,
+                    .link = j->spring / j->link * time2,
+                    .motor = j->spring / j->motor * time2,
+                    .brake = j->link_friction / j->link * time,
+                    .drag = j->motor_friction / j->motor * time,
                     .q2 = q[1] * cost * time2,
                     .q3 = q[2] * cost * time2 * time2,
                     .q4 = q[3] * cost * time2,
@@ -61,8 +61,8 @@ static int coefficients(const scaled *p, const gains *x, awiwi_real *c1, awiwi_r
 static gains descend(const scaled *p, awiwi_real t, int iterations)
 {
     const awiwi_real a3 = p->brake + p->drag, a2 = p->link + p->motor + p->brake * p->drag;
-    const awiwi_real a1 = p->link * p->drag + p->brake * p->motor, bend = p->brake * p->brake - 2 * p->link;
-    const awiwi_real w1 = p->link * p->link * (p->q2 + p->q4) + p->q3 * bend, w2 = p->q3 + p->q4 * bend;
+    const awiwi_real a1 = p->link * p->drag + p->brake * p->motor, curve = p->brake * p->brake - 2 * p->link;
+    const awiwi_real w1 = p->link * p->link * (p->q2 + p->q4) + p->q3 * curve, w2 = p->q3 + p->q4 * curve;
     const awiwi_real g1 = a1 * a1 + w1, g2 = a2 * a2 - 2 * a1 * a3 + w2, g3 = a3 * a3 - 2 * a2 + p->q4;
     const awiwi_real half = t + 1 / t, square = half * half - 2 + g2 + t * g3 + g1 / t;
     awiwi_real rise = half + root(square) - a2, step = rise, c1, c3, f, k1;
@@ -121,14 +121,16 @@ static int polish(const scaled *p, gains *x)
 
 static int in_domain(const awiwi_joint *j, const awiwi_real *q, awiwi_real R)
 {
-    return j->m > 0 && j->b > 0 && j->k > 0 && j->dq >= 0 && j->dtheta >= 0 && R > 0 && q[0] >= 0 && q[1] >= 0 &&
-           q[2] >= 0 && q[3] >= 0 && q[0] + q[2] > 0;
+    const int plant = j->link > 0 && j->motor > 0 && j->spring > 0 && j->link_friction >= 0 && j->motor_friction >= 0;
+    return plant && R > 0 && q[0] >= 0 && q[1] >= 0 && q[2] >= 0 && q[3] >= 0 && q[0] + q[2] > 0;
 }
 
 int awiwi_joint_gains(const awiwi_joint *joint, const awiwi_real *q, awiwi_real R, const awiwi_real *last,
                       int iterations, awiwi_real *K)
 {
-    const awiwi_real numbers[] = {joint->m, joint->b, joint->k, joint->dq, joint->dtheta, R};
+    const awiwi_real numbers[] = {
+        joint->link, joint->motor, joint->spring, joint->link_friction, joint->motor_friction, R,
+    };
     const int known = awiwi_all_finite(last, 4);
     int status = AWIWI_NOT_FINITE;
     for (int i = 0; i < 4; i++)
@@ -138,7 +140,7 @@ int awiwi_joint_gains(const awiwi_joint *joint, const awiwi_real *q, awiwi_real 
     if (!in_domain(joint, q, R))
         return AWIWI_OUT_OF_DOMAIN;
     const scaled p = scale(joint, q, R);
-    const awiwi_real once = p.time / joint->b, twice = p.time * once;
+    const awiwi_real once = p.time / joint->motor, twice = p.time * once;
     const gains before = {.h = K[0] * twice, .g = K[1] * once, .e = K[2] * twice, .f = K[3] * once};
     awiwi_real c1, c2, c3;
     const int usable = coefficients(&p, &before, &c1, &c2, &c3) && c1 / c3 <= AWIWI_REAL_MAX;

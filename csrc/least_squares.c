@@ -13,17 +13,17 @@ static awiwi_real cost(const awiwi_problem *p, const awiwi_real *measured, const
     awiwi_real h[AWIWI_MOST_EQUATIONS], P[AWIWI_MOST_EQUATIONS * AWIWI_MOST_UNKNOWNS];
     awiwi_real total = 0, terms = 0;
     p->model(p->context, q, h, P);
-    for (int j = 0; j < p->n; j++) {
+    for (int j = 0; j < p->unknowns; j++) {
         gradient[j] = 0;
-        for (int k = 0; k < p->n; k++)
+        for (int k = 0; k < p->unknowns; k++)
             normal[j][k] = 0;
     }
-    for (int i = 0; i < p->m; i++) {
-        const awiwi_real *row = P + i * p->n;
+    for (int i = 0; i < p->equations; i++) {
+        const awiwi_real *row = P + i * p->unknowns;
         const awiwi_real residual = h[i] - measured[i];
         total += residual * residual;
         terms += awiwi_size(residual) * (awiwi_size(h[i]) + awiwi_size(measured[i]));
-        for (int j = 0; j < p->n; j++) {
+        for (int j = 0; j < p->unknowns; j++) {
             gradient[j] += row[j] * residual;
             for (int k = 0; k <= j; k++)
                 normal[j][k] += row[j] * row[k];
@@ -60,8 +60,8 @@ static void damped_step(int n, matrix A, const vector b, const int *held, awiwi_
 /* Clamp the start into the box; a start that is not a number becomes the middle of the box. */
 static int begin(const awiwi_problem *p, const awiwi_real *measured, const awiwi_real *start, awiwi_real *q)
 {
-    const int finite = awiwi_all_finite(measured, p->m) && awiwi_all_finite(start, p->n);
-    for (int j = 0; j < p->n; j++)
+    const int finite = awiwi_all_finite(measured, p->equations) && awiwi_all_finite(start, p->unknowns);
+    for (int j = 0; j < p->unknowns; j++)
         q[j] = awiwi_all_finite(start + j, 1) ? awiwi_clamp(start[j], p->low[j], p->high[j])
                                               : (p->low[j] + p->high[j]) / 2;
     return finite;
@@ -81,24 +81,24 @@ int awiwi_least_squares(const awiwi_problem *p, const awiwi_real *measured, cons
     for (int i = 1; i < iterations; i++) {
         int held[AWIWI_MOST_UNKNOWNS];
         awiwi_real longest = 0;
-        for (int j = 0; j < p->n; j++) /* at a limit and pushed against it */
+        for (int j = 0; j < p->unknowns; j++) /* at a limit and pushed against it */
             held[j] = (q[j] <= p->low[j] && gradient[j] >= 0) || (q[j] >= p->high[j] && gradient[j] <= 0);
-        damped_step(p->n, normal, gradient, held, damping, step);
-        for (int j = 0; j < p->n; j++) {
+        damped_step(p->unknowns, normal, gradient, held, damping, step);
+        for (int j = 0; j < p->unknowns; j++) {
             trial[j] = awiwi_clamp(q[j] + step[j], p->low[j], p->high[j]);
             longest = awiwi_size(trial[j] - q[j]) > longest ? awiwi_size(trial[j] - q[j]) : longest;
         }
-        if (!awiwi_all_finite(trial, p->n))
+        if (!awiwi_all_finite(trial, p->unknowns))
             return AWIWI_NOT_FINITE;
         const awiwi_real found = cost(p, measured, trial, trial_gradient, trial_normal, &blur);
         /* near the bottom rounding decides which cost is lower, and the step is still right */
         if (found <= best + blur || longest <= tolerance) {
             best = found;
             damping = damping / 10;
-            for (int j = 0; j < p->n; j++) {
+            for (int j = 0; j < p->unknowns; j++) {
                 q[j] = trial[j];
                 gradient[j] = trial_gradient[j];
-                for (int k = 0; k < p->n; k++)
+                for (int k = 0; k < p->unknowns; k++)
                     normal[j][k] = trial_normal[j][k];
             }
             if (longest <= tolerance)
@@ -119,17 +119,17 @@ int awiwi_gradient_search(const awiwi_problem *p, const awiwi_real *measured, co
     if (!begin(p, measured, start, q))
         return AWIWI_NOT_FINITE;
     awiwi_real best = cost(p, measured, q, gradient, normal, &blur);
-    for (int j = 0; j < p->n; j++)
+    for (int j = 0; j < p->unknowns; j++)
         curvature += normal[j][j];
     if (!(step > 0))
         step = curvature > 0 ? 1 / curvature : 0;
     for (int i = 0; i < iterations; i++) {
-        for (int j = 0; j < p->n; j++) /* the gradient of the whole square is twice that of half of it */
+        for (int j = 0; j < p->unknowns; j++) /* the gradient of the whole square is twice that of half of it */
             trial[j] = awiwi_clamp(q[j] - 2 * step * gradient[j], p->low[j], p->high[j]);
         const awiwi_real found = cost(p, measured, trial, trial_gradient, normal, &blur);
         if (found < best) {
             best = found;
-            for (int j = 0; j < p->n; j++) {
+            for (int j = 0; j < p->unknowns; j++) {
                 q[j] = trial[j];
                 gradient[j] = trial_gradient[j];
             }

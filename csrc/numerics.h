@@ -8,7 +8,7 @@
 
 #include "real.h"
 
-/* -- flags ---------------------------------------------------------------------------------------------------------- */
+/* -- flags --------------------------------------------------------------------------------------------------------- */
 
 #if defined(__FAST_MATH__) || defined(_M_FP_FAST)
 #error "awiwi: compile without -ffast-math, -Ofast or /fp:fast: they change results and remove the checks for NaN"
@@ -20,13 +20,13 @@
 #error "awiwi: compile without -fassociative-math and -funsafe-math-optimizations: sums must keep their order"
 #endif
 #if defined(__RECIPROCAL_MATH__)
-#error "awiwi: compile without -freciprocal-math and -funsafe-math-optimizations: quotients must be rounded once"
+#error "awiwi: compile without -freciprocal-math and -funsafe-math-optimizations: quotients are rounded once"
 #endif
 #if defined(__NO_SIGNED_ZEROS__)
 #error "awiwi: compile without -fno-signed-zeros: atan2 reads the sign of zero"
 #endif
 
-/* -- types ---------------------------------------------------------------------------------------------------------- */
+/* -- types --------------------------------------------------------------------------------------------------------- */
 
 #if CHAR_BIT != 8 || INT_MAX < 2147483647
 #error "awiwi: the target needs bytes of 8 bits and int of at least 32 bits"
@@ -45,18 +45,12 @@
 #error "awiwi: arithmetic must be in the declared type (FLT_EVAL_METHOD 0): on 32-bit x86 add -msse2 -mfpmath=sse"
 #endif
 
-#if defined(__GNUC__)
-#define AWIWI_REQUIRE(condition, name, sentence) __extension__ _Static_assert(condition, sentence)
-#else
-#define AWIWI_REQUIRE(condition, name, sentence) typedef char awiwi_requires_##name[(condition) ? 1 : -1]
-#endif
+/* The preprocessor knows no sizeof; where one is wrong, the compiler names the array that has a negative size. */
+typedef char
+    awiwi_real_must_have_the_size_that_real_h_states[sizeof(awiwi_real) * CHAR_BIT == AWIWI_REAL_BITS ? 1 : -1];
+typedef char awiwi_compile_without_fsingle_precision_constant[sizeof(1.0) == sizeof(double) ? 1 : -1];
 
-AWIWI_REQUIRE(sizeof(awiwi_real) * CHAR_BIT == AWIWI_REAL_BITS, size_of_real,
-              "awiwi: the scalar type does not have the size that real.h states");
-AWIWI_REQUIRE(sizeof(1.0) == sizeof(double), double_constants,
-              "awiwi: compile without -fsingle-precision-constant: it rounds the constants to float");
-
-/* -- contraction ---------------------------------------------------------------------------------------------------- */
+/* -- contraction --------------------------------------------------------------------------------------------------- */
 
 /* a*b + c must round twice: results are verified that way, and twofold.h depends on it. Compilers contract it to one
  * fused operation by default; no macro tells, so each file says no. AWIWI_ALLOW_CONTRACTION lets the flags decide. */
@@ -65,6 +59,13 @@ AWIWI_REQUIRE(sizeof(1.0) == sizeof(double), double_constants,
 #pragma STDC FP_CONTRACT OFF
 #elif defined(__GNUC__)
 #pragma GCC optimize("fp-contract=off")
+/* gcc 12 makes fused instructions of a sum beside a difference all the same, so on x86 it may not use any. */
+#if defined(__AVX512F__)
+#pragma GCC target("no-avx512f")
+#endif
+#if defined(__FMA__)
+#pragma GCC target("no-fma")
+#endif
 #elif defined(_MSC_VER)
 #pragma fp_contract(off)
 #endif

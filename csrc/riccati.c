@@ -21,7 +21,7 @@ typedef struct plant {
     awiwi_real d[N], A[N * N], b[N], Q[N * N], R;
 } plant;
 
-/* A candidate with twice the digits: S, its gains, the closed loop A - b K of what is returned of them; the equation's
+/* A candidate in double the precision: S, its gains, the closed loop A - b K of the returned gains; the equation's
    left side E, and how large that is against its terms; how far the last step moved K, against its largest. */
 typedef struct solution {
     awiwi_twofold S[N * N], K[N], loop[N * N];
@@ -34,8 +34,8 @@ static void balance(plant *p)
     const int n = p->n;
     for (int i = 0; i < n; i++)
         p->d[i] = 1;
-    for (int turn = 0; turn < SWEEPS * n; turn++) {
-        const int i = turn % n;
+    for (int step = 0; step < SWEEPS * n; step++) {
+        const int i = step % n;
         awiwi_real row = 0, column = 0;
         int exponent;
         for (int j = 0; j < n; j++) {
@@ -127,14 +127,14 @@ static void add_symmetric(int n, const awiwi_real *Y, const awiwi_real *Z, awiwi
 /* One doubling: A <- A W A, G <- G + A W G A', H <- H + A'H W A with W = (1 + G H)^-1. */
 static int redouble(int n, awiwi_real *A, awiwi_real *G, awiwi_real *H)
 {
-    awiwi_real W[N * N], right[2 * N * N], WA[N * N], WG[N * N], turned[N * N], Y[N * N];
+    awiwi_real W[N * N], right[2 * N * N], WA[N * N], WG[N * N], transposed[N * N], Y[N * N];
     awiwi_product(n, G, H, W);
     for (int i = 0; i < n; i++) {
         W[i * n + i] += 1;
         for (int j = 0; j < n; j++) {
             right[2 * i * n + j] = A[i * n + j];
             right[2 * i * n + n + j] = G[i * n + j];
-            turned[j * n + i] = A[i * n + j];
+            transposed[j * n + i] = A[i * n + j];
         }
     }
     if (!awiwi_solve(n, 2 * n, W, right))
@@ -145,8 +145,8 @@ static int redouble(int n, awiwi_real *A, awiwi_real *G, awiwi_real *H)
             WG[i * n + j] = right[2 * i * n + n + j];
         }
     awiwi_product(n, A, WG, Y);
-    add_symmetric(n, Y, turned, G);
-    awiwi_product(n, turned, H, Y);
+    add_symmetric(n, Y, transposed, G);
+    awiwi_product(n, transposed, H, Y);
     add_symmetric(n, Y, WA, H);
     awiwi_product(n, A, WA, Y);
     for (int i = 0; i < n * n; i++)
@@ -223,14 +223,14 @@ static int refine(int n, solution *s)
 static int is_sound(const plant *p)
 {
     const int n = p->n;
-    awiwi_real turned[N * N], seen[N * N]; /* by the costs: the rows of Q, in parts of their own */
+    awiwi_real transposed[N * N], seen[N * N]; /* by the costs: the rows of Q, in parts of their own */
     for (int i = 0; i < n * n; i++) {
         const awiwi_real own = p->Q[i / n * (n + 1)];
-        turned[i] = p->A[i % n * n + i / n];
+        transposed[i] = p->A[i % n * n + i / n];
         seen[i] = own > 0 ? p->Q[i] / sqrt(own) : 0;
     }
     return awiwi_is_semidefinite(n, p->Q) && awiwi_rest_decays(n, p->A, 1, p->b) &&
-           awiwi_rest_decays(n, turned, n, seen);
+           awiwi_rest_decays(n, transposed, n, seen);
 }
 
 /* Double until the closed loop vanishes; 0 where that leaves the numbers. */

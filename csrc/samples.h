@@ -46,7 +46,8 @@ INLINED awiwi_sincos3_result awiwi_sincos3_apart(awiwi_real x0, awiwi_real x1, a
 
 INLINED awiwi_sincos4_result awiwi_sincos4_apart(awiwi_real x0, awiwi_real x1, awiwi_real x2, awiwi_real x3)
 {
-    const awiwi_sincos_result r0 = awiwi_sincos(x0), r1 = awiwi_sincos(x1), r2 = awiwi_sincos(x2), r3 = awiwi_sincos(x3);
+    const awiwi_sincos_result r0 = awiwi_sincos(x0), r1 = awiwi_sincos(x1);
+    const awiwi_sincos_result r2 = awiwi_sincos(x2), r3 = awiwi_sincos(x3);
     awiwi_sincos4_result all;
     all.sin[0] = r0.sin;
     all.cos[0] = r0.cos;

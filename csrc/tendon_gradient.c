@@ -1,4 +1,4 @@
-/* Algorithm 2 of chapter 7, mended: a gradient search among the forces that give the torque, limits as a penalty.
+/* Algorithm 2 of chapter 7, corrected: a gradient search among the forces that give the torque, limits as a penalty.
 
    Printed, the gradient is that of the last trial, taken or not, while the search stands elsewhere. Here both move
    together. A step along the projected gradient is one of alpha in an orthonormal null space of P'. */
@@ -20,30 +20,29 @@ static void project(const awiwi_tendons *t, const columns *c, awiwi_real *v)
 {
     for (int again = 0; again < 2; again++) {
         for (int k = 0; k < c->count; k++) {
-            const awiwi_real share = awiwi_dot(v, c->along[k], t->m) / c->square[k];
-            for (int i = 0; i < t->m; i++)
+            const awiwi_real share = awiwi_dot(v, c->along[k], t->tendons) / c->square[k];
+            for (int i = 0; i < t->tendons; i++)
                 v[i] -= share * c->along[k][i];
         }
     }
 }
 
-/* Span the columns of P, and move f to where it gives the torque by the shortest way: one column after the other, each
-   with what is new in it. */
+/* Orthogonalise the columns of P one by one, and move f along each to the nearest forces that give the torque. */
 static void span(const awiwi_tendons *t, const awiwi_real *tau, columns *c, awiwi_real *f)
 {
     c->count = 0;
-    for (int j = 0; j < t->n; j++) {
+    for (int j = 0; j < t->joints; j++) {
         awiwi_real *v = c->along[c->count];
         awiwi_real missing = tau[j], before = 0;
-        for (int i = 0; i < t->m; i++) {
-            v[i] = t->P[i * t->n + j];
+        for (int i = 0; i < t->tendons; i++) {
+            v[i] = t->coupling[i * t->joints + j];
             missing += v[i] * f[i];
             before += v[i] * v[i];
         }
         project(t, c, v);
-        c->square[c->count] = awiwi_dot(v, v, t->m);
+        c->square[c->count] = awiwi_dot(v, v, t->tendons);
         if (c->square[c->count] > 64 * AWIWI_REAL_EPSILON * before) {
-            for (int i = 0; i < t->m; i++)
+            for (int i = 0; i < t->tendons; i++)
                 f[i] -= missing / c->square[c->count] * v[i];
             c->count++;
         }
@@ -55,10 +54,10 @@ static void span(const awiwi_tendons *t, const awiwi_real *tau, columns *c, awiw
 static int cost(const awiwi_tendons *t, const columns *c, const awiwi_real *K, awiwi_real weight, const vector f,
                 awiwi_real *total, vector gradient)
 {
-    const int n = t->n;
+    const int n = t->joints;
     vector inside, k, slope, unused;
     *total = 0;
-    for (int i = 0; i < t->m; i++) {
+    for (int i = 0; i < t->tendons; i++) {
         inside[i] = f[i] < t->low ? t->low : f[i] > t->high ? t->high : f[i];
         *total += weight * (f[i] - inside[i]) * (f[i] - inside[i]) / 2;
         gradient[i] = weight * (f[i] - inside[i]);
@@ -68,13 +67,14 @@ static int cost(const awiwi_tendons *t, const columns *c, const awiwi_real *K, a
     for (int a = 0; a < n; a++) {
         for (int b = 0; b < n; b++) {
             awiwi_real excess = -(K[a * n + b] + K[b * n + a]) / 2;
-            for (int i = 0; i < t->m; i++)
-                excess += k[i] * t->P[i * n + a] * t->P[i * n + b] + (t->dP ? f[i] * t->dP[(i * n + a) * n + b] : 0);
+            for (int i = 0; i < t->tendons; i++)
+                excess += k[i] * t->coupling[i * n + a] * t->coupling[i * n + b]
+                          + (t->slope ? f[i] * t->slope[(i * n + a) * n + b] : 0);
             *total += excess * excess / 2;
-            for (int i = 0; i < t->m; i++) {
+            for (int i = 0; i < t->tendons; i++) {
                 const int moves = f[i] >= t->low && f[i] <= t->high;
-                gradient[i] += excess * ((moves ? slope[i] : 0) * t->P[i * n + a] * t->P[i * n + b]
-                                         + (t->dP ? t->dP[(i * n + a) * n + b] : 0));
+                gradient[i] += excess * ((moves ? slope[i] : 0) * t->coupling[i * n + a] * t->coupling[i * n + b]
+                                         + (t->slope ? t->slope[(i * n + a) * n + b] : 0));
             }
         }
     }
@@ -89,23 +89,24 @@ int awiwi_gradient_forces(const awiwi_tendons *t, const awiwi_real *tau, const a
     vector gradient, trial, trial_gradient;
     awiwi_real best, found;
     const int usable = t->low <= t->high && awiwi_all_finite(&t->low, 1) && awiwi_all_finite(&t->high, 1);
-    for (int i = 0; i < t->m; i++)
+    for (int i = 0; i < t->tendons; i++)
         f[i] = usable ? t->low + (t->high - t->low) / 2 : 0;
     if (!usable)
         return AWIWI_OUT_OF_DOMAIN;
-    if (!awiwi_all_finite(tau, t->n) || !awiwi_all_finite(K, t->n * t->n) || !awiwi_all_finite(t->P, t->m * t->n))
+    if (!awiwi_all_finite(tau, t->joints) || !awiwi_all_finite(K, t->joints * t->joints)
+        || !awiwi_all_finite(t->coupling, t->tendons * t->joints))
         return AWIWI_NOT_FINITE;
     span(t, tau, &c, f);
     if (cost(t, &c, K, weight, f, &best, gradient))
         return AWIWI_OUT_OF_DOMAIN;
     for (int round = 0; round < rounds; round++) {
-        for (int i = 0; i < t->m; i++)
+        for (int i = 0; i < t->tendons; i++)
             trial[i] = f[i] - step * gradient[i];
         if (cost(t, &c, K, weight, trial, &found, trial_gradient))
             return AWIWI_OUT_OF_DOMAIN;
         if (found < best) {
             best = found;
-            for (int i = 0; i < t->m; i++) {
+            for (int i = 0; i < t->tendons; i++) {
                 f[i] = trial[i];
                 gradient[i] = trial_gradient[i];
             }

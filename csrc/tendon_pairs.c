@@ -45,11 +45,12 @@ static void nearest_of_all(const awiwi_tendons *t, int squared, const vector aim
 {
     for (int i = 0; i < t->pairs; i++) {
         const int o = t->pair[i].partner;
-        const awiwi_real *p = t->P + t->pair[i].first * t->n, *r = t->P + t->pair[o].first * t->n;
+        const awiwi_real *p = t->coupling + t->pair[i].first * t->joints;
+        const awiwi_real *r = t->coupling + t->pair[o].first * t->joints;
         awiwi_real pp = 0, pr = 0, rr = 0;
         if (o < i)
             continue;
-        for (int j = 0; j < t->n; j++) {
+        for (int j = 0; j < t->joints; j++) {
             pp += p[j] * p[j];
             pr += p[j] * r[j];
             rr += r[j] * r[j];
@@ -140,11 +141,11 @@ static int distribute_pairs(const awiwi_tendons *t, const awiwi_real *tau, const
     const awiwi_real range = t->high - t->low;
     vector aim = {0}, low = {0}, high = {0}, none = {0}, d, most, wanted, slope;
     for (int i = 0; i < t->pairs; i++) { /* the torque is -sum d_i p_i */
-        const awiwi_real *p = t->P + t->pair[i].first * t->n;
+        const awiwi_real *p = t->coupling + t->pair[i].first * t->joints;
         aim[i] = 0;
         low[i] = -range;
         high[i] = range;
-        for (int j = 0; j < t->n; j++)
+        for (int j = 0; j < t->joints; j++)
             aim[i] -= p[j] * tau[j];
     }
     nearest_of_all(t, 0, aim, low, high, d);
@@ -153,11 +154,11 @@ static int distribute_pairs(const awiwi_tendons *t, const awiwi_real *tau, const
     if (sums(t, d, none, f, low, slope) || sums(t, d, most, f, high, slope))
         return AWIWI_OUT_OF_DOMAIN;
     for (int i = 0; i < t->pairs; i++) { /* the stiffness is sum of (k_i1 + k_i2) p_i p_i' */
-        const awiwi_real *p = t->P + t->pair[i].first * t->n;
+        const awiwi_real *p = t->coupling + t->pair[i].first * t->joints;
         aim[i] = 0;
-        for (int j = 0; j < t->n; j++)
-            for (int l = 0; l < t->n; l++)
-                aim[i] += p[j] * K[j * t->n + l] * p[l];
+        for (int j = 0; j < t->joints; j++)
+            for (int l = 0; l < t->joints; l++)
+                aim[i] += p[j] * K[j * t->joints + l] * p[l];
     }
     nearest_of_all(t, 1, aim, low, high, wanted);
     return invert(t, d, low, high, wanted, most, tolerance, f);
@@ -166,11 +167,11 @@ static int distribute_pairs(const awiwi_tendons *t, const awiwi_real *tau, const
 /* Whether the forces give the torque, up to rounding. */
 static int gives(const awiwi_tendons *t, const awiwi_real *f, const awiwi_real *tau)
 {
-    for (int j = 0; j < t->n; j++) {
+    for (int j = 0; j < t->joints; j++) {
         awiwi_real missing = tau[j], terms = awiwi_size(tau[j]);
-        for (int i = 0; i < t->m; i++) {
-            missing += t->P[i * t->n + j] * f[i];
-            terms += awiwi_size(t->P[i * t->n + j]) * t->high;
+        for (int i = 0; i < t->tendons; i++) {
+            missing += t->coupling[i * t->joints + j] * f[i];
+            terms += awiwi_size(t->coupling[i * t->joints + j]) * t->high;
         }
         if (!(awiwi_size(missing) <= 16 * AWIWI_REAL_EPSILON * terms))
             return 0;
@@ -178,10 +179,10 @@ static int gives(const awiwi_tendons *t, const awiwi_real *f, const awiwi_real *
     return 1;
 }
 
-/* What is returned where nothing can be found: all forces in the middle of the limits. */
+/* The result where none can be found: all forces in the middle of the limits. */
 static void fall_back(const awiwi_tendons *t, int bounded, awiwi_real *f)
 {
-    for (int i = 0; i < t->m; i++)
+    for (int i = 0; i < t->tendons; i++)
         f[i] = bounded ? t->low + (t->high - t->low) / 2 : 0;
 }
 
@@ -191,8 +192,8 @@ int awiwi_distribute(const awiwi_tendons *t, const awiwi_real *tau, const awiwi_
     const int bounded = awiwi_all_finite(&t->low, 1) && awiwi_all_finite(&t->high, 1);
     int status = AWIWI_OK;
     fall_back(t, bounded, f);
-    if (!bounded || !awiwi_all_finite(tau, t->n) || !awiwi_all_finite(K, t->n * t->n) ||
-        !awiwi_all_finite(t->P, t->m * t->n))
+    if (!bounded || !awiwi_all_finite(tau, t->joints) || !awiwi_all_finite(K, t->joints * t->joints) ||
+        !awiwi_all_finite(t->coupling, t->tendons * t->joints))
         return AWIWI_NOT_FINITE;
     if (!(t->low <= t->high))
         return AWIWI_OUT_OF_DOMAIN;
@@ -200,7 +201,7 @@ int awiwi_distribute(const awiwi_tendons *t, const awiwi_real *tau, const awiwi_
         status = distribute_pairs(t, tau, K, tolerance, f);
     if (t->searched > 0 && status == AWIWI_OK)
         status = awiwi_search_forces(t, tau, K, tolerance, f);
-    if (!awiwi_all_finite(f, t->m)) {
+    if (!awiwi_all_finite(f, t->tendons)) {
         fall_back(t, bounded, f);
         return AWIWI_NOT_FINITE;
     }

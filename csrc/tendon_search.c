@@ -43,14 +43,14 @@ typedef struct moves {
 enum { AT_LOW = -1, FREE = 0, AT_HIGH = 1 };
 
 static const awiwi_real LEAST_SHARE = (awiwi_real)1 / 32; /* of a unit move that is worth a direction: below 1 / 16 */
-static const awiwi_real DAMPING = (awiwi_real)1 / 4096;       /* of steps where the cost bends down */
+static const awiwi_real DAMPING = (awiwi_real)1 / 4096;       /* of steps where the Hessian is not positive */
 
 /* Half of |tau + P' f|^2. */
 static int torque_cost(const task *s, const vector f, model *c)
 {
     awiwi_real missing[AWIWI_MOST_JOINTS], trace = 0;
     c->cost = c->blur = 0;
-    for (int j = 0; j < s->t->n; j++) {
+    for (int j = 0; j < s->t->joints; j++) {
         awiwi_real terms = awiwi_size(s->tau[j]);
         missing[j] = s->touched[j] ? s->tau[j] : 0;
         for (int i = 0; i < s->count; i++) {
@@ -63,9 +63,9 @@ static int torque_cost(const task *s, const vector f, model *c)
         c->blur += 4 * AWIWI_REAL_EPSILON * awiwi_size(missing[j]) * terms;
     }
     for (int i = 0; i < s->count; i++) {
-        c->gradient[i] = awiwi_dot(s->p[i], missing, s->t->n);
+        c->gradient[i] = awiwi_dot(s->p[i], missing, s->t->joints);
         for (int l = 0; l <= i; l++)
-            c->hessian[i][l] = c->hessian[l][i] = awiwi_dot(s->p[i], s->p[l], s->t->n);
+            c->hessian[i][l] = c->hessian[l][i] = awiwi_dot(s->p[i], s->p[l], s->t->joints);
         trace += c->hessian[i][i];
     }
     for (int i = 0; i < s->count; i++)
@@ -76,7 +76,7 @@ static int torque_cost(const task *s, const vector f, model *c)
 /* Half of |K_q - K|^2, over the joints that are touched. */
 static int stiffness_cost(const task *s, const vector f, model *c)
 {
-    const int n = s->t->n;
+    const int n = s->t->joints;
     vector k, slope, curvature;
     for (int i = 0; i < s->count; i++)
         s->f[s->t->searched_tendons[i]] = f[i];
@@ -98,10 +98,10 @@ static int stiffness_cost(const task *s, const vector f, model *c)
             for (int i = 0; i < s->count; i++) {
                 const int tendon = s->t->searched_tendons[i];
                 const awiwi_real pp = s->p[i][a] * s->p[i][b];
-                const awiwi_real bend = s->t->dP ? s->t->dP[(tendon * n + a) * n + b] : 0;
-                excess += k[tendon] * pp + f[i] * bend;
-                growth[i] = slope[tendon] * pp + bend;
-                terms += awiwi_size(k[tendon] * pp) + awiwi_size(f[i] * bend);
+                const awiwi_real change = s->t->slope ? s->t->slope[(tendon * n + a) * n + b] : 0;
+                excess += k[tendon] * pp + f[i] * change;
+                growth[i] = slope[tendon] * pp + change;
+                terms += awiwi_size(k[tendon] * pp) + awiwi_size(f[i] * change);
             }
             const awiwi_real rounding = 4 * AWIWI_REAL_EPSILON * terms;
             c->cost += both * excess * excess / 2;
@@ -151,7 +151,7 @@ static void split(const task *s, const int *held, moves *m)
 {
     int free = 0;
     m->count = 0;
-    for (int j = 0; s->keep_torque && j < s->t->n; j++) {
+    for (int j = 0; s->keep_torque && j < s->t->joints; j++) {
         awiwi_real taken[AWIWI_MOST_TENDONS] = {0}, before;
         vector row;
         for (int i = 0; i < s->count; i++)
@@ -208,22 +208,22 @@ static int solve(int n, matrix H, awiwi_real least, const vector b, vector x)
     return 1;
 }
 
-/* Newton's step of the free tendons along the moves that are allowed; where the cost bends down, that of Gauss and
-   Newton, damped. Returns what it is to gain. */
+/* Newton's step of the free tendons along the moves that are allowed; where the Hessian is not positive, a damped
+   Gauss-Newton step. Returns the predicted decrease. */
 static awiwi_real newton(const task *s, const model *c, const moves *m, vector step)
 {
     const int n = m->count - m->rank;
     matrix H, full;
-    vector b, x, turned;
+    vector b, x, product;
     awiwi_real trace = 0;
     for (int j = 0; j < n; j++) {
         const awiwi_real *v = m->along[m->rank + j];
         b[j] = -awiwi_dot(v, c->gradient, s->count);
         for (int i = 0; i < s->count; i++)
-            turned[i] = awiwi_dot(c->hessian[i], v, s->count);
+            product[i] = awiwi_dot(c->hessian[i], v, s->count);
         for (int l = 0; l <= j; l++) {
             const awiwi_real *w = m->along[m->rank + l];
-            H[j][l] = full[j][l] = awiwi_dot(w, turned, s->count);
+            H[j][l] = full[j][l] = awiwi_dot(w, product, s->count);
             for (int i = 0; i < s->count; i++)
                 full[j][l] += v[i] * c->curvature[i] * w[i];
         }
@@ -259,7 +259,7 @@ static int leaving(const task *s, const model *c, const moves *m, const int *hel
     }
     most = 256 * AWIWI_REAL_EPSILON * awiwi_largest(c->gradient, s->count);
     for (int i = 0; i < s->count; i++) {
-        const awiwi_real gain = (awiwi_real)held[i] * (c->gradient[i] + awiwi_dot(s->p[i], price, s->t->n));
+        const awiwi_real gain = (awiwi_real)held[i] * (c->gradient[i] + awiwi_dot(s->p[i], price, s->t->joints));
         if (gain > most) {
             most = gain;
             found = i;
@@ -329,7 +329,7 @@ static int descend(const task *s, int steps, vector f, model *here)
                 f[i] = trial[i];
             *here = there;
         } else if (stopped == left) {
-            return AWIWI_OK; /* what seemed to gain by leaving wants back: rounding */
+            return AWIWI_OK; /* leaving the limit gained nothing but rounding */
         }
         left = -1;
         if (stopped >= 0) {
@@ -352,8 +352,8 @@ int awiwi_search_forces(const awiwi_tendons *t, const awiwi_real *tau, const awi
     model found;
     int status = AWIWI_NOT_CONVERGED;
     for (int i = 0; i < s.count; i++) {
-        s.p[i] = t->P + t->searched_tendons[i] * t->n;
-        for (int j = 0; j < t->n; j++)
+        s.p[i] = t->coupling + t->searched_tendons[i] * t->joints;
+        for (int j = 0; j < t->joints; j++)
             s.touched[j] = s.touched[j] || awiwi_size(s.p[i][j]) > 0;
     }
     for (int start = 0; start < 3; start++) {

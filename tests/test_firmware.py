@@ -203,7 +203,6 @@ CALLED = (
     "thumb_joint_estimate",
     "wrist_points",
     "model",
-    "trig",
 )
 
 

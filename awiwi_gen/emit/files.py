@@ -1,4 +1,4 @@
-"""Finished strings into files by way of Jinja: the only file that knows the templates."""
+"""Fill the templates with finished strings: the only file that uses Jinja."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def banner(*lines: str) -> str:
 
 
 def describe(kernel: Kernel, cost_line: str) -> tuple[str, ...]:
-    """The contract of a kernel as comment lines: meaning, source, ports with units and ranges, cost."""
+    """The comment of a kernel: its documentation, source, ports with units and ranges, cost."""
     lines = [*_wrapped(kernel.doc), f"Source: {kernel.source}."]
     lines += [f"  in   {_port(name, port)}" for name, port in kernel.inputs.items()]
     lines += [f"  out  {_port(name, port)}" for name, port in kernel.outputs.items()]
@@ -54,7 +54,7 @@ def describe(kernel: Kernel, cost_line: str) -> tuple[str, ...]:
         lines += _wrapped("Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.")
     if kernel.guards:
         lines += _wrapped(
-            f"Returns 0 where {' and '.join(kernel.guards)}; elsewhere 1, and what is not defined is NaN."
+            f"Returns 0 where {' and '.join(kernel.guards)}; else 1, and outputs without a value are NaN."
         )
     return (*lines, cost_line)
 
@@ -62,7 +62,7 @@ def describe(kernel: Kernel, cost_line: str) -> tuple[str, ...]:
 def cost_line(counts: Mapping[str, int]) -> str:
     """Operation counts as one line."""
     shown = [f"{counts[key]} {key}" for key in ("add", "mul", "div", "neg", "sqrt", "sincos", "calls") if counts[key]]
-    return f"Cost: {', '.join(shown) or 'nothing but moves'}."
+    return f"Cost: {', '.join(shown) or 'copies only'}."
 
 
 def _port(name: str, port: Port) -> str:

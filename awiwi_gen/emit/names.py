@@ -17,7 +17,7 @@ from awiwi_gen.errors import InputError
 from awiwi_gen.kernel import GUARDS, Kernel
 from awiwi_gen.resources import CSRC
 
-SIGNIFICANT = 63  # characters of an external name that today's toolchains tell apart
+SIGNIFICANT = 63  # characters of an external name that today's toolchains use
 C99_SIGNIFICANT = 31  # and those that C99 guarantees
 LONGEST_PORT = 48  # leaves room for the suffixes of batch loops within 63 characters
 PORT = re.compile(r"[A-Za-z](_?[A-Za-z0-9])*")

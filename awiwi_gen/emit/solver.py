@@ -20,7 +20,7 @@ def solver_function(
 ) -> tuple[CFunction, str]:
     """The function and the C file of a kernel with a solver; ``used`` are the kernels it calls, by family.
 
-    The cost is that of the worst case, without the solver's own linear algebra.
+    The cost is that of all calls in the worst case, without the solver's own work, which nobody counts.
     """
     prototype, definition = signature(
         f"int {function_name(prefix, kernel.name)}",
@@ -29,11 +29,11 @@ def solver_function(
         options,
         runtime and prefix,
     )
-    called = " and ".join(function.name for function in used.values())
-    times = (
-        f"at most {solver.iterations} times that of {called}, and the solver's own" if called else "the solver's own"
+    calls = {family: 1 if family in solver.once else solver.iterations for family in used}
+    listed = [f"{count} of {used[family].name}" for family, count in calls.items()]
+    comment = describe(
+        kernel, f"Cost: the solver's own work{' and calls, at most: ' * bool(listed)}{', '.join(listed)}."
     )
-    comment = describe(kernel, f"Cost: {times}.")
     text = render(
         solver.template,
         banner=banner(*comment),
@@ -53,8 +53,8 @@ def solver_function(
         tolerance=options.literal(Fraction(STOP[options.scalar])),
         **solver.strings,
     )
-    total = sum((function.cost for function in used.values()), Cost())
-    function = CFunction(kernel.name, prototype, definition, comment, (), total * solver.iterations, ())
+    total = sum((function.cost * calls[family] for family, function in used.items()), Cost())
+    function = CFunction(kernel.name, prototype, definition, comment, (), total, ())
     return function, text
 
 

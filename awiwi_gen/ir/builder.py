@@ -163,7 +163,7 @@ class Builder:
         return self.add((a, ~b))
 
     def div(self, a: Ref, b: Ref) -> Ref:
-        """``a / b``, kept as a product with a reciprocal."""
+        """``a / b``, as a product with a reciprocal."""
         return self.mul((a, self.inv(b)))
 
     def power(self, base: Ref, exponent: int) -> Ref:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict, astuple, dataclass
+from typing import Any
 
 from awiwi_gen.ir.graph import LEAVES, Graph
 
@@ -40,6 +42,14 @@ class Cost:
     def as_dict(self) -> dict[str, int]:
         """Plain data for JSON."""
         return {**asdict(self), "operations": self.operations}
+
+
+def operations_text(entry: Mapping[str, Any]) -> str:
+    """The operations of a kernel (an entry of the manifest) in a table; a solver's own work is not counted."""
+    count = entry["cost"]["operations"]
+    if entry["route"] != "solver":
+        return str(count)
+    return f"{count} + solver" if count else "solver"
 
 
 def cost(graph: Graph) -> Cost:

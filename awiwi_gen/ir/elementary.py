@@ -4,7 +4,7 @@ Only + - * /, comparisons as masks, and bit operations, no branches: the same bi
 
 `atan2`: the smaller of |y| and |x| is divided by the larger, or, above tan(pi/8), their difference by their sum, so that
 the quotient r stays below tan(pi/8) in magnitude; its remainder is computed exactly (factors are cut in halves by
-their bits) and divided too. The angle is k pi/4 +- atan r, with pi/4 in two parts, the first with spare bits so that its
+their bits) and divided too. The angle is k pi/4 +- atan r, with pi/4 in two parts, the first short enough that its
 multiples are exact.
 
 `exp`: x = n log 2 + r with log 2 in two parts; 1 + r is added exactly, the rest is small; 2^n is put into the exponent.

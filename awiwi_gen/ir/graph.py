@@ -5,7 +5,7 @@ A node is a plain tuple. Leaves are ``("const", Fraction)``, ``("input", port, e
 the value of node ``i`` and ``~i`` means *minus* that value. Negation therefore is no node of its own, and two
 expressions that differ by sign only share one node.
 
-Canonical form, kept by `builder.Builder`:
+Canonical form, established by `builder.Builder`:
 
 - constants are exact, non-negative fractions (``-2`` is the reference ``~i`` of the constant 2);
 - ``add`` and ``mul`` take any number of operands, sorted by node; like terms and powers are collected;
@@ -191,7 +191,7 @@ def _moved(node: Node, renamed: list[Ref], nodes: list[Node], constants: set[int
 def prune(graph: Graph) -> Graph:
     """Drop the nodes no output depends on; the order of the others stays."""
     marked = reachable(graph)
-    return graph if all(marked) else reordered(graph, [index for index, kept in enumerate(marked) if kept])
+    return graph if all(marked) else reordered(graph, [index for index, needed in enumerate(marked) if needed])
 
 
 def reordered(graph: Graph, order: Sequence[int]) -> Graph:

@@ -175,6 +175,7 @@ def distribution(finger: Finger) -> Solver:
         },
         iterations=(INVERSIONS if pairs else 0) + (SEARCHES if searched else 0),
         tolerance={"f64": 1e-11, "f32": 1e-4},
+        once=("coupling", "coupling_derivative"),
     )
 
 
