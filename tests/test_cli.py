@@ -155,11 +155,11 @@ def test_the_mend_that_is_told_mends(tmp_path):
     told("generate", *options)
     (place / "jaw_tendon_lengths.c").write_text("/* better */")
     lines = told("check", *options, code=1).splitlines()
-    mend = lines[-1].removeprefix("to mend it: awiwi-gen ")
+    mend = lines[-1].removeprefix("to fix it: awiwi-gen ")
     refusal = run("verify", "--hand", ONE_FINGER, "-o", place).stderr
 
     assert f"{place}/jaw_tendon_lengths.c: edited by hand; changes belong in the hand file" in lines
-    assert refusal.splitlines()[-1] == f"to mend it: awiwi-gen generate --hand {ONE_FINGER} -o {place}"
+    assert refusal.splitlines()[-1] == f"to fix it: awiwi-gen generate --hand {ONE_FINGER} -o {place}"
     told(*shlex.split(mend))
     assert told("check", *options).endswith(": fresh\n")
 

@@ -23,7 +23,7 @@ COMPILER = [
 TOP = [
     ["derive", "records", "budget"],
     ["pipeline"],
-    ["report", "explain", "simulate", "studies"],
+    ["report", "explain", "terminal", "simulate", "studies"],
     ["__init__"],
     ["__main__"],
 ]

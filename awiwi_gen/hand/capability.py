@@ -16,7 +16,7 @@ from awiwi_gen.hand.pose import Chain
 if TYPE_CHECKING:
     from awiwi_gen.hand import Hand
 
-__all__ = ["left_out"]
+__all__ = ["left_out", "left_out_names"]
 
 # Kernel families of a finger that need tendon lengths to tell the joint angles, and tendons that can give any torque.
 _NEED_LENGTHS = ("joint_estimate", "joint_estimate_error")
@@ -35,6 +35,11 @@ def left_out(hand: Hand) -> dict[tuple[str, str], str]:
     }
 
 
+def left_out_names(hand: Hand) -> dict[str, str]:
+    """The same by the name that the kernel would have."""
+    return {f"{path.partition('.')[2]}_{family}": reason for (path, family), reason in left_out(hand).items()}
+
+
 @lru_cache(maxsize=64)
 def _of_finger(finger: Finger) -> tuple[tuple[str, str], ...]:
     """(Kernel family, reason) for every kernel that no pose of the finger allows."""
@@ -47,15 +52,20 @@ def _of_finger(finger: Finger) -> tuple[tuple[str, str], ...]:
         (family, f"{lengths}: tendon lengths do not determine the joint angles") for family in _NEED_LENGTHS if lengths
     ]
     found += [(family, torques) for family in _NEED_TORQUES if torques]
+    found += [(family, reason) for family in _NEED_SPANS for reason in _indistinct_base(finger, couplings)]
+    return tuple(found)
+
+
+def _indistinct_base(finger: Finger, couplings: Sequence[Any]) -> list[str]:
+    """Why the straight spans of a finger that could have a tensegrity base do not tell its base joints apart, if so."""
     order = [link.joint for link in finger.links]
+    rows = [row for row, tendon in enumerate(finger.tendons) if tendon.span]
     ends = [order.index(tendon.span.joint) for tendon in finger.tendons if tendon.span]
     base = {finger.leaders.get(joint, joint) for joint in order[: max(ends, default=0)]}
     columns = [column for column, joint in enumerate(finger.joints) if joint in base]
-    rows = [row for row, tendon in enumerate(finger.tendons) if tendon.span]
     spans = [[[coupling[row][column] for column in columns] for row in rows] for coupling in couplings]
-    if rows and (reason := _indistinct(spans, [finger.joints[column] for column in columns])):
-        found += [(family, f"of the spans, {reason}") for family in _NEED_SPANS]
-    return tuple(found)
+    reason = _indistinct(spans, [finger.joints[column] for column in columns]) if len(rows) >= len(columns) > 0 else ""
+    return [f"of the spans alone, {reason}"] if reason else []
 
 
 def _indistinct(couplings: Sequence[Any], joints: Sequence[str]) -> str:
