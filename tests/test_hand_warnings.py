@@ -120,7 +120,7 @@ def test_degrees_written_as_radians_warn_or_are_refused_with_the_angle_that_is_m
 
     assert message == '= "-2 rad" leaves a range of 401 deg up to high = "5 rad"; 7 deg if deg was meant'
     assert ratio == pytest.approx(401.07 / 270, rel=1e-4)
-    with pytest.raises(ValueError, match='= "90 rad" is not plausible; .*; did you mean "90 deg"'):
+    with pytest.raises(ValueError, match=r'= "90 rad" is not plausible; .*; did you mean "90 deg"'):
         warned(('high = "90 deg"', 'high = "90 rad"'))
 
 

@@ -44,7 +44,7 @@ def left_out_names(hand: Hand) -> dict[str, str]:
 def _of_finger(finger: Finger) -> tuple[tuple[str, str], ...]:
     """(Kernel family, reason) for every kernel that no pose of the finger allows."""
     chain = Chain(finger)
-    couplings = [chain.coupling(q) for q in chain.poses()]
+    couplings = [*chain.couplings()]
     found: list[tuple[str, str]] = []
     lengths = _indistinct(couplings, finger.joints)
     torques = lengths or _beyond_pull(couplings, finger.joints)
@@ -72,18 +72,21 @@ def _indistinct(couplings: Sequence[Any], joints: Sequence[str]) -> str:
     """Why the tendons do not tell the joints apart in any of the poses; empty if they do."""
     import numpy as np
 
-    best = max(int(np.linalg.matrix_rank(_scaled(coupling), _RANK)) for coupling in couplings)
-    if best == len(joints):
-        return ""
+    best = 0
+    for coupling in couplings:
+        best = max(best, int(np.linalg.matrix_rank(_scaled(coupling), _RANK)))
+        if best == len(joints):
+            return ""
     return f"the tendons move only {best} of the {len(joints)} joints {', '.join(joints)} independently"
 
 
 def _beyond_pull(couplings: Sequence[Any], joints: Sequence[str]) -> str:
     """Which torques the tendons cannot pull in any of the poses, all joints being moved; empty if they can."""
-    missing = [_unreachable(_scaled(coupling)) for coupling in couplings]
-    if not all(torque is not None for torque in missing):
-        return ""
-    torque = missing[0]
+    torque: Any = None
+    for coupling in couplings:
+        torque = _unreachable(_scaled(coupling))
+        if torque is None:
+            return ""
     largest = max(abs(torque))
     signs = [f"{'+' if each > 0 else '-'}{joint}" for joint, each in zip(joints, torque, strict=True)
              if abs(each) > 0.1 * largest]  # fmt: skip
