@@ -5,8 +5,8 @@ Exit codes: 0 done, 1 verification failed or out of date, 2 bad input.
 
 from __future__ import annotations
 
+import fnmatch
 import json
-import shlex
 import sys
 from collections.abc import Callable
 from dataclasses import replace
@@ -18,8 +18,8 @@ from typing import Annotated, Any
 import typer
 
 from awiwi_gen import exits
-from awiwi_gen.errors import AwiwiError, InputError, unknown
-from awiwi_gen.exits import system_errors
+from awiwi_gen.errors import AwiwiError, InputError, printable
+from awiwi_gen.terminal import fix, listing, no_kernel, parse_inputs, read_json_inputs, require, why_absent
 
 app = typer.Typer(
     help="From the CAD numbers of a tendon-driven hand to verified real-time C.",
@@ -63,21 +63,21 @@ PAGE = Path("build/report/index.html")
 
 
 def command(function: Callable[..., int | None]) -> Callable[..., None]:
-    """Register a command: errors become one message and an exit code, in JSON where that was asked for."""
+    """Register a command: an error becomes one message and an exit code, in JSON with --json."""
 
     @wraps(function)
     def run(**options: Any) -> None:
         try:
-            with system_errors():
+            with exits.system_errors():
                 code = function(**options)
-        except AwiwiError as error:
+        except AwiwiError as known:
             if options.get("as_json"):
-                from awiwi_gen.report import print_json
+                from awiwi_gen.report import error_entry, print_json
 
-                print_json({"error": type(error).__name__, "message": str(error)})
+                print_json(error_entry(known))
             else:
-                print(error, file=sys.stderr)
-            code = error.exit_code
+                print(printable(str(known)), file=sys.stderr)
+            code = known.exit_code
         raise typer.Exit(code or 0)
 
     app.command(function.__name__.removesuffix("_"))(run)
@@ -91,13 +91,18 @@ def make_job(
     only: str = "*",
     math: Math = Math.own,
 ) -> Any:
-    """A job from command-line options."""
+    """A job from command-line options. Raises InputError where the pattern matches no kernel."""
     from awiwi_gen.emit.options import Options
     from awiwi_gen.hand import Hand
     from awiwi_gen.pipeline import Job
     from awiwi_gen.report import Progress
 
-    return Job(Hand.load(hand), Options(scalar.value, params.value, math.value), only, progress=Progress())
+    job = Job(Hand.load(hand), Options(scalar.value, params.value, math.value), only, progress=Progress())
+    if only != "*" and not fnmatch.filter([kernel.name for kernel in job.catalog], only):
+        raise InputError(
+            f"--only {only}: {why_absent(job.hand, only) or f'no kernel has such a name; see {listing(hand)}'}"
+        )
+    return job
 
 
 @command
@@ -115,7 +120,7 @@ def generate(
     if verify:
         from awiwi_gen.compiler import compiler
 
-        compiler()  # without one nothing can be verified: the error comes before anything is replaced
+        compiler()  # without one nothing can be verified: an error before anything is replaced
     if job.hand.gains:
         with_studies("the check of its gains", "tune").require_running_gains(job.hand, job.store)
     changed = generate(job, output)
@@ -134,17 +139,26 @@ def check(
     params: ParamsOption = Params.baked, math: MathOption = Math.own, only: Only = "*", as_json: Json = False,
 ) -> int:  # fmt: skip
     """Check the hand file, and whether the generated C is fresh and unedited."""
+    from awiwi_gen.hand import Hand
+    from awiwi_gen.hand.capability import left_out_names
     from awiwi_gen.pipeline import state
-    from awiwi_gen.report import print_json, state_lines
+    from awiwi_gen.report import counted, print_json, print_left_out, state_lines
 
     job = make_job(hand, scalar, params, only, math)
+    warnings = Hand.review(hand)[1]
+    absent = left_out_names(job.hand)
     found = state(job, output)
     if as_json:
-        print_json({"hand": job.hand.name, "fresh": found.fresh, **vars(found)})
+        extra = {"warnings": [each.as_dict() for each in warnings],
+                 "left_out": [{"name": name, "reason": reason} for name, reason in absent.items()]}  # fmt: skip
+        print_json({"hand": job.hand.name, "fresh": found.fresh, **vars(found), **extra})
     else:
-        print(f"{hand or 'hand.toml'}: {len(job.hand.fingers)} fingers, no faults")
-        print("\n".join(state_lines(found, str(output), mend(job, hand, output))))
-    return 0 if found.fresh else 1
+        more = f", {counted(len(warnings), 'warning')}" if warnings else ""
+        print(printable(f"{hand or 'hand.toml'}: {counted(len(job.hand.fingers), 'finger')}, no faults{more}"))
+        print("".join(f"warning: {each}\n" for each in warnings), end="")
+        print_left_out(absent)
+        print("\n".join(state_lines(found, str(output), fix(job, hand, output))))
+    return 0 if found.fresh or (found.missing and not found.foreign) else 1
 
 
 @command
@@ -153,7 +167,7 @@ def build(hand: HandFile = None, output: Output = GENERATED, as_json: Json = Fal
     from awiwi_gen.build import load
     from awiwi_gen.report import print_json
 
-    require(output)
+    require(output, hand)
     library = load(output)
     summary = {"kernels": len(library), "digest": library.digest, "scalar": library.manifest["c_type"]}
     if as_json:
@@ -169,37 +183,30 @@ def verify(
     params: ParamsOption = Params.baked, math: MathOption = Math.own, only: Only = "*", as_json: Json = False,
 ) -> int:  # fmt: skip
     """Compile the generated C as it stands and compare every kernel with its reference."""
-    require(output)
+    require(output, hand)
     return prove(make_job(hand, scalar, params, only, math), hand, output, as_json)
 
 
 @command
 def list_(
-    hand: HandFile = None, output: Output = GENERATED, as_json: Json = False,
+    hand: HandFile = None, as_json: Json = False,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="List what was generated there.")] = None,
     assumed: Annotated[bool, typer.Option("--assumed", help="The hand's numbers without a source.")] = False,
 ) -> int:  # fmt: skip
-    """List the kernels with their ports and costs, or the numbers that are assumed."""
-    from awiwi_gen.report import print_json, print_table
+    """List the kernels of the hand with their ports and costs, or its numbers that are assumed."""
+    from awiwi_gen.hand import Hand
+    from awiwi_gen.report import kernel_entries, print_json, print_kernels, print_table
 
     if assumed:
-        guesses = {path: str(quantity) for path, quantity in make_job(hand).hand.assumed().items()}
+        guesses = {path: str(quantity) for path, quantity in Hand.load(hand).assumed().items()}
         if as_json:
             print_json([{"path": path, "value": value} for path, value in guesses.items()])
         else:
             print_table(("number", "assumed value"), list(guesses.items()))
         return 0
-    entries = require(output)["kernels"]
-    if as_json:
-        print_json(entries)
-        return 0
-    from awiwi_gen.ir.cost import operations_text
-
-    rows = [
-        (e["name"], ", ".join(p["name"] for p in e["inputs"]), ", ".join(p["name"] for p in e["outputs"]),
-         operations_text(e), e["source"])
-        for e in entries
-    ]  # fmt: skip
-    print_table(("kernel", "inputs", "outputs", "operations", "source"), rows)
+    there = output is not None and hand is None
+    entries = require(output or GENERATED)["kernels"] if there else kernel_entries(Hand.load(hand), output or GENERATED)
+    (print_json if as_json else print_kernels)(entries)
     return 0
 
 
@@ -216,8 +223,11 @@ def call(
     from awiwi_gen.hand import Hand
     from awiwi_gen.report import print_json
 
-    library = awiwi_gen.build(Hand.load(hand))
-    function = find(library, kernel)
+    shape = Hand.load(hand)
+    library = awiwi_gen.build(shape)
+    if kernel not in library:
+        raise no_kernel(shape, hand, kernel, library)
+    function = library[kernel]
     given = parse_inputs(inputs or [], function) if inputs or not as_json else read_json_inputs()
     result = function(**given)
     values = result._asdict() if hasattr(result, "_asdict") else {function.outputs[0]["name"]: result}
@@ -241,11 +251,15 @@ def explain(
     from awiwi_gen.explain import explanation, explanation_lines
     from awiwi_gen.report import print_json
 
-    told = explanation(make_job(hand), kernel)
+    job = make_job(hand)
+    known = [each.name for each in job.catalog]
+    if kernel not in known:
+        raise no_kernel(job.hand, hand, kernel, known)
+    explained = explanation(job, kernel)
     if as_json:
-        print_json(told)
+        print_json(explained)
     else:
-        print("\n".join(explanation_lines(told)))
+        print(printable("\n".join(explanation_lines(explained))))
     return 0
 
 
@@ -254,7 +268,7 @@ def report(
     hand: HandFile = None, as_json: Json = False,
     page: Annotated[Path, typer.Option("--page", "-o", help="HTML file to write.")] = PAGE,
 ) -> int:  # fmt: skip
-    """Compute the source's figures and numbers again, and write them on one page with the proof of every kernel."""
+    """Reproduce the source's figures and numbers on one page, with the proof of every kernel."""
     from awiwi_gen.report import print_json
     from awiwi_gen.reproduce import publish, summary, verdict
 
@@ -273,7 +287,7 @@ def tune(
     hand: HandFile = None, as_json: Json = False,
     output: Annotated[Path, typer.Option("--output", "-o", help="File of gains to write.")] = Path("gains.toml"),
 ) -> int:  # fmt: skip
-    """Find gains of the backstepping law for every tendon, and write them for the hand file to take in."""
+    """Find gains of the backstepping law for every tendon, and write a file that the hand file can name."""
     from awiwi_gen.report import print_json
 
     studies = with_studies("tuning", "tune")
@@ -297,7 +311,7 @@ def simulate(
     plant: Annotated[str, typer.Option("--plant", help="Plant of that run.")] = "as known",
     hand: HandFile = None, as_json: Json = False,
 ) -> int:  # fmt: skip
-    """Run laws on a joint between two tendons, on the hand's clock, and tell how they bear it."""
+    """Simulate control laws on a joint between two tendons, at the hand's clock rate, and compare the results."""
     studies = with_studies("simulation", "compare")
     one = scenario != ""
     shown = studies.one_run(hand, law, gains, scenario, force, plant) if one else studies.benchmark(hand, law, gains)
@@ -315,14 +329,6 @@ def with_studies(purpose: str, room: str) -> Any:
         raise InputError(f"{error.name} needed for {purpose}; install it: pip install 'awiwi_gen[studies]'") from None
 
 
-def mend(job: Any, hand: Path | None, output: Path) -> str:
-    """The command that brings a generated directory up to date."""
-    usual, chosen = vars(type(job.options)()), vars(job.options) | {"only": job.only}
-    words = ["awiwi-gen", "generate", *(["--hand", str(hand)] if hand else []), "-o", str(output)]
-    words += [word for key, value in chosen.items() if value != usual.get(key, "*") for word in (f"--{key}", value)]
-    return shlex.join(words)
-
-
 def prove(job: Any, hand: Path | None, output: Path, as_json: bool) -> int:
     """Verify a directory, print the proof sheet, return the exit code."""
     from awiwi_gen.pipeline import state
@@ -331,7 +337,11 @@ def prove(job: Any, hand: Path | None, output: Path, as_json: bool) -> int:
 
     found = state(job, output)
     if found.stale or found.lost:
-        print("\n".join(state_lines(found, str(output), mend(job, hand, output))), file=sys.stderr)
+        lines = state_lines(found, str(output), fix(job, hand, output))
+        if as_json:
+            print_json({"error": "stale", "message": "\n".join(lines), **vars(found)})
+        else:
+            print("\n".join(lines), file=sys.stderr)
         return 1
     proof = examine(job, output)
     if as_json:
@@ -341,56 +351,27 @@ def prove(job: Any, hand: Path | None, output: Path, as_json: bool) -> int:
     return 0 if proof.passed else 1
 
 
-def require(output: Path) -> dict[str, Any]:
-    """The manifest of a generated directory. Raises InputError if there is none."""
-    from awiwi_gen.emit.tree import read_manifest
-
-    manifest = read_manifest(output)
-    if manifest is None:
-        raise InputError(f"{output}: nothing generated here; run awiwi-gen generate -o {output}")
-    return manifest
-
-
-def find(library: Any, kernel: str) -> Any:
-    """A kernel of a library by name. Raises InputError with near names."""
-    if kernel not in library:
-        raise unknown("kernel", kernel, library)
-    return library[kernel]
-
-
-def parse_inputs(texts: list[str], function: Any) -> dict[str, Any]:
-    """``q=0.1,0.2`` as named arrays; as many numbers as an input has elements take its shape."""
-    import numpy as np
-
-    shapes = {port["name"]: port["shape"] for port in function.inputs}
-    parsed: dict[str, Any] = {}
-    for text in texts:
-        name, equals, numbers = text.partition("=")
-        try:
-            given = np.array([float(number) for number in numbers.split(",")])
-        except ValueError:
-            equals = ""
-        if not equals:
-            raise InputError(f"{text!r} is not an input; expected name=number,number,... such as q=0.1,0.2,0.3,0.4")
-        shape = shapes.get(name, given.shape)
-        parsed[name] = given.reshape(shape) if given.size == np.prod(shape) else given
-    return parsed
-
-
-def read_json_inputs() -> dict[str, Any]:
-    """One JSON object from standard input."""
-    try:
-        given = json.load(sys.stdin)
-    except ValueError as error:
-        raise InputError(f"standard input is not JSON: {error}") from None
-    if not isinstance(given, dict):
-        raise InputError('standard input must be one JSON object such as {"q": [0.1, 0.2, 0.3, 0.4]}')
-    return given
-
-
 def main() -> None:
     """Entry point of ``awiwi-gen``."""
-    exits.run(app)
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="backslashreplace")  # a terminal that cannot show a letter shows its number
+    exits.run(command_line)
+
+
+def command_line() -> None:
+    """Parse the arguments and run a command; an unreadable command line is one sentence, or JSON with ``--json``."""
+    try:
+        code = app(standalone_mode=False) or 0
+    except Exception as error:
+        if not hasattr(error, "format_message"):  # what typer raises for a command line that it cannot read
+            raise
+        code = 2
+        if "--json" in sys.argv:
+            print(json.dumps({"error": "UsageError", "message": error.format_message()}))
+        else:
+            error.show()  # type: ignore[attr-defined]
+    sys.exit(code)
 
 
 if __name__ == "__main__":

@@ -6,12 +6,16 @@ import json
 import math
 import sys
 from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from awiwi_gen.emit.tree import State
+from awiwi_gen.errors import AwiwiError, InputError, printable
 from awiwi_gen.ir.cost import operations_text
 
 if TYPE_CHECKING:
+    from awiwi_gen.hand import Hand
+    from awiwi_gen.kernel import Kernel, Port
     from awiwi_gen.pipeline import Proof
     from awiwi_gen.verify.objects import Seal
     from awiwi_gen.verify.verdict import Verdict
@@ -20,7 +24,7 @@ COLUMNS = ("kernel", "operations", "sincos", "worst ulp", "scaled error", "witne
 
 
 def print_json(value: Any) -> None:
-    """One JSON document on standard output; what is not a number is null, for JSON has no word for it."""
+    """One JSON document on standard output; NaN and infinity, which JSON does not have, are null."""
     json.dump(_finite(value), sys.stdout, indent=1, ensure_ascii=False, allow_nan=False)
     sys.stdout.write("\n")
 
@@ -57,10 +61,9 @@ def print_proof(proof: Proof, manifest: Mapping[str, Any]) -> None:
     parts = dict.fromkeys(law.part for law in proof.laws)
     for part in parts:
         laws = [law for law in proof.laws if law.part == part]
-        kept = [law for law in laws if law.passed]
-        print(
-            f"{part}: {len(kept)} of {len(laws)} laws of physics hold, to {max((k.worst for k in kept), default=0):.0e}"
-        )
+        passed = [law for law in laws if law.passed]
+        worst = max((law.worst for law in passed), default=0)
+        print(f"{part}: {len(passed)} of {len(laws)} laws of physics hold, to {worst:.0e}")
     for law in proof.laws:
         if not law.passed:
             print(f"{law.part} FAILS: {law.statement} (by {law.worst:.1e})")
@@ -75,7 +78,7 @@ def print_proof(proof: Proof, manifest: Mapping[str, Any]) -> None:
 
 
 def seal_lines(seal: Seal) -> list[str]:
-    """What is said of the objects of a single-precision build."""
+    """The findings about the objects of a single-precision build."""
     if seal.skipped:
         return [f"single precision: objects not examined, {seal.skipped}"]
     faults = [f"{name} FAILS: it computes in double: {', '.join(found)}" for name, found in seal.found.items()]
@@ -85,31 +88,24 @@ def seal_lines(seal: Seal) -> list[str]:
 
 
 def print_table(columns: Sequence[str], rows: Sequence[Sequence[str]], title: str = "") -> None:
-    """Aligned columns: drawn with rich on a terminal, plain lines elsewhere."""
-    if sys.stdout.isatty():
-        from rich.console import Console
-        from rich.table import Table
-
-        table = Table(title=title or None, title_justify="left")
-        for i, column in enumerate(columns):
-            table.add_column(column, justify="left" if i in (0, len(columns) - 1) else "right")
-        for row in rows:
-            table.add_row(*row, style="red" if row[-1] not in ("proved", "") else None)
-        Console().print(table)
-        return
+    """Aligned columns, never shortened; on a terminal, rows of failed kernels are red."""
     if title:
-        print(title)
-    widths = [max(len(str(r[i])) for r in [columns, *rows]) for i in range(len(columns))]
-    for row in [columns, *rows]:
+        print(printable(title))
+    table = [columns, *rows]
+    widths = [max(len(row[i]) for row in table) for i in range(len(columns))]
+    numeric = [all(not row[i][:1].isalpha() for row in rows) for i in range(len(columns))]
+    for number, row in enumerate(table):
         cells = [
-            c.ljust(w) if i in (0, len(columns) - 1) else c.rjust(w)
-            for i, (c, w) in enumerate(zip(row, widths, strict=True))
+            cell.rjust(width) if right else cell.ljust(width)
+            for cell, width, right in zip(row, widths, numeric, strict=True)
         ]
-        print("  ".join(cells).rstrip())
+        line = printable("  ".join(cells).rstrip())
+        failed = number > 0 and columns[-1] == "verdict" and row[-1] != "proved"
+        print(f"\033[31m{line}\033[0m" if failed and sys.stdout.isatty() else line)
 
 
-def state_lines(state: State, directory: str, mend: str) -> list[str]:
-    """What is the matter with a generated directory, and how to mend it."""
+def state_lines(state: State, directory: str, fix: str) -> list[str]:
+    """How a generated directory differs from what its job generates, and the command that fixes it."""
     if state.fresh:
         return [f"{directory}: fresh"]
     lines = []
@@ -119,7 +115,81 @@ def state_lines(state: State, directory: str, mend: str) -> list[str]:
     lines += [f"{directory}/{name}: missing" for name in state.lost]
     lines += [f"{directory}/{name}: not generated; it does not belong here" for name in state.foreign]
     lines += [f"{directory}: stale, another {REASONS.get(key, key)} than it was made from" for key in state.stale]
-    return [*lines, f"to mend it: {'move that away, then ' if state.foreign else ''}{mend}"]
+    return [*map(printable, lines), f"to fix it: {'move that away, then ' if state.foreign else ''}{fix}"]
+
+
+def kernel_entries(hand: Hand, directory: Path) -> list[dict[str, Any]]:
+    """The kernels of a hand as plain data, those that its tendons make impossible last, with the reason.
+
+    Costs are known where the directory was generated from this hand; elsewhere they are None.
+    """
+    from awiwi_gen.emit.tree import read_manifest
+    from awiwi_gen.hand.capability import left_out
+    from awiwi_gen.kernels import declared
+
+    manifest = read_manifest(directory)
+    generated = manifest["kernels"] if manifest and manifest["digest"] == hand.digest() else []
+    known = {entry["name"]: entry for entry in generated}
+    reasons = left_out(hand)
+    entries = [
+        known.get(kernel.name) or _entry(kernel, reasons.get((kernel.path, kernel.family), ""))
+        for kernel in declared(hand)
+    ]
+    return sorted(entries, key=lambda entry: "left_out" in entry)
+
+
+def _entry(kernel: Kernel, reason: str) -> dict[str, Any]:
+    def port(name: str, spec: Port) -> dict[str, Any]:
+        return {"name": name, "shape": list(spec.shape), "unit": spec.unit_text}
+
+    def ranged(name: str, spec: Port) -> dict[str, Any]:
+        low, high = zip(*spec.bounds(), strict=True)
+        return port(name, spec) | {"low": list(low), "high": list(high)}
+
+    entry = {
+        "name": kernel.name,
+        "doc": kernel.doc,
+        "source": kernel.source,
+        "part": kernel.path,
+        "inputs": [ranged(name, spec) for name, spec in kernel.inputs.items()],
+        "outputs": [port(name, spec) for name, spec in kernel.outputs.items()],
+        "cost": None,
+    }
+    return entry | {"left_out": reason} if reason else entry
+
+
+def print_kernels(entries: Sequence[Mapping[str, Any]]) -> None:
+    """The kernels as a table; below it, those that the hand cannot have."""
+    rows = [
+        (
+            entry["name"],
+            ", ".join(port["name"] for port in entry["inputs"]),
+            ", ".join(port["name"] for port in entry["outputs"]),
+            str(entry["cost"]["operations"]) if entry["cost"] else "?",
+            entry["source"],
+        )
+        for entry in entries
+        if "left_out" not in entry
+    ]
+    print_table(("kernel", "inputs", "outputs", "operations", "source"), rows)
+    print_left_out({entry["name"]: entry["left_out"] for entry in entries if "left_out" in entry})
+
+
+def counted(number: int, noun: str) -> str:
+    """A number with its noun: "1 finger", "2 fingers"."""
+    return f"{number} {noun}{'' if number == 1 else 's'}"
+
+
+def print_left_out(reasons: Mapping[str, str]) -> None:
+    """A line for each kernel that the hand cannot have."""
+    for name, reason in reasons.items():
+        print(f"left out: {name}: {reason}")
+
+
+def error_entry(error: AwiwiError) -> dict[str, Any]:
+    """An error as plain data, with the location of each fault."""
+    entry: dict[str, Any] = {"error": type(error).__name__, "message": str(error)}
+    return entry | {"faults": [fault.as_dict() for fault in error.faults]} if isinstance(error, InputError) else entry
 
 
 REASONS = {"hand": "hand file", "generator": "version of awiwi_gen", "libraries": "set of libraries"}
@@ -132,7 +202,7 @@ class Progress:
         self._terminal = sys.stderr.isatty()
 
     def __call__(self, stage: str, done: int, total: int) -> None:
-        """Tell how far a stage has come."""
+        """Show how many tasks of a stage are done."""
         if self._terminal:
             end = "\n" if done == total else ""
             print(f"\r{stage} {done}/{total}", end=end, file=sys.stderr, flush=True)

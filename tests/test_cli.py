@@ -6,54 +6,17 @@ import json
 import re
 import shlex
 from pathlib import Path
-from typing import Any
 
 import pytest
-from typer.testing import CliRunner
+from commands import ONE_FINGER, answer, complaint, run, small, told
 
 import awiwi_gen
-from awiwi_gen.__main__ import app
 
-ONE_FINGER = str(Path(__file__).with_name("one_finger.toml"))
-
-
-def run(*arguments: object, stdin: str | None = None) -> Any:
-    """Run a command; whatever is no exit of its own is a bug and raises."""
-    done = CliRunner().invoke(app, [str(argument) for argument in arguments], input=stdin)
-    if done.exception and not isinstance(done.exception, SystemExit):
-        raise done.exception
-    return done
-
-
-def told(*arguments: object, code: int = 0, stdin: str | None = None) -> str:
-    """Standard output, after a look at the exit code."""
-    done = run(*arguments, stdin=stdin)
-    assert done.exit_code == code, done.output
-    return done.stdout
-
-
-def answer(*arguments: object, code: int = 0, stdin: str | None = None) -> Any:
-    """The JSON document on standard output."""
-    return json.loads(told(*arguments, "--json", code=code, stdin=stdin))
-
-
-def complaint(*arguments: object, code: int = 2, stdin: str | None = None) -> str:
-    """Standard error of a command that fails without printing anything else."""
-    done = run(*arguments, stdin=stdin)
-    assert (done.exit_code, done.stdout) == (code, "")
-    return done.stderr.rstrip("\n")
+__all__ = ["small"]
 
 
 def snapshot(directory: Path) -> dict[str, tuple[int, bytes]]:
     return {str(path): (path.stat().st_mtime_ns, path.read_bytes()) for path in directory.rglob("*") if path.is_file()}
-
-
-@pytest.fixture(scope="module")
-def small(tmp_path_factory) -> Path:
-    """The small hand's kinematics and tendons, generated."""
-    directory = tmp_path_factory.mktemp("small") / "generated"
-    told("generate", "--hand", ONE_FINGER, "-o", directory, "--only", "jaw_[fjt]*")
-    return directory
 
 
 SMALL = ("--hand", ONE_FINGER, "--only", "jaw_[fjt]*")
@@ -84,7 +47,9 @@ def test_a_bad_hand_file_is_told_with_its_line_and_changes_nothing(command, smal
     message = f'{bad}:16 fingers.jaw.pulleys[0].radius = "9 N" is a force; expected a length such as "6.2 mm"'
 
     assert complaint(*command.split(), "--hand", bad, *place) == message
-    assert answer(*command.split(), "--hand", bad, *place, code=2) == {"error": "InputError", "message": message}
+    found = answer(*command.split(), "--hand", bad, *place, code=2)
+    assert (found["error"], found["message"]) == ("InputError", message)
+    assert [(fault["line"], fault["key"]) for fault in found["faults"]] == [(16, "fingers.jaw.pulleys[0].radius")]
     assert snapshot(small) == before
 
 
@@ -116,7 +81,7 @@ def test_a_pattern_that_matches_nothing_is_refused(tmp_path):
     place = tmp_path / "out"
 
     assert complaint("generate", "--hand", ONE_FINGER, "-o", place, "--only", "elbow_*") == (
-        "--only elbow_*: no kernel has such a name; awiwi-gen list shows them"
+        f"--only elbow_*: no kernel has such a name; see awiwi-gen list --hand {ONE_FINGER}"
     )
     assert not place.exists()
 
@@ -130,9 +95,10 @@ def test_a_kernel_that_iterates_brings_the_kernels_it_calls(tmp_path):
 
 
 def test_a_fresh_directory_is_called_fresh(small):
-    assert told("check", *SMALL, "-o", small) == f"{ONE_FINGER}: 1 fingers, no faults\n{small}: fresh\n"
+    assert told("check", *SMALL, "-o", small) == f"{ONE_FINGER}: 1 finger, no faults\n{small}: fresh\n"
     assert answer("check", *SMALL, "-o", small) == {
-        "hand": "One finger", "fresh": True, "missing": False, "edited": [], "lost": [], "foreign": [], "stale": []
+        "hand": "One finger", "fresh": True, "missing": False, "edited": [], "lost": [], "foreign": [], "stale": [],
+        "warnings": [], "left_out": [],
     }  # fmt: skip
 
 
@@ -155,17 +121,17 @@ def test_the_mend_that_is_told_mends(tmp_path):
     told("generate", *options)
     (place / "jaw_tendon_lengths.c").write_text("/* better */")
     lines = told("check", *options, code=1).splitlines()
-    mend = lines[-1].removeprefix("to mend it: awiwi-gen ")
+    fix = lines[-1].removeprefix("to fix it: awiwi-gen ")
     refusal = run("verify", "--hand", ONE_FINGER, "-o", place).stderr
 
     assert f"{place}/jaw_tendon_lengths.c: edited by hand; changes belong in the hand file" in lines
-    assert refusal.splitlines()[-1] == f"to mend it: awiwi-gen generate --hand {ONE_FINGER} -o {place}"
-    told(*shlex.split(mend))
+    assert refusal.splitlines()[-1] == f"to fix it: awiwi-gen generate --hand {ONE_FINGER} -o {place}"
+    told(*shlex.split(fix))
     assert told("check", *options).endswith(": fresh\n")
 
 
 @pytest.mark.parametrize("command", ["build", "verify", "list"])
-def test_where_nothing_was_generated_the_way_to_it_is_told(command, tmp_path):
+def test_where_nothing_was_generated_the_error_says_how(command, tmp_path):
     place = tmp_path / "nowhere"
 
     assert complaint(command, "-o", place) == f"{place}: nothing generated here; run awiwi-gen generate -o {place}"
@@ -234,6 +200,7 @@ def test_the_list_names_kernels_ports_costs_and_sources(small):
     lines = told("list", "-o", small).splitlines()
 
     assert lines[0].split() == ["kernel", "inputs", "outputs", "operations", "source"]
+    assert len(lines) == 1 + len(json.loads((small / "manifest.json").read_text())["kernels"])
     assert any(re.match(r"jaw_joint_torque +q, f +tau +\d+ +eq\. 5\.8", line) for line in lines)
 
 

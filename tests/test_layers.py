@@ -35,7 +35,7 @@ TOP = [
     ["judge"],
     ["parallel", "tasks"],
     ["pipeline"],
-    ["report", "explain", "simulate", "results"],
+    ["report", "explain", "terminal", "simulate", "results"],
     ["loops", "identify"],
     [*ROOMS],
     ["__init__"],

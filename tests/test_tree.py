@@ -61,7 +61,7 @@ def test_what_was_just_installed_is_fresh(tree):
 
 
 def test_a_directory_that_is_not_there_is_told_how_to_make(tmp_path):
-    assert said(tmp_path / "nowhere") == f"generated: nothing generated here yet\nto mend it: {MEND}"
+    assert said(tmp_path / "nowhere") == f"generated: nothing generated here yet\nto fix it: {MEND}"
 
 
 def test_an_edited_file_is_named(tree):
@@ -69,7 +69,7 @@ def test_an_edited_file_is_named(tree):
 
     assert inspect(tree, INPUTS) == State(edited=("kernel1.c",))
     assert said(tree) == (
-        f"generated/kernel1.c: edited by hand; changes belong in the hand file\nto mend it: {MEND}"
+        f"generated/kernel1.c: edited by hand; changes belong in the hand file\nto fix it: {MEND}"
     )  # fmt: skip
 
 
@@ -77,7 +77,7 @@ def test_a_lost_file_is_named(tree):
     (tree / "kernel2.c").unlink()
 
     assert inspect(tree, INPUTS) == State(lost=("kernel2.c",))
-    assert said(tree) == f"generated/kernel2.c: missing\nto mend it: {MEND}"
+    assert said(tree) == f"generated/kernel2.c: missing\nto fix it: {MEND}"
 
 
 @pytest.mark.parametrize("is_directory", [False, True])
@@ -86,7 +86,7 @@ def test_a_foreign_file_is_named_and_its_owner_told_to_move_it(tree, is_director
 
     assert inspect(tree, INPUTS) == State(foreign=("notes.txt",))
     assert said(tree) == (
-        f"generated/notes.txt: not generated; it does not belong here\nto mend it: move that away, then {MEND}"
+        f"generated/notes.txt: not generated; it does not belong here\nto fix it: move that away, then {MEND}"
     )  # fmt: skip
 
 
@@ -118,7 +118,7 @@ def test_files_below_a_directory_are_known_by_their_places(tmp_path):
 )
 def test_a_stale_directory_says_what_has_changed(tree, changed, reason):
     assert said(tree, {**INPUTS, changed: "another"}) == (
-        f"generated: stale, another {reason} than it was made from\nto mend it: {MEND}"
+        f"generated: stale, another {reason} than it was made from\nto fix it: {MEND}"
     )
 
 

@@ -16,7 +16,7 @@ from awiwi_gen.hand.pose import Chain
 if TYPE_CHECKING:
     from awiwi_gen.hand import Hand
 
-__all__ = ["left_out"]
+__all__ = ["left_out", "left_out_names"]
 
 # Kernel families of a finger that need tendon lengths to tell the joint angles, and tendons that can give any torque.
 _NEED_LENGTHS = ("joint_estimate", "joint_estimate_error")
@@ -35,11 +35,16 @@ def left_out(hand: Hand) -> dict[tuple[str, str], str]:
     }
 
 
+def left_out_names(hand: Hand) -> dict[str, str]:
+    """The same by the name that the kernel would have."""
+    return {f"{path.partition('.')[2]}_{family}": reason for (path, family), reason in left_out(hand).items()}
+
+
 @lru_cache(maxsize=64)
 def _of_finger(finger: Finger) -> tuple[tuple[str, str], ...]:
     """(Kernel family, reason) for every kernel that no pose of the finger allows."""
     chain = Chain(finger)
-    couplings = [chain.coupling(q) for q in chain.poses()]
+    couplings = [*chain.couplings()]
     found: list[tuple[str, str]] = []
     lengths = _indistinct(couplings, finger.joints)
     torques = lengths or _beyond_pull(couplings, finger.joints)
@@ -47,33 +52,41 @@ def _of_finger(finger: Finger) -> tuple[tuple[str, str], ...]:
         (family, f"{lengths}: tendon lengths do not determine the joint angles") for family in _NEED_LENGTHS if lengths
     ]
     found += [(family, torques) for family in _NEED_TORQUES if torques]
+    found += [(family, reason) for family in _NEED_SPANS for reason in _indistinct_base(finger, couplings)]
+    return tuple(found)
+
+
+def _indistinct_base(finger: Finger, couplings: Sequence[Any]) -> list[str]:
+    """Why the straight spans of a finger that could have a tensegrity base do not tell its base joints apart, if so."""
     order = [link.joint for link in finger.links]
+    rows = [row for row, tendon in enumerate(finger.tendons) if tendon.span]
     ends = [order.index(tendon.span.joint) for tendon in finger.tendons if tendon.span]
     base = {finger.leaders.get(joint, joint) for joint in order[: max(ends, default=0)]}
     columns = [column for column, joint in enumerate(finger.joints) if joint in base]
-    rows = [row for row, tendon in enumerate(finger.tendons) if tendon.span]
     spans = [[[coupling[row][column] for column in columns] for row in rows] for coupling in couplings]
-    if rows and (reason := _indistinct(spans, [finger.joints[column] for column in columns])):
-        found += [(family, f"of the spans, {reason}") for family in _NEED_SPANS]
-    return tuple(found)
+    reason = _indistinct(spans, [finger.joints[column] for column in columns]) if len(rows) >= len(columns) > 0 else ""
+    return [f"of the spans alone, {reason}"] if reason else []
 
 
 def _indistinct(couplings: Sequence[Any], joints: Sequence[str]) -> str:
     """Why the tendons do not tell the joints apart in any of the poses; empty if they do."""
     import numpy as np
 
-    best = max(int(np.linalg.matrix_rank(_scaled(coupling), _RANK)) for coupling in couplings)
-    if best == len(joints):
-        return ""
+    best = 0
+    for coupling in couplings:
+        best = max(best, int(np.linalg.matrix_rank(_scaled(coupling), _RANK)))
+        if best == len(joints):
+            return ""
     return f"the tendons move only {best} of the {len(joints)} joints {', '.join(joints)} independently"
 
 
 def _beyond_pull(couplings: Sequence[Any], joints: Sequence[str]) -> str:
     """Which torques the tendons cannot pull in any of the poses, all joints being moved; empty if they can."""
-    missing = [_unreachable(_scaled(coupling)) for coupling in couplings]
-    if not all(torque is not None for torque in missing):
-        return ""
-    torque = missing[0]
+    torque: Any = None
+    for coupling in couplings:
+        torque = _unreachable(_scaled(coupling))
+        if torque is None:
+            return ""
     largest = max(abs(torque))
     signs = [f"{'+' if each > 0 else '-'}{joint}" for joint, each in zip(joints, torque, strict=True)
              if abs(each) > 0.1 * largest]  # fmt: skip

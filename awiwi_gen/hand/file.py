@@ -24,7 +24,8 @@ from awiwi_gen.hand.parts import Keys
 __all__ = ["HandFile", "key_path"]
 
 Model = TypeVar("Model", bound=BaseModel)
-_MOST_BYTES = 1_000_000  # a hand file has about 15 kB
+_MOST_BYTES = 250_000  # a hand file has about 15 kB
+_MOST_ENTRIES = 2000  # of one array or table; the schema allows a few hundred, and words a fault for each entry
 _MOST_COLUMNS = 1000  # the time to parse a dotted key grows with the square of its length
 
 
@@ -83,6 +84,8 @@ class HandFile:
 
     def validated(self, schema: type[Model]) -> Model:
         """Validate the data by a schema. Raises `InputError` with all faults."""
+        if long := _too_long(self.data):
+            raise self.error([long])
         try:
             return schema.model_validate(self.data)
         except ValidationError as error:
@@ -109,3 +112,13 @@ class HandFile:
         from awiwi_gen.hand.lines import lines_of_keys
 
         return lines_of_keys(self.text)
+
+
+def _too_long(data: object, keys: Keys = ()) -> tuple[Keys, str] | None:
+    """The first array or table that has more entries than any hand needs."""
+    if not isinstance(data, dict | list):
+        return None
+    if len(data) > _MOST_ENTRIES:
+        return keys, f"has {len(data)} entries; expected at most {_MOST_ENTRIES}"
+    items = data.items() if isinstance(data, dict) else enumerate(data)
+    return next((found for key, value in items if (found := _too_long(value, (*keys, key)))), None)

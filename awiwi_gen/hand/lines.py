@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
@@ -67,7 +68,10 @@ def lines_of_keys(text: str) -> dict[Keys, int]:
 
 def _parts(key: Node) -> list[str]:
     """The parts of a dotted key, with quotes and escapes read by the TOML parser."""
-    table = tomllib.loads((key.text or b"").decode() + " = 0")
+    text = (key.text or b"").decode()
+    if re.fullmatch(r"[A-Za-z0-9_.-]+", text):
+        return text.split(".")
+    table = tomllib.loads(text + " = 0")
     parts = []
     while isinstance(table, dict):
         ((part, table),) = table.items()

@@ -266,7 +266,7 @@ def _closure(bar: FourBar, low: Quantity, high: Quantity) -> Iterator[Complaint]
 def _tendons(finger: Finger) -> Iterator[Complaint]:
     """Every tendon moves with some joint, and a span has a length in every pose: else its derivatives do not exist."""
     chain = Chain(finger)
-    arms = [chain.coupling(q) for q in chain.poses()]
+    arms = [*chain.couplings()]
     for index, tendon in enumerate(finger.tendons):
         if tendon.span:
             length, q = chain.shortest(index)

@@ -7,7 +7,7 @@ a crank of angle q + reference and a coupler. Everything is a function of the n 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 
 from awiwi_gen.hand.parts import Finger, FourBar
@@ -54,6 +54,10 @@ class Chain:
         shares = [[0.5] * len(self.joints), [0.0] * len(self.joints), [1.0] * len(self.joints)]
         shares += [[i * math.sqrt(prime) % 1.0 for prime in _PRIMES[: len(self.joints)]] for i in range(1, _SAMPLES)]
         return [[a + (b - a) * x for a, b, x in zip(self.low, self.high, each, strict=True)] for each in shares]
+
+    def couplings(self) -> Iterator[list[list[float]]]:
+        """The coupling in all `poses`; once if there are no spans, for pulleys have the same arms everywhere."""
+        yield from map(self.coupling, self.poses() if any(self._spans) else self.poses()[:1])
 
     def coupling(self, q: Sequence[float]) -> list[list[float]]:
         """P = dh/dq (m x n) [m/rad]: senses times radii, and central differences of the spans' lengths."""

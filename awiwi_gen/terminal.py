@@ -1,0 +1,82 @@
+"""What the commands share: their inputs and the advice in their messages."""
+
+from __future__ import annotations
+
+import fnmatch
+import json
+import shlex
+import sys
+from pathlib import Path
+from typing import Any
+
+from awiwi_gen.errors import InputError, unknown
+
+
+def fix(job: Any, hand: Path | None, output: Path) -> str:
+    """The command that brings a generated directory up to date."""
+    usual, chosen = vars(type(job.options)()), vars(job.options) | {"only": job.only}
+    words = ["awiwi-gen", "generate", *(["--hand", str(hand)] if hand else []), "-o", str(output)]
+    words += [word for key, value in chosen.items() if value != usual.get(key, "*") for word in (f"--{key}", value)]
+    return shlex.join(words)
+
+
+def require(output: Path, hand: Path | None = None) -> dict[str, Any]:
+    """The manifest of a generated directory. Raises InputError if there is none."""
+    from awiwi_gen.emit.tree import read_manifest
+
+    manifest = read_manifest(output)
+    if manifest is None:
+        words = ["awiwi-gen", "generate", *(["--hand", str(hand)] if hand else []), "-o", str(output)]
+        raise InputError(f"{output}: nothing generated here; run {shlex.join(words)}")
+    return manifest
+
+
+def listing(hand: Path | None) -> str:
+    """The command that lists the kernels of a hand."""
+    return shlex.join(["awiwi-gen", "list", *(["--hand", str(hand)] if hand else [])])
+
+
+def why_absent(hand: Any, pattern: str) -> str:
+    """Why a hand does not have the kernels of a pattern, if its tendons make them impossible."""
+    from awiwi_gen.hand.capability import left_out_names
+
+    return next(
+        (f"{name} is left out: {why}" for name, why in left_out_names(hand).items() if fnmatch.fnmatch(name, pattern)),
+        "",
+    )
+
+
+def no_kernel(hand: Any, file: Path | None, name: str, known: Any) -> InputError:
+    """The exception for a kernel that a hand does not have."""
+    reason = why_absent(hand, name)
+    return InputError(reason) if reason else unknown("kernel", name, known, f"see {listing(file)}")
+
+
+def parse_inputs(texts: list[str], function: Any) -> dict[str, Any]:
+    """``q=0.1,0.2`` as named arrays; as many numbers as an input has elements take its shape."""
+    import numpy as np
+
+    shapes = {port["name"]: port["shape"] for port in function.inputs}
+    parsed: dict[str, Any] = {}
+    for text in texts:
+        name, equals, numbers = text.partition("=")
+        try:
+            given = np.array([float(number) for number in numbers.split(",")])
+        except ValueError:
+            equals = ""
+        if not equals:
+            raise InputError(f"{text!r} is not an input; expected name=number,number,... such as q=0.1,0.2,0.3,0.4")
+        shape = shapes.get(name, given.shape)
+        parsed[name] = given.reshape(shape) if given.size == np.prod(shape) else given
+    return parsed
+
+
+def read_json_inputs() -> dict[str, Any]:
+    """One JSON object from standard input."""
+    try:
+        given = json.load(sys.stdin)
+    except ValueError as error:
+        raise InputError(f"standard input is not JSON: {error}") from None
+    if not isinstance(given, dict):
+        raise InputError('standard input must be one JSON object such as {"q": [0.1, 0.2, 0.3, 0.4]}')
+    return given
