@@ -8,7 +8,7 @@ import pytest
 pytest.importorskip("scipy")
 
 from awiwi_gen.compare.clock import clocked, require_clocked, running_gains
-from awiwi_gen.compare.compare import compare
+from awiwi_gen.compare.comparison import compare
 from awiwi_gen.compare.laws import LAWS
 from awiwi_gen.compare.printed_gains import printed_gains
 from awiwi_gen.compare.scenarios import FORCES, PLANTS
