@@ -191,7 +191,7 @@ def test_gains_too_fast_for_the_clock_are_refused_with_what_would_do(tmp_path, l
     done = tune(tmp_path, COSTS.replace("R = 0.1", "R = 1e-9"))
 
     assert done.exit_code == 2
-    assert re.search(r"tendon 0 \(thumb, \w+\): R = 1e-09 asks for gains that are unstable at 3000 Hz", done.stderr)
+    assert re.search(r"tendon 0 \(thumb, \w+\): R = 1e-09 gives gains that are unstable at 3000 Hz", done.stderr)
     least = [float(number) for number in re.findall(r"R = ([0-9.e-]+) is the least that works", done.stderr)]
     assert len(least) > 10
     assert not (tmp_path / "gains.toml").exists()
