@@ -160,13 +160,13 @@ def spoilt(column, index, value):
     [
         (lambda v, t: (v[:5], t[:5]), "velocity is 5; expected a column of at least 8 numbers"),
         (lambda v, t: (v, t[:-1]), "the columns differ in length: velocity 34, torque 33"),
-        (lambda v, t: (spoilt(v, 3, np.nan), t), "velocity[3] = nan is not a number to reckon with"),
+        (lambda v, t: (spoilt(v, 3, np.nan), t), "velocity[3] = nan is not finite"),
         (lambda v, t: (["fast"] * 9, t), "velocity is not a column of numbers"),
         (lambda v, t: (v, -t), "torque opposes velocity"),
         (lambda v, t: (np.sign(v), t), "fewer than 4 different speeds"),
         (lambda v, t: (v, spoilt(t, 30, 50.0)), "point 30 (velocity 4, torque 50)"),
-        (lambda v, t: (v[np.abs(v) > 2], t[np.abs(v) > 2]), "does not come near enough to standstill"),
-        (lambda v, t: (v, t - 0.1 * v), "a viscosity of -0.0"),
+        (lambda v, t: (v[np.abs(v) > 2], t[np.abs(v) > 2]), "has no values near enough to standstill"),
+        (lambda v, t: (v, t - 0.1 * v), "a negative viscosity, -0.0"),
     ],
 )
 def test_recordings_that_cannot_tell_friction_are_refused(friction, spoil, expected):
@@ -179,7 +179,7 @@ def test_recordings_that_cannot_tell_friction_are_refused(friction, spoil, expec
     ("spoil", "expected"),
     [
         (lambda a, t: (a[:4000], t[:4000]), "the slowest ripple has a period of 6.28 rad"),
-        (lambda a, t: (np.linspace(-np.pi, np.pi, 101), t[:101]), "too few or too regular to tell 4 ripples apart"),
+        (lambda a, t: (np.linspace(-np.pi, np.pi, 101), t[:101]), "too few or too regular to distinguish 4 ripples"),
         (lambda a, t: (a, spoilt(t, 7, 9.0)), "point 7 (theta -3.13926, torque 9)"),
     ],
 )
