@@ -164,7 +164,7 @@ def test_costs_that_are_none_are_refused_with_line_key_and_reason(tmp_path, key,
     assert not (tmp_path / "gains.toml").exists()
 
 
-def test_all_faults_are_told_at_once(tmp_path):
+def test_all_faults_are_reported_at_once(tmp_path):
     done = tune(tmp_path, '[cost]\nQ = [1.0]\nR = 0\npretension = "10"\n[fingers.index]\nR = -1\n')
 
     assert done.exit_code == 2
@@ -187,7 +187,7 @@ def test_a_pretension_that_the_springs_cannot_hold_is_refused(tmp_path, lib):
     assert "pretension = 4000 N is beyond what the hand's springs can hold" in done.stderr
 
 
-def test_gains_too_fast_for_the_clock_are_refused_with_what_would_do(tmp_path, lib):
+def test_gains_too_fast_for_the_clock_are_refused_with_the_least_stable_cost(tmp_path, lib):
     done = tune(tmp_path, COSTS.replace("R = 0.1", "R = 1e-9"))
 
     assert done.exit_code == 2
