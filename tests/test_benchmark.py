@@ -8,7 +8,7 @@ import pytest
 pytest.importorskip("scipy")
 
 from awiwi_gen.compare.clock import clocked, require_clocked, running_gains
-from awiwi_gen.compare.compare import compare
+from awiwi_gen.compare.comparison import compare
 from awiwi_gen.compare.laws import LAWS
 from awiwi_gen.compare.printed_gains import printed_gains
 from awiwi_gen.compare.scenarios import FORCES, PLANTS
@@ -161,7 +161,7 @@ def test_a_reference_far_beyond_the_motors_leaves_torques_within_their_limit_and
     assert np.abs(trace["x"][-300:, 0]).max() < 0.02
 
 
-def test_while_a_stiffness_is_singular_the_law_refuses_and_then_recovers(lib, joint):
+def test_the_law_fails_while_a_stiffness_is_singular_and_then_recovers(lib, joint):
     ticks, impedance = 1500, np.tile([0.5, 0.003], (1500, 1))
     impedance[300:330, 0] = 0.0
     values = values_of(joint, joint.believed(), 20.0) | BEST.values(lib, joint.believed(), 20.0, BEST.gains_with({}))
@@ -176,7 +176,7 @@ def test_while_a_stiffness_is_singular_the_law_refuses_and_then_recovers(lib, jo
     assert trace["tau"][-300:].mean() == pytest.approx(20.0 * joint.arm, rel=0.02)
 
 
-def test_a_sensor_that_fails_for_a_while_commands_nothing_and_is_recovered_from(lib, joint):
+def test_a_sensor_failure_commands_zero_and_the_loop_recovers(lib, joint):
     """The load, as the law is told, is no number for 10 ms."""
     ticks, told = 1500, np.zeros(1500)
     told[300:330] = np.nan
@@ -209,7 +209,7 @@ def test_the_printed_impedance_cannot_run_on_the_clock_for_its_damping_asks_for_
             assert np.abs(found.report.poles).max() == pytest.approx(0.05 / 7.2e-7, rel=0.01)
 
 
-def test_of_figure_15_13_one_plant_bears_a_sample_of_delay_and_the_other_does_not(printed):
+def test_the_gains_of_figure_15_13_are_stable_on_the_clock_for_one_of_two_plants(printed):
     assert printed["figure 15.13", "table 15.1"].report.delay_margin == pytest.approx(0.399e-3, rel=0.01)
     assert printed["figure 15.13", "table 15.1"].report.radius == pytest.approx(1.107, abs=1e-3)
     assert printed["figure 15.13", "table 16.1"].report.implementable

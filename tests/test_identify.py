@@ -56,7 +56,7 @@ def angle(counts):
 # -- what comes back --------------------------------------------------------------------------------------
 
 
-def test_friction_comes_back_from_noisy_torques_within_three_deviations(friction):
+def test_friction_is_identified_from_noisy_torques_within_three_deviations(friction):
     fit = fit_friction(*friction)
     errors = np.array([fit.steepness - 10, fit.level - 0.5586, fit.viscosity - 0.0356])
 
@@ -65,7 +65,7 @@ def test_friction_comes_back_from_noisy_torques_within_three_deviations(friction
     assert fit.residual == pytest.approx(0.01, rel=0.3)
 
 
-def test_friction_comes_back_from_exact_torques_exactly(lib):
+def test_friction_is_identified_exactly_from_exact_torques(lib):
     velocity = np.linspace(-5, 5, 200)
     fit = fit_friction(velocity, lib.motor_friction(velocity))
 
@@ -73,14 +73,14 @@ def test_friction_comes_back_from_exact_torques_exactly(lib):
 
 
 @pytest.mark.parametrize("steepness", [0.3, 3.0, 60.0])
-def test_friction_is_found_whatever_its_steepness(steepness):
+def test_friction_of_any_steepness_is_identified(steepness):
     velocity = np.linspace(-10, 10, 401)
     fit = fit_friction(velocity, 0.2 * np.arctan(steepness * velocity) + 0.01 * velocity)
 
     assert (fit.steepness, fit.level, fit.viscosity) == pytest.approx((steepness, 0.2, 0.01), rel=1e-6)
 
 
-def test_ripple_comes_back_from_a_noisy_turn(ripple):
+def test_ripple_is_identified_from_a_noisy_revolution(ripple):
     fit = fit_ripple(*ripple, 100, (1, 2), (1, 3))
     found = [(wave.shaft, wave.harmonic) for wave in fit.waves]
     true = [(0.06, 40), (0.025, -75), (0.03, 10), (0.012, 120)]
@@ -93,7 +93,7 @@ def test_ripple_comes_back_from_a_noisy_turn(ripple):
     assert fit.deviation < 4e-4
 
 
-def test_calibration_comes_back_through_the_middle_of_the_hysteresis(lib, pulled):
+def test_calibration_runs_through_the_middle_of_the_hysteresis(lib, pulled):
     fit = fit_calibration(*pulled, ENDS, float(lib.spring_lever(SLACK).dL))
     counts = np.linspace(*ENDS, 300)
     dL, force, stiffness, status = lib.calibration_polynomials(
@@ -109,7 +109,7 @@ def test_calibration_comes_back_through_the_middle_of_the_hysteresis(lib, pulled
     assert fit.residuals["elongation"] == pytest.approx(2e-6, rel=0.2)
 
 
-def test_calibration_of_exact_data_leaves_what_degree_6_leaves(lib):
+def test_calibration_of_exact_data_has_the_residual_of_degree_6(lib):
     counts = np.linspace(*ENDS, 200)
     dL, force, stiffness, _ = lib.spring_lever(angle(counts))
     fit = fit_calibration(counts, dL[0] - dL, force, ENDS, float(dL[0]))
@@ -120,7 +120,7 @@ def test_calibration_of_exact_data_leaves_what_degree_6_leaves(lib):
     assert np.max(np.abs(read.stiffness / stiffness - 1)) < 1e-3
 
 
-def test_a_units_own_spring_comes_back_and_goes_into_the_hand_file(noise):
+def test_a_units_own_spring_is_identified_and_fits_into_the_hand_file(noise):
     unit = '\n[[spring.units]]\ntendon = 1\nrate = "6.87 N/mm"\nfree_length = "35.02 mm"\nsource = "bench"\n'
     own = compiled(("[tendon]", unit + "[tendon]"), only="calibration_readings")
     counts = np.linspace(*ENDS, 300)
@@ -135,7 +135,7 @@ def test_a_units_own_spring_comes_back_and_goes_into_the_hand_file(noise):
     assert float(calibrated.rate) == pytest.approx(fit.rate, rel=1e-5)
 
 
-def test_what_was_identified_can_be_pasted_into_the_hand_file(friction, ripple):
+def test_identified_parameters_can_be_pasted_into_the_hand_file(friction, ripple):
     text = hand_text()
     old = text[text.index("friction = ") : text.index("compensation = ")]
     waves = text[text.index("[[motor.ripple]]") : text.index("[spring]")]
@@ -160,16 +160,16 @@ def spoilt(column, index, value):
     [
         (lambda v, t: (v[:5], t[:5]), "velocity is 5; expected a column of at least 8 numbers"),
         (lambda v, t: (v, t[:-1]), "the columns differ in length: velocity 34, torque 33"),
-        (lambda v, t: (spoilt(v, 3, np.nan), t), "velocity[3] = nan is not a number to reckon with"),
+        (lambda v, t: (spoilt(v, 3, np.nan), t), "velocity[3] = nan is not finite"),
         (lambda v, t: (["fast"] * 9, t), "velocity is not a column of numbers"),
         (lambda v, t: (v, -t), "torque opposes velocity"),
         (lambda v, t: (np.sign(v), t), "fewer than 4 different speeds"),
         (lambda v, t: (v, spoilt(t, 30, 50.0)), "point 30 (velocity 4, torque 50)"),
-        (lambda v, t: (v[np.abs(v) > 2], t[np.abs(v) > 2]), "does not come near enough to standstill"),
-        (lambda v, t: (v, t - 0.1 * v), "a viscosity of -0.0"),
+        (lambda v, t: (v[np.abs(v) > 2], t[np.abs(v) > 2]), "has no values near enough to standstill"),
+        (lambda v, t: (v, t - 0.1 * v), "a negative viscosity, -0.0"),
     ],
 )
-def test_recordings_that_cannot_tell_friction_are_refused(friction, spoil, expected):
+def test_recordings_that_do_not_determine_friction_are_refused(friction, spoil, expected):
     with pytest.raises(InputError) as caught:
         fit_friction(*spoil(*friction))
     assert expected in str(caught.value)
@@ -179,11 +179,11 @@ def test_recordings_that_cannot_tell_friction_are_refused(friction, spoil, expec
     ("spoil", "expected"),
     [
         (lambda a, t: (a[:4000], t[:4000]), "the slowest ripple has a period of 6.28 rad"),
-        (lambda a, t: (np.linspace(-np.pi, np.pi, 101), t[:101]), "too few or too regular to tell 4 ripples apart"),
+        (lambda a, t: (np.linspace(-np.pi, np.pi, 101), t[:101]), "too few or too regular to distinguish 4 ripples"),
         (lambda a, t: (a, spoilt(t, 7, 9.0)), "point 7 (theta -3.13926, torque 9)"),
     ],
 )
-def test_recordings_that_cannot_tell_ripples_apart_are_refused(ripple, spoil, expected):
+def test_recordings_that_do_not_distinguish_ripples_are_refused(ripple, spoil, expected):
     with pytest.raises(InputError) as caught:
         fit_ripple(*spoil(*ripple), 100, (1, 2), (1, 3))
     assert expected in str(caught.value)

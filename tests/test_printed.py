@@ -48,7 +48,7 @@ def test_a_number_agrees_if_it_rounds_to_the_digits_that_are_printed(printed, ou
     assert same_digits(printed, ours) is same
 
 
-def test_what_does_not_agree_is_a_misprint_unless_told_otherwise():
+def test_a_number_that_differs_is_a_misprint_by_default():
     assert compared("eq. 1", "1.5", 1.5, "").verdict == "agrees"
     assert compared("eq. 1", "1.5", 1.6, "").verdict == "misprint"
     assert compared("eq. 1", "1.5", 1.6, "", "not reproducible").verdict == "not reproducible"
@@ -64,7 +64,7 @@ def test_every_chapter_of_part_2_with_numbers_is_in_the_table_in_order(numbers):
     assert set(chapters) == set(range(7, 17))
 
 
-def test_every_row_says_what_is_printed_what_is_right_and_why_they_differ(numbers):
+def test_every_row_has_the_printed_number_ours_and_a_reason(numbers):
     assert all(number.printed and number.ours and number.reason for number in numbers)
     assert {number.verdict for number in numbers} == {"agrees", "misprint", "not reproducible"}
 
@@ -81,7 +81,7 @@ def test_every_row_says_what_is_printed_what_is_right_and_why_they_differ(number
         ("chapters 14 and 16, tendons", ["agrees"]),
     ],
 )
-def test_the_table_tells_misprints_from_what_agrees(numbers, where, verdicts):
+def test_the_table_has_the_verdicts_of_known_misprints(numbers, where, verdicts):
     assert [number.verdict for number in numbers if number.where.startswith(where)] == verdicts
 
 
@@ -105,7 +105,7 @@ def test_a_heavier_motor_than_that_of_table_13_1_gives_eq_13_11(lib):
         assert not any(same_digits(text, gain) for text, gain in zip(GAINS_13_11, table, strict=True))
 
 
-def test_what_a_figure_claims_of_optimal_gains_holds_of_the_torque_only(lib):
+def test_of_the_claims_on_optimal_gains_only_the_one_on_torque_holds(lib):
     settling, torque = linear.optimal(lib)
 
     assert (settling.number, settling.holds) == ("13.2", False)
@@ -123,7 +123,7 @@ def test_no_gains_of_chapter_14_run_on_the_clock(lib):
 # -- chapters 15 and 16 ------------------------------------------------------------------------------------
 
 
-def test_the_inertia_of_table_15_1_is_a_tenth_of_what_its_ratio_makes():
+def test_the_inertia_of_table_15_1_is_a_tenth_of_rotor_times_ratio_squared():
     assert pytest.approx(10 * TABLE_15_1.b) == TABLE_16_1.b == 2e-7 * 100**2
 
 
@@ -184,7 +184,7 @@ def impedance_free(plant, gains):
     return A
 
 
-def test_cancelling_the_spring_is_what_tells_the_two_plants_of_chapter_16_apart(lib):
+def test_the_two_plants_of_chapter_16_differ_by_cancelling_the_spring(lib):
     found = lib.backstepping_state_gains(plant=TABLE_16_1.numbers, gains=(1.0, 1e-3, 100.0, 100.0), weights=(1.0, 1.0))
 
     assert pytest.approx(found.K + cancelling(TABLE_16_1), rel=1e-12) == found.K_cancelled

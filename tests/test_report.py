@@ -136,7 +136,7 @@ def test_text_of_a_figure_cannot_become_markup(tmp_path, hand, figures):
     assert "a &lt; b &amp; c" in written
 
 
-def test_the_command_writes_the_page_and_tells_each_verdict(tmp_path, monkeypatch, results, some_proof, hand):
+def test_the_command_writes_the_page_and_prints_each_verdict(tmp_path, monkeypatch, results, some_proof, hand):
     def publish(job, path, comparison):
         page.write_page(path, hand, results, some_proof[1])
         return results
@@ -161,7 +161,7 @@ def test_without_the_drawing_libraries_the_command_says_what_to_install(tmp_path
         page.publish(Job(hand), tmp_path / "index.html", None)
 
 
-def test_a_claw_shows_what_it_has_a_finger_on_straight_tendons_but_no_index(root):
+def test_a_claw_without_an_index_has_the_figures_of_straight_tendons(root):
     claw = Hand.load(root / "examples" / "claw.toml")
     job = Job(claw, only="beak_*")
     shown = figures_fingers.figures(load(cached_tree(job), job.store), claw)

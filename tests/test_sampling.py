@@ -61,7 +61,7 @@ def test_the_delay_margin_of_an_integrator_is_a_quarter_turn():
     assert delay_margin(np.zeros((1, 1)), np.ones(1), np.array([5.0])) == pytest.approx(np.pi / 2 / 5)
 
 
-def test_a_loop_of_little_gain_bears_any_delay():
+def test_a_loop_of_small_gain_is_stable_with_any_delay():
     assert delay_margin(np.array([[-2.0]]), np.ones(1), np.ones(1)) == np.inf
 
 
@@ -111,7 +111,7 @@ def test_a_law_that_is_too_fast_is_refused_with_the_reason_and_the_nearest_that_
     assert not report(A, B, faster, delay=2).implementable
 
 
-def test_a_design_says_itself_what_slower_means():
+def test_a_design_function_defines_slower_laws():
     A, B = TABLE_13_1
     answer = is_implementable(
         A, B, optimal(A, B, WEIGHTS, np.array([[1e-4]])),

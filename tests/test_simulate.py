@@ -124,7 +124,7 @@ def test_a_law_on_the_clock_is_the_plant_between_ticks_under_torques_of_the_samp
 
 
 @pytest.mark.parametrize("late", [True, False])
-def test_a_torque_acts_one_sample_after_what_it_answers_if_it_is_late(lib, late):
+def test_a_late_torque_acts_one_sample_after_its_measurement(lib, late):
     goal = np.zeros((6, 4))
     goal[2:, 0] = 1.0
     values = JOINT | {"x": np.zeros(4), "K": GAINS, "u": 0.0, "wanted": 0.0}
@@ -155,7 +155,7 @@ def test_a_sensor_sees_whole_steps_nearest_to_the_truth(lib):
     assert np.abs(trace["seen"] - trace["x"]).max() <= 0.005 + 1e-12
 
 
-def test_noise_is_normal_enough_and_of_the_deviation_that_was_asked_for(lib):
+def test_noise_is_nearly_normal_with_the_given_deviation(lib):
     trace = run(lib, controlled(noise=0.02), JOINT | {"K": GAINS, "u": 0.0, "wanted": 0.0}, 5000, ["x", "seen"])
     noise = (trace["seen"] - trace["x"]) / 0.02
 
@@ -177,14 +177,14 @@ def test_the_same_seed_gives_the_same_run_and_another_one_another(lib):
 # -- bad input ----------------------------------------------------------------------------------------------
 
 
-def test_a_state_that_is_no_number_ends_the_run_at_once(lib):
+def test_an_initial_state_that_is_nan_ends_the_run_at_once(lib):
     trace = run(lib, joint(), JOINT | {"u": 0.0, "x": (np.nan, 0, 0, 0)}, 10, ["x"])
 
     assert trace.status != 0
     assert trace.done == 0
 
 
-def test_a_state_that_becomes_no_number_ends_the_run_there(lib):
+def test_a_state_that_becomes_nan_ends_the_run(lib):
     push = np.zeros(10)
     push[5] = np.nan
     values = {name: value for name, value in JOINT.items() if name != "load"}
@@ -196,7 +196,7 @@ def test_a_state_that_becomes_no_number_ends_the_run_there(lib):
     assert np.isfinite(trace["x"][:5]).all()
 
 
-def test_while_a_law_refuses_nothing_is_commanded_and_afterwards_it_goes_on(lib):
+def test_while_a_law_fails_zero_is_commanded_and_then_it_goes_on(lib):
     """The gains are not positive for a while: the law's kernel says so, and its motor lets go."""
     law = [
         Block(
@@ -219,7 +219,7 @@ def test_while_a_law_refuses_nothing_is_commanded_and_afterwards_it_goes_on(lib)
     assert np.abs(trace["x"][-1]).max() < 0.01
 
 
-def test_a_law_that_reads_what_is_no_number_commands_nothing_and_recovers(lib):
+def test_a_law_that_reads_nan_commands_zero_and_recovers(lib):
     goal = np.zeros((300, 4))
     goal[50:60] = np.nan
     values = {name: value for name, value in JOINT.items() if name != "x_des"}
@@ -251,7 +251,7 @@ def test_a_law_that_reads_what_is_no_number_commands_nothing_and_recovers(lib):
         (Loop([Block("plant_joint_linear")], [], {"y": "xd"}), {}, "y is a state or a rate whose size"),
     ],
 )
-def test_wires_that_lead_nowhere_are_told_by_name(lib, loop, values, message):
+def test_errors_name_wires_to_unknown_signals(lib, loop, values, message):
     with pytest.raises(InputError, match=message):
         simulate(lib, loop, [Scenario(JOINT | {"u": 0.0, "K": GAINS} | values, 5)], ["x"])
 

@@ -59,11 +59,11 @@ def test_one_run_is_shown_sample_by_sample(lib):
         (["motor_pd", "--scenario", "step", "--force", "-1"], "--force -1: a pretension is more than 0"),
     ],
 )
-def test_what_there_is_not_is_told_with_what_there_is(lib, arguments, message):
+def test_errors_name_the_unknown_word_and_the_known_ones(lib, arguments, message):
     assert message in complaint("simulate", *arguments)
 
 
-def test_a_law_that_there_is_not_is_told_to_programs_too():
+def test_an_unknown_law_is_an_error_in_json_too():
     assert "there are motor_pd" in answer("simulate", "fuzzy", code=2)["message"]
 
 

@@ -1,6 +1,6 @@
 """All laws on one antagonistic joint of a hand, in the same scenarios: `awiwi-gen simulate`."""
 
 from awiwi_gen.compare.command import benchmark, one_run
-from awiwi_gen.compare.compare import comparison
+from awiwi_gen.compare.comparison import comparison
 
 __all__ = ["benchmark", "comparison", "one_run"]

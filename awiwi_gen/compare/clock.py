@@ -1,7 +1,7 @@
-"""What a clock of 3 kHz and one sample of delay leave of a law and its gains: the loop of the compiled kernels.
+"""Stability of a law with its gains at 3 kHz and one sample of delay, from the loop of the compiled kernels.
 
-At rest dry friction is a stiff damper, and would make nearly all gains look good; while a motor slides it is a constant
-torque, and damps nothing. Gains must do for both.
+At rest dry friction is a stiff damper, and makes nearly all gains look stable; while a motor slides it is a constant
+torque, and damps nothing. Gains must be stable in both cases.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from awiwi_gen.loops.linearised import STABLE, SampledLoop
 from awiwi_gen.loops.nearest import nearest
 from awiwi_gen.simulate import PERIOD, Machine, Scenario, simulate
 
-SPARE = (0.0, 0.25, 0.5, 0.75, 1.0)  # periods of further delay that the nearest gains bear
-RESTING = 600  # ticks in which noise is watched
-SETTLING = 12  # ticks, until all that a law writes has come to rest
+SPARE = (0.0, 0.25, 0.5, 0.75, 1.0)  # periods of additional delay at which the nearest gains must be stable
+RESTING = 600  # ticks for which noise is recorded
+SETTLING = 12  # ticks until all signals of a law are constant
 
 
 @dataclass(frozen=True)
 class Clocked:
-    """A law with gains on the clock: spectral radius, and the delay [s] that it bears beyond its one sample.
+    """A law with gains on the clock: spectral radius, and delay margin [s] beyond the one sample.
 
-    ``noise`` is the largest torque that the sensors' noise alone makes it ask for, in parts of what the motors have.
+    ``noise`` is the largest torque commanded because of sensor noise alone, as a share of the motors' limit.
     """
 
     law: str
@@ -39,12 +39,12 @@ class Clocked:
 
     @property
     def runs(self) -> bool:
-        """Whether it can run."""
+        """Whether the loop is stable and noise does not saturate the motors."""
         return self.radius < STABLE and self.noise < 1
 
     @property
     def reason(self) -> str:
-        """Why it can, or cannot."""
+        """The reason, in words."""
         clock = f"{1 / PERIOD:.0f} Hz and one sample of delay"
         if self.radius >= STABLE:
             return f"unstable at {clock}: spectral radius {self.radius:.4g}"
@@ -61,7 +61,7 @@ class Clocked:
 
 
 def clocked(library: Any, law: Law, gains: Mapping[str, float], joint: Joint, force: float) -> Clocked:
-    """How a law with gains does on the clock. Raises InputError where its kernels refuse them."""
+    """Stability of a law with gains. Raises InputError where its kernels refuse them."""
     loops = loops_of(library, law, gains, joint, force)
     radius = max(loop.radius(0.0) for loop in loops)
     spare = min(loop.margin() for loop in loops) if radius < STABLE else 0.0
@@ -69,16 +69,16 @@ def clocked(library: Any, law: Law, gains: Mapping[str, float], joint: Joint, fo
 
 
 def noise(library: Any, law: Law, gains: Mapping[str, float], joint: Joint, force: float) -> float:
-    """The largest torque besides its mean that a law asks for at rest, in parts of the motors' limit."""
+    """The largest deviation of the command from its mean at rest, as a share of the motors' limit."""
     values = values_of(joint, joint.believed(), force) | law.values(library, joint.believed(), force, gains)
     loop = loop_around(joint, list(law.blocks))
     (trace,) = simulate(library, loop, [Scenario(values, RESTING, seed=1)], ["wanted"])
-    asked = trace["wanted"][RESTING // 3 :]
-    return float(np.abs(asked - asked.mean(axis=0)).max() / joint.limit) if len(asked) else float("inf")
+    command = trace["wanted"][RESTING // 3 :]
+    return float(np.abs(command - command.mean(axis=0)).max() / joint.limit) if len(command) else float("inf")
 
 
 def loops_of(library: Any, law: Law, gains: Mapping[str, float], joint: Joint, force: float) -> list[SampledLoop]:
-    """The loop with motors that slide, then with motors at rest."""
+    """The linearised loop with sliding motors, then with motors at rest."""
     sliding = replace(joint, friction=joint.friction * [1, 0, 1])
     loops = []
     for each in (sliding, joint):
@@ -91,11 +91,11 @@ def loops_of(library: Any, law: Law, gains: Mapping[str, float], joint: Joint, f
 
 
 def running_gains(library: Any, law: Law, gains: Mapping[str, float], joint: Joint, force: float) -> Clocked | None:
-    """The gains nearest to some that fail, and how they do: they bear another sample of delay, too."""
+    """The nearest stable gains, and their stability: they are stable with another sample of delay, too."""
 
     def works(chosen: Mapping[str, float]) -> bool:
         try:
-            if noise(library, law, chosen, joint, force) >= 1:  # the quicker look, and it sees what is unstable, too
+            if noise(library, law, chosen, joint, force) >= 1:  # the cheaper check; it also finds most unstable gains
                 return False
             loops = loops_of(library, law, chosen, joint, force)
         except InputError:
@@ -113,14 +113,14 @@ def running_gains(library: Any, law: Law, gains: Mapping[str, float], joint: Joi
 
 
 def require_clocked(library: Any, law: Law, gains: Mapping[str, float], joint: Joint, force: float) -> Clocked:
-    """How gains do on the clock. Raises InputError for such that fail, with the reason and the nearest that do not."""
+    """Stability of gains. Raises InputError for gains that cannot run, with the reason and the nearest that can."""
     found = clocked(library, law, gains, joint, force)
     if found.runs:
         return found
     way_out = running_gains(library, law, gains, joint, force)
     if way_out is None:
-        instead = "neither another bandwidth nor a change of gains was found to mend that"
+        instead = "no other bandwidth and no change of gains was found that helps"
     else:
-        told = ", ".join(f"{name} = {value:.4g}" for name, value in way_out.gains.items() if value != gains[name])
-        instead = f"the nearest that run have {told} ({way_out.reason})"
+        changed = ", ".join(f"{name} = {value:.4g}" for name, value in way_out.gains.items() if value != gains[name])
+        instead = f"the nearest that run have {changed} ({way_out.reason})"
     raise InputError(f"{law.name}: these gains are {found.reason}; {instead}")

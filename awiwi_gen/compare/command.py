@@ -1,4 +1,4 @@
-"""What `awiwi-gen simulate` does and shows."""
+"""The command `awiwi-gen simulate`."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import awiwi_gen
-from awiwi_gen.compare import compare
+from awiwi_gen.compare import comparison
 from awiwi_gen.compare.clock import require_clocked
 from awiwi_gen.compare.laws import LAWS, law_of
 from awiwi_gen.compare.scenarios import BEFORE, FORCES, PLANTS, run
@@ -19,18 +19,18 @@ from awiwi_gen.report import print_json, print_table
 from awiwi_gen.results import Table
 from awiwi_gen.simulate import PERIOD
 
-SHOWN = 30  # ticks from one shown line of a run to the next
+SHOWN = 30  # ticks between two printed rows of a run
 
 
 @dataclass(frozen=True)
 class Shown:
-    """A result for programs, and as tables for people."""
+    """A result as plain data for JSON, and as tables."""
 
     data: Any
     tables: Sequence[Table]
 
     def show(self, as_json: bool) -> None:
-        """Print one or the other."""
+        """Print the data or the tables."""
         if as_json:
             print_json(self.data)
             return
@@ -39,7 +39,7 @@ class Shown:
 
 
 def read_gains(text: str) -> dict[str, float]:
-    """``K_p=0.5,K_d=0.003`` as numbers by their names. Raises InputError for anything else."""
+    """Parse ``K_p=0.5,K_d=0.003``. Raises InputError for anything else."""
     found = {}
     for part in filter(None, text.split(",")):
         name, _, number = part.partition("=")
@@ -51,32 +51,32 @@ def read_gains(text: str) -> dict[str, float]:
 
 
 def benchmark(hand_file: Path | None, name: str, gains: str) -> Shown:
-    """One law, or all, on all plants, after its gains were found to run. Raises InputError for such that cannot."""
+    """Compare one law, or all of them, on all plants. Raises InputError for gains that are unstable on the clock."""
     chosen = read_gains(gains)
     if chosen and not name:
         raise InputError("--gains are for one law; name it: awiwi-gen simulate LAW --gains ...")
     laws = [law_of(name)] if name else list(LAWS.values())
     for law in laws:
-        law.gains_with(chosen)  # told before anything is compiled
+        law.gains_with(chosen)  # refuses bad gains before anything is compiled
     hand = Hand.load(hand_file)
     library = awiwi_gen.build(hand)
     if chosen:
         joint, own = joint_of(library, hand), laws[0].gains_with(chosen)
         clocked = [(force, require_clocked(library, laws[0], own, joint, force)) for force in FORCES]
     else:
-        clocked = compare.clocks(library, hand, laws)
-    rows = compare.compare(library, hand, laws, chosen)
+        clocked = comparison.clocks(library, hand, laws)
+    rows = comparison.compare(library, hand, laws, chosen)
     return Shown(
         {
             "clock": [{"force": force, **found.as_dict()} for force, found in clocked],
             "benchmark": [row.as_dict() for row in rows],
         },
-        compare.tables(clocked, rows),
+        comparison.tables(clocked, rows),
     )
 
 
 def one_run(hand_file: Path | None, name: str, gains: str, scenario: str, force: float, plant: str) -> Shown:
-    """One run of one law, sample by sample for programs. Raises InputError for what there is not."""
+    """One run of one law. Raises InputError for an unknown law, scenario or plant, and for gains that cannot run."""
     law = law_of(name)
     own = law.gains_with(read_gains(gains))
     if plant not in PLANTS:

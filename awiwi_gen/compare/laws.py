@@ -1,8 +1,8 @@
-"""The laws that are compared, as blocks of kernels with gains, and how each comes to what it needs.
+"""The compared laws: blocks of kernels, gains, and the design that computes their other inputs.
 
-All of them move along the reference filter and know the joint by the same observer, so that what is compared is the
-law alone. Those of the source take the springs and the friction for what the hand file says. The last one also takes
-from the observer how stiff the springs are and what the motors must overcome besides.
+All laws follow the same reference filter and use the same observer, so that only the laws differ. Those of the source
+use springs and friction of the hand file. The last one also uses the observer's estimates of spring stiffness and of
+the torque that the motors must overcome.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import numpy as np
 
 from awiwi_gen.errors import InputError, unknown
 from awiwi_gen.loops.hand_joint import Joint
+from awiwi_gen.loops.joint import Plant
 from awiwi_gen.simulate import Array, Block, Wire
 
 Values = dict[str, Any]
@@ -23,7 +24,7 @@ Wires = dict[str, Wire]
 
 @dataclass(frozen=True)
 class Gain:
-    """A number that tunes a law, and the power of the law's bandwidth that it grows with."""
+    """Default value and unit of a gain, and the power of the bandwidth that it is proportional to."""
 
     value: float
     unit: str
@@ -32,7 +33,7 @@ class Gain:
 
 @dataclass(frozen=True)
 class Law:
-    """Blocks that come from what is observed to ``wanted``, and what they take from the joint and from the gains."""
+    """Blocks from the sensors to the command ``wanted``; ``design`` computes their constant inputs from joint and gains."""
 
     name: str
     source: str
@@ -42,7 +43,7 @@ class Law:
     design: Callable[[Any, Joint, float, Mapping[str, float]], Values]
 
     def gains_with(self, chosen: Mapping[str, float]) -> dict[str, float]:
-        """Its gains, some of them chosen. Raises InputError for one that it has not, or that is not positive."""
+        """All gains, the chosen ones replaced. Raises InputError for an unknown one, or one that is not positive."""
         for name, value in chosen.items():
             if name not in self.gains:
                 raise InputError(f"{self.name} has no gain {name!r}; it has {', '.join(self.gains)}")
@@ -51,7 +52,7 @@ class Law:
         return {name: float(chosen.get(name, gain.value)) for name, gain in self.gains.items()}
 
     def values(self, library: Any, believed: Joint, force: float, gains: Mapping[str, float]) -> Values:
-        """What its blocks are given besides what the joint gives, at a pretension [N]."""
+        """Signals of the law besides those of the joint, at a pretension [N]."""
         return COMMON | self.design(library, believed, force, gains)
 
 
@@ -71,7 +72,7 @@ SETPOINT = Block(
     {"desired": "motion", "inertias": "known_inertias", "damping": "known_damping"},
 )
 FEEDBACK = Block("antagonistic_feedback", {"x": STATE, "resistance": "modelled", "tau_m": "wanted"})
-COMPENSATED = Block(  # adds the friction that a law has no place for
+COMPENSATED = Block(  # adds friction compensation to a law without it
     "antagonistic_feedback",
     {
         "x": STATE, "x_des": STATE, "u_des": "torques_wanted", "feedback": "no_feedback", "resistance": "modelled",
@@ -82,7 +83,7 @@ PAIR: Wires = {"desired": "motion", "external": ("load_seen", "nothing"), "inert
 
 
 def rest(believed: Joint, force: float) -> Values:
-    """What a law knows of the springs at rest."""
+    """Known elongations and stiffness of the springs at rest."""
     torque = force * believed.arm
     return {
         "elongations": believed.elongations(torque),
@@ -99,9 +100,9 @@ def of_modes(link: Array, pull: Array) -> Array:
 
 
 def answered(result: Any, law: str) -> Any:
-    """A kernel's result. Raises InputError where it has none."""
+    """A kernel's result. Raises InputError where the kernel fails."""
     if result.status:
-        raise InputError(f"{law}: no gains follow from what was chosen")
+        raise InputError(f"{law}: the design has no solution for these gains")
     return result
 
 
@@ -109,48 +110,45 @@ def answered(result: Any, law: str) -> Any:
 
 
 def motor_pd(_: Any, believed: Joint, force: float, gains: Mapping[str, float]) -> Values:
-    """Each motor on a spring and a damper of its own; the link hangs between the tendons' springs."""
+    """A PD controller for each motor; the link hangs between the tendons' springs."""
     feedback = np.zeros((2, 6))
     for motor in (0, 1):
         feedback[motor, 2 * motor + 2 : 2 * motor + 4] = gains["kp"], gains["kd"]
     return rest(believed, force) | {"feedback": feedback}
 
 
+def modes_of(believed: Joint, force: float) -> tuple[Plant, Plant]:
+    """The link's mode, of both motors behind both springs; and one motor on its spring, the mode of the pretension."""
+    m, b, _ = map(float, believed.inertias)
+    k = float(believed.slopes(force * believed.arm).mean())
+    return Plant(m, 2 * b, 2 * k, dq=believed.damping), Plant(m, b, k)
+
+
+def pretension_gains(library: Any, motor: Plant, omega: float) -> Array:
+    """Gains (2,) on the common motion of both motors."""
+    placed = library.pole_placement_motor(b=motor.b, dtheta=0.0, k=motor.k, omega0=omega, xi0=1.0)
+    gains: Array = 2 * answered(placed, "pole_placement_motor").K
+    return gains
+
+
 def placed(library: Any, believed: Joint, force: float, gains: Mapping[str, float]) -> Values:
     """Poles of the link's mode and of the pretension's."""
-    m, b, _ = believed.inertias
-    k = float(believed.slopes(force * believed.arm).mean())
-    link = answered(
-        library.pole_placement(
-            m=m, b=2 * b, k=2 * k, dq=believed.damping, dtheta=0.0, omega=[gains["slow"], gains["fast"]], xi=[1.0, 1.0]
-        ),
-        "pole_placement",
-    )
-    pull = answered(library.pole_placement_motor(b=b, dtheta=0.0, k=k, omega0=gains["pull"], xi0=1.0), "pole_placement")
-    return rest(believed, force) | {"feedback": of_modes(link.K, 2 * pull.K)}
-
-
-def plant_of(believed: Joint, force: float) -> tuple[Array, Array, float, float]:
-    """A (4, 4) and B (4,) of the link's mode; inertia and stiffness of one motor, the pretension's mode."""
-    m, b, _ = believed.inertias
-    k = float(believed.slopes(force * believed.arm).mean())
-    A = np.array([
-        [0, 1, 0, 0], [-2 * k / m, -believed.damping / m, 2 * k / m, 0], [0, 0, 0, 1], [k / b, 0, -k / b, 0],
-    ])  # fmt: skip
-    return A, np.array([0, 0, 0, 1 / (2 * b)]), float(b), k
+    link, motor = modes_of(believed, force)
+    found = library.pole_placement(**link.ports, omega=[gains["slow"], gains["fast"]], xi=[1.0, 1.0])
+    pull = pretension_gains(library, motor, gains["pull"])
+    return rest(believed, force) | {"feedback": of_modes(answered(found, "pole_placement").K, pull)}
 
 
 def regulated(library: Any, believed: Joint, force: float, gains: Mapping[str, float]) -> Values:
-    """The optimum for what the link's error, the motors' speed and torque cost."""
-    A, B, b, k = plant_of(believed, force)
-    Q = np.diag([gains["error"] ** 2, 0, 0, gains["speed"] ** 2])
-    link = answered(library.lqr(A=A, B=B, Q=Q, R=1.0), "lqr")
-    pull = answered(library.pole_placement_motor(b=b, dtheta=0.0, k=k, omega0=gains["pull"], xi0=1.0), "lqr")
-    return rest(believed, force) | {"feedback": of_modes(link.K, 2 * pull.K)}
+    """The optimum for costs of the link's error, of the motors' speed and of their torque."""
+    link, motor = modes_of(believed, force)
+    found = library.lqr(A=link.A, B=link.B, Q=np.diag([gains["error"] ** 2, 0, 0, gains["speed"] ** 2]), R=1.0)
+    pull = pretension_gains(library, motor, gains["pull"])
+    return rest(believed, force) | {"feedback": of_modes(answered(found, "lqr").K, pull)}
 
 
 def scheduled(_: Any, believed: Joint, force: float, gains: Mapping[str, float]) -> Values:
-    """Impedance of the link over force loops of both tendons; of four joints the law is for, three stand still."""
+    """Impedance of the link over force loops of both tendons; three of the law's four joints stand still."""
     others = np.eye(4)
     others[0, 0] = 0
 

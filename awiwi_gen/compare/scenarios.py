@@ -1,4 +1,4 @@
-"""What is done to the joint, and how well a law bears it: the same for all laws, with fixed seeds."""
+"""Scenarios and scores: the same for all laws, with fixed seeds."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from awiwi_gen.simulate import PERIOD, Array, Scenario, Trace, simulate
 BEFORE, TICKS = 150, 1500  # ticks at rest, and in all
 STEP, LOAD = 0.2, 0.04  # rad, N m
 WAVE, FREQUENCY = 0.2, 2.0  # rad, Hz
-BAND = 0.02  # of a step: where it counts as settled
-LAST = 300  # ticks that tell where it came to
+BAND = 0.02  # of a step: tolerance of the settling time
+LAST = 300  # ticks over which the steady state is averaged
 WATCHED = ("x", "u", "tau", "wanted")
 
 PLANTS: Mapping[str, Mapping[str, Any]] = {
@@ -33,21 +33,21 @@ FORCES = (10.0, 20.0)  # N, pretensions
 
 @dataclass(frozen=True)
 class Motion:
-    """What the link is to do, (ticks, 5) with derivatives, and what pushes it, (ticks,) [N m]."""
+    """Desired motion of the link with four derivatives (ticks, 5), and load (ticks,) [N m]."""
 
     goal: Array
     load: Array
 
 
 def motions() -> dict[str, Motion]:
-    """A step, a sine with its derivatives, and a load that comes at once and stays."""
+    """A step, a load step, and a sine with its derivatives."""
     rest, none = np.zeros((TICKS, 5)), np.zeros(TICKS)
     step, load, sine = rest.copy(), none.copy(), rest.copy()
     step[BEFORE:, 0], load[BEFORE:] = STEP, LOAD
     w, t = 2 * np.pi * FREQUENCY, np.arange(TICKS - BEFORE) * PERIOD
-    turns: list[Callable[[Array], Array]] = [np.cos, lambda a: -np.sin(a), lambda a: -np.cos(a), np.sin, np.cos]
-    for order, turn in enumerate(turns):  # 1 - cos begins at rest
-        sine[BEFORE:, order] = WAVE / 2 * ((order == 0) - w**order * turn(w * t))
+    waves: list[Callable[[Array], Array]] = [np.cos, lambda a: -np.sin(a), lambda a: -np.cos(a), np.sin, np.cos]
+    for order, wave in enumerate(waves):  # 1 - cos starts at rest
+        sine[BEFORE:, order] = WAVE / 2 * ((order == 0) - w**order * wave(w * t))
     return {"step": Motion(step, none), "load": Motion(rest, load), "sine": Motion(sine, none)}
 
 
@@ -56,11 +56,11 @@ SCENARIOS = tuple(motions())
 
 @dataclass(frozen=True)
 class Score:
-    """How a law bore a step, a load and a sine on one plant under one pretension.
+    """Results of a law in a step, a load step and a sine, on one plant under one pretension.
 
     settling [s], overshoot and stiffness error as shares, steady and sine error [rad], slack time [s] of the slacker
-    tendon, energy [J] that the motors put in during the step, chatter [N m]: the torques' change from tick to tick at
-    rest, its root mean square. ``failed`` says that some run did not come to its end, or was refused a torque.
+    tendon, positive work [J] of the motors during the step, chatter [N m]: r.m.s. change of the torques from tick to tick
+    at rest. ``failed``: some run ended early, or the law failed in some tick.
     """
 
     settling: float
@@ -79,7 +79,7 @@ class Score:
 
     @property
     def good(self) -> bool:
-        """Whether it reaches the goal: 40 ms, 2 % of overshoot, 3 % of stiffness, no slack."""
+        """Whether the goal is reached: 40 ms, 2 % of overshoot, 3 % of stiffness error, no slack."""
         fast = self.settling <= 0.040 and self.overshoot <= 0.02
         return not self.failed and fast and abs(self.stiffness) <= 0.03 and self.slack == 0
 
@@ -88,7 +88,7 @@ def run(
     library: Any, law: Law, gains: Mapping[str, float], true: Joint, believed: Joint, force: float,
     names: Iterable[str] = SCENARIOS, seed: int = 1,
 ) -> dict[str, Trace]:  # fmt: skip
-    """Traces of the named scenarios. Raises InputError for one that there is not."""
+    """Traces of the named scenarios. Raises InputError for an unknown name."""
     known, names = motions(), list(names)
     for name in names:
         if name not in known:
@@ -100,21 +100,21 @@ def run(
 
 
 def score(traces: Mapping[str, Trace], K_p: float) -> Score:
-    """What came of it."""
+    """The score of the three scenarios."""
     step, load, sine = (traces[name] for name in ("step", "load", "sine"))
     failed = any(trace.status or trace.refused or trace.done < TICKS for trace in traces.values())
     if any(trace.done < TICKS for trace in traces.values()):
         return Score(*(float("inf"),) * 4, float("inf"), float("inf"), float("inf"), float("inf"), failed=True)
     q = step["x"][:, 0]
     off = np.flatnonzero(np.abs(q - STEP) > BAND * STEP)
-    yielded = float(load["x"][-LAST:, 0].mean())
+    deflexion = float(load["x"][-LAST:, 0].mean())
     power = step["u"][1:] * step["x"][1:, 3::2]
     changes = np.diff(np.concatenate([trace["wanted"][-LAST:] for trace in (step, load)]), axis=0)
     return Score(
         settling=float(max(off[-1] + 1 - BEFORE, 0) * PERIOD) if off[-1] + 1 < TICKS else float("inf"),
         overshoot=float(max(q.max() / STEP - 1, 0)),
         steady=float(abs(q[-LAST:].mean() - STEP)),
-        stiffness=float(LOAD / yielded / K_p - 1) if yielded else float("inf"),
+        stiffness=float(LOAD / deflexion / K_p - 1) if deflexion else float("inf"),
         sine=float(np.abs(sine["x"][BEFORE:, 0] - motions()["sine"].goal[BEFORE:, 0])[-TICKS // 3 :].max()),
         slack=float(max(((trace["tau"] <= 0).sum(axis=0).max()) for trace in traces.values()) * PERIOD),
         energy=float(np.maximum(power, 0).sum() * PERIOD),

@@ -1,8 +1,8 @@
-"""The joint that laws are compared on: between two tendons of the hand, with all that a real one has.
+"""A joint of the hand between two tendons, with motors, friction and sensors: the plant of simulated laws.
 
-Its link, motors, springs and friction are the hand's, in the terms of the joint: with lever arm R and pulley r, an
-angle of the motor is R / r times what the joint sees, a torque r / R times. The law knows them but for the friction, of
-which it knows the share that the hand file gives, and for what a perturbation changes.
+Its link, motors, springs and friction are those of the hand, in joint coordinates: with lever arm R and pulley radius r
+a motor angle is R / r times the joint's, a motor torque r / R times. A law knows all parameters but the friction, of
+which it knows the share in the hand file, and but perturbations.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ STRETCH = (3.0, 80.0)  # N: tendon forces between which the spring's cubic is fi
 
 @dataclass(frozen=True)
 class Joint:
-    """A link between two tendons, as its joint sees it: inertias [kg m^2], springs, friction, limits.
+    """A link between two tendons, in joint coordinates: inertias [kg m^2], springs, friction, limits.
 
     A row of ``tendons`` is (k1, k2, k3) of a spring's torque k1 p + k2 p^2 + k3 p^3 at the elongation p [rad];
-    ``friction`` is (steepness, level, viscosity) of either motor, ``known`` the share of it that laws may know;
-    ``arm`` turns a tendon's force into a torque; ``limit`` is the motors' largest torque [N m].
+    ``friction`` is (steepness, level, viscosity) of either motor, ``known`` the share of it that laws compensate;
+    ``arm`` [m] is the lever arm of the tendons; ``limit`` is the motors' largest torque [N m].
     """
 
     inertias: Array
@@ -46,11 +46,11 @@ class Joint:
     encoder: float
 
     def believed(self) -> Joint:
-        """What a law knows of it."""
+        """The same with the friction that a law knows."""
         return replace(self, friction=self.friction * [1, self.known, self.known])
 
     def perturbed(self, springs: tuple[float, float] = (1, 1), friction: float = 1, link: float = 1) -> Joint:
-        """Another one, with springs, friction and link so many times as stiff, strong and heavy."""
+        """The same with springs, friction and the link's inertia multiplied by factors."""
         tendons = self.tendons * np.array(springs)[:, None]
         return replace(
             self,
@@ -72,7 +72,7 @@ class Joint:
 
 
 def joint_of(library: Any, hand: Hand, finger: str = FINGER, joint: str = JOINT) -> Joint:
-    """The joint of a hand; its finger straight, its other joints held. Raises InputError where there is none."""
+    """A joint of a hand, with the finger straight and its other joints held. Raises InputError where there is none."""
     if hand.motor is None or hand.spring is None or hand.motor.friction is None:
         raise InputError("a joint between tendons needs a hand with the sections [motor], with friction, and [spring]")
     finger = finger if finger in hand.fingers else next(iter(hand.fingers))
@@ -101,7 +101,7 @@ def joint_of(library: Any, hand: Hand, finger: str = FINGER, joint: str = JOINT)
 
 
 def joints_of(arms: Array) -> list[int]:
-    """The joint of each tendon, from lever arms (m, n): shared out evenly, so that the arms are as long as can be."""
+    """The joint of each tendon, from lever arms (m, n): equally many for each joint, with the largest sum of arms."""
     tendons, joints = arms.shape
     share = -(-tendons // joints)
     _, places = linear_sum_assignment(np.repeat(arms, share, axis=1), maximize=True)
@@ -109,7 +109,7 @@ def joints_of(arms: Array) -> list[int]:
 
 
 def _cubic(library: Any) -> Array:
-    """Coefficients (k1, k2, k3) of the hand's spring from where it begins to pull, fitted to its forces."""
+    """Coefficients (k1, k2, k3) of the hand's spring from its slack length on, fitted to its forces."""
     forces = np.linspace(*STRETCH, 200)
     found = library.spring_elongation(forces)
     x, f = found.x[found.status == 0], forces[found.status == 0]
@@ -120,8 +120,8 @@ def _cubic(library: Any) -> Array:
     return fitted
 
 
-def loop_around(joint: Joint, law: Sequence[Element], late: bool = True) -> Loop:
-    """The joint on the hand's clock, its sensors, its motors, and a law that reads these and writes ``wanted``."""
+def loop_around(joint: Joint, law: Sequence[Element]) -> Loop:
+    """The joint on the hand's clock, with its sensors and motors; the law reads the sensors and writes ``wanted``."""
     noise = sqrt(2.0) * ANGLE_NOISE  # of the two sensors of a lever
     return Loop(
         plant=[Block("plant_antagonistic")],
@@ -133,13 +133,13 @@ def loop_around(joint: Joint, law: Sequence[Element], late: bool = True) -> Loop
             Sensor("tau", "measured", noise=TORQUE_NOISE, step=TORQUE_NOISE),
             Sensor("u", "acted"),
         ],
-        actuators=[Actuator("wanted", "u", limit=joint.limit, late=late)],
+        actuators=[Actuator("wanted", "u", limit=joint.limit)],
         period=PERIOD,
     )
 
 
 def values_of(joint: Joint, believed: Joint, force: float) -> dict[str, Any]:
-    """Signals of the joint at rest under a pretension [N], and of what its law knows."""
+    """Signals of the joint at rest under a pretension [N], and the parameters that its law knows."""
     torque = force * joint.arm
     theta = joint.elongations(torque)
     return {

@@ -1,19 +1,18 @@
-"""The loop of compiled kernels on a clock, linearised: spectral radius, and how much more delay it bears.
+"""The loop of compiled kernels on a clock, linearised: spectral radius and delay margin.
 
-All that a law keeps from one sample to the next belongs to the state, observers and reference filters too. Between
-samples the plant moves by its matrix exponential, and a torque that comes some time later acts for the rest of its
-period only: so the delay margin is that of the sampled loop itself.
+The state includes all memory of the law: observers, reference filters. Between samples the plant moves by its matrix
+exponential, and a torque with an additional delay acts for the rest of its period only.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import expm
 
+from awiwi_gen.loops.sampled import hold
 from awiwi_gen.simulate import Array, Machine, slopes
 
-STABLE = 1 - 1e-6  # what is called stable on the clock: rounding of slopes leaves that much
-LONGEST = 6  # periods: no more delay is asked for
+STABLE = 1 - 1e-6  # largest spectral radius that counts as stable: slopes have rounding errors
+LONGEST = 6  # periods: the longest delay that is tried
 FINE = 6  # steps per period of the search for the delay margin
 HALVINGS = 20
 
@@ -21,42 +20,40 @@ HALVINGS = 20
 class SampledLoop:
     """The linear map of a loop from one sample to the next, about its present signals, for any delay of the torques.
 
-    The machine is used up: no time passes in it any more. Its loop has actuators that are late by one period.
+    The machine cannot be used afterwards. Its loop has actuators that are late by one period.
     """
 
     def __init__(self, machine: Machine, applied: str = "u") -> None:
         self.period = machine.loop.period
-        acting = machine.indices(applied)
+        inputs = machine.indices(applied)
         self.A: Array = machine.plant_slopes()
-        self.B: Array = slopes(machine.rates, machine.signals, np.array(acting))
+        self.B: Array = slopes(machine.rates, machine.signals, np.array(inputs))
         machine.freeze_plant()
-        places = np.array(machine.memory())
-        map_of: Array = slopes(lambda signals: machine.tick(signals)[places], machine.signals, places)
-        read = np.abs(map_of).any(axis=0) | (places < machine.states) | np.isin(places, acting)
-        self.acting = np.searchsorted(places[read], acting)
-        self.thought: Array = map_of[np.ix_(read, read)]
-        self.thought[: machine.states] = np.eye(machine.states, read.sum())  # the law takes no time
+        memory = np.array(machine.memory())
+        law: Array = slopes(lambda signals: machine.tick(signals)[memory], machine.signals, memory)
+        read = np.abs(law).any(axis=0) | (memory < machine.states) | np.isin(memory, inputs)
+        self.inputs = np.searchsorted(memory[read], inputs)
+        self.law: Array = law[np.ix_(read, read)]
+        self.law[: machine.states] = np.eye(machine.states, read.sum())  # the law takes no time
 
-    def radius(self, late: float) -> float:
-        """Spectral radius with torques that come ``late`` periods after their sample."""
-        whole, part = divmod(late, 1.0)
-        size, (n, p) = len(self.thought), self.B.shape
+    def radius(self, delay: float) -> float:
+        """Spectral radius with torques that are delayed by this many periods more."""
+        whole, part = divmod(delay, 1.0)
+        size, (n, p) = len(self.law), self.B.shape
         loop = np.zeros((size + (int(whole) + 1) * p,) * 2)
-        loop[:size, :size] = self.thought
+        loop[:size, :size] = self.law
         queue = np.arange(size, len(loop)).reshape(-1, p)  # torques of the last samples, newest first
-        loop[queue[0]] = loop[self.acting]
+        loop[queue[0]] = loop[self.inputs]
         for later, earlier in zip(queue[1:], queue[:-1], strict=True):
             loop[later, earlier] = 1
-        first, second = self._moved(part), self._moved(1 - part)
-        now = queue[int(whole) - 1] if whole else None
-        at_start = np.eye(len(loop))[queue[int(whole)]]
-        after = loop[self.acting] if now is None else np.eye(len(loop))[now]
-        moved = second[0] @ (first[0] @ loop[:n] + first[1] @ at_start) + second[1] @ after
-        loop[:n] = moved
+        first, second = (hold(self.A, self.B, self.period * share) for share in (part, 1 - part))
+        unit = np.eye(len(loop))
+        before, after = unit[queue[int(whole)]], unit[queue[int(whole) - 1]] if whole else loop[self.inputs]
+        loop[:n] = second[0] @ (first[0] @ loop[:n] + first[1] @ before) + second[1] @ after
         return float(np.abs(np.linalg.eigvals(loop)).max())
 
     def margin(self) -> float:
-        """The shortest delay [s] beyond the one sample at which a pole reaches the unit circle; infinite if none does."""
+        """The shortest additional delay [s] at which a pole reaches the unit circle; infinite if none does."""
         for step in range(1, LONGEST * FINE + 1):
             if self.radius(step / FINE) >= STABLE:
                 good, bad = (step - 1) / FINE, step / FINE
@@ -65,9 +62,3 @@ class SampledLoop:
                     good, bad = (good, middle) if self.radius(middle) >= STABLE else (middle, bad)
                 return good * self.period
         return float("inf")
-
-    def _moved(self, part: float) -> tuple[Array, Array]:
-        """The plant's state after a part of a period, by the state before and by the torques meanwhile."""
-        n, p = self.B.shape
-        step = expm(np.block([[self.A, self.B], [np.zeros((p, n + p))]]) * (self.period * part))
-        return step[:n, :n], step[:n, n:]

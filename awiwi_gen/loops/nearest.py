@@ -1,6 +1,6 @@
-"""The gains nearest to some that fail: one gain changed alone, or all of them as of a slower or a faster law.
+"""The nearest gains that are stable: one gain changed alone, or all gains scaled to another bandwidth.
 
-Where no such gains do, each step changes the gain that helps most, until they do or nothing helps any more.
+If that fails, a descent changes in each step the gain that helps most.
 """
 
 from __future__ import annotations
@@ -8,15 +8,15 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-WIDEST = 1e3  # by how much gains are changed at most
-MOVES = 24  # steps of the search on the way there
+WIDEST = 1e3  # largest factor on a gain
+MOVES = 24  # steps of the search up to that factor
 HALVINGS = 10
-DESCENTS = 60  # steps of one gain after the other, each by a move's factor
+DESCENTS = 60  # steps of the descent, each by one move of one gain
 
 
 @dataclass(frozen=True)
 class Nearest:
-    """What was changed, "bandwidth" or "several" for more than one, by which factor, and the gains that work."""
+    """The changed gain, or "bandwidth", or "several"; the factor; and all gains."""
 
     changed: str
     factor: float
@@ -29,12 +29,12 @@ def nearest(
     works: Callable[[Mapping[str, float]], bool],
     radius: Callable[[Mapping[str, float]], float],
 ) -> Nearest | None:
-    """The gains that work and need the smallest factor, or some that come near, or None.
+    """The gains that work with the smallest factor, else those of the descent, or None.
 
-    ``powers`` are those of the bandwidth that the gains grow with, ``radius`` is what must fall before they work. The
-    order of trials is fixed, and so is the answer.
+    A gain is proportional to a power of the bandwidth, given in ``powers``. ``radius`` is what the descent reduces. The
+    search is deterministic.
     """
-    most = max(abs(power) for power in powers.values())  # a move's length is the factor of the gain that changes most
+    most = max(abs(power) for power in powers.values())  # the factor is that of the gain that changes most
     directions = {"bandwidth": {name: power / most for name, power in powers.items()}}
     directions |= {name: {name: 1.0} for name in gains}
 
@@ -60,7 +60,7 @@ def _descent(
     works: Callable[[Mapping[str, float]], bool],
     radius: Callable[[Mapping[str, float]], float],
 ) -> Nearest | None:
-    """Gains that work, by the steepest way down of the radius along single gains; None where it ends too early."""
+    """Gains that work, by steepest descent of the radius along single gains; None where the descent ends earlier."""
     chosen, least, step = dict(gains), radius(gains), float(WIDEST ** (1 / MOVES))
     for _ in range(DESCENTS):
         trials = [chosen | {name: chosen[name] * factor} for name in chosen for factor in (1 / step, step)]

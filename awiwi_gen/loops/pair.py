@@ -24,16 +24,16 @@ class Pair:
 
     @classmethod
     def like(cls, plant: Plant) -> Pair:
-        """Both motors with the spring of a single joint."""
+        """A pair with the link, motors and springs of a single joint."""
         return cls(plant.m, (plant.b,) * 2, (plant.k,) * 2)
 
     @property
     def given(self) -> dict[str, Any]:
-        """What the laws take for the plant."""
+        """The plant by the names of the laws' ports."""
         return {"inertias": (self.m, *self.b), "springs": [(k, 0.0) for k in self.k]}
 
     def open_loop(self) -> tuple[Array, Array, Array]:
-        """A (6, 6), B (6, 2) and E (6, 2) of the plant (eq. 15.83, mended)."""
+        """A (6, 6), B (6, 2) and E (6, 2) of the plant (eq. 15.83, corrected)."""
         A, B, E = np.zeros((6, 6)), np.zeros((6, 2)), np.zeros((6, 2))
         pull = np.zeros(6)
         pull[2::2] = SIDES / self.m
@@ -52,7 +52,7 @@ TABLE_PAIR = Pair.like(TABLE_16_1)
 def pair_loop(
     law: Any, pair: Pair, impedance: Any, tuning: Any = TUNING, pretension: float = 0.0
 ) -> tuple[Loop, Array]:
-    """A law for pairs as a feedback about q_d = 0, and the constant torques (2,) that it adds for a pretension."""
+    """A law for pairs as feedback about q_d = 0, and the constant torques (2,) that it adds for a pretension."""
     zero = {"joint": np.zeros(2), "torques": np.zeros((2, 2)), "external": np.zeros(2)}
     given = pair.given | {
         "desired": np.zeros(5),
@@ -77,13 +77,13 @@ _UNIT_TORQUES = np.eye(4).reshape(4, 2, 2)
 
 
 def at_rest(loop: Loop, constant: Array) -> Array:
-    """The state (6,) that a pretension leads to."""
+    """The state (6,) at rest under constant torques."""
     rest: Array = -np.linalg.solve(loop.closed, loop.B @ constant)
     return rest
 
 
 def literal_loop(pair: Pair, impedance: Any, tuning: Any = TUNING) -> Loop:
-    """The closed loop of eq. 15.106 as it stands, with its algebraic loop through tau'' solved.
+    """The closed loop of eq. 15.106 as printed, its algebraic loop through tau'' solved.
 
     Without a pretension tau_d = s (-K_p q - K_d q') / 2 on the side s; all signals are rows over the six states.
     """

@@ -1,9 +1,9 @@
-"""Gains of the impedance law for what motion may cost (chapter 16).
+"""Optimal gains of the impedance law, for costs of motion and torque (chapter 16).
 
 A linear-quadratic regulator gives feedback gains, and the closed loop's poles split into two pairs: one for the link,
 one for the torque. Near the impedance that the first pair would be alone, the law has exactly these feedback gains with
 positive rates and weights. The two curves 1 / C_t = 0 and K_4 / C_t = 0 cross at that impedance, so a small step away,
-in the right direction, gives C_t and K_4 whatever positive values are wanted.
+in the right direction, gives C_t and K_4 any positive values.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from awiwi_gen.loops.joint import Array, Loop, Plant, joint_loop
 
 Quadratic = tuple[float, float]
 
-STEPS = 0.5 ** np.arange(1.0, 40.0)  # tried from the longest on, in parts of the distance to the impedance's origin
+STEPS = 0.5 ** np.arange(1.0, 40.0)  # lengths that are tried, as shares of the distance to the origin
 _PAIRINGS: dict[int, tuple[tuple[int, ...], ...]] = {
     0: ((),),
     2: ((0, 1),),
@@ -37,7 +37,7 @@ class Gains:
 
 
 def regulator(plant: Plant, Q: Array, R: float, cancelled: bool = False) -> Array:
-    """Feedback gains (4,) on (q, q', tau, tau') that cost least, for the plant or for that of table 16.1.
+    """Optimal feedback gains (4,) on (q, q', tau, tau'), for the plant or, ``cancelled``, for that of table 16.1.
 
     Raises InputError for costs that no feedback minimises.
     """
@@ -54,14 +54,15 @@ def regulator(plant: Plant, Q: Array, R: float, cancelled: bool = False) -> Arra
 
 
 def cancelling(plant: Plant) -> Array:
-    """Gains that cancel the spring's torque: what tells the feedback gains of the two plants apart (eq. 15.62)."""
+    """Gains that cancel the spring's torque: the difference between the gains of the two plants (eq. 15.62)."""
     return np.array([0, 0, (plant.m + plant.b) / plant.m, 0])
 
 
 def exact_gains(library: Any, plant: Plant, wanted: Array) -> Gains:
-    """Gains whose feedback on the plant of table 16.1 is exactly ``wanted``: those that settle a pretension fastest.
+    """Gains whose feedback on the plant of table 16.1 is exactly ``wanted``.
 
-    Raises InputError where the closed loop is not stable, or four equal poles leave no two pairs.
+    Of several, those that settle a pretension fastest. Raises InputError where the closed loop is not stable, or four
+    equal poles leave no two pairs.
     """
     m, b, k = plant.numbers
     c = k / b * wanted
@@ -77,7 +78,7 @@ def exact_gains(library: Any, plant: Plant, wanted: Array) -> Gains:
 
 
 def _near(library: Any, plant: Plant, wanted: Array, link: Quadratic, torque: Quadratic) -> Iterator[Gains]:
-    """The exact gains nearest to an impedance that alone would have one pair of the poles, at most one set."""
+    """The exact gains nearest to the impedance that has one pair of the poles; at most one set."""
     (a1, a0), (sigma, pi) = link, torque
     slow = min(sigma / 2, pi / (2 * sigma))  # a K_4 that leaves K_3 and C_s positive
     towards = np.array([[pi / a0 - 1, a1 - sigma], [a1 * pi / a0 - sigma, a0 - pi]])
@@ -92,7 +93,7 @@ def _near(library: Any, plant: Plant, wanted: Array, link: Quadratic, torque: Qu
 
 
 def pairs(poles: Array) -> Iterator[tuple[Quadratic, Quadratic]]:
-    """All ways to group four poles into two real quadratics s^2 + a s + b, given as (a, b), in either order."""
+    """All pairs of real quadratics s^2 + a s + b with the four poles, as (a, b), in either order."""
     upper = sorted((z for z in poles if z.imag > 0), key=abs)
     real = sorted(-z.real for z in poles if z.imag == 0)
     complex_pairs = [(-2 * z.real, abs(z) ** 2) for z in upper]
@@ -109,7 +110,7 @@ def loop_of(plant: Plant, wanted: Array) -> Loop:
 
 
 def pretension_loop(plant: Plant, gains: Gains) -> Loop:
-    """The torque that both motors of a pair have in common: the link does not feel it (section 15.5)."""
+    """The loop of the common torque of both motors of a pair, which does not move the link (section 15.5)."""
     _, _, fast, slow = gains.gains
     back = plant.b / plant.k
     K = back * np.array([[fast * slow + gains.weights[0] / gains.weights[1], fast + slow]]) - [[1, 0]]

@@ -1,9 +1,9 @@
-"""What a clock and a delay leave of a linear law: can it run on the hand at all?
+"""Stability of a linear law on a clock with a delay.
 
-A law u = -K x for dx/dt = A x + B u is designed as if it acted at once. On the hand it sees the state at the ticks of a
-clock, and its torque is held for a period that begins `delay` ticks later. All about that is exact: the plant between
-ticks by the matrix exponential, the held torques as further states; and in continuous time the shortest delay at which
-a pole comes to the imaginary axis.
+A law u = -K x for dx/dt = A x + B u is designed as if it acted at once. On the hand it reads the state at the ticks of a
+clock, and its torque is constant for a period that begins `delay` ticks later. The analysis is exact: the plant between
+ticks is a matrix exponential, and delayed torques are additional states. The delay margin is that of continuous time:
+the shortest delay at which a pole reaches the imaginary axis.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ Array = np.ndarray[Any, Any]
 Design = Callable[[float], Array]
 
 PERIOD = 1 / 3000  # [s] of the hand's clock
-SLOWEST = 1e-3  # bandwidth below which no law is worth looking for, as a share of the wanted one
-STEPS = 30  # of the search from the wanted bandwidth down to that
+SLOWEST = 1e-3  # smallest bandwidth that is tried, as a share of the law's own
+STEPS = 30  # of the search from the law's bandwidth down to that
 HALVINGS = 40
 
 
 @dataclass(frozen=True)
 class Report:
-    """One law on one plant: poles (n) [1/s] as designed, delay margin [s], and the largest pole on the clock."""
+    """One law on one plant: poles (n) [1/s] as designed, delay margin [s], and spectral radius on the clock."""
 
     poles: Array
     delay_margin: float
@@ -42,7 +42,7 @@ class Report:
 
     @property
     def reason(self) -> str:
-        """Why it is, or is not."""
+        """The reason, in words."""
         clock = f"at {1 / self.period:.0f} Hz and {self.delay} period{'s' * (self.delay != 1)} of delay"
         if self.implementable:
             return f"stable {clock}: spectral radius {self.radius:.6g}"
@@ -50,15 +50,16 @@ class Report:
         if np.real(worst) >= 0:
             return f"unstable without any delay: a pole at {_pole(worst)} 1/s"
         fastest = max(self.poles, key=abs)
+        needed = self.period * (self.delay + 0.5)  # by the clock and the delay
         return (
             f"unstable {clock}: spectral radius {self.radius:.3g}; the fastest pole is {_pole(fastest)} 1/s and the "
-            f"delay margin {self.delay_margin * 1e6:.3g} us of the {self.period * (self.delay + 0.5) * 1e6:.0f} us it takes"
+            f"delay margin {self.delay_margin * 1e6:.3g} us, less than the necessary {needed * 1e6:.0f} us"
         )
 
 
 @dataclass(frozen=True)
 class Answer:
-    """Whether a law can run, why, and if not, the fastest of its family that can: its bandwidth, gains and report."""
+    """Whether a law is stable on the clock, and the fastest law of its family that is: its bandwidth, gains and report."""
 
     report: Report
     bandwidth: float
@@ -67,21 +68,21 @@ class Answer:
 
     @property
     def implementable(self) -> bool:
-        """Whether the law can run as it is."""
+        """Whether the law itself is stable on the clock."""
         return self.report.implementable
 
     @property
     def reason(self) -> str:
-        """Why, and what instead."""
+        """The reason, and the nearest stable law, in words."""
         if self.implementable:
             return self.report.reason
         if self.nearest is None:
-            return f"{self.report.reason}; nor does any slower one run"
+            return f"{self.report.reason}; no slower law is stable either"
         return f"{self.report.reason}; at {self.bandwidth:.3g} of its bandwidth it is {self.nearest.reason}"
 
 
 def report(A: Array, B: Array, K: Array, period: float = PERIOD, delay: int = 1) -> Report:
-    """Poles, delay margin and spectral radius for A (n, n), B (n, p) and K (p, n); one input may come flat."""
+    """Poles, delay margin and spectral radius for A (n, n), B (n, p) and K (p, n); a single input may be flat."""
     A, B, K = _shaped(A, B, K)
     radius = float(np.abs(eigvals(sampled(A, B, K, period, delay))).max())
     return Report(eigvals(A - B @ K), delay_margin(A, B, K), radius, period, delay)
@@ -90,11 +91,10 @@ def report(A: Array, B: Array, K: Array, period: float = PERIOD, delay: int = 1)
 def is_implementable(
     A: Array, B: Array, K: Array, period: float = PERIOD, delay: int = 1, design: Design | None = None
 ) -> Answer:
-    """Whether a law runs on the clock, and else the nearest that does.
+    """Whether a law is stable on the clock; if not, the nearest law that is.
 
-    ``design`` gives the gains for a share of the bandwidth, those in question for 1. Without it, the poles that K gives
-    a plant with one input are slowed down alike. The nearest must have something to spare: it also runs when every
-    torque comes one period later.
+    ``design`` maps a share of the bandwidth to gains. Without it, all poles of a plant with one input are slowed down by
+    the same factor. The nearest law has a reserve: it is also stable with another period of delay.
     """
     A, B, K = _shaped(A, B, K)
     found = report(A, B, K, period, delay)
@@ -119,11 +119,11 @@ def is_implementable(
 
 
 def slowed(A: Array, B: Array, K: Array) -> Design:
-    """Gains that give a plant with one input the poles that K gives it, times a factor (Ackermann's formula)."""
+    """Gains that multiply the poles of A - B K by a factor, for one input (Ackermann's formula)."""
     A, B, K = _shaped(A, B, K)
     n = len(A)
     if B.shape[1] != 1:
-        raise ValueError("only poles of a plant with one input are slowed down; for more, say how with `design`")
+        raise ValueError("only poles of a plant with one input are slowed down; for several inputs pass `design`")
     poles = eigvals(A - B @ K)
     _, (scale, _) = matrix_balance(np.abs(A) + np.abs(B @ K), permute=False, separate=True)
     time = 1 / np.abs(poles).max()
@@ -141,21 +141,28 @@ def slowed(A: Array, B: Array, K: Array) -> Design:
 
 
 def sampled(A: Array, B: Array, K: Array, period: float = PERIOD, delay: int = 1) -> Array:
-    """The closed loop from one tick to the next, on the state and the last `delay` torques, newest first."""
+    """The closed loop from one tick to the next; the state is extended by the last `delay` torques, newest first."""
     A, B, K = _shaped(A, B, K)
     n, p = B.shape
-    step = expm(np.block([[A, B], [np.zeros((p, n + p))]]) * period)
+    moved, driven = hold(A, B, period)
     if delay == 0:
-        closed: Array = step[:n, :n] - step[:n, n:] @ K
+        closed: Array = moved - driven @ K
         return closed
-    loop = np.eye(n + delay * p, k=-p)  # every held torque moves on by one place
+    loop = np.eye(n + delay * p, k=-p)  # the queue of torques moves on by one
     loop[: n + p] = 0
-    loop[:n, :n], loop[:n, -p:], loop[n : n + p, :n] = step[:n, :n], step[:n, n:], -K
+    loop[:n, :n], loop[:n, -p:], loop[n : n + p, :n] = moved, driven, -K
     return loop
 
 
+def hold(A: Array, B: Array, time: float) -> tuple[Array, Array]:
+    """Matrices (n, n) and (n, p) of the state after a time under constant inputs: of the state and the inputs."""
+    n, p = B.shape
+    step = expm(np.block([[A, B], [np.zeros((p, n + p))]]) * time)
+    return step[:n, :n], step[:n, n:]
+
+
 def delay_margin(A: Array, B: Array, K: Array) -> float:
-    """The shortest delay [s] of all inputs alike that takes a pole of a stable loop to the imaginary axis.
+    """The shortest common delay [s] of all inputs that moves a pole of a stable loop to the imaginary axis.
 
     Zero if the loop is not stable, infinite if no delay does it. With z = exp(-j w delay), j w is an eigenvalue of
     A - z B K and -j w one of A - B K/z, so that the Kronecker sum of these two matrices is singular: a quadratic
@@ -201,7 +208,7 @@ def _crossing(A: Array, feedback: Array, z: complex) -> float | None:
 
 
 def _shaped(A: Array, B: Array, K: Array) -> tuple[Array, Array, Array]:
-    """As matrices; a flat B or K is that of one input."""
+    """As matrices; a flat B or K belongs to a single input."""
     A, B, K = (np.asarray(matrix, float) for matrix in (A, B, K))
     return A, B.reshape(len(A), -1), K.reshape(-1, len(A))
 

@@ -50,7 +50,7 @@ class BaseSearch:
         return P
 
     def gradient(self, h: Array, start: Array, iterations: int, step: float = 0.0) -> Found:
-        """Algorithm 1, mended, for each of the lengths (..., m) from starts (..., n); step 0 fits the curvature."""
+        """Algorithm 1, corrected, for each of the lengths (..., m) from starts (..., n); step 0 fits the curvature."""
         return self._each(self.library.c.awiwi_gradient_search, h, start, iterations, step)
 
     def least_squares(self, h: Array, start: Array, iterations: int, tolerance: float = 1e-11) -> Found:

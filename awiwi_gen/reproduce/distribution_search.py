@@ -1,4 +1,4 @@
-"""Algorithm 2 of chapter 7, as printed and mended, for the tendons of a finger with constant couplings."""
+"""Algorithm 2 of chapter 7, as printed and corrected, for the tendons of a finger with constant couplings."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ Array = np.ndarray[Any, Any]
 
 LIMITS = 6.0, 90.0  # N
 ROUNDS = 200
-STEP = 400.0  # N^2 per (N m/rad)^2, the printed s0 is not told; larger ones diverge as printed, smaller ones are slow
-WEIGHTS = (1.0, 1e-3)  # of what lies outside the limits; "large" in the print
+STEP = 400.0  # N^2 per (N m/rad)^2, the source does not print s0; larger ones diverge as printed, smaller ones are slow
+WEIGHTS = (1.0, 1e-3)  # of the violation of the limits; "large" in print
 
 
 def closed_form_of(library: Any, finger: str) -> bool:
@@ -64,7 +64,7 @@ class Demands:
         return f
 
     def search(self, printed: bool, weight: float = 1e-3, step: float = STEP, rounds: int = ROUNDS) -> Array:
-        """Forces by the search. As printed a trial's gradient is kept even where the trial is not taken."""
+        """Forces by the search. As printed, the gradient of a rejected trial replaces that of the best point."""
         inverse = np.linalg.pinv(self.P.T)
         f = np.full((len(self.tau), len(self.P)), sum(LIMITS) / 2)
         f += (-self.tau - f @ self.P) @ inverse.T
@@ -80,7 +80,7 @@ class Demands:
             better = (found < best)[:, None]
             if printed:
                 gradient = tried
-                trial = f - steps * gradient @ level  # alpha moves after g has been overwritten
+                trial = f - steps * gradient @ level  # the step is taken after the gradient was overwritten
             gradient = tried if printed else np.where(better, tried, gradient)
             best, f, steps = np.minimum(best, found), np.where(better, trial, f), np.where(better, steps, steps / 2)
         return f

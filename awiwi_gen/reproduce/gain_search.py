@@ -1,7 +1,7 @@
-"""Algorithm 3, mended: gains of the impedance law that come near wanted feedback gains, drawn at random (section 16.3).
+"""Algorithm 3, corrected: random gains of the impedance law, the best by their feedback gains (section 16.3).
 
-The printed algorithm keeps the feedback gains of the best draw where it means the draw itself, and draws each gain from
-(0, 1), where no useful K_3 or K_4 lies. Its cost is the distance of two vectors whose elements differ in their units.
+The printed algorithm stores the feedback gains of the best draw instead of the draw itself, and draws each gain from
+(0, 1), which contains no useful K_3 or K_4. Its cost is the distance of two vectors whose elements differ in their units.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def draw(box: Box, samples: int, seed: int) -> Array:
 def nearest(library: Any, plant: Plant, wanted: Array, drawn: Array, relative: bool = True) -> Found:
     """The draw whose feedback gains on the plant of table 16.1 are nearest to the wanted ones (eq. 16.4).
 
-    ``relative`` measures each feedback gain in parts of the wanted one, else the third, of thousands, decides alone.
+    ``relative`` divides each error by the wanted gain; otherwise the third gain, of thousands, dominates.
     """
     feedback = library.backstepping_state_gains(plant=plant.numbers, gains=drawn, weights=UNIT_WEIGHTS).K_cancelled
     costs = np.linalg.norm((feedback - wanted) / (wanted if relative else 1.0), axis=-1)

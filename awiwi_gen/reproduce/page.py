@@ -1,4 +1,4 @@
-"""All studies on one page: figures with claims and verdicts, printed numbers against ours, the proof of every kernel."""
+"""The report page: figures with claims and verdicts, printed numbers beside ours, the proof of every kernel."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ PARTS = {"Modelling": range(FIRST_OF_PART_II), "Control": range(FIRST_OF_PART_II
 
 @dataclass(frozen=True)
 class Results:
-    """All that the page shows of a hand."""
+    """Everything on the page of a hand."""
 
     figures: Sequence[Figure]
     numbers: Sequence[Printed]
@@ -54,7 +54,7 @@ class Results:
     compared: Sequence[Table] = ()
 
     def as_dict(self) -> dict[str, Any]:
-        """For programs."""
+        """Plain data for JSON."""
         shown = [
             {"number": f.number, "title": f.title, "claim": f.claim, "found": f.found, "holds": bool(f.holds)}
             for f in self.figures
@@ -70,7 +70,10 @@ Comparison = Callable[[Any, Hand], tuple[list[Figure], list[Table]]]
 
 
 def publish(job: Job, path: Path, comparison: Comparison) -> Results:
-    """Compute all studies of a hand, verify its kernels, write both. Raises InputError where libraries are missing."""
+    """Compute figures and numbers of a hand, verify its kernels, write the page.
+
+    ``comparison`` gives the figures and tables of compared laws. Raises InputError where libraries are missing.
+    """
     from awiwi_gen.build import load
     from awiwi_gen.pipeline import cached_tree, verify
 
@@ -87,7 +90,7 @@ def publish(job: Job, path: Path, comparison: Comparison) -> Results:
 
 
 def write_page(path: Path, hand: Hand, results: Results, manifest: Mapping[str, Any]) -> None:
-    """Write one HTML file that needs no other; the same bytes for the same results."""
+    """Write one self-contained HTML file; the same bytes for the same results."""
     kernels = {entry["name"]: chapter(entry["source"]) for entry in manifest["kernels"]}
     rows = proof_rows(results.proof.verdicts, manifest)
     parts = [
@@ -118,20 +121,20 @@ def write_page(path: Path, hand: Hand, results: Results, manifest: Mapping[str, 
     path.write_text(page, encoding="utf-8", newline="\n")
 
 
-def chapter(place: str) -> int:
-    """The chapter that a figure, an equation or a kernel's source is of; one that the source lacks counts as the last."""
-    found = re.search(r"\d+", place)
+def chapter(reference: str) -> int:
+    """The chapter of a figure, an equation or a kernel's source; the last one for what the source lacks."""
+    found = re.search(r"\d+", reference)
     return int(found[0]) if found else max(PARTS["Control"])
 
 
 def summary(results: Results) -> str:
-    """A sentence on what agrees."""
+    """Counts of claims that hold, numbers that agree, kernels that are proved."""
     verdicts = Counter(number.verdict for number in results.numbers)
-    told = ", ".join(f"{verdicts[name]} {word}" for name, word in COUNTED.items() if verdicts[name])
+    counts = ", ".join(f"{verdicts[name]} {word}" for name, word in COUNTED.items() if verdicts[name])
     holding = sum(bool(figure.holds) for figure in results.figures)
     proved = sum(verdict.passed for verdict in results.proof.verdicts)
     return (
-        f"{holding} of {len(results.figures)} claims of figures hold. Printed numbers: {told or 'none compared'}. "
+        f"{holding} of {len(results.figures)} claims of figures hold. Printed numbers: {counts or 'none compared'}. "
         f"{proved} of {len(results.proof.verdicts)} kernels proved."
     )
 
@@ -159,7 +162,7 @@ def drawing(figure: Figure) -> str:
     from matplotlib.figure import Figure as Canvas
 
     text = io.StringIO()
-    # what must be unique inside one drawing is made from the salt, and must be unique on the page
+    # identifiers inside a drawing are made from the salt, and must be unique on the page
     with mpl.rc_context(STYLE | {"svg.hashsalt": figure.number}):
         canvas = Canvas(figsize=SIZE, layout="constrained")
         figure.draw(canvas.add_subplot())

@@ -1,7 +1,7 @@
-"""Gains that a hand file brings along, tried on the clock before they become C.
+"""The check of gains in a hand file, before C is generated from them.
 
-Each tendon is taken as one half of its joint, as `awiwi-gen tune` does; the law is the antagonistic one, at 3 kHz and a
-delay of one sample, about a rest under two pretensions. Gains that are unstable there are refused.
+As in `awiwi-gen tune` each tendon counts as one half of its joint; the law is the antagonistic one, at 3 kHz and a delay
+of one sample, linearised about rest at two pretensions. Unstable gains are refused.
 """
 
 from __future__ import annotations
@@ -22,11 +22,18 @@ from awiwi_gen.loops.sampled import PERIOD
 from awiwi_gen.tune.tendons import GAINS, plants
 
 PRETENSIONS = (10.0, 20.0)  # N
-POWERS = {"K_p": 2, "K_d": 1, "K_3": 1, "K_4": 1, "C_t": 0, "C_s": -2}  # of the bandwidth that a gain grows with
+POWERS = {
+    "K_p": 2,
+    "K_d": 1,
+    "K_3": 1,
+    "K_4": 1,
+    "C_t": 0,
+    "C_s": -2,
+}  # of the bandwidth that a gain is proportional to
 
 
 def require_running_gains(hand: Hand, store: Cache) -> None:
-    """Raise InputError that names every tendon of a hand whose gains cannot run, and the nearest that can."""
+    """Raise InputError with every tendon whose gains are unstable, and the nearest stable gains."""
     if not hand.gains:
         return
     digest = key(hand.digest(), code_digest())
@@ -36,7 +43,7 @@ def require_running_gains(hand: Hand, store: Cache) -> None:
 
 
 def failing(library: Any, hand: Hand) -> list[Fault]:
-    """A fault for each tendon whose gains cannot run."""
+    """A fault for each tendon whose gains are unstable."""
     found: dict[int, tuple[str, list[Plant]]] = {}
     for force in PRETENSIONS:
         for name, finger in hand.fingers.items():
@@ -44,7 +51,7 @@ def failing(library: Any, hand: Hand) -> list[Fault]:
             for index, (joint, plant) in enumerate(plants(library, hand, name, finger, force)):
                 found.setdefault(first + index, (f"{name}, {joint}", []))[1].append(plant)
     faults = []
-    for place, gains in enumerate(hand.gains):
+    for index, gains in enumerate(hand.gains):
         joint, both = found[gains.tendon]
         wanted = {name: float(getattr(gains, name)) for name in GAINS}
         worst = max(radius(library, plant, wanted) for plant in both)
@@ -53,12 +60,12 @@ def failing(library: Any, hand: Hand) -> list[Fault]:
                 f"= {gains.tendon} ({joint}): these gains are unstable at {1 / PERIOD:.0f} Hz and a delay of one sample "
                 f"(spectral radius {worst:.3g}); {way_out(library, both, wanted)}"
             )
-            faults.append(Fault(key=f"gains[{place}].tendon", message=message))
+            faults.append(Fault(key=f"gains[{index}].tendon", message=message))
     return faults
 
 
 def radius(library: Any, plant: Plant, gains: Mapping[str, float], delay: int = 1) -> float:
-    """Spectral radius of a joint whose both tendons have these gains; infinite where the law refuses them."""
+    """Spectral radius of a joint whose two tendons have these gains; infinite where the law refuses them."""
     pair = Pair(plant.m, (plant.b / 2,) * 2, (plant.k / 2,) * 2)
     impedance, tuning = list(gains.values())[:2], list(gains.values())[2:]
     loop, constant = pair_loop(library.backstepping_antagonistic, pair, impedance, tuning)
@@ -68,7 +75,7 @@ def radius(library: Any, plant: Plant, gains: Mapping[str, float], delay: int = 
 
 
 def way_out(library: Any, both: list[Plant], gains: dict[str, float]) -> str:
-    """The nearest gains that run, in words; they bear another sample of delay, too."""
+    """The nearest stable gains, in words; they are stable with another sample of delay, too."""
 
     def works(chosen: Mapping[str, float]) -> bool:
         return all(radius(library, plant, chosen, delay) < 1 for plant in both for delay in (1, 2))
@@ -78,6 +85,6 @@ def way_out(library: Any, both: list[Plant], gains: dict[str, float]) -> str:
 
     found = nearest(gains, POWERS, works, widest)
     if found is None:
-        return "neither another bandwidth nor a change of gains was found to mend that"
-    told = ", ".join(f'{name} = "{value:.6g} {GAINS[name]}"' for name, value in found.gains.items())
-    return f"the nearest that run are {told}"
+        return "no other bandwidth and no change of gains was found that helps"
+    listed = ", ".join(f'{name} = "{value:.6g} {GAINS[name]}"' for name, value in found.gains.items())
+    return f"the nearest that run are {listed}"

@@ -1,14 +1,14 @@
-"""Gains of all tendons from what their motion may cost: `awiwi-gen tune --costs costs.toml -o gains.toml` (chapter 16).
+"""Gains of all tendons from a file of costs: `awiwi-gen tune --costs costs.toml -o gains.toml` (chapter 16).
 
     [cost]
-    Q = [100.0, 0.01, 0.01, 0.01]  # of the squares of q, q', tau and tau' in SI; or four rows of four
-    R = 0.1                        # of the square of the motor's torque
-    pretension = "10 N"            # where the springs' stiffness is taken
+    Q = [100.0, 0.01, 0.01, 0.01]  # weights of the squares of q, q', tau, tau' in SI; or a 4 x 4 matrix
+    R = 0.1                        # weight of the square of the motor's torque
+    pretension = "10 N"            # tendon force at which the springs' stiffness is taken
 
-    [fingers.thumb]                # what is different for one finger
+    [fingers.thumb]                # optional: costs of one finger
     R = 1.0
 
-Every tendon is tuned as one half of its joint; tendons are shared out so that each joint has its pair. Two motors of
+Every tendon is tuned as one half of its joint; each joint has the same number of tendons. Two motors of
 inertia b behind springs k move the link as one motor 2 b behind a spring 2 k does, with half the weights (section
 15.5); so the regulator is that of a single joint, and its gains are those of either motor. Gains that a clock of 3 kHz
 would make unstable are refused.
@@ -42,11 +42,11 @@ GAINS = {
     for note in field.metadata
     if isinstance(note, Measure)
 }
-DEAREST = 1e12  # times R is what is tried before a tendon counts as too fast for the clock
+DEAREST = 1e12  # largest factor on R that is tried
 
 
 def _cost_matrix(value: object) -> Rows:
-    """Four numbers, or four rows of four, as a symmetric matrix that no motion makes negative."""
+    """Four numbers, or four rows of four, as a positive semidefinite matrix."""
     try:
         given = np.array(value, dtype=float)
     except (TypeError, ValueError):
@@ -59,7 +59,7 @@ def _cost_matrix(value: object) -> Rows:
     if not np.array_equal(rows, rows.T):
         raise ValueError("is not symmetric")
     if np.linalg.eigvalsh(rows).min() < -1e-12 * np.abs(rows).max():
-        raise ValueError("has a negative eigenvalue: some motion would earn a reward")
+        raise ValueError("has a negative eigenvalue: some motion would have a negative cost")
     if rows[0, 0] <= 0:
         raise ValueError("does not weigh the position q")
     return tuple(map(tuple, rows.tolist()))
@@ -78,7 +78,7 @@ Force = Annotated[Quantity, Measure("10 N", "0", "10 kN")]
 
 
 class Cost(Part):
-    """What the motion of a joint costs, and the tendon force at which its springs are taken."""
+    """Costs of a joint's motion, and the tendon force at which its springs' stiffness is taken."""
 
     Q: Matrix
     R: Weight
@@ -86,7 +86,7 @@ class Cost(Part):
 
 
 class OwnCost(Part):
-    """What is different for one finger."""
+    """Costs of one finger; missing ones are those of all fingers."""
 
     Q: Matrix | None = None
     R: Weight | None = None
@@ -107,7 +107,7 @@ class CostFile(Part):
 
 @dataclass(frozen=True)
 class Tuned:
-    """A tendon with its gains: its number in the hand, its joint, and how it does on the hand's clock."""
+    """Gains of a tendon: its number in the hand, its joint, spectral radius and delay margin on the hand's clock."""
 
     tendon: int
     joint: str
@@ -117,7 +117,7 @@ class Tuned:
     delay_margin: float
 
     def values(self) -> dict[str, float]:
-        """The gains by their names in a file of gains."""
+        """The gains by their keys in a file of gains."""
         return dict(zip(GAINS, map(float, (*self.gains.gains, *self.gains.weights)), strict=True))
 
     def as_dict(self) -> dict[str, Any]:
@@ -160,9 +160,9 @@ def tune(library: Any, hand: Hand, costs: CostFile) -> list[Tuned]:
 
 
 def plants(library: Any, hand: Hand, name: str, finger: Finger, force: float) -> list[tuple[str, Plant]]:
-    """Joint and plant of each tendon: of the straight finger with its other joints held, seen from the joint.
+    """Joint and plant of each tendon, in joint coordinates: the finger straight, its other joints held.
 
-    Raises InputError if the hand has no motors or no springs, or springs that cannot hold the force.
+    Raises InputError for a hand without motors or springs, and for a force that its springs cannot have.
     """
     if hand.motor is None or hand.spring is None:
         raise InputError("gains need a hand with the sections [motor] and [spring]")
@@ -183,12 +183,12 @@ def plants(library: Any, hand: Hand, name: str, finger: Finger, force: float) ->
 
 
 def tune_tendon(library: Any, tendon: int, joint: str, plant: Plant, Q: Array, R: float) -> Tuned:
-    """Gains of one tendon of a pair. Raises InputError if they fail on the clock, with the nearest R that does not."""
+    """Gains of one tendon of a pair. Raises InputError with the least stable R if they are unstable."""
     single, loops = _regulated(library, plant, Q, R)
     radius, margin = max(loop.sampled_radius() for loop in loops), min(loop.delay_margin() for loop in loops)
     if radius >= 1:
         raise InputError(
-            f"R = {R:g} asks for gains that are unstable at {1 / PERIOD:.0f} Hz and a delay of one sample (spectral "
+            f"R = {R:g} gives gains that are unstable at {1 / PERIOD:.0f} Hz and a delay of one sample (spectral "
             f"radius {radius:.3g}, delay margin {margin * 1e6:.0f} us); {_way_out(library, plant, Q, R)}"
         )
     return Tuned(tendon, joint, plant, Gains(single.gains, 2 * single.weights), radius, margin)
@@ -202,7 +202,7 @@ def _regulated(library: Any, plant: Plant, Q: Array, R: float) -> tuple[Gains, t
 
 
 def _way_out(library: Any, plant: Plant, Q: Array, R: float) -> str:
-    """The least R that the clock allows, by bisection."""
+    """The least stable R, found by bisection, in words."""
 
     def works(factor: float) -> bool:
         _, loops = _regulated(library, plant, Q, factor * R)
@@ -221,7 +221,7 @@ def _way_out(library: Any, plant: Plant, Q: Array, R: float) -> str:
 
 
 def write_gains(path: Path, tuned: list[Tuned]) -> None:
-    """Write a file of gains; numbers are spelled so that reading them gives the same doubles. Raises InputError."""
+    """Write a file of gains, numbers with all digits. Raises InputError if it cannot be written."""
     lines = ['# Written by awiwi-gen tune; a hand file takes it in with: gains = "gains.toml"']
     for each in tuned:
         lines += ["", "[[gains]]", f"tendon = {each.tendon}  # {each.joint}"]

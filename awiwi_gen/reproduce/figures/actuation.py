@@ -1,6 +1,6 @@
 """Figures 3.3 to 3.6 and 4.7: friction and ripple of a motor, found and compensated; the lever spring's characteristic.
 
-The source shows measurements. Here a simulated motor takes the place of the real one: it obeys the compiled equation of
+The source shows measurements. Here the motor is simulated: it obeys the compiled equation of
 motion, a position controller drives it 3000 times a second, and its sensors are noisy.
 """
 
@@ -40,7 +40,7 @@ def figures(library: Any, hand: Hand) -> list[Figure]:
 
 
 def friction(library: Any, motor: Motor) -> Figure:
-    """Figure 3.3: mean torques at constant speeds tell the friction curve, whatever the ripple around them."""
+    """Figure 3.3: mean torques at constant speeds give the friction curve, in spite of ripple."""
     generator = np.random.default_rng(33)
     fastest, turn = float(motor.velocity) / 4, 2 * np.pi / float(motor.gear_ratio)
     speeds = fastest * np.linspace(-1, 1, 41) ** 3
@@ -62,7 +62,7 @@ def friction(library: Any, motor: Motor) -> Figure:
         number="3.3",
         title="Friction found from the mean motor torque at constant speeds",
         claim="The mean torques at constant speeds follow atan(g1 w) g2 + g3 w.",
-        found=f"The friction of the simulated motor comes back within {error:.2%} of its largest value.",
+        found=f"The fit finds the friction of the simulated motor within {error:.2%} of its largest value.",
         holds=error < 0.02,
         draw=draw,
     )
@@ -98,8 +98,8 @@ class Recordings:
         speeds[-2] /= 2
         fed = np.zeros(RUNS + 2)
         fed[-1] = 1.0
-        angle, asked = drive(library, speeds, fed, -0.6 * window, 2.2 * window / speed)
-        torque = np.array([np.interp(theta, *lane) for lane in zip(angle, asked, strict=True)])
+        angle, feedback = drive(library, speeds, fed, -0.6 * window, 2.2 * window / speed)
+        torque = np.array([np.interp(theta, *lane) for lane in zip(angle, feedback, strict=True)])
         strongest = max(motor.ripple, key=lambda wave: (wave.shaft == "input", float(wave.amplitude)))
         line = strongest.harmonic * (ratio if strongest.shaft == "input" else 1.0)
         return cls(speed, line, theta, torque[:RUNS], torque[-2], torque[-1])
@@ -129,10 +129,10 @@ def drive(library: Any, speeds: Array, fed: Array, start: float, duration: float
     law: list[Element] = [
         Block(
             "pole_placement_law",
-            {"x": ("position", "velocity", "zeros"), "x_des": ("goal", "zeros"), "u_des": "zeros[0]", "u": "asked"},
+            {"x": ("position", "velocity", "zeros"), "x_des": ("goal", "zeros"), "u_des": "zeros[0]", "u": "feedback"},
         ),
         Block("motor_compensation", {"theta": "position", "thd": "goal[1]", "tau": "modelled"}),
-        Sum("command", (1.0, "asked"), ("fed", "modelled")),
+        Sum("command", (1.0, "feedback"), ("fed", "modelled")),
     ]
     motor: dict[str, Wire] = {"theta": "x[0]", "thd": "x[1]", "tau": "u", "f": "zeros[0]", "thdd": "xd[1]"}
     loop = Loop(
@@ -150,8 +150,8 @@ def drive(library: Any, speeds: Array, fed: Array, start: float, duration: float
     for seed, (speed, share) in enumerate(zip(speeds, fed, strict=True)):
         goal = np.stack([start + speed * times, np.full_like(times, speed)], axis=1)
         scenarios.append(Scenario(values | {"x": goal[0], "fed": share}, len(times), {"goal": goal}, seed))
-    traces = simulate(library, loop, scenarios, ["x[0]", "asked"])
-    return np.stack([trace["x[0]"][:, 0] for trace in traces]), np.stack([trace["asked"][:, 0] for trace in traces])
+    traces = simulate(library, loop, scenarios, ["x[0]", "feedback"])
+    return np.stack([trace["x[0]"][:, 0] for trace in traces]), np.stack([trace["feedback"][:, 0] for trace in traces])
 
 
 def repeatability(recordings: Recordings) -> Figure:
@@ -190,7 +190,7 @@ def frequencies(recordings: Recordings) -> Figure:
 
 
 def compensation(recordings: Recordings) -> Figure:
-    """Figure 3.6: what the controller still has to ask for when friction and ripple are fed forward."""
+    """Figure 3.6: the controller's remaining torque when friction and ripple are fed forward."""
     without, fed = recordings.repeated[0], recordings.compensated
     left = recordings.peak(fed) / recordings.peak(without)
 

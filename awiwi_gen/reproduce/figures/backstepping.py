@@ -1,7 +1,7 @@
 """Figures 15.1 to 15.13: the example of section 15.1 and the position law of section 15.2, with the compiled laws.
 
-Figures 15.7 and 15.8 are shown twice. For the law that the text derives (eq. 15.27 to 15.43) they claim the opposite of
-what happens; for the impedance law of section 15.3, with a link of unit inertia, they come out as described.
+Figures 15.7 and 15.8 are shown twice. For the law that the text derives (eq. 15.27 to 15.43) their claims are false;
+for the impedance law of section 15.3, with a link of unit inertia, they hold.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ def convergence(library: Any) -> Figure:
         number="15.1",
         title="The example for 50 pairs of gains",
         claim="Every pair of positive gains brings the state to the origin.",
-        found=f"All runs end within {left:.0e} after 60 s, and V falls all the way, with the control of eq. 15.10 mended.",
+        found=f"All runs end within {left:.0e} after 60 s, and V falls all the way (eq. 15.10, corrected).",
         holds=falling and bool(left < 0.1),
         draw=curves(np.linspace(0, 10, 501), trace[:501, :, 0], "t", "x1"),
     )
@@ -127,17 +127,17 @@ def sweep(library: Any, which: int, name: str, build: Builder) -> Figure:
     overshoots = [max(float(run.max() / STEP - 1), 0.0) for run in runs.values()]
     shown = ", ".join(f"{v:g}: {r:.3g} s, {o:.0%}" for v, r, o in zip(SWEEP, rises, overshoots, strict=True))
     if which == 1:
-        told = "K1 is a stiffness: more of it is faster, and too much oscillates"
+        effect = "K1 is a stiffness: more of it is faster, and too much oscillates"
         holds = monotone(rises[::-1]) and overshoots[-1] > max(0.1, overshoots[0])
     else:
-        told = "K2 is a damping: more of it slows the link down"
+        effect = "K2 is a damping: more of it slows the link down"
         holds = monotone(rises)
 
     lines = {f"K{which} = {value:g}": run for value, run in runs.items()}
     return Figure(
         number=f"15.{6 + which} ({name})",
         title=f"Influence of K{which} on a step of {STEP:g} rad, {name}",
-        claim=f"{told}.",
+        claim=f"{effect}.",
         found=f"Rise time and overshoot at K{which} = {shown}.",
         holds=holds,
         draw=curves(times, lines, "t [s]", "q [rad]", xlim=(0, 10)),
@@ -164,7 +164,7 @@ def rise(times: Array, run: Array) -> float:
 def held(
     library: Any, plant: Plant, rates: Any, until: float, tick: float, limit: float = np.inf, late: float = 0.0
 ) -> Trace:
-    """A step under the position law: torques change every tick, are cut at a limit, and come late by some time [s]."""
+    """A step under the position law: torques change every tick, have a limit [N m] and a delay [s]."""
     waits = round(late / tick)
     law: list[Element] = [
         Block("pole_placement_law", {"u": "command"}),

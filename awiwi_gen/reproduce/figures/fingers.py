@@ -61,7 +61,7 @@ def coriolis(library: Any, hand: Hand, spring: Spring) -> Figure:
     worst = change.max(axis=(1, 2))
     early = change[:, release.times <= DURATION / 5].max(axis=(1, 2))
     unseen = " and ".join(reading for reading, change in zip(release.readings, worst, strict=True) if change < seen)
-    told = "; ".join(
+    listed = "; ".join(
         f"{reading}: {a * 1e3:.2g} mrad within {DURATION / 5:g} s, {b * 1e3:.2g} mrad within {DURATION:g} s"
         for reading, a, b in zip(release.readings, early, worst, strict=True)
     )
@@ -75,10 +75,10 @@ def coriolis(library: Any, hand: Hand, spring: Spring) -> Figure:
     return Figure(
         number="5.7",
         title="What Coriolis and centrifugal terms change in the motion of the index finger",
-        claim="Without these terms the finger moves the same, as far as the sensors can tell.",
+        claim="Without these terms the finger moves the same, within the resolution of its sensors.",
         found=(
             f"A count of the sensors is {seen * 1e3:.2g} mrad, an error of 0.5 mm in the lengths {coarse * 1e3:.0f} "
-            f"mrad. Damping read as {told}. The difference is a drift of phase, growing with time, less with damping. "
+            f"mrad. Damping read as {listed}. The difference is a drift of phase, growing with time, less with damping. "
             f"Less than a count of the sensors it remains with {unseen or 'none of these'}. Abduction is moved too, by "
             f"{np.abs(release.full[0, :, 0]).max() * 1e3:.2g} mrad, for the links are not symmetric."
         ),
@@ -191,7 +191,7 @@ def estimates(library: Any, hand: Hand, finger: str) -> list[Figure]:
             title=f"Base joints of the {finger} by the gradient search, 30 iterations from (0, 0)",
             claim="30 iterations find the joints, but for the corners.",
             found=(
-                f"The mended search finds the corners too. From exact lengths its largest errors are {clean} iterations; "
+                f"The corrected search finds the corners too. From exact lengths its largest errors are {clean} iterations; "
                 f"the figure shows {visible:.1e} rad."
             ),
             holds=bool(result.error(0.0, 30) < visible),
@@ -211,7 +211,7 @@ def estimates(library: Any, hand: Hand, finger: str) -> list[Figure]:
 
 
 def estimated(search: BaseSearch) -> Estimates:
-    """The mended algorithm 1 and Gauss and Newton's method on a grid over the range of the base joints."""
+    """The corrected algorithm 1 and Gauss and Newton's method on a grid over the range of the base joints."""
     axes = [np.linspace(low, high, GRID) for low, high in search.limits.T]
     poses = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, len(axes))
     start, random = np.zeros(len(axes)), np.random.default_rng(SEED)
@@ -230,7 +230,7 @@ def scatter(axes: Any, poses: Array, found: Array) -> None:
     axes.plot(*found.T, "x", color="tab:blue", markersize=4)
 
 
-# -- what the sensors can tell ----------------------------------------------------------------------------
+# -- resolution of the sensors ----------------------------------------------------------------------------
 
 
 def resolution(library: Any, spring: Spring, finger: str) -> float:

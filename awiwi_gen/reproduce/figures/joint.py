@@ -68,7 +68,7 @@ def joint_with_own_pair(hand: Hand) -> tuple[str, str] | None:
 
 
 def algorithm_2(library: Any, finger: str) -> Figure:
-    """What the penalty of algorithm 2 trades for what, against the closed form."""
+    """Violated limits and missed stiffness by the penalty's weight, beside the closed form."""
     demands = Demands.feasible(library, finger, DEMANDS)
     searched = [demands.search(False, weight) for weight in WEIGHTS]
     violated = np.array([np.percentile(demands.violation(f), 90) for f in searched])
@@ -78,7 +78,7 @@ def algorithm_2(library: Any, finger: str) -> Figure:
     log: dict[str, Any] = {"xscale": "log", "yscale": "log"}
     return Figure(
         number="7 (algorithm 2)",
-        title="What algorithm 2, mended, makes of demands that can be met",
+        title="Algorithm 2, corrected, on feasible demands",
         claim="The force limits are in practice achieved, since their weight can be large.",
         found=(
             "One case in ten "
@@ -95,7 +95,7 @@ def algorithm_2(library: Any, finger: str) -> Figure:
 
 
 def correction(library: Any, joint: Joint) -> Figure:
-    """Figure 8.3: the controller's stiffness follows what a disturbance makes of the tendons' stiffness."""
+    """Figure 8.3: the controller corrects the stiffness of the tendons, which a disturbance changes."""
     even = np.linspace(*STRETCH, 400) * joint.arm  # N m, of either tendon
     slopes = np.array([joint.slopes(torque)[0] for torque in even])
     shown = []

@@ -15,7 +15,7 @@ from awiwi_gen.hand import Hand
 from awiwi_gen.loops.joint import TABLE_16_1, impedance_loop
 from awiwi_gen.loops.regulator import regulator
 from awiwi_gen.reproduce.gain_search import PRINTED_BOX, USEFUL_BOX, Box, draw, nearest
-from awiwi_gen.results import Figure
+from awiwi_gen.results import Figure, curves
 
 COSTS = np.diag([100.0, 0.01, 0.01, 0.01])
 STEP, END = 0.5, 0.1
@@ -26,25 +26,21 @@ def figures(library: Any, hand: Hand) -> list[Figure]:
     """All of them; they need nothing of the hand."""
     return [
         draws(library, "16.2", "five draws as printed", 0.1, PRINTED_BOX, 5, 20000),
-        draws(library, "16.2", "five draws, mended", 1e-3, USEFUL_BOX, 5, 200000),
-        draws(library, "16.3", "ten short searches, mended", 1e-3, USEFUL_BOX, 10, 2000),
+        draws(library, "16.2", "five draws, corrected", 1e-3, USEFUL_BOX, 5, 200000),
+        draws(library, "16.3", "ten short searches, corrected", 1e-3, USEFUL_BOX, 10, 2000),
     ]
 
 
 def draws(library: Any, number: str, title: str, R: float, box: Box, runs: int, samples: int) -> Figure:
     """Steps of the gains that several searches find."""
-    wanted, mended = regulator(TABLE_16_1, COSTS, R, cancelled=True), box is not PRINTED_BOX
-    found = [nearest(library, TABLE_16_1, wanted, draw(box, samples, seed), mended) for seed in range(runs)]
+    wanted, corrected = regulator(TABLE_16_1, COSTS, R, cancelled=True), box is not PRINTED_BOX
+    found = [nearest(library, TABLE_16_1, wanted, draw(box, samples, seed), corrected) for seed in range(runs)]
     loops = [impedance_loop(library, TABLE_16_1, each.gains) for each in found]
     times = np.linspace(0, END, 501)
-    curves = np.array([STEP + loop.response([-STEP, 0, 0, 0], times)[:, 0] for loop in loops])
+    steps = np.array([STEP + loop.response([-STEP, 0, 0, 0], times)[:, 0] for loop in loops])
     slowest = [float(loop.poles().real.max()) for loop in loops]
-    apart = float(np.ptp(curves, axis=0).max() / STEP)
-    arrived = float(curves[:, -1].min() / STEP)
-
-    def on(axes: Any) -> None:
-        axes.plot(times * 1e3, curves.T, linewidth=0.8)
-        axes.set(xlabel="t [ms]", ylabel="q [rad]")
+    apart = float(np.ptp(steps, axis=0).max() / STEP)
+    arrived = float(steps[:, -1].min() / STEP)
 
     return Figure(
         number=f"{number} ({title})",
@@ -56,5 +52,5 @@ def draws(library: Any, number: str, title: str, R: float, box: Box, runs: int, 
             f"and cover at least {arrived:.0%} of the step in {END * 1e3:.0f} ms."
         ),
         holds=apart < ALIKE and arrived > 0.95,
-        draw=on,
+        draw=curves(times * 1e3, steps.T, "t [ms]", "q [rad]"),
     )

@@ -213,7 +213,7 @@ def state_dependent(bench: Bench) -> Figure:
     apart = float(np.abs(forces["state-dependent"] - forces["fixed"]).max())
     return Figure(
         "14.3", "State-dependent and fixed optimal gains on a tendon's force",
-        "The two are hardly to be told apart.",
+        "The two are hardly distinguishable.",
         f"They are {apart:.2g} N apart at most. Computed without delay, as printed; "
         f"with that, the law of table 14.1 is {clock.reason}.",
         apart < 0.5, curves(_times(), forces, "t [s]", "tendon force [N]", "-", "--"),

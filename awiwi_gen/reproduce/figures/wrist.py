@@ -1,7 +1,7 @@
 """Figures 6.9 and 6.10: the wrist flexes by 30 deg to either side, then it is abducted by 20 deg (section 6.2).
 
-The source means angles of the palm, which turns about twice as far as the internal angles do; these are found by
-inverting the palm's pose along one axis at a time.
+The source means angles of the palm, about twice the internal angles; these are found by inverting the palm's pose along
+one axis at a time.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from awiwi_gen.hand import Hand, Wrist
-from awiwi_gen.results import Figure
+from awiwi_gen.results import Figure, curves
 
 Array = np.ndarray[Any, Any]
 
@@ -31,17 +31,15 @@ def bars(library: Any, wrist: Wrist) -> Figure:
     everywhere = np.meshgrid(np.linspace(low71, high71, STEPS), np.linspace(low73, high73, STEPS))
     worst = bar_errors(library, wrist, *everywhere).max()
 
-    def draw(axes: Any) -> None:
-        axes.plot(bar_errors(library, wrist, *motion(library, wrist)).max(axis=-1), linewidth=0.8)
-        axes.set(xlabel="step of the motion", ylabel="largest error of a bar's length [m]", ylim=(0, 1.5 * worst))
-
+    errors = bar_errors(library, wrist, *motion(library, wrist)).max(axis=-1)
+    labels = "step of the motion", "largest error of a bar's length [m]"
     return Figure(
         number="6.9",
         title="Errors of the six distances between the points of the wrist",
         claim="The distances stay constant up to rounding.",
         found=f"Within {worst:.0e} m over the whole range of the wrist.",
         holds=bool(worst < EXACT),
-        draw=draw,
+        draw=curves(np.arange(len(errors)), errors, *labels, ylim=(0, 1.5 * worst)),
     )
 
 
@@ -51,7 +49,7 @@ def displacements(library: Any, wrist: Wrist) -> Figure:
     moved = tendon_displacements(library, wrist, *path)
     flexing, abducting = moved[: 2 * STEPS], moved[2 * STEPS :]
     largest = abducting[np.abs(abducting).max(axis=1).argmax()]
-    linear = min((abs(np.corrcoef(place, largest[layer])[0, 1]) for layer, place in layers(wrist)), default=0.0)
+    linear = min((abs(np.corrcoef(across, largest[layer])[0, 1]) for layer, across in layers(wrist)), default=0.0)
     ratio = np.abs(abducting).max() / np.abs(flexing).max()
 
     def draw(axes: Any) -> None:
@@ -73,7 +71,7 @@ def displacements(library: Any, wrist: Wrist) -> Figure:
 
 
 def layers(wrist: Wrist) -> list[tuple[Array, Array]]:
-    """Tendons that lie at one height in the forearm, three or more: their indices, and their places across it [m]."""
+    """Tendons that lie at one height in the forearm, three or more: their indices, and their positions across it [m]."""
     _, y, z = np.array([[float(x) for x in tendon.forearm] for tendon in wrist.tendons]).T
     found = [np.flatnonzero(z == height) for height in np.unique(z)]
     return [(layer, y[layer]) for layer in found if len(layer) > 2]

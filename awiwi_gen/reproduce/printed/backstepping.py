@@ -172,10 +172,10 @@ def antagonistic(library: Any) -> Iterator[Printed]:
     shortcut = pair_loop(
         library.backstepping_antagonistic_decoupled, TABLE_PAIR, stiffness_and_damping, pretension=wanted
     )
-    left, kept = at_rest(*shortcut)[2], at_rest(loop, constant)[2]
+    left, exact = at_rest(*shortcut)[2], at_rest(loop, constant)[2]
     yield Printed(
         "eq. 15.84 to 15.86", f"pretension {wanted:g} N m", f"{left:.2g} N m", "misprint",
-        f"each motor takes its pretension for an acceleration; as one system of order six it is {kept:.7g}",
+        f"each motor takes its pretension for an acceleration; as one system of order six it is {exact:.7g}",
     )  # fmt: skip
 
 
@@ -202,8 +202,8 @@ def optimum(library: Any, hand: Hand) -> Iterator[Printed]:
     poles = np.sort(joint_loop(plant, unit - cancelling(plant), np.zeros(2)).poles().real)
     for text, pole, gain in zip(("-7.7018", "-3.8384", "-3.8384", "-0.0100"), poles, wanted, strict=True):
         hundredth = compared("", text, pole / 100, "")
-        told = "is" if hundredth.verdict == "agrees" else "is not even"
-        reason = f"it {told} a hundredth of the real part of a closed-loop pole for Q = I and R = 1"
+        relation = "is" if hundredth.verdict == "agrees" else "is not even"
+        reason = f"it {relation} a hundredth of the real part of a closed-loop pole for Q = I and R = 1"
         yield Printed("tables 16.1, 16.2: K_des", text, f"{gain:.7g}", "misprint", reason)
     m, b, k = plant.numbers
     least = b / k * (1 + 1 / m)

@@ -61,11 +61,12 @@ def search(library: Any, hand: Hand) -> Iterator[Printed]:
             f"closed form: errors up to {demands.miss(ours).max():.0e} N m/rad, no limit violated", "misprint",
             "antagonistic pairs make the problem convex in the sums of their stiffnesses",
         )  # fmt: skip
-        printed, mended = (demands.search(printed) for printed in (True, False))
+        printed, corrected = (demands.search(printed) for printed in (True, False))
         yield Printed(
             "chapter 7, algorithm 2", "alpha moves by the gradient of the last trial",
-            f"median error {np.median(demands.miss(printed)):.2g} N m/rad, mended {np.median(demands.miss(mended)):.2g}",
-            "misprint", "the gradient is overwritten before alpha moves, and kept where the trial is not taken",
+            f"median error {np.median(demands.miss(printed)):.2g} N m/rad, "
+            f"corrected {np.median(demands.miss(corrected)):.2g}",
+            "misprint", "the gradient is overwritten before alpha moves, also by that of a rejected trial",
         )  # fmt: skip
         for weight in WEIGHTS:
             f = demands.search(False, weight)
@@ -76,7 +77,7 @@ def search(library: Any, hand: Hand) -> Iterator[Printed]:
                 "not reproducible" if violated.max() > VISIBLE else "agrees",
                 f"a penalty trades limits for stiffness: its error there is {np.median(demands.miss(f)):.2g} N m/rad",
             )  # fmt: skip
-        missed = np.abs(mended @ demands.P + demands.tau).max()
+        missed = np.abs(corrected @ demands.P + demands.tau).max()
         exact: Verdict = "agrees" if missed < 1e-12 else "not reproducible"
         yield Printed("section 7.2", "the torque is exactly achieved", f"to {missed:.0e} N m", exact, "null space")
 

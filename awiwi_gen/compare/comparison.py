@@ -1,4 +1,4 @@
-"""All laws on one joint: who reaches the goal, on which plants, and what each can bear on the clock."""
+"""All laws on one joint: which of them reach the goal on which plants, and the delay margin of each."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Row:
         }  # fmt: skip
 
     def cells(self) -> tuple[str, ...]:
-        """The row as text; nothing but its failure for a run that did not end."""
+        """The row as text; a run that did not end has no numbers."""
         s = self.score
         head = (self.law, f"{self.force:g} N", self.plant)
         if s.settling == s.slack == float("inf"):
@@ -68,7 +68,7 @@ def compare(
     forces: Sequence[float] = FORCES,
     plants: Iterable[str] = PLANTS,
 ) -> list[Row]:
-    """Every law on every plant under every pretension; chosen gains are for laws that have them."""
+    """Every law on every plant under every pretension; ``gains`` replace the laws' own."""
     joint, rows = joint_of(library, hand), []
     for law in laws:
         own = law.gains_with(gains or {})
@@ -83,13 +83,13 @@ def compare(
 
 
 def clocks(library: Any, hand: Hand, laws: Iterable[Law] = tuple(LAWS.values())) -> list[tuple[float, Clocked]]:
-    """What every law's own gains bear on the clock, under every pretension [N]."""
+    """Stability and delay margin of every law with its own gains, with each pretension [N]."""
     joint = joint_of(library, hand)
     return [(force, clocked(library, law, law.gains_with({}), joint, force)) for law in laws for force in FORCES]
 
 
 def tables(clocked: Iterable[tuple[float, Clocked]], rows: Iterable[Row]) -> list[Table]:
-    """Both as text."""
+    """Both results as tables."""
     return [
         Table("Laws at 3 kHz with one sample of delay", CLOCK_COLUMNS, [_clock_cells(*each) for each in clocked]),
         Table("Laws on one joint; the goal is 40 ms, 2 % overshoot, 3 % stiffness error, no slack", COLUMNS,
