@@ -165,7 +165,7 @@ def print_kernels(entries: Sequence[Mapping[str, Any]]) -> None:
             entry["name"],
             ", ".join(port["name"] for port in entry["inputs"]),
             ", ".join(port["name"] for port in entry["outputs"]),
-            str(entry["cost"]["operations"]) if entry["cost"] else "?",
+            operations_text(entry) if entry["cost"] else "?",
             entry["source"],
         )
         for entry in entries
