@@ -7,7 +7,7 @@
  *   in   wrist[2] in rad, from [0.1004, 0.6234] to [1.148, 1.322]
  *   out  h[38] in m
  * Returns 0 where q73 is between 0 and pi and the plane of the side bars has not passed A0 and bar AA0
- * closes the loop; elsewhere 1, and what is not defined is NaN.
+ * closes the loop; else 1, and outputs without a value are NaN.
  * Cost: 254 add, 180 mul, 2 div, 43 sqrt, 4 sincos.
  * Inputs: sha256 043c7fe4cf3ab8c45707fb92fe06f721b86c5746382be7b476392fac3d18624a.
  */

@@ -8,7 +8,7 @@
  *   out  B[3] in m
  *   out  C[3] in m
  * Returns 0 where q73 is between 0 and pi and the plane of the side bars has not passed A0 and bar AA0
- * closes the loop; elsewhere 1, and what is not defined is NaN.
+ * closes the loop; else 1, and outputs without a value are NaN.
  * Cost: 20 add, 39 mul, 2 div, 1 neg, 1 sqrt, 2 sincos.
  * Inputs: sha256 db74b2a34f56c6ccad41684846d922ba049b7832368c63b234f7fba0d2100dce.
  */
