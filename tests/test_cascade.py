@@ -156,13 +156,13 @@ def test_the_force_error_obeys_its_own_equation_whatever_the_joints_do():
     angle, h, wanted = functions("theta h f_des")
     B, elongation = symbols("B x")
     curve, x = sympy.Function("phi")(elongation), r * angle + h
-    force, k, bend = (curve.diff(elongation, order).subs(elongation, x) for order in range(3))
+    force, k, curvature = (curve.diff(elongation, order).subs(elongation, x) for order in range(3))
 
     tau, _ = cascade(
-        None, *column(force, x.diff(T), k, bend / k, h.diff(T, 2), wanted, wanted.diff(T), wanted.diff(T, 2), friction,
+        None, *column(force, x.diff(T), k, curvature / k, h.diff(T, 2), wanted, wanted.diff(T), wanted.diff(T, 2), friction,
                       r, B, kp, kd),
     )  # fmt: skip
-    growing = k * (r * (tau - friction - r * force) / B + h.diff(T, 2)) + bend * x.diff(T) ** 2  # f''
+    growing = k * (r * (tau - friction - r * force) / B + h.diff(T, 2)) + curvature * x.diff(T) ** 2  # f''
     error, rate = wanted - force, wanted.diff(T) - k * x.diff(T)
 
     assert simplify(sympy.expand(wanted.diff(T, 2) - growing + kd * rate + kp * error)) == 0

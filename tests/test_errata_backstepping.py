@@ -91,13 +91,15 @@ def test_eq_15_62_cancels_the_torque_and_eq_15_67_doubles_and_reverses_it():
 
 def test_before_eq_15_76_the_torques_stand_outside_the_bracket():
     slope, curvature = symbols("slope curvature")
-    bend = curvature * (x4 / slope) ** 2
-    stretch = bend + slope / b * (tau_m - (b + m) / m * x3 - b / m * tau_ext)  # eq. 15.75
+    curved = curvature * (x4 / slope) ** 2
+    stretch = curved + slope / b * (tau_m - (b + m) / m * x3 - b / m * tau_ext)  # eq. 15.75
     torques = (b + m) / m * x3 + b / m * tau_ext
 
-    assert vanishes(stretch.subs(tau_m, b / slope * (u - bend) + torques) - u)
-    assert not vanishes(stretch.subs(tau_m, b / slope * (u - bend + torques)) - u)
-    assert vanishes(stretch.subs(tau_m, b / slope * (u - bend) + torques).subs(curvature, 0) - u)  # it may be straight
+    assert vanishes(stretch.subs(tau_m, b / slope * (u - curved) + torques) - u)
+    assert not vanishes(stretch.subs(tau_m, b / slope * (u - curved + torques)) - u)
+    assert vanishes(
+        stretch.subs(tau_m, b / slope * (u - curved) + torques).subs(curvature, 0) - u
+    )  # it may be straight
 
 
 def test_the_middle_line_of_eq_15_81_interchanges_slope_and_curvature():

@@ -1,4 +1,4 @@
-"""Imports run downhill, and the heavy libraries stay in their rooms."""
+"""Layers of the package: who may import whom, and where the heavy libraries are imported."""
 
 from __future__ import annotations
 
@@ -71,22 +71,22 @@ def heights(ladder: list[list[str]]) -> dict[str, int]:
 
 @pytest.mark.parametrize("path", FILES, ids=lambda p: str(p.relative_to(PACKAGE)))
 def test_imports_run_downhill(path):
-    own = room("awiwi_gen." + str(path.relative_to(PACKAGE)).removesuffix(".py").replace("/", "."))
-    used = {room(m) for m in imports(path) if m.startswith("awiwi_gen") and m != "awiwi_gen"} - {own}
+    importer = room("awiwi_gen." + str(path.relative_to(PACKAGE)).removesuffix(".py").replace("/", "."))
+    used = {room(m) for m in imports(path) if m.startswith("awiwi_gen") and m != "awiwi_gen"} - {importer}
     ladders = [heights(PHYSICS + TOP), heights(COMPILER + TOP)]
 
-    assert any(own in ladder for ladder in ladders), f"{own} has no place in the house"
+    assert any(importer in ladder for ladder in ladders), f"{importer} is in no layer"
     for name in used:
-        allowed = any(name in ladder and own in ladder and ladder[name] <= ladder[own] for ladder in ladders)
+        allowed = any(name in ladder and importer in ladder and ladder[name] <= ladder[importer] for ladder in ladders)
         assert allowed, f"{path.name} imports {name}"
         assert not {own, name} <= set(ROOMS), f"{path.name} imports {name}: rooms do not use one another"
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda p: str(p.relative_to(PACKAGE)))
 def test_heavy_libraries_stay_in_their_rooms(path):
-    place = str(path.relative_to(PACKAGE))
+    name = str(path.relative_to(PACKAGE))
     for library in {m.split(".")[0] for m in imports(path)} & HOMES.keys():
-        assert any(place == home or place.startswith(home + "/") for home in HOMES[library]), library
+        assert any(name == home or name.startswith(home + "/") for home in HOMES[library]), library
 
 
 def reached(path: Path) -> set[str]:
@@ -102,9 +102,9 @@ def reached(path: Path) -> set[str]:
 
 @pytest.mark.parametrize("path", FILES, ids=lambda p: str(p.relative_to(PACKAGE)))
 def test_the_wings_share_nothing_but_the_structure_and_the_numbers(path):
-    own = path.relative_to(PACKAGE).parts[0]
-    if own in WINGS:
-        rooms = {room(module) for module in reached(path)} - {own}
+    importer = path.relative_to(PACKAGE).parts[0]
+    if importer in WINGS:
+        rooms = {room(module) for module in reached(path)} - {importer}
         assert rooms <= {"structure", "hand", "errors", "units", "resources"}
 
 

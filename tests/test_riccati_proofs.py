@@ -206,8 +206,8 @@ def test_the_search_comes_down_without_fail():
     c1, c3 = symbols("c1 c3", positive=True)
     F = c2**2 + 2 - g2 - 2 * sqrt(g3 + 2 * c2) * sqrt(g1 + 2 * c2)
     known = {g3: c3**2 - 2 * c2, g1: c1**2 - 2 * c2}
-    slope, bend = diff(F, c2).subs(known), diff(F, c2, 2).subs(known)
+    slope, curvature = diff(F, c2).subs(known), diff(F, c2, 2).subs(known)
     hurwitz = c1 * c2 * c3 - c1**2 - c3**2
 
-    assert simplify(bend - 2 - 2 * (c1**2 - c3**2) ** 2 / (c1 * c3) ** 3) == 0
+    assert simplify(curvature - 2 - 2 * (c1**2 - c3**2) ** 2 / (c1 * c3) ** 3) == 0
     assert simplify(slope * c1 * c3 - 2 * hurwitz) == 0

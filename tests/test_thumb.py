@@ -102,9 +102,9 @@ def test_the_geometric_stiffness_is_the_force_times_the_bend_of_the_lengths(read
     _, _, lib = reading
     random, q = np.random.default_rng(3), poses()
     f, k = random.uniform(0, 100, (len(q), 8)), random.uniform(1e3, 5e4, (len(q), 8))
-    P, bend = lib.thumb_coupling(q), lib.thumb_coupling_derivative(q)
+    P, second = lib.thumb_coupling(q), lib.thumb_coupling_derivative(q)
     elastic = np.einsum("sij,si,sik->sjk", P, k, P)
-    geometric = np.einsum("si,sijk->sjk", f, bend)
+    geometric = np.einsum("si,sijk->sjk", f, second)
 
     np.testing.assert_allclose(lib.thumb_joint_stiffness(q, f, k), elastic + geometric, atol=1e-13)
     assert np.abs(geometric).max() > 0.02 * np.abs(elastic).max()  # it may not be left out

@@ -216,7 +216,7 @@ class RotatingPlane:
         return total
 
     def gravity(self, g: SX) -> list[SX]:
-        """Torques of the joints [N m] that hold the finger still in gravity g (3) [m/s^2]."""
+        """Torques of the joints [N m] that hold the finger at rest in gravity g (3) [m/s^2]."""
         down, along = self._gravity(g)
         chain = [-_cross(first, down) for first in self.firsts_beyond[:-1]]
         return [self._plane_weight(down, along), *chain] if self.plane_joint else chain
