@@ -174,12 +174,15 @@ def assemble(finger: Finger, q: SX) -> Assembly:
     bodies, ballast = _lightened(parts)
     joints: list[Joint] = []
     start, angle = (SX(1), SX(0)), SX(0)
+    before: Vector = start
     for part, body, following in zip(parts, bodies, [*parts[1:], None], strict=True):
         if part.turn is not None:
             start, angle = (SX(1), SX(0)), SX(0)
+        if following is not None and following.direction is not None:  # a crank: its coupler starts from here
+            before = _sum_of_angles(start, (ca.cos(angle), ca.sin(angle)))
         angle += part.angle
         if part.direction is not None:
-            start, angle = part.direction, SX(0)
+            start, angle = _sum_of_angles(before, part.direction), SX(0)
         spin = _sum_of_angles(start, (ca.cos(angle), ca.sin(angle)))
         turn = following.turn if following is not None else None
         place = (part.link, part.slid, part.offset, body)
