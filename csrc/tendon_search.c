@@ -232,7 +232,7 @@ static awiwi_real newton(const task *s, const model *c, const moves *m, vector s
     for (int i = 0; i < s->count; i++)
         step[i] = 0;
     if (!solve(n, full, 64 * AWIWI_REAL_EPSILON * trace, b, x)) {
-        /* less damping near the demand: some tendons are alike, and the cost does not bend along what they may swap */
+        /* less damping near the demand: where tendons do the same, the cost is flat along exchanges between them */
         const awiwi_real range = s->t->high - s->t->low, near = c->cost / (range * range);
         for (int j = 0; j < n; j++)
             H[j][j] += near < DAMPING * trace ? near + 64 * AWIWI_REAL_EPSILON * trace : DAMPING * trace;

@@ -79,7 +79,7 @@ def test_imports_run_downhill(path):
     for name in used:
         allowed = any(name in ladder and importer in ladder and ladder[name] <= ladder[importer] for ladder in ladders)
         assert allowed, f"{path.name} imports {name}"
-        assert not {own, name} <= set(ROOMS), f"{path.name} imports {name}: rooms do not use one another"
+        assert not {importer, name} <= set(ROOMS), f"{path.name} imports {name}: rooms do not use one another"
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda p: str(p.relative_to(PACKAGE)))

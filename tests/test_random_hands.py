@@ -50,3 +50,14 @@ def test_random_hands_are_of_all_kinds():
     kinds = set().union(*(random_hands.kinds(random_hands.hand(seed)) for seed in range(40)))
 
     assert kinds == set(random_hands.FEATURES)
+
+
+@pytest.mark.parametrize("turn", ["none", "z+90", "x+90"])
+def test_both_derivations_agree_on_a_four_bar_behind_another_joint(turn):
+    text = random_hands.hand(1, 2, {"four-bar"})
+    before, four_bar = text.split('\njoint = "j1"\nturn = "')
+    assert "[fingers.one.links.four_bar]" in four_bar
+    hand = Hand.parse(f'{before}\njoint = "j1"\nturn = "{turn}"{four_bar[four_bar.index(chr(10)) :]}')
+    records = Job(hand, only="one_fingertip_pose").records
+
+    assert records["one_fingertip_pose"].agreement < 1e-60

@@ -68,13 +68,13 @@ class JointRegulator(Problem):
             m, b, dq, dtheta, R = (arb(float(inputs[name][s].item())) for name in ("m", "b", "dq", "dtheta", "R"))
             spring, weights, x, x_des = (_row(inputs[name][s]) for name in ("spring", "weights", "x", "x_des"))
             now, wanted = x[2] - x[0], x_des[2] - x_des[0]
-            held = sum((c * wanted ** (i + 1) for i, c in enumerate(spring)), arb(0))
+            feedforward = sum((c * wanted ** (i + 1) for i, c in enumerate(spring)), arb(0))
             k = sum((c * sum(now**j * wanted ** (i - j) for j in range(i + 1)) for i, c in enumerate(spring)), arb(0))
             A = [[0, 1, 0, 0], [-k / m, -dq / m, k / m, 0], [0, 0, 0, 1], [k / b, 0, -k / b, -dtheta / b]]
             Q = [[weights[i] if i == j else arb(0) for j in range(N)] for i in range(N)]
             K, _ = optimum_of(arb_mat(A), arb_mat([[0], [0], [0], [1 / b]]), arb_mat(Q), R)
             gains.append(K)
-            torques.append([held - sum((g * (p - d) for g, p, d in zip(K, x, x_des, strict=True)), arb(0))])
+            torques.append([feedforward - sum((g * (p - d) for g, p, d in zip(K, x, x_des, strict=True)), arb(0))])
         return _reference({"K": gains, "u": torques})
 
 
@@ -90,7 +90,7 @@ def optimum(A: Array, B: Array, Q: Array, R: Array) -> tuple[list[arb], list[arb
 
 def optimum_of(A: arb_mat, b: arb_mat, Q: arb_mat, R: arb) -> tuple[list[arb], list[arb]]:
     """The same for balls, by Kleinman's iteration: Newton's method on gains converges from stabilising ones."""
-    K = arb_mat([_row(_begin(A, b, Q, R))])
+    K = arb_mat([_row(_initial_gains(A, b, Q, R))])
     for _ in range(ROUNDS):
         loop = A - b * K
         S = _lyapunov(loop, Q + K.transpose() * K * R)
@@ -102,7 +102,7 @@ def optimum_of(A: arb_mat, b: arb_mat, Q: arb_mat, R: arb) -> tuple[list[arb], l
     raise ValueError("the Riccati equation has no stabilising solution, or it is not found in floats")
 
 
-def _begin(A: arb_mat, b: arb_mat, Q: arb_mat, R: arb) -> Array:
+def _initial_gains(A: arb_mat, b: arb_mat, Q: arb_mat, R: arb) -> Array:
     """Gains in floats, from the stable eigenvectors of the Hamiltonian matrix in balanced coordinates."""
     a, column, q = (np.array([[float(x) for x in row] for row in m.tolist()]) for m in (A, b, Q))
     d = _balance(a, column @ column.T / float(R), q)
@@ -129,14 +129,14 @@ def _lyapunov(loop: arb_mat, C: arb_mat) -> arb_mat:
     """S with loop'S + S loop + C = 0."""
     n = loop.nrows()
     pairs = [(i, j) for i in range(n) for j in range(i + 1)]
-    place = {pair: row for row, (i, j) in enumerate(pairs) for pair in ((i, j), (j, i))}
+    index = {pair: row for row, (i, j) in enumerate(pairs) for pair in ((i, j), (j, i))}
     system = [[arb(0)] * len(pairs) for _ in pairs]
     for row, (i, j) in enumerate(pairs):
         for k in range(n):
-            system[row][place[k, j]] += loop[k, i]
-            system[row][place[i, k]] += loop[k, j]
+            system[row][index[k, j]] += loop[k, i]
+            system[row][index[i, k]] += loop[k, j]
     solution = _middle(arb_mat(system).solve(arb_mat([[-C[i, j]] for i, j in pairs])))
-    return arb_mat([[solution[place[i, j], 0] for j in range(n)] for i in range(n)])
+    return arb_mat([[solution[index[i, j], 0] for j in range(n)] for i in range(n)])
 
 
 def _middle(matrix: arb_mat) -> arb_mat:
@@ -203,11 +203,11 @@ def _chain(random: Any) -> Plant:
 
 
 def _dense(random: Any) -> Plant:
-    """Modes of about 1 rad/s, stable or not, all of them in easy reach, seen from coordinates of unlike size."""
+    """Modes of about 1 rad/s, stable or not, all controllable and observable, in coordinates of different scales."""
     radius, angle = random.uniform(0.3, 3, 2), random.uniform(0, np.pi, 2)
     A = np.diag(np.ones(N - 1), 1)
     A[-1] = -np.poly(np.concatenate([radius * np.exp(1j * angle), radius * np.exp(-1j * angle)])).real[:0:-1]
-    turn, C = np.linalg.qr(random.normal(size=(N, N)))[0], random.normal(size=(N, N))
+    rotation, C = np.linalg.qr(random.normal(size=(N, N)))[0], random.normal(size=(N, N))
     d = 10 ** random.uniform(-2, 2, N)
     Q, R = C.T @ C / np.outer(d, d), 10 ** random.uniform(-1, 1)
-    return (turn @ A @ turn.T) * d[:, None] / d, turn[:, -1] * d, Q, R
+    return (rotation @ A @ rotation.T) * d[:, None] / d, rotation[:, -1] * d, Q, R

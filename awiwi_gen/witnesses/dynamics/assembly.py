@@ -177,12 +177,15 @@ def assemble(finger: Finger, q: SX) -> Assembly:
     bodies, palm_moment = _masses_moved_inward(parts)
     joints: list[Joint] = []
     start, angle = (SX(1), SX(0)), SX(0)
+    before_crank: Vector = start
     for part, body, following in zip(parts, bodies, [*parts[1:], None], strict=True):
         if part.fixed_rotation is not None:
             start, angle = (SX(1), SX(0)), SX(0)
+        if following is not None and following.cos_sin is not None:  # a crank: its coupler starts from here
+            before_crank = _sum_of_angles(start, (ca.cos(angle), ca.sin(angle)))
         angle += part.angle
         if part.cos_sin is not None:
-            start, angle = part.cos_sin, SX(0)
+            start, angle = _sum_of_angles(before_crank, part.cos_sin), SX(0)
         cos_sin = _sum_of_angles(start, (ca.cos(angle), ca.sin(angle)))
         next_rotation = following.fixed_rotation if following is not None else None
         in_link = (part.link, part.shift, part.offset, body)
