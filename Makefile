@@ -1,6 +1,7 @@
 # make        set up .venv, then derive, emit, compile and verify the default hand
 # make test   all tests              make lint   ruff, mypy, layers
 # make check  is generated/ fresh?   make bench  us and the peers, side by side
+# make torture  10 000 damaged files and 200 kills, far longer than the tests
 # make report the figures of the source, computed again, with all proofs: build/report/index.html
 # make clean  remove what make made (generated/ stays: it is checked in)
 
@@ -20,6 +21,9 @@ all: .venv/installed
 
 test: .venv/installed
 	$(BIN)/python -m pytest
+
+torture: .venv/installed
+	AWIWI_TORTURE=25 $(BIN)/python -m pytest tests/test_cache.py tests/test_system_errors.py
 
 lint: .venv/installed
 	$(BIN)/ruff check .
@@ -48,4 +52,4 @@ clean:
 	rm -rf .venv .venv-bench .cache build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
-.PHONY: all test lint check report bench clean
+.PHONY: all test torture lint check report bench clean
