@@ -294,7 +294,7 @@ class Library(Mapping[str, KernelFunction]):
 
     Two numbers may be changed at any time. Batches that are large enough are shared by ``threads``, as many as there
     are cores; 1 keeps to the calling one. A kernel that was evaluated ``vectorise_after`` times gets a loop compiled for
-    this machine's vector units, which takes a second and is kept; 0 compiles at the first call, infinity never. Neither
+    this machine's vector units, which takes a second and is cached; 0 compiles at the first call, infinity never. Neither
     changes a bit of any result.
 
     ``c`` and ``ffi`` are what cffi made of the firmware's header: every function of it, kernels and solvers, called as

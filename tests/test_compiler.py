@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+import awiwi_gen
 from awiwi_gen import cache, compiler
 from awiwi_gen.build import load, object_key
 from awiwi_gen.compiler import VARIABLES, bindings, machine
@@ -176,3 +177,12 @@ def test_a_library_of_another_command_is_another_library(monkeypatch, tmp_path):
     assert load(tree(only="jaw_tendon_lengths")).origin != first.origin
     monkeypatch.setenv("CC", "gcc")
     assert load(tree(only="jaw_tendon_lengths")).origin == first.origin
+
+
+def test_a_missing_compiler_is_reported_before_anything_is_derived(monkeypatch, tmp_path):
+    monkeypatch.setenv("CC", "/nonexistent/cc")
+    monkeypatch.setenv("AWIWI_GEN_CACHE", str(tmp_path / "cache"))
+    with pytest.raises(NoCompilerError, match="which is not there"):
+        awiwi_gen.build(awiwi_gen.Hand.load())
+
+    assert not (tmp_path / "cache").exists()
