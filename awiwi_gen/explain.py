@@ -1,4 +1,4 @@
-"""What a kernel computes, told to a person: its meaning, ports, source, cost, and the mathematics behind it."""
+"""The explanation of a kernel: meaning, ports, source, cost, and mathematics."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ MOST_LINES = 60
 
 
 def explanation(job: Job, name: str) -> dict[str, Any]:
-    """Everything worth telling about a kernel. Raises InputError for an unknown name, with near ones."""
+    """A kernel's documentation, ports, cost, numbers and mathematics. Raises InputError for an unknown name."""
     known = {kernel.name: kernel for kernel in job.kernels}
     if name not in known:
         raise unknown("kernel", name, known)
@@ -60,29 +60,29 @@ class Names(Printer):
     output_element = input_element
 
     def parameter(self, path: str) -> str:
-        """``links[1].mass`` as it stands in the file."""
+        """``links[1].mass`` as in the file."""
         return path
 
 
 def _port(port: Port) -> dict[str, Any]:
-    told: dict[str, Any] = {"shape": list(port.shape), "unit": port.unit_text}
-    return told if port.low is None else told | {"range": port.bounds()}
+    shown: dict[str, Any] = {"shape": list(port.shape), "unit": port.unit_text}
+    return shown if port.low is None else shown | {"range": port.bounds()}
 
 
-def explanation_lines(told: dict[str, Any]) -> list[str]:
+def explanation_lines(shown: dict[str, Any]) -> list[str]:
     """The same as text."""
-    lines = [told["name"], f"  {told['doc']}", "", f"  source     {told['source']}"]
+    lines = [shown["name"], f"  {shown['doc']}", "", f"  source     {shown['source']}"]
     for side in ("inputs", "outputs"):
-        for name, port in told[side].items():
+        for name, port in shown[side].items():
             shape = "".join(f"[{n}]" for n in port["shape"])
             lines.append(f"  {side[:-1]:9}  {name}{shape} in {port['unit']}")
-    counts = ", ".join(f"{n} {what}" for what, n in told["cost"].items() if n and what != "operations")
-    lines += [f"  cost       {operations_text(told)} operations ({counts or 'only moves'}), route {told['route']}"]
-    lines += [f"  returns 1 unless {guard}" for guard in told["guards"]]
+    counts = ", ".join(f"{n} {what}" for what, n in shown["cost"].items() if n and what != "operations")
+    lines += [f"  cost       {operations_text(shown)} operations ({counts or 'only moves'}), route {shown['route']}"]
+    lines += [f"  returns 1 unless {guard}" for guard in shown["guards"]]
     lines += [
         "",
-        f"  definition, with the numbers of {told['part']}:",
-        *(f"    {line}" for line in told["mathematics"]),
+        f"  definition, with the numbers of {shown['part']}:",
+        *(f"    {line}" for line in shown["mathematics"]),
     ]
-    lines += ["", "  numbers:", *(f"    {path} = {value}" for path, value in told["numbers"].items())]
+    lines += ["", "  numbers:", *(f"    {path} = {value}" for path, value in shown["numbers"].items())]
     return lines

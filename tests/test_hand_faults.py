@@ -1,7 +1,8 @@
-"""Bad hand files: each fault is told with its line, its key and a way to mend it; and what physics does allow."""
+"""Bad hand files: each error names the line and the key, and suggests a fix; and what physics does allow."""
 
 from __future__ import annotations
 
+import math
 import pickle
 from dataclasses import replace
 from fractions import Fraction
@@ -12,6 +13,7 @@ import pytest
 from awiwi_gen.errors import InputError
 from awiwi_gen.hand import Hand
 from awiwi_gen.hand.lint import complaints
+from awiwi_gen.hand.pose import Chain
 from awiwi_gen.units import Quantity
 
 PACKAGED = Path(__file__).parents[1] / "awiwi_gen" / "hand.toml"
@@ -86,6 +88,23 @@ SCHEMA = {
         '"30 mm"', '"30 m"',
         JAW + '.links[0].offset[0] = "30 m" is not plausible; expected a length such as "6.2 mm", from -1 m to 1 m',
     ),
+    "millimetres to the 39th": (
+        '"9 mm"', '"1e-30 nm^39/m^38"',
+        JAW + '.pulleys[0].radius = "1e-30 nm^39/m^38" is not plausible; expected a length such as "6.2 mm", from 10 um',
+    ),
+    "a length that is zero as a double": (
+        '"30 mm"', '"1e-30 nm^39/m^38"',
+        JAW + '.links[0].offset[0] = "1e-30 nm^39/m^38" is not plausible; expected zero, written "0 mm", or a length',
+    ),
+    "tiny mass": ('mass = "5 g"', 'mass = "1e-30 g"', JAW + '.links[0].mass = "1e-30 g" is not plausible; expected a mass'),
+    "tiny moment": (
+        '"60 g mm^2"', '"1e-30 g mm^2"', JAW + '.links[0].inertia.xx = "1e-30 g mm^2" is not plausible; expected a moment',
+    ),
+    "tiny limit": (
+        '"1 N m"', '"1e-30 N m"',
+        'hand.toml:{} limits.joint_torque = "1e-30 N m" is not plausible; expected a torque such as "1 N m", from 1e-9 N m',
+    ),
+    "inches": ('"9 mm"', '"0.25 in"', JAW + '.pulleys[0].radius = "0.25 in" is in inches, which are not read; did you mean'),
     "nan": ('mass = "5 g"', 'mass = "nan g"', JAW + '.links[0].mass = "nan g" does not begin with a number'),
     "infinity": ('mass = "5 g"', 'mass = "inf"', JAW + '.links[0].mass = "inf" does not begin with a number'),
     "absurd exponent": ('"5 g"', '"1e999999 g"', JAW + '.links[0].mass = "1e999999 g" is too large or too small'),
@@ -117,6 +136,14 @@ SCHEMA = {
 PHYSICS = {
     "range upside down": (
         'low = "-20 deg"', 'low = "40 deg"', JAW + '.links[0].low = "40 deg" is not below high = "40 deg"',
+    ),
+    "range without width": (
+        'high = "40 deg"', 'high = "-19.99999999 deg"',
+        JAW + '.links[0].high = "-19.99999999 deg" leaves a range of 1e-08 deg from low = "-20 deg"; expected 0.01 deg or',
+    ),
+    "tendon that two pulleys cancel": (
+        'over = ["-mid"]', 'over = ["-mid", "+end"]',
+        JAW + ".tendons[2] pulls nothing: its length is the same in every pose",
     ),
     "limits upside down": (
         '"1000 N/m"', '"1e6 N/m"',
@@ -242,6 +269,35 @@ def test_a_name_that_must_not_reach_the_c_code_is_refused(name: str, expected: s
     message = faults_of(ONE_FINGER.replace("fingers.jaw", f"fingers.{name}"))
     assert message.startswith(f"hand.toml:14 {expected}")
     assert message.isascii()
+
+
+def test_faults_of_all_links_are_not_a_lack_of_links() -> None:
+    text = ONE_FINGER
+    for mass in (5, 4, 2):
+        text = text.replace(f'mass = "{mass} g"', 'mass = "0 g"')
+    lines = faults_of(text).splitlines()
+    assert [line.split(" ")[1] for line in lines] == [f"fingers.jaw.links[{i}].mass" for i in range(3)]
+    assert all('= "0 g" must be above zero' in line for line in lines)
+
+
+def test_a_slip_is_suggested_only_where_it_explains_the_hand() -> None:
+    slip = ONE_FINGER.replace('zz = "405 g mm^2"', 'zz = "4050 g mm^2"')
+    assert "zz is probably 10 times too large" in faults_of(slip)
+    two_alike = faults_of(slip.replace('yy = "251 g mm^2"', 'yy = "2510 g mm^2"'))
+    assert two_alike.count("no body is like that") == 2
+    assert "probably" not in two_alike
+
+
+def test_a_span_that_reaches_a_length_of_zero_within_the_range_is_found() -> None:
+    # A crank of 10 mm and a coupler: the collar of `mid` is where this span begins in one pose between the samples.
+    finger = Hand.parse(ONE_FINGER).fingers["jaw"]
+    _, meeting = Chain(finger)._seat([0.123, 0.0], 1)
+    start = ", ".join(f'"{x * 1e3:.9f} mm"' for x in meeting)
+    span = f'span = {{ from = [{start}], to = ["0 mm", "0 mm", "0 mm"], joint = "mid" }}'
+    message = faults_of(ONE_FINGER.replace('over = ["-mid"]', span))
+    assert message.startswith(JAW.format(23) + ".tendons[2].span has a length of ")
+    assert float(message.partition("at root = ")[2].partition(" ")[0]) == pytest.approx(math.degrees(0.123), abs=0.01)
+    assert message.endswith("expected at least 0.1 mm in every pose")
 
 
 def test_nine_fingers_are_too_many_and_none_too_few() -> None:

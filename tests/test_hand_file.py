@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import pickle
 import subprocess
 import sys
@@ -223,6 +224,56 @@ def test_a_hundred_megabytes_are_refused_at_once(tmp_path: Path) -> None:
     start = time.perf_counter()
     assert "is longer than 250000 bytes" in load_faults(file)
     assert time.perf_counter() - start < 0.5
+
+
+@pytest.mark.parametrize("count", [1_900, 16_000])
+def test_an_array_that_is_far_too_long_is_refused_in_a_second_of_cpu(count: int) -> None:
+    text = ONE_FINGER.replace('over = ["-mid"]', "over = [\n" + '"-mid",\n' * count + "]")
+    start = time.process_time()
+    message = faults_of(text)
+    assert time.process_time() - start < 1
+    assert message.startswith(f"hand.toml:23 fingers.jaw.tendons[2].over has {count} entries; expected at most ")
+
+
+def test_a_pipe_is_no_hand_file(tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe.toml"
+    os.mkfifo(pipe)
+    assert load_faults(pipe) == f"{pipe} is not a regular file"
+    hand = tmp_path / "hand.toml"
+    hand.write_text('gains = "pipe.toml"\n' + ONE_FINGER)
+    assert load_faults(hand) == f'{hand}:1 gains = "pipe.toml": {pipe} is not a regular file'
+
+
+@pytest.mark.parametrize("name", ["../gains.toml", "/etc/passwd", "link.toml", "a\\u0000b", "x" * 300 + "/../../y"])
+def test_gains_are_read_in_or_below_the_folder_of_the_hand_only(name: str, tmp_path: Path) -> None:
+    folder = tmp_path / "hands"
+    folder.mkdir()
+    (tmp_path / "gains.toml").write_text("gains = []")
+    (folder / "link.toml").symlink_to(tmp_path / "gains.toml")
+    hand = folder / "hand.toml"
+    hand.write_text(f'gains = "{name}"\n' + ONE_FINGER)
+    message = load_faults(hand)
+    assert message.startswith(f"{hand}:1 gains = ")
+    assert "is no file in or below the folder of the hand file" in message
+
+
+def test_gains_below_the_folder_of_the_hand_are_read_and_their_faults_have_their_own_lines(tmp_path: Path) -> None:
+    (tmp_path / "below").mkdir()
+    (tmp_path / "below" / "gains.toml").write_text(
+        "[[gains]]\ntendon = 9\n" + "".join(f'{key} = "{value}"\n' for key, value in GAINS.items()) + 'source = "x"\n'
+    )
+    hand = tmp_path / "hand.toml"
+    hand.write_text('gains = "below/gains.toml"\n' + ONE_FINGER)
+    assert (
+        load_faults(hand)
+        == f"{tmp_path}/below/gains.toml:2 gains[0].tendon = 9 is no tendon of this hand; expected 0 to 2"
+    )
+
+
+GAINS = {
+    "K_p": "0.5 N m/rad", "K_d": "0.001 N m s/rad", "K_3": "100 1/s", "K_4": "100 1/s", "C_t": "1 rad/(N m)",
+    "C_s": "0.001 rad s^2/(N m)",
+}  # fmt: skip
 
 
 def test_bytes_that_are_no_text_are_refused_with_their_line(tmp_path: Path) -> None:

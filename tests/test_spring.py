@@ -335,7 +335,7 @@ def test_two_guidings_in_a_row_take_what_one_of_both_bends_takes(guiding):
         ('rate = "7 N/mm"', 'rate = "0 N/mm"', "must be above zero"),
         ('taut = "3685"', 'taut = "410"', "it would measure nothing"),
         ("winding = -1", "winding = 1", "fails at a lever angle of 3.25 rad"),
-        ("[tendon]", UNIT.replace("tendon = 1", "tendon = 3") + "[tendon]", "they count from 0 to 2"),
+        ("[tendon]", UNIT.replace("tendon = 1", "tendon = 3") + "[tendon]", "expected 0 to 2"),
         ("[tendon]", UNIT + UNIT + "[tendon]", "is units[0] already"),
         (
             "[tendon]",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from fractions import Fraction
 
 import pytest
@@ -145,6 +146,27 @@ def test_the_algebra_is_a_group(a: Unit, b: Unit, c: Unit) -> None:
     assert a / a == one
     assert (a * b) ** 2 == a**2 * b**2
     assert hash(a * b) == hash(b * a)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("0.25 in", 'is in inches, which are not read; did you mean "6.35 mm"?'),
+        ("2 lb", 'is in pounds, which are not read; did you mean "907.18474 g"?'),
+        ("35 g mm²", 'has the unknown unit "mm²"; did you mean "mm^2"?'),
+        ("2 m s⁻¹", 'has the unknown unit "s⁻¹"; did you mean "s^-1"?'),
+        ("3 mm2", 'has the unknown unit "mm2"; did you mean "mm^2"?'),
+        ("3 MM", 'has the unknown unit "MM"; did you mean "mm"?'),
+        ("3 foo", 'has the unknown unit "foo"'),
+    ],
+)
+def test_an_unknown_unit_suggests_what_was_meant(text: str, message: str) -> None:
+    with pytest.raises(InputError) as caught:
+        parse_quantity(text)
+    (fault,) = caught.value.faults
+    assert fault.message == message
+    for suggested in re.findall(r'did you mean "(.*)"', message):
+        assert parse_quantity(suggested if suggested[0].isdigit() else f"1 {suggested}")
 
 
 def test_dimensions_have_english_names() -> None:

@@ -54,6 +54,7 @@ def wrist_library(hand: Hand):
         (redrawn(a=(50, 21, 72)), "wrist.a lies on the same side of the side bars as A0"),
         (redrawn(a=(50, 21, 36)), "wrist.a lies on BC: the palm's three points must form a triangle"),
         (redrawn(a=(49, 20, 0)), "wrist.a has x = 49 mm; expected 50 mm, straight across the palm from the middle of"),
+        (redrawn(a=("50.0000001", 21, 0)), "wrist.a has x = 50.0000001 mm; expected 50 mm, straight across the palm"),
         (redrawn(a0=(50, 21, 90)), 'wrist.a0[0] = "50 mm" lies no nearer to the elbow than the palm'),
         (redrawn(b=(50, -42, 36)), "wrist.b does not cross the width of the wrist"),
         (replaced('    { forearm = ["4 mm", "35 mm", "28 mm"], palm = ["-4 mm", "16 mm", "-10 mm"] },\n', ""),

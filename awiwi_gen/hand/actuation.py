@@ -1,7 +1,7 @@
 """The actuators as a hand file describes them: motors, lever springs and tendon fibres (chapters 3 and 4).
 
 Each section is optional; a hand without it has no kernels of that kind. All tendons share one design of each. What
-differs from unit to unit, a lever's spring and its sensor, is calibrated: `spring.units` is laid over the design.
+differs from unit to unit, a lever's spring and its sensor, is calibrated: `spring.units` overrides the design.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ Winding = Annotated[Literal[1, -1], Field(examples=["1", "-1"])]
 class Friction(Part):
     """Friction torque at the output shaft: atan(steepness w) level + viscosity w (eq. 3.8).
 
-    What dry friction tends to at speed is level pi/2, not level.
+    At high speed the dry friction tends to level pi/2, not to level.
     """
 
     steepness: Annotated[Quantity, Measure("10 s/rad", "1e-6 s/rad", "1000000 s/rad")]
@@ -45,7 +45,7 @@ class Motor(Part):
     """A motor with its gear and the pulley that winds up one tendon; torques and angles are those of the output shaft.
 
     `gear_ratio` counts turns of the input per turn of the output. `compensation` is the share of friction and ripple
-    that is fed forward: below 1, for whoever compensates too much feeds the motion with energy.
+    that is fed forward: below 1, because overcompensation adds energy to the motion.
     """
 
     rotor_inertia: Moment
@@ -62,34 +62,34 @@ class Motor(Part):
     source: Source
 
     def structure(self) -> dict[str, Any]:
-        """All that is not a number, ready for JSON."""
+        """Everything but the numbers, ready for JSON."""
         return {"ripple": [[ripple.shaft, ripple.harmonic] for ripple in self.ripple]}
 
 
 class Roller(Part):
-    """A pulley under the tendon; winding 1 turns the tendon, seen along its run, to the left, -1 to the right."""
+    """A pulley under the tendon; winding 1 deflects the tendon, seen along its run, to the left, -1 to the right."""
 
     radius: Size
     winding: Winding
 
 
 class Wheel(Roller):
-    """A pulley whose centre stands still."""
+    """A pulley with a fixed centre."""
 
     centre: Point2
 
 
 class Sensor(Part):
-    """What the lever's angle sensor reads at both ends of the lever's travel; between them it is linear."""
+    """Readings of the lever's angle sensor at both ends of the lever's travel; between them it is linear."""
 
     slack: Reading
     taut: Reading
 
 
 class CalibratedUnit(Part):
-    """One tendon's own mechanism: the numbers that were measured on it, in place of those of the design.
+    """The calibrated mechanism of one tendon: numbers measured on it, which replace those of the design.
 
-    `tendon` counts all tendons of the hand from zero, finger by finger, as they lie in the forearm.
+    `tendon` counts all tendons of the hand from zero, finger by finger, in their order in the forearm.
     """
 
     tendon: Annotated[int, Field(ge=0, examples=["11"])]
@@ -99,7 +99,7 @@ class CalibratedUnit(Part):
     source: Source
 
     def measured(self) -> dict[str, Any]:
-        """The design's keys that this unit replaces, with its values."""
+        """The keys of the design that this unit overrides, with its values."""
         own = {"rate": self.rate, "free_length": self.free_length, "sensor": self.sensor}
         return {key: value for key, value in own.items() if value is not None}
 
@@ -130,11 +130,11 @@ class Spring(Part):
 
     @property
     def calibrated(self) -> dict[int, Spring]:
-        """The mechanisms of the tendons that have their own: the design, with what was measured in its place."""
+        """Tendon -> its mechanism, for calibrated units: the design with the measured numbers."""
         return {unit.tendon: self.model_copy(update=unit.measured()) for unit in self.units}
 
     def structure(self) -> dict[str, Any]:
-        """All that is not a number, ready for JSON."""
+        """Everything but the numbers, ready for JSON."""
         return {
             "windings": [wheel.winding for wheel in (self.motor, self.roller, self.fixed)],
             "units": [[unit.tendon, sorted(unit.measured())] for unit in self.units],
@@ -142,9 +142,10 @@ class Spring(Part):
 
 
 class Fibre(Part):
-    """The tendon's fibre, from spring to finger, and the guidings it rubs in.
+    """The tendon's fibre, from spring to finger, and its guidings.
 
-    `guiding` is the friction coefficient of the capstan's law (eq. 4.1), `bend` the most a tendon is bent in all.
+    `guiding` is the friction coefficient of the capstan equation (eq. 4.1), `bend` the largest total angle by which the
+    guidings deflect a tendon.
     """
 
     modulus: Annotated[Quantity, Measure("90 GPa", "1 kPa", "1000 GPa")]
@@ -155,5 +156,5 @@ class Fibre(Part):
     source: Source
 
     def structure(self) -> dict[str, Any]:
-        """All that is not a number: nothing."""
+        """Everything but the numbers: nothing."""
         return {}

@@ -1,8 +1,8 @@
-"""The lever spring in plain floats: what can be told of a hand file's numbers before anything is derived.
+"""The lever spring in plain floats: what the checks of a hand file need before anything is derived.
 
 The tendon pulls the roller with two forces f along its straight runs, u1 towards it and u2 away from it; the spring
-pulls the lever's other arm. Both act about the pivot, and balance. Everything here but arcs is analytic, so one
-evaluation with an imaginary step gives a derivative without rounding error to speak of.
+pulls the lever's other arm. Their moments about the pivot balance. All functions but arcs are analytic, so one
+evaluation with an imaginary step gives a derivative with negligible rounding error.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ if TYPE_CHECKING:
 __all__ = ["BEYOND", "CURVE_NODES", "POWERS", "READING_NODES", "Lever", "Pose", "chebyshev"]
 
 CURVE_NODES = 17  # samples for curves over elongation or force; each two more make the error ten times smaller
-READING_NODES = 9  # samples for curves over sensor readings, which are so much smoother
-POWERS = 7  # coefficients of a calibration polynomial from the bench: degree 6 is finer than its data
+READING_NODES = 9  # samples for curves over sensor readings, which are smoother
+POWERS = 7  # coefficients of a measured calibration polynomial: degree 6 is finer than the data
 BEYOND = Fraction(65, 64)  # square of how far curves may be followed, in halves of the travel: an 0.8 % margin
 
 Vector = tuple[complex, complex]
 
-_STEP = 1e-30  # of the imaginary part: far below where its square would be seen
+_STEP = 1e-30  # of the imaginary part: its square is far below the rounding error
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Pose:
 
 
 class Lever:
-    """A spring's mechanism. Raises `ValueError` where a pulley is too close for the tendon to run straight."""
+    """A spring's mechanism. Raises `ValueError` where a pulley is too close for a straight run of the tendon."""
 
     def __init__(self, spring: Spring) -> None:
         self.motor, self.roller, self.fixed = (
@@ -64,7 +64,7 @@ class Lever:
 
     @property
     def travel(self) -> float:
-        """How much of the tendon the mechanism gives between its slack and its taut end [m]."""
+        """Length of tendon that the mechanism pays out between its slack and its taut end [m]."""
         return self._path(self.slack) - self._path(self.taut)
 
     def angles(self, steps: int) -> list[float]:
@@ -72,11 +72,11 @@ class Lever:
         return [self.slack + (self.taut - self.slack) * i / steps for i in range(steps + 1)]
 
     def curve_error(self) -> float:
-        """How far the polynomial through `CURVE_NODES` samples misses an elongation's force, over the largest force."""
+        """Largest error of the force by a polynomial through `CURVE_NODES` samples, over the largest force."""
         slack = self._path(self.slack)
         samples = [self.at(self.slack + float(share) * (self.taut - self.slack)) for share in chebyshev(CURVE_NODES)]
         nodes = [(slack - pose.path) / self.travel for pose in samples]
-        differences = [pose.force for pose in samples]  # Newton's, each as soon as those before are known
+        differences = [pose.force for pose in samples]  # Newton's divided differences, in place
         for order in range(1, CURVE_NODES):
             for i in range(CURVE_NODES - 1, order - 1, -1):
                 differences[i] = (differences[i] - differences[i - 1]) / (nodes[i] - nodes[i - order])
@@ -102,8 +102,8 @@ class Lever:
         (_, u1), (_, u2) = self._runs(angle)
         sideways = (-self.arm * cmath.sin(angle), self.arm * cmath.cos(angle))
         leverage = _dot((u1[0] - u2[0], u1[1] - u2[1]), sideways)
-        turned = angle + self.spring_angle
-        hook = _sum(self.pivot, (self.spring_arm * cmath.cos(turned), self.spring_arm * cmath.sin(turned)))
+        direction = angle + self.spring_angle
+        hook = _sum(self.pivot, (self.spring_arm * cmath.cos(direction), self.spring_arm * cmath.sin(direction)))
         pull = (self.anchor[0] - hook[0], self.anchor[1] - hook[1])
         length = cmath.sqrt(_dot(pull, pull))
         if not length.real > 0:

@@ -251,10 +251,10 @@ def _closure(bar: FourBar, low: Quantity, high: Quantity) -> Iterator[Complaint]
     shortest, longest = abs(coupler - rocker), coupler + rocker
     for step in range(_CLOSURE_STEPS + 1):
         joint = float(low) + (float(high) - float(low)) * step / _CLOSURE_STEPS
-        turned = float(bar.reference) + joint
-        gap = math.sqrt(max(0.0, ground**2 + crank**2 - 2 * ground * crank * math.cos(turned)))
+        angle = float(bar.reference) + joint
+        gap = math.sqrt(max(0.0, ground**2 + crank**2 - 2 * ground * crank * math.cos(angle)))
         if not shortest * (1 + 1e-6) < gap < longest * (1 - 1e-6):
-            angles = f"a joint angle of {math.degrees(joint):.4g} deg (crank at {math.degrees(turned):.4g} deg)"
+            angles = f"a joint angle of {math.degrees(joint):.4g} deg (crank at {math.degrees(angle):.4g} deg)"
             bridge = f"coupler and rocker bridge {shortest * 1e3:.4g} to {longest * 1e3:.4g} mm, not {gap * 1e3:.4g} mm"
             yield (), f"does not close at {angles}: {bridge}"
             return

@@ -1,4 +1,4 @@
-"""What a schema cannot see in motors, springs and fibres: complaints as in `lint`, with the angle that fails."""
+"""What no motor, spring or fibre can have: complaints as in `lint`, with the lever angle that fails."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from awiwi_gen.hand.lint import Complaint, below, sources
 __all__ = ["actuator_complaints"]
 
 _STEPS = 200
-_FARTHEST_ANGLE = 1000.0  # rad; sines of larger arguments have lost too many digits, and the generated ones refuse them
+_FARTHEST_ANGLE = 1000.0  # rad; sines of larger arguments lose too many digits, and the generated sincos refuses them
 _LARGEST_CURVE_ERROR = 1e-6  # of the largest force: far below what a sensor of 12 bits resolves
-_LEAST_LEVERAGE = 0.02  # of the lever's arm: nearer to a dead point, force and stiffness have no bound worth its name
+_LEAST_LEVERAGE = 0.02  # of the lever's arm: nearer to a dead point, force and stiffness have no useful bound
 
 
 def actuator_complaints(
     motor: Motor | None, spring: Spring | None, tendon: Fibre | None, tendons: int
 ) -> Iterator[Complaint]:
-    """All that is wrong with actuators whose single values are all right, for a hand with so many tendons."""
+    """All faults of actuators whose single values are valid, for a hand with so many tendons."""
     if motor:
         yield from below(("motor",), _motor(motor))
     if spring:
@@ -27,17 +27,17 @@ def actuator_complaints(
     if tendon:
         yield from below(("tendon",), sources(tendon))
     if motor and spring and motor.pulley != spring.motor.radius:
-        same = f'motor.pulley = "{motor.pulley}"; the mechanism begins at the pulley of the motor'
+        same = f'motor.pulley = "{motor.pulley}"; they are the same pulley'
         yield ("spring", "motor", "radius"), f'= "{spring.motor.radius}" is not {same}'
 
 
 def _motor(motor: Motor) -> Iterator[Complaint]:
     yield from sources(motor)
-    turned = float(motor.travel) * float(motor.gear_ratio)
+    rotation = float(motor.travel) * float(motor.gear_ratio)
     harmonic = max((ripple.harmonic for ripple in motor.ripple if ripple.shaft == "input"), default=0)
-    if turned * harmonic > _FARTHEST_ANGLE:
+    if rotation * harmonic > _FARTHEST_ANGLE:
         limit = f"harmonic {harmonic} of its ripple is computed to {_FARTHEST_ANGLE:.0f}/{harmonic} rad"
-        yield ("travel",), f'= "{motor.travel}" turns the rotor by {turned:.6g} rad; {limit}'
+        yield ("travel",), f'= "{motor.travel}" turns the rotor by {rotation:.6g} rad; {limit}'
     lines = [(ripple.shaft, ripple.harmonic) for ripple in motor.ripple]
     for index, line in enumerate(lines):
         if line in lines[:index]:
@@ -69,20 +69,20 @@ def _sensor(sensor: Sensor) -> Iterator[Complaint]:
 
 
 def _unit(units: Sequence[CalibratedUnit], index: int, tendons: int) -> Iterator[Complaint]:
-    """A unit is that of an existing tendon, and the only one."""
+    """A unit belongs to an existing tendon, which has no other unit."""
     unit = units[index]
     yield from sources(unit)
     if unit.sensor:
         yield from below(("sensor",), _sensor(unit.sensor))
     if unit.tendon >= tendons:
-        yield ("tendon",), f"= {unit.tendon} is none of this hand's tendons; they count from 0 to {tendons - 1}"
+        yield ("tendon",), f"= {unit.tendon} is no tendon of this hand; expected 0 to {tendons - 1}"
     first = next(i for i, other in enumerate(units) if other.tendon == unit.tendon)
     if first < index:
         yield ("tendon",), f"= {unit.tendon} is units[{first}] already"
 
 
 def _obstacle(spring: Spring) -> str:
-    """The first lever angle where the mechanism is no spring such as tendons need, and why; nothing if all is well."""
+    """The first lever angle where the mechanism is no convex spring, and why; empty if there is none."""
     lever = Lever(spring)
     stiffness = 0.0
     for angle in lever.angles(_STEPS):
@@ -104,7 +104,7 @@ def _fault(pose: Pose, lever: Lever) -> str:
     if not pays_out > _LEAST_LEVERAGE * lever.arm:
         return f"the tendon turns the lever with an arm of {pays_out * 1e3:.4g} mm; dead points must stay far away"
     if not pose.wrap > 0:
-        return f"the tendon leaves the roller, around which it turns by {pose.wrap:.4g} rad"
+        return f"the tendon leaves the roller, with a wrap angle of {pose.wrap:.4g} rad"
     if not pose.stretch > 0:
         return f"the spring is not stretched but {-pose.stretch * 1e3:.4g} mm too short to pull"
     if not pose.force > 0:

@@ -7,8 +7,8 @@ carry the palm, a rigid triangle A, B, C:
     bar CC0     its mirror image at half width: from (0, width, 0) to C = (b.x, 0, b.z)
     bar AA0     from `a0` to `a`, which lies straight across the palm from M, the middle of BC
 
-The lengths of the bars, the width B0C0 = BC, the height AM and the neutral angles all follow from these points, so a
-drawing cannot contradict itself. Which of its ways of assembly the linkage is in follows too: that with crossed bars.
+The lengths of the bars, the width B0C0 = BC, the height AM and the neutral angles follow from these points, so a
+drawing cannot contradict itself. So does the assembly of the linkage: the one with crossed bars.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ from awiwi_gen.hand.parts import Angle, Keys, Part, Point, Source
 __all__ = ["Linkage", "Swing", "Wrist", "WristTendon", "closure"]
 
 _STEPS = 40  # per axis, of the grid of poses on which the bars must close
-_MARGIN = 1e-6  # how far, relatively, from the end of its reach a bar must stay
+_MARGIN = 1e-6  # relative distance that a bar keeps from the end of its reach
 
 
 class Swing(Part):
-    """How far an internal angle of the wrist goes to either side of its neutral value."""
+    """Range of an internal angle of the wrist, relative to its neutral value."""
 
     low: Angle
     high: Angle
@@ -43,7 +43,7 @@ class WristTendon(Part):
 
 
 class Wrist(Part):
-    """Two degrees of freedom between forearm and palm, and the tendons that pass through.
+    """Two degrees of freedom between forearm and palm, and the tendons through the wrist.
 
     The palm frame is parallel to {0} in the neutral pose, with its origin at `palm`. `q71` turns the plane of B and C
     about B0C0, `q73` is the angle between B0C0 and bar BB0 in that plane.
@@ -72,12 +72,12 @@ class Wrist(Part):
         return low, (q71 + float(self.q71.high), q73 + float(self.q73.high))
 
     def structure(self) -> dict[str, Any]:
-        """All that is not a number, ready for JSON."""
+        """Everything but the numbers, ready for JSON."""
         return {"tendons": len(self.tendons)}
 
 
 def closure(wrist: Wrist) -> Iterator[tuple[Keys, str]]:
-    """What keeps the drawn linkage from moving through its whole range: (keys, predicate) pairs as for `lint`."""
+    """Why the drawn linkage cannot move through its whole range: complaints as in `lint`."""
     if drawn := list(_misdrawn(wrist)):
         yield from drawn
         return
@@ -93,16 +93,19 @@ def closure(wrist: Wrist) -> Iterator[tuple[Keys, str]]:
 
 
 def _misdrawn(wrist: Wrist) -> Iterator[tuple[Keys, str]]:
-    """What the points of the neutral pose must fulfil, without rounding."""
+    """Conditions that the points of the neutral pose break."""
     x0, _, z0 = (coordinate.value for coordinate in wrist.a0)
     x, y, z = (coordinate.value for coordinate in wrist.a)
     bx, by, bz = (coordinate.value for coordinate in wrist.b)
     if by <= 0 or not (bx or bz):
         yield ("b",), "does not cross the width of the wrist: expected y = B0C0 above zero, and x or z other than zero"
     for axis, found, wanted in (("x", x, bx), ("y", y, by / 2)):
-        if found != wanted:
-            opposite = f"expected {float(wanted) * 1e3:.6g} mm, straight across the palm from the middle of BC"
-            yield ("a",), f"has {axis} = {float(found) * 1e3:.6g} mm; {opposite}"
+        if float(found) != float(wanted):
+            digits = next(
+                (n for n in range(6, 18) if f"{float(found) * 1e3:.{n}g}" != f"{float(wanted) * 1e3:.{n}g}"), 17
+            )
+            given, expected = (f"{float(value) * 1e3:.{digits}g} mm" for value in (found, wanted))
+            yield ("a",), f"has {axis} = {given}; expected {expected}, straight across the palm from the middle of BC"
     if x0 >= bx:
         yield ("a0", 0), f'= "{wrist.a0[0]}" lies no nearer to the elbow than the palm, with b at x = "{wrist.b[0]}"'
     off_plane = z0 * bx - x0 * bz  # of A0 from the plane of the side bars, times their length in it
@@ -124,14 +127,14 @@ class Linkage:
 
     @classmethod
     def of(cls, wrist: Wrist) -> Linkage:
-        """The linkage as it is drawn."""
+        """The linkage of the drawing."""
         x, y, z = (float(value) for value in wrist.a0)
         points = [tuple(float(value) for value in point) for point in (wrist.a, wrist.b)]
         a, b = points
         return cls((x, y, z), math.hypot(*b), b[1], b[2] - a[2], math.dist((x, y, z), a))
 
     def obstacle(self, q71: float, q73: float) -> str:
-        """Why there is no such pose; nothing if there is."""
+        """Why the linkage does not have a pose; empty if it does."""
         x0, y0, z0 = self.a0
         along, across = self.side * math.sin(q73), self.side * math.cos(q73)  # B, in the plane of the side bars
         if not along > _MARGIN * self.side:
