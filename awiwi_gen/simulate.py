@@ -161,6 +161,9 @@ class Machine:
     def _dtype(self) -> Any:
         return np.dtype(np.float64 if self.library.manifest["c_type"] == "double" else np.float32)
 
+    def _pointer(self, array: Array) -> Any:
+        return self.library.ffi.from_buffer(f"{self.library.manifest['c_type']}[]", array)
+
     @property
     def states(self) -> int:
         """Number of states of the plant."""
@@ -174,8 +177,8 @@ class Machine:
         for port, wire in self._wired():
             if isinstance(wire, str) and "[" not in wire:
                 sizes.setdefault(wire, prod(port["shape"]))
-        pairs: list[tuple[Wire, Wire]] = [(sensor.target, sensor.source) for sensor in self.loop.sensors]
-        pairs += [(actuator.target, actuator.source) for actuator in self.loop.actuators]
+        pairs = [(each.target, each.source) for each in self.loop.sensors]
+        pairs += [(each.target, each.source) for each in self.loop.actuators]
         pairs += [(rate, state) for state, rate in self.loop.states.items()]
         for target, source in pairs:
             if isinstance(target, str) and "[" not in target:
@@ -229,9 +232,7 @@ class Machine:
         """Indices of the signals of a wire, or of a constant of a sum. Raises InputError if there are none."""
         if isinstance(wire, tuple):
             return [index for part in wire for index in self.indices(part)]
-        if not isinstance(wire, str):
-            return [self.slices[_constant(wire)].start]
-        name, low, high = _parts(wire)
+        name, low, high = _parts(wire) if isinstance(wire, str) else (_constant(wire), None, None)
         if name not in self.slices:
             raise InputError(f"no signal {wire!r}: no block writes it, and the scenario gives it no value")
         whole = range(self.slices[name].start, self.slices[name].stop)
@@ -258,21 +259,27 @@ class Machine:
         counts = (self.states, len(loop.plant), len(loop.law), len(sensors), len(actuators))
         return ffi.new("awiwi_loop *", (*counts, *blocks, *tables, loop.period, 1, seed))
 
-    def _row(self, block: Element) -> tuple[Any, ...]:
-        """A block as C has it: its function, and the indices of what it reads and writes."""
-        if isinstance(block, Sum):
-            function, target = self.library.ffi.NULL, self.indices(block.target)
-            read = [index for term in block.terms for factor in term for index in self._repeated(factor, len(target))]
+    def _row(self, element: Element) -> tuple[Any, ...]:
+        """A block or a sum as C has it: its function, and the indices of what it reads and writes."""
+        written, most = self._outputs(element), self.library.c.AWIWI_MOST_ARGUMENTS
+        if isinstance(element, Sum):
+            factors = [factor for term in element.terms for factor in term]
+            read = [index for factor in factors for index in self._repeated(factor, len(written))]
         else:
-            function = self._kernel(block).flat
-            read, target = (self._ports(block, ports) for ports in self._sides(block))
-        sides = [self.library.ffi.new("int[]", side) for side in (read, target)]
+            read = self._ports(element, self._kernel(element).inputs)
+        if max(len(read), len(written)) > most:
+            raise InputError(
+                f"a block reads {len(read)} and writes {len(written)} elements; at most {most} are possible"
+            )
+        sides = [self.library.ffi.new("int[]", side) for side in (read, written)]
         self._alive += sides
-        return function, len(read), len(target), *sides
+        function = self.library.ffi.NULL if isinstance(element, Sum) else self._kernel(element).flat
+        return function, len(read), len(written), *sides
 
-    def _sides(self, block: Block) -> tuple[Any, Any]:
-        kernel = self._kernel(block)
-        return kernel.inputs, kernel.outputs
+    def _outputs(self, element: Element) -> list[int]:
+        if isinstance(element, Sum):
+            return self.indices(element.target)
+        return self._ports(element, self._kernel(element).outputs)
 
     def _ports(self, block: Block, ports: Any) -> list[int]:
         indices: list[int] = []
@@ -307,12 +314,11 @@ class Machine:
         parts = {name: self.indices(name) for name in watch}
         watched = [index for part in parts.values() for index in part]
         record = np.zeros((ceil(scenario.ticks / every), len(watched)), self._dtype)
-        pointer = f"{self.library.manifest['c_type']}[]"
-        tables = [ffi.new("int[]", inputs), ffi.from_buffer(pointer, values), ffi.new("int[]", watched)]
+        tables = [ffi.new("int[]", inputs), self._pointer(values), ffi.new("int[]", watched)]
         counts = (scenario.ticks, len(inputs), len(watched), every)
-        plan = ffi.new("awiwi_run *", (*counts, *tables, ffi.from_buffer(pointer, record)))
+        plan = ffi.new("awiwi_run *", (*counts, *tables, self._pointer(record)))
         refused, status = ffi.new("int *"), ffi.new("int *")
-        done = self.library.c.awiwi_simulate(self.c, plan, ffi.from_buffer(pointer, self.signals), refused, status)
+        done = self.library.c.awiwi_simulate(self.c, plan, self._pointer(self.signals), refused, status)
         record = record[: ceil(done / every)]
         ends = np.cumsum([len(part) for part in parts.values()])[:-1]
         split = dict(zip(parts, np.split(record, ends, axis=1), strict=True))
@@ -328,16 +334,14 @@ class Machine:
 
     def rates(self, signals: Array) -> Array:
         """Rates of the plant's states (states,) at given signals; writes the plant's other outputs into them."""
-        pointer = f"{self.library.manifest['c_type']}[]"
-        if self.library.c.awiwi_rates(self.c, self.library.ffi.from_buffer(pointer, signals)):
+        if self.library.c.awiwi_rates(self.c, self._pointer(signals)):
             raise InputError("the plant has no rates there: one of its kernels fails")
         return signals[self.states : 2 * self.states].copy()
 
     def tick(self, signals: Array) -> Array:
         """All signals one period later."""
         after = signals.copy()
-        pointer = f"{self.library.manifest['c_type']}[]"
-        status = self.library.c.awiwi_tick(self.c, 0, self.library.ffi.from_buffer(pointer, after))
+        status = self.library.c.awiwi_tick(self.c, 0, self._pointer(after))
         if status:
             raise InputError(f"the loop cannot continue from there (status {status})")
         return after
@@ -351,10 +355,7 @@ class Machine:
         written = [sensor.target for sensor in self.loop.sensors]
         written += [wire for actuator in self.loop.actuators for wire in (actuator.source, actuator.target)]
         indices = {*range(self.states), *(index for wire in written for index in self.indices(wire))}
-        for block in self.loop.law:
-            indices |= set(
-                self.indices(block.target) if isinstance(block, Sum) else self._ports(block, self._sides(block)[1])
-            )
+        indices |= {index for element in self.loop.law for index in self._outputs(element)}
         return sorted(indices)
 
     def plant_slopes(self) -> Array:

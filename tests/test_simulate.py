@@ -247,6 +247,7 @@ def test_a_law_that_reads_nan_commands_zero_and_recovers(lib):
         (Loop([Block("plant_joint_linear", {"u": "torques"})], [], {"x": "xd"}), {"torques": np.zeros(2)}, "u has 1"),
         (joint(FEEDBACK, [Sensor("x[7]", "seen")]), {}, "beyond its signal, which has 4 elements"),
         (joint(actuators=[Actuator("wanted", "x")]), {"wanted": 0.0}, "wanted has 1 elements, x has 4"),
+        (joint([Sum("many", (1.0, "long"))]), {"long": np.zeros(300)}, "a block reads 600 and writes 300 elements"),
         (joint([Sum("total", ("x", "damping"))]), {}, "a sum of 4 elements has the factor 'damping' of 2"),
         (Loop([Block("plant_joint_linear")], [], {"y": "xd"}), {}, "y is a state or a rate whose size"),
     ],
