@@ -10,7 +10,7 @@
  *   in   damping[1] in N m s/rad, 0 to 0.005
  *   out  x_des[6] in rad, rad/s, from [-3, -50, -3, -50, -3, -50] to [3, 50, 3, 50, 3, 50]
  *   out  u_des[2] in N m
- * Returns 0 where slope 1 is positive and slope 2 is positive; elsewhere 1, and what is not defined is
+ * Returns 0 where slope 1 is positive and slope 2 is positive; else 1, and outputs without a value are
  * NaN.
  * Cost: 15 add, 15 mul, 2 div.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.

@@ -5,7 +5,7 @@
  *   in   x[2] in 1, from [-3, -10] to [3, 10]
  *   in   k[2] in 1, 0.01 to 10
  *   out  u[1] in 1
- * Returns 0 where k1 is positive and k2 is positive; elsewhere 1, and what is not defined is NaN.
+ * Returns 0 where k1 is positive and k2 is positive; else 1, and outputs without a value are NaN.
  * Cost: 6 add, 7 mul.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */

@@ -17,8 +17,8 @@
  * inertia is positive and slope 1 is positive and slope 2 is positive and K_p is positive and K_d is
  * positive and K_3 of motor 1 is positive and K_4 of motor 1 is positive and C_t of motor 1 is
  * positive and C_s of motor 1 is positive and K_3 of motor 2 is positive and K_4 of motor 2 is
- * positive and C_t of motor 2 is positive and C_s of motor 2 is positive; elsewhere 1, and what is not
- * defined is NaN.
+ * positive and C_t of motor 2 is positive and C_s of motor 2 is positive; else 1, and outputs without
+ * a value are NaN.
  * Cost: 48 add, 40 mul, 7 div.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */

@@ -14,7 +14,7 @@
  *   out  tau_m[1] in N m
  * Returns 0 where the link's inertia is positive and the motor's inertia is positive and the stiffness
  * is positive and K_p is positive and K_d is positive and K_3 is positive and K_4 is positive and C_t
- * is positive and C_s is positive; elsewhere 1, and what is not defined is NaN.
+ * is positive and C_s is positive; else 1, and outputs without a value are NaN.
  * Cost: 22 add, 16 mul, 4 div.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */

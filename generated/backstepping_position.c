@@ -11,7 +11,7 @@
  *   out  tau_m[1] in N m
  * Returns 0 where the link's inertia is positive and the motor's inertia is positive and the stiffness
  * is positive and k1 is positive and k2 is positive and k3 is positive and k4 is positive and c2 is
- * positive and c3 is positive and c4 is positive; elsewhere 1, and what is not defined is NaN.
+ * positive and c3 is positive and c4 is positive; else 1, and outputs without a value are NaN.
  * Cost: 22 add, 16 mul, 4 div.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */

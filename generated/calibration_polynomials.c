@@ -12,8 +12,8 @@
  *   out  dL[1] in m
  *   out  force[1] in N
  *   out  stiffness[1] in N/m
- * Returns 0 where the argument is within the lever's travel, give or take a hundredth; elsewhere 1,
- * and what is not defined is NaN.
+ * Returns 0 where the argument is within the lever's travel, give or take a hundredth; else 1, and
+ * outputs without a value are NaN.
  * Cost: 23 add, 19 mul, 1 div.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */

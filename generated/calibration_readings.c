@@ -7,8 +7,8 @@
  *   out  dL[38] in m
  *   out  force[38] in N
  *   out  stiffness[38] in N/m
- * Returns 0 where the argument is within the lever's travel, give or take a hundredth; elsewhere 1,
- * and what is not defined is NaN.
+ * Returns 0 where the argument is within the lever's travel, give or take a hundredth; else 1, and
+ * outputs without a value are NaN.
  * Cost: 1062 add, 1062 mul, 37 calls.
  * Inputs: sha256 81166638325d19ce820092fbbacf77498af1a52b1dd7a49aece0ce3925406682.
  */

@@ -19,8 +19,8 @@
  *   in   force_kd[1] in 1/s, 10 to 10000
  *   out  tau[1] in N m
  * Returns 0 where the tendon's stiffness is positive and the pulley's radius is positive and the
- * motor's inertia is positive and the gain kp is positive and the gain kd is positive; elsewhere 1,
- * and what is not defined is NaN.
+ * motor's inertia is positive and the gain kp is positive and the gain kd is positive; else 1, and
+ * outputs without a value are NaN.
  * Cost: 8 add, 8 mul, 2 div.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */

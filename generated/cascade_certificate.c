@@ -13,8 +13,8 @@
  *   in   omega[1] in rad/s, 10 to 1000
  *   out  margin[1] in 1
  *   out  S[8][3] in m/N, m s/N, m s^2/N
- * Returns 0 where the weight is positive and the frequency omega is positive; elsewhere 1, and what is
- * not defined is NaN.
+ * Returns 0 where the weight is positive and the frequency omega is positive; else 1, and outputs
+ * without a value are NaN.
  * Cost: 166 add, 210 mul, 23 div, 20 calls.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */

@@ -4,7 +4,7 @@
  * Source: eq. 5.6, 5.9, 5.21.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   out  P[8][4] in m/rad
- * Cost: nothing but moves.
+ * Cost: copies only.
  * Inputs: sha256 fc64e49011f94c883d0dff8d313f87b0ec40722e48a38df7128230bbe8804bb6.
  */
 #include "numerics.h"

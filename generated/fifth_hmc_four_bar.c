@@ -10,7 +10,7 @@
  *   out  coupler_ratio[1] in 1
  *   out  rocker_ratio[1] in 1
  *   out  transmission[1] in 1
- * Returns 0 where the loop closes; elsewhere 1, and what is not defined is NaN.
+ * Returns 0 where the loop closes; else 1, and outputs without a value are NaN.
  * Cost: 15 add, 25 mul, 2 div, 1 sqrt, 1 sincos, 2 calls.
  * Inputs: sha256 d021538d8900d42317b84036df325beebaa6feecad7df8e1e869f0ec5a1f0d9f.
  */

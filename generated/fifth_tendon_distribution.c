@@ -12,7 +12,7 @@
  *   in   f_max[1] in N, 76.0811 to 100.149
  *   out  f[8] in N
  * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
- * Cost: at most 66 times that of fifth_coupling and fifth_tendon_stiffness, and the solver's own.
+ * Cost: the solver's own work and calls, at most: 1 of fifth_coupling, 66 of fifth_tendon_stiffness.
  */
 #include "numerics.h"
 #include "awiwi_distribution.h"

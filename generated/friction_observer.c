@@ -15,7 +15,7 @@
  *   out  momentum_next[1] in N m s
  *   out  friction[1] in N m
  * Returns 0 where the motor's inertia is positive and the gain is positive and the period is positive;
- * elsewhere 1, and what is not defined is NaN.
+ * else 1, and outputs without a value are NaN.
  * Cost: 5 add, 5 mul, 1 div, 1 neg.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */

@@ -7,7 +7,7 @@
  *   in   wrist[2] in rad, from [0.1004, 0.6234] to [1.148, 1.322]
  *   out  h[38] in m
  * Returns 0 where the side bars are short of the line B0C0 (q73 between 0 and pi) and their plane is
- * short of A0 and bar AA0 reaches; elsewhere 1, and what is not defined is NaN.
+ * short of A0 and bar AA0 reaches; else 1, and outputs without a value are NaN.
  * Cost: 254 add, 180 mul, 2 div, 43 sqrt, 4 sincos.
  * Inputs: sha256 043c7fe4cf3ab8c45707fb92fe06f721b86c5746382be7b476392fac3d18624a.
  */

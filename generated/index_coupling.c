@@ -4,7 +4,7 @@
  * Source: eq. 5.6, 5.9, 5.21.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   out  P[8][4] in m/rad
- * Cost: nothing but moves.
+ * Cost: copies only.
  * Inputs: sha256 c04274f97a734fc3fdffd0d8f88190412d5617239e915734eaf2c2cd78e52397.
  */
 #include "numerics.h"

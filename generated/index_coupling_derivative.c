@@ -4,7 +4,7 @@
  * Source: eq. 5.11.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   out  dP[8][4][4] in m/rad^2
- * Cost: nothing but moves.
+ * Cost: copies only.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
 #include "numerics.h"

@@ -6,7 +6,7 @@
 /* Port x of a kernel is the parameter x_in or x_out, an array of numbers row by row. The caller owns all arrays;
  * outputs overlap neither inputs nor each other (definitions are `restrict`). */
 
-/* For toolchains that tell names apart by 31 characters only: define AWIWI_SHORT_NAMES in every file. */
+/* For toolchains that use only 31 characters of a name: define AWIWI_SHORT_NAMES in every file. */
 #ifdef AWIWI_SHORT_NAMES
 #define awiwi_thumb_inverse_dynamics_derivatives awiwi_thumb_inverse_dy_c9173c4f
 #define awiwi_thumb_joint_torque_and_stiffness awiwi_thumb_joint_torq_9ffb34a1
@@ -51,8 +51,8 @@ extern const char awiwi_model_digest[65];
  *   out  k[8] in N/m
  *   out  slope[8] in 1/m
  *   out  curvature[8] in 1/(N m)
- * Returns 0 where every tension is on its spring's curve, give or take a hundredth; elsewhere 1, and
- * what is not defined is NaN.
+ * Returns 0 where every tension is on its spring's curve, give or take a hundredth; else 1, and
+ * outputs without a value are NaN.
  * Cost: 198 add, 198 mul, 7 calls.
  */
 int awiwi_thumb_tendon_stiffness(const double tension_in[8], double k_out[8], double slope_out[8], double curvature_out[8]);
@@ -263,7 +263,7 @@ void awiwi_thumb_joint_torque_and_stiffness(const double q_in[4], const double f
  *   in   start[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   out  q[4] in rad
  * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
- * Cost: at most 24 times that of thumb_tendon_lengths and thumb_coupling, and the solver's own.
+ * Cost: the solver's own work and calls, at most: 24 of thumb_tendon_lengths, 24 of thumb_coupling.
  */
 int awiwi_thumb_joint_estimate(const double h_in[8], const double start_in[4], double q_out[4]);
 
@@ -292,7 +292,7 @@ void awiwi_thumb_joint_estimate_error(const double q_in[4], const double noise_i
  *   in   f_max[1] in N, 76.0811 to 100.149
  *   out  f[8] in N
  * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
- * Cost: at most 357 times that of thumb_coupling and thumb_tendon_stiffness and thumb_coupling_derivative, and the solver's own.
+ * Cost: the solver's own work and calls, at most: 1 of thumb_coupling, 357 of thumb_tendon_stiffness, 1 of thumb_coupling_derivative.
  */
 int awiwi_thumb_tendon_distribution(const double q_in[4], const double tau_in[4], const double K_in[16], const double f_min_in[1], const double f_max_in[1], double f_out[8]);
 
@@ -303,7 +303,7 @@ int awiwi_thumb_tendon_distribution(const double q_in[4], const double tau_in[4]
  *   in   start[2] in rad, -0.610865 to 0.610865
  *   out  q[2] in rad
  * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
- * Cost: at most 51 times that of thumb_tendon_lengths and thumb_coupling, and the solver's own.
+ * Cost: the solver's own work and calls, at most: 51 of thumb_tendon_lengths, 51 of thumb_coupling.
  */
 int awiwi_thumb_base_estimate_by_gradient(const double h_in[4], const double start_in[2], double q_out[2]);
 
@@ -315,8 +315,8 @@ int awiwi_thumb_base_estimate_by_gradient(const double h_in[4], const double sta
  *   out  k[8] in N/m
  *   out  slope[8] in 1/m
  *   out  curvature[8] in 1/(N m)
- * Returns 0 where every tension is on its spring's curve, give or take a hundredth; elsewhere 1, and
- * what is not defined is NaN.
+ * Returns 0 where every tension is on its spring's curve, give or take a hundredth; else 1, and
+ * outputs without a value are NaN.
  * Cost: 198 add, 198 mul, 7 calls.
  */
 int awiwi_index_tendon_stiffness(const double tension_in[8], double k_out[8], double slope_out[8], double curvature_out[8]);
@@ -474,7 +474,7 @@ void awiwi_index_tendon_lengths(const double q_in[4], double h_out[8]);
  * Source: eq. 5.6, 5.9, 5.21.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   out  P[8][4] in m/rad
- * Cost: nothing but moves.
+ * Cost: copies only.
  */
 void awiwi_index_coupling(const double q_in[4], double P_out[32]);
 
@@ -483,7 +483,7 @@ void awiwi_index_coupling(const double q_in[4], double P_out[32]);
  * Source: eq. 5.11.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   out  dP[8][4][4] in m/rad^2
- * Cost: nothing but moves.
+ * Cost: copies only.
  */
 void awiwi_index_coupling_derivative(const double q_in[4], double dP_out[128]);
 
@@ -555,7 +555,7 @@ void awiwi_index_joint_estimate_error(const double q_in[4], const double noise_i
  *   in   f_max[1] in N, 76.0811 to 100.149
  *   out  f[8] in N
  * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
- * Cost: at most 66 times that of index_coupling and index_tendon_stiffness, and the solver's own.
+ * Cost: the solver's own work and calls, at most: 1 of index_coupling, 66 of index_tendon_stiffness.
  */
 int awiwi_index_tendon_distribution(const double q_in[4], const double tau_in[4], const double K_in[16], const double f_min_in[1], const double f_max_in[1], double f_out[8]);
 
@@ -567,8 +567,8 @@ int awiwi_index_tendon_distribution(const double q_in[4], const double tau_in[4]
  *   out  k[8] in N/m
  *   out  slope[8] in 1/m
  *   out  curvature[8] in 1/(N m)
- * Returns 0 where every tension is on its spring's curve, give or take a hundredth; elsewhere 1, and
- * what is not defined is NaN.
+ * Returns 0 where every tension is on its spring's curve, give or take a hundredth; else 1, and
+ * outputs without a value are NaN.
  * Cost: 198 add, 198 mul, 7 calls.
  */
 int awiwi_middle_tendon_stiffness(const double tension_in[8], double k_out[8], double slope_out[8], double curvature_out[8]);
@@ -726,7 +726,7 @@ void awiwi_middle_tendon_lengths(const double q_in[4], double h_out[8]);
  * Source: eq. 5.6, 5.9, 5.21.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   out  P[8][4] in m/rad
- * Cost: nothing but moves.
+ * Cost: copies only.
  */
 void awiwi_middle_coupling(const double q_in[4], double P_out[32]);
 
@@ -735,7 +735,7 @@ void awiwi_middle_coupling(const double q_in[4], double P_out[32]);
  * Source: eq. 5.11.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   out  dP[8][4][4] in m/rad^2
- * Cost: nothing but moves.
+ * Cost: copies only.
  */
 void awiwi_middle_coupling_derivative(const double q_in[4], double dP_out[128]);
 
@@ -807,7 +807,7 @@ void awiwi_middle_joint_estimate_error(const double q_in[4], const double noise_
  *   in   f_max[1] in N, 76.0811 to 100.149
  *   out  f[8] in N
  * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
- * Cost: at most 66 times that of middle_coupling and middle_tendon_stiffness, and the solver's own.
+ * Cost: the solver's own work and calls, at most: 1 of middle_coupling, 66 of middle_tendon_stiffness.
  */
 int awiwi_middle_tendon_distribution(const double q_in[4], const double tau_in[4], const double K_in[16], const double f_min_in[1], const double f_max_in[1], double f_out[8]);
 
@@ -819,8 +819,8 @@ int awiwi_middle_tendon_distribution(const double q_in[4], const double tau_in[4
  *   out  k[6] in N/m
  *   out  slope[6] in 1/m
  *   out  curvature[6] in 1/(N m)
- * Returns 0 where every tension is on its spring's curve, give or take a hundredth; elsewhere 1, and
- * what is not defined is NaN.
+ * Returns 0 where every tension is on its spring's curve, give or take a hundredth; else 1, and
+ * outputs without a value are NaN.
  * Cost: 148 add, 148 mul, 5 calls.
  */
 int awiwi_ring_tendon_stiffness(const double tension_in[6], double k_out[6], double slope_out[6], double curvature_out[6]);
@@ -978,7 +978,7 @@ void awiwi_ring_tendon_lengths(const double q_in[3], double h_out[6]);
  * Source: eq. 5.6, 5.9, 5.21.
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   out  P[6][3] in m/rad
- * Cost: nothing but moves.
+ * Cost: copies only.
  */
 void awiwi_ring_coupling(const double q_in[3], double P_out[18]);
 
@@ -987,7 +987,7 @@ void awiwi_ring_coupling(const double q_in[3], double P_out[18]);
  * Source: eq. 5.11.
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   out  dP[6][3][3] in m/rad^2
- * Cost: nothing but moves.
+ * Cost: copies only.
  */
 void awiwi_ring_coupling_derivative(const double q_in[3], double dP_out[54]);
 
@@ -1059,7 +1059,7 @@ void awiwi_ring_joint_estimate_error(const double q_in[3], const double noise_in
  *   in   f_max[1] in N, 76.0811 to 100.149
  *   out  f[6] in N
  * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
- * Cost: at most 66 times that of ring_coupling and ring_tendon_stiffness, and the solver's own.
+ * Cost: the solver's own work and calls, at most: 1 of ring_coupling, 66 of ring_tendon_stiffness.
  */
 int awiwi_ring_tendon_distribution(const double q_in[3], const double tau_in[3], const double K_in[9], const double f_min_in[1], const double f_max_in[1], double f_out[6]);
 
@@ -1071,8 +1071,8 @@ int awiwi_ring_tendon_distribution(const double q_in[3], const double tau_in[3],
  *   out  k[8] in N/m
  *   out  slope[8] in 1/m
  *   out  curvature[8] in 1/(N m)
- * Returns 0 where every tension is on its spring's curve, give or take a hundredth; elsewhere 1, and
- * what is not defined is NaN.
+ * Returns 0 where every tension is on its spring's curve, give or take a hundredth; else 1, and
+ * outputs without a value are NaN.
  * Cost: 198 add, 198 mul, 7 calls.
  */
 int awiwi_fifth_tendon_stiffness(const double tension_in[8], double k_out[8], double slope_out[8], double curvature_out[8]);
@@ -1230,7 +1230,7 @@ void awiwi_fifth_tendon_lengths(const double q_in[4], double h_out[8]);
  * Source: eq. 5.6, 5.9, 5.21.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   out  P[8][4] in m/rad
- * Cost: nothing but moves.
+ * Cost: copies only.
  */
 void awiwi_fifth_coupling(const double q_in[4], double P_out[32]);
 
@@ -1239,7 +1239,7 @@ void awiwi_fifth_coupling(const double q_in[4], double P_out[32]);
  * Source: eq. 5.11.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   out  dP[8][4][4] in m/rad^2
- * Cost: nothing but moves.
+ * Cost: copies only.
  */
 void awiwi_fifth_coupling_derivative(const double q_in[4], double dP_out[128]);
 
@@ -1311,7 +1311,7 @@ void awiwi_fifth_joint_estimate_error(const double q_in[4], const double noise_i
  *   in   f_max[1] in N, 76.0811 to 100.149
  *   out  f[8] in N
  * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
- * Cost: at most 66 times that of fifth_coupling and fifth_tendon_stiffness, and the solver's own.
+ * Cost: the solver's own work and calls, at most: 1 of fifth_coupling, 66 of fifth_tendon_stiffness.
  */
 int awiwi_fifth_tendon_distribution(const double q_in[4], const double tau_in[4], const double K_in[16], const double f_min_in[1], const double f_max_in[1], double f_out[8]);
 
@@ -1326,7 +1326,7 @@ int awiwi_fifth_tendon_distribution(const double q_in[4], const double tau_in[4]
  *   out  coupler_ratio[1] in 1
  *   out  rocker_ratio[1] in 1
  *   out  transmission[1] in 1
- * Returns 0 where the loop closes; elsewhere 1, and what is not defined is NaN.
+ * Returns 0 where the loop closes; else 1, and outputs without a value are NaN.
  * Cost: 15 add, 25 mul, 2 div, 1 sqrt, 1 sincos, 2 calls.
  */
 int awiwi_fifth_hmc_four_bar(const double q_in[1], double coupler_out[1], double rocker_out[1], double coupler_ratio_out[1], double rocker_ratio_out[1], double transmission_out[1]);
@@ -1340,7 +1340,7 @@ int awiwi_fifth_hmc_four_bar(const double q_in[1], double coupler_out[1], double
  *   out  B[3] in m
  *   out  C[3] in m
  * Returns 0 where the side bars are short of the line B0C0 (q73 between 0 and pi) and their plane is
- * short of A0 and bar AA0 reaches; elsewhere 1, and what is not defined is NaN.
+ * short of A0 and bar AA0 reaches; else 1, and outputs without a value are NaN.
  * Cost: 20 add, 39 mul, 2 div, 1 neg, 1 sqrt, 2 sincos.
  */
 int awiwi_wrist_points(const double q71_in[1], const double q73_in[1], double A_out[3], double B_out[3], double C_out[3]);
@@ -1352,7 +1352,7 @@ int awiwi_wrist_points(const double q71_in[1], const double q73_in[1], double A_
  *   in   q73[1] in rad, 0.6234 to 1.32153
  *   out  T[4][4] in 1, m
  * Returns 0 where the side bars are short of the line B0C0 (q73 between 0 and pi) and their plane is
- * short of A0 and bar AA0 reaches; elsewhere 1, and what is not defined is NaN.
+ * short of A0 and bar AA0 reaches; else 1, and outputs without a value are NaN.
  * Cost: 24 add, 48 mul, 2 div, 1 neg, 1 sqrt, 2 sincos.
  */
 int awiwi_wrist_palm_pose(const double q71_in[1], const double q73_in[1], double T_out[16]);
@@ -1364,7 +1364,7 @@ int awiwi_wrist_palm_pose(const double q71_in[1], const double q73_in[1], double
  *   in   q73[1] in rad, 0.6234 to 1.32153
  *   out  h[38] in m
  * Returns 0 where the side bars are short of the line B0C0 (q73 between 0 and pi) and their plane is
- * short of A0 and bar AA0 reaches; elsewhere 1, and what is not defined is NaN.
+ * short of A0 and bar AA0 reaches; else 1, and outputs without a value are NaN.
  * Cost: 180 add, 143 mul, 2 div, 39 sqrt, 2 sincos.
  */
 int awiwi_wrist_tendon_lengths(const double q71_in[1], const double q73_in[1], double h_out[38]);
@@ -1376,7 +1376,7 @@ int awiwi_wrist_tendon_lengths(const double q71_in[1], const double q73_in[1], d
  *   in   q73[1] in rad, 0.6234 to 1.32153
  *   out  dh[38][2] in m/rad
  * Returns 0 where the side bars are short of the line B0C0 (q73 between 0 and pi) and their plane is
- * short of A0 and bar AA0 reaches; elsewhere 1, and what is not defined is NaN.
+ * short of A0 and bar AA0 reaches; else 1, and outputs without a value are NaN.
  * Cost: 436 add, 478 mul, 41 div, 39 sqrt, 2 sincos.
  */
 int awiwi_wrist_coupling(const double q71_in[1], const double q73_in[1], double dh_out[76]);
@@ -1389,7 +1389,7 @@ int awiwi_wrist_coupling(const double q71_in[1], const double q73_in[1], double 
  *   in   wrist[2] in rad, from [0.1004, 0.6234] to [1.148, 1.322]
  *   out  h[38] in m
  * Returns 0 where the side bars are short of the line B0C0 (q73 between 0 and pi) and their plane is
- * short of A0 and bar AA0 reaches; elsewhere 1, and what is not defined is NaN.
+ * short of A0 and bar AA0 reaches; else 1, and outputs without a value are NaN.
  * Cost: 254 add, 180 mul, 2 div, 43 sqrt, 4 sincos.
  */
 int awiwi_hand_tendon_lengths(const double q_in[19], const double wrist_in[2], double h_out[38]);
@@ -1570,8 +1570,8 @@ void awiwi_motor_torque(const double theta_in[1], const double thd_in[1], const 
  *   out  force[1] in N
  *   out  stiffness[1] in N/m
  * Returns 0 where the roller is clear of the motor's pulley and the roller is clear of the fixed
- * pulley and the tendon turns the lever towards its taut end and the spring is stretched; elsewhere 1,
- * and what is not defined is NaN.
+ * pulley and the tendon turns the lever towards its taut end and the spring is stretched; else 1, and
+ * outputs without a value are NaN.
  * Cost: 38 add, 54 mul, 7 div, 3 sqrt, 1 sincos, 2 calls.
  */
 int awiwi_spring_lever(const double theta_in[1], double dL_out[1], double force_out[1], double stiffness_out[1]);
@@ -1582,8 +1582,8 @@ int awiwi_spring_lever(const double theta_in[1], double dL_out[1], double force_
  * Source: figure 4.7.
  *   in   x[1] in m, 0 to 0.0100745
  *   out  f[1] in N
- * Returns 0 where the argument is within the lever's travel, give or take a hundredth; elsewhere 1,
- * and what is not defined is NaN.
+ * Returns 0 where the argument is within the lever's travel, give or take a hundredth; else 1, and
+ * outputs without a value are NaN.
  * Cost: 18 add, 18 mul.
  */
 int awiwi_spring_force(const double x_in[1], double f_out[1]);
@@ -1593,8 +1593,8 @@ int awiwi_spring_force(const double x_in[1], double f_out[1]);
  * Source: figure 4.7.
  *   in   x[1] in m, 0 to 0.0100745
  *   out  k[1] in N/m
- * Returns 0 where the argument is within the lever's travel, give or take a hundredth; elsewhere 1,
- * and what is not defined is NaN.
+ * Returns 0 where the argument is within the lever's travel, give or take a hundredth; else 1, and
+ * outputs without a value are NaN.
  * Cost: 18 add, 18 mul.
  */
 int awiwi_spring_stiffness(const double x_in[1], double k_out[1]);
@@ -1604,8 +1604,8 @@ int awiwi_spring_stiffness(const double x_in[1], double k_out[1]);
  * Source: figure 4.7.
  *   in   f[1] in N, 3.87595 to 100.149
  *   out  x[1] in m
- * Returns 0 where the argument is within the lever's travel, give or take a hundredth; elsewhere 1,
- * and what is not defined is NaN.
+ * Returns 0 where the argument is within the lever's travel, give or take a hundredth; else 1, and
+ * outputs without a value are NaN.
  * Cost: 18 add, 18 mul.
  */
 int awiwi_spring_elongation(const double f_in[1], double x_out[1]);
@@ -1618,8 +1618,8 @@ int awiwi_spring_elongation(const double f_in[1], double x_out[1]);
  *   out  dL[38] in m
  *   out  force[38] in N
  *   out  stiffness[38] in N/m
- * Returns 0 where the argument is within the lever's travel, give or take a hundredth; elsewhere 1,
- * and what is not defined is NaN.
+ * Returns 0 where the argument is within the lever's travel, give or take a hundredth; else 1, and
+ * outputs without a value are NaN.
  * Cost: 1062 add, 1062 mul, 37 calls.
  */
 int awiwi_calibration_readings(const double readings_in[38], double dL_out[38], double force_out[38], double stiffness_out[38]);
@@ -1637,8 +1637,8 @@ int awiwi_calibration_readings(const double readings_in[38], double dL_out[38], 
  *   out  dL[1] in m
  *   out  force[1] in N
  *   out  stiffness[1] in N/m
- * Returns 0 where the argument is within the lever's travel, give or take a hundredth; elsewhere 1,
- * and what is not defined is NaN.
+ * Returns 0 where the argument is within the lever's travel, give or take a hundredth; else 1, and
+ * outputs without a value are NaN.
  * Cost: 23 add, 19 mul, 1 div.
  */
 int awiwi_calibration_polynomials(const double counts_in[1], const double ends_in[2], const double length_powers_in[7], const double force_powers_in[7], const double stiffness_powers_in[7], double dL_out[1], double force_out[1], double stiffness_out[1]);
@@ -1684,7 +1684,7 @@ void awiwi_guiding_friction(const double f_in[1], const double bend_in[1], doubl
  * Returns 0 where pivot 0 of K_eff is positive and pivot 1 of K_eff is positive and pivot 2 of K_eff
  * is positive and pivot 3 of K_eff is positive and pivot 0 of K_mech - K_eff is positive and pivot 1
  * of K_mech - K_eff is positive and pivot 2 of K_mech - K_eff is positive and pivot 3 of K_mech -
- * K_eff is positive; elsewhere 1, and what is not defined is NaN.
+ * K_eff is positive; else 1, and outputs without a value are NaN.
  * Cost: 91 add, 111 mul, 7 div, 5 neg.
  */
 int awiwi_stiffness_correction(const double K_eff_in[16], const double K_mech_in[16], double K_imp_out[16]);
@@ -1697,8 +1697,8 @@ int awiwi_stiffness_correction(const double K_eff_in[16], const double K_mech_in
  *   in   k_mech[1] in N m/rad, 3.5 to 20
  *   out  k_imp[1] in N m/rad
  *   out  sensitivity[1] in 1
- * Returns 0 where k_eff is positive and k_mech - k_eff is positive; elsewhere 1, and what is not
- * defined is NaN.
+ * Returns 0 where k_eff is positive and k_mech - k_eff is positive; else 1, and outputs without a
+ * value are NaN.
  * Cost: 1 add, 4 mul, 2 div, 3 neg.
  */
 int awiwi_stiffness_correction_scalar(const double k_eff_in[1], const double k_mech_in[1], double k_imp_out[1], double sensitivity_out[1]);
@@ -1719,7 +1719,7 @@ int awiwi_stiffness_correction_scalar(const double k_eff_in[1], const double k_m
  *   out  momentum_next[1] in N m s
  *   out  friction[1] in N m
  * Returns 0 where the motor's inertia is positive and the gain is positive and the period is positive;
- * elsewhere 1, and what is not defined is NaN.
+ * else 1, and outputs without a value are NaN.
  * Cost: 5 add, 5 mul, 1 div, 1 neg.
  */
 int awiwi_friction_observer(const double momentum_in[1], const double u_in[1], const double tau_in[1], const double thd_in[1], const double B_in[1], const double gain_in[1], const double period_in[1], double momentum_next_out[1], double friction_out[1]);
@@ -1759,7 +1759,7 @@ void awiwi_joint_impedance(const double M_in[16], const double C_in[16], const d
  *   in   motor_kd[1] in N m s/rad, 0.001 to 1
  *   out  tau[1] in N m
  * Returns 0 where the pulley's radius is positive and the proportional gain is positive and the
- * derivative gain is positive; elsewhere 1, and what is not defined is NaN.
+ * derivative gain is positive; else 1, and outputs without a value are NaN.
  * Cost: 4 add, 3 mul.
  */
 int awiwi_motor_impedance(const double theta_in[1], const double thd_in[1], const double theta_des_in[1], const double f_des_in[1], const double friction_in[1], const double r_in[1], const double motor_kp_in[1], const double motor_kd_in[1], double tau_out[1]);
@@ -1784,8 +1784,8 @@ int awiwi_motor_impedance(const double theta_in[1], const double thd_in[1], cons
  *   in   force_kd[1] in 1/s, 10 to 10000
  *   out  tau[1] in N m
  * Returns 0 where the tendon's stiffness is positive and the pulley's radius is positive and the
- * motor's inertia is positive and the gain kp is positive and the gain kd is positive; elsewhere 1,
- * and what is not defined is NaN.
+ * motor's inertia is positive and the gain kp is positive and the gain kd is positive; else 1, and
+ * outputs without a value are NaN.
  * Cost: 8 add, 8 mul, 2 div.
  */
 int awiwi_cascade(const double f_in[1], const double xd_in[1], const double stiffness_in[1], const double slope_in[1], const double hdd_in[1], const double f_des_in[1], const double fd_des_in[1], const double fdd_des_in[1], const double friction_in[1], const double r_in[1], const double B_in[1], const double force_kp_in[1], const double force_kd_in[1], double tau_out[1]);
@@ -1804,8 +1804,8 @@ int awiwi_cascade(const double f_in[1], const double xd_in[1], const double stif
  *   in   omega[1] in rad/s, 10 to 1000
  *   out  margin[1] in 1
  *   out  S[8][3] in m/N, m s/N, m s^2/N
- * Returns 0 where the weight is positive and the frequency omega is positive; elsewhere 1, and what is
- * not defined is NaN.
+ * Returns 0 where the weight is positive and the frequency omega is positive; else 1, and outputs
+ * without a value are NaN.
  * Cost: 166 add, 210 mul, 23 div, 20 calls.
  */
 int awiwi_cascade_certificate(const double D_in[16], const double P_in[32], const double kp_in[8], const double kd_in[8], const double weight_in[1], const double omega_in[1], double margin_out[1], double S_out[24]);
@@ -1826,7 +1826,7 @@ int awiwi_cascade_certificate(const double D_in[16], const double P_in[32], cons
  *   in   kd[1] in m s, 1e-06 to 0.1
  *   out  tau[1] in N m
  * Returns 0 where the pulley's radius is positive and the proportional gain is positive and the
- * derivative gain is positive; elsewhere 1, and what is not defined is NaN.
+ * derivative gain is positive; else 1, and outputs without a value are NaN.
  * Cost: 5 add, 3 mul.
  */
 int awiwi_tendon_force_pd(const double f_in[1], const double fd_in[1], const double f_des_in[1], const double fd_des_in[1], const double f_hat_in[1], const double friction_in[1], const double r_in[1], const double kp_in[1], const double kd_in[1], double tau_out[1]);
@@ -1852,7 +1852,7 @@ int awiwi_tendon_force_pd(const double f_in[1], const double fd_in[1], const dou
  *   out  gains[2] in m, m s
  * Returns 0 where the pulley's radius is positive and the motor's inertia is positive and the tendon's
  * stiffness is positive and the target's frequency is positive and the target's damping ratio is
- * positive and the proportional gain is positive; elsewhere 1, and what is not defined is NaN.
+ * positive and the proportional gain is positive; else 1, and outputs without a value are NaN.
  * Cost: 6 add, 15 mul, 1 div.
  */
 int awiwi_tendon_force_scheduled(const double f_in[1], const double fd_in[1], const double f_des_in[1], const double fd_des_in[1], const double f_hat_in[1], const double friction_in[1], const double r_in[1], const double b_in[1], const double stiffness_in[1], const double stiffness_rate_in[1], const double omega0_in[1], const double xi0_in[1], double tau_out[1], double gains_out[2]);
@@ -1868,7 +1868,7 @@ int awiwi_tendon_force_scheduled(const double f_in[1], const double fd_in[1], co
  *   in   xi0[1] in 1, 0.2 to 2
  *   out  K[2] in N m/rad, N m s/rad
  * Returns 0 where the motor's inertia is positive and the target's frequency is positive and the
- * target's damping ratio is positive; elsewhere 1, and what is not defined is NaN.
+ * target's damping ratio is positive; else 1, and outputs without a value are NaN.
  * Cost: 2 add, 4 mul.
  */
 int awiwi_pole_placement_motor(const double b_in[1], const double dtheta_in[1], const double k_in[1], const double omega0_in[1], const double xi0_in[1], double K_out[2]);
@@ -1888,7 +1888,7 @@ int awiwi_pole_placement_motor(const double b_in[1], const double dtheta_in[1], 
  *   out  K[2] in N m/rad, N m s/rad
  *   out  u[1] in N m
  * Returns 0 where the motor's inertia is positive and the torque's weight is positive and the angle's
- * weight is positive and the speed's weight is positive; elsewhere 1, and what is not defined is NaN.
+ * weight is positive and the speed's weight is positive; else 1, and outputs without a value are NaN.
  * Cost: 12 add, 18 mul, 2 div, 2 neg, 2 sqrt.
  */
 int awiwi_sdre_tendon(const double theta_in[1], const double thd_in[1], const double theta_des_in[1], const double b_in[1], const double dtheta_in[1], const double spring_in[3], const double weights_in[2], const double R_in[1], double K_out[2], double u_out[1]);
@@ -1907,8 +1907,8 @@ int awiwi_sdre_tendon(const double theta_in[1], const double thd_in[1], const do
  *   out  K[4] in N m/rad, N m s/rad
  * Returns 0 where the link's inertia is positive and the motor's inertia is positive and the stiffness
  * is positive and the first frequency is positive and the second frequency is positive and the first
- * damping ratio is positive and the second damping ratio is positive; elsewhere 1, and what is not
- * defined is NaN.
+ * damping ratio is positive and the second damping ratio is positive; else 1, and outputs without a
+ * value are NaN.
  * Cost: 14 add, 26 mul, 2 div.
  */
 int awiwi_pole_placement(const double m_in[1], const double b_in[1], const double k_in[1], const double dq_in[1], const double dtheta_in[1], const double omega_in[2], const double xi_in[2], double K_out[4]);
@@ -1955,7 +1955,7 @@ void awiwi_secant_stiffness(const double spring_in[3], const double deflexion_in
  *   out  K[4] in N m/rad, N m s/rad
  *   out  u[1] in N m
  * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
- * Cost: at most 1 times that of secant_stiffness and pole_placement_law, and the solver's own.
+ * Cost: the solver's own work and calls, at most: 1 of secant_stiffness, 1 of pole_placement_law.
  */
 int awiwi_sdre_joint(const double m_in[1], const double b_in[1], const double dq_in[1], const double dtheta_in[1], const double spring_in[3], const double weights_in[4], const double R_in[1], const double K_last_in[4], const double x_in[4], const double x_des_in[4], double K_out[4], double u_out[1]);
 
@@ -1973,7 +1973,7 @@ int awiwi_sdre_joint(const double m_in[1], const double b_in[1], const double dq
  *   out  S[4][4] in 1
  *   out  residual[1] in 1
  * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
- * Cost: the solver's own.
+ * Cost: the solver's own work.
  */
 int awiwi_lqr(const double A_in[16], const double B_in[4], const double Q_in[16], const double R_in[1], double K_out[4], double S_out[16], double residual_out[1]);
 
@@ -1983,7 +1983,7 @@ int awiwi_lqr(const double A_in[16], const double B_in[4], const double Q_in[16]
  *   in   x[2] in 1, from [-3, -10] to [3, 10]
  *   in   k[2] in 1, 0.01 to 10
  *   out  u[1] in 1
- * Returns 0 where k1 is positive and k2 is positive; elsewhere 1, and what is not defined is NaN.
+ * Returns 0 where k1 is positive and k2 is positive; else 1, and outputs without a value are NaN.
  * Cost: 6 add, 7 mul.
  */
 int awiwi_backstepping_academic(const double x_in[2], const double k_in[2], double u_out[1]);
@@ -2012,7 +2012,7 @@ void awiwi_backstepping_academic_lyapunov(const double x_in[2], const double k_i
  *   out  tau_m[1] in N m
  * Returns 0 where the link's inertia is positive and the motor's inertia is positive and the stiffness
  * is positive and k1 is positive and k2 is positive and k3 is positive and k4 is positive and c2 is
- * positive and c3 is positive and c4 is positive; elsewhere 1, and what is not defined is NaN.
+ * positive and c3 is positive and c4 is positive; else 1, and outputs without a value are NaN.
  * Cost: 22 add, 16 mul, 4 div.
  */
 int awiwi_backstepping_position(const double motion_in[4], const double desired_in[5], const double plant_in[3], const double rates_in[4], const double scales_in[3], double tau_m_out[1]);
@@ -2048,7 +2048,7 @@ void awiwi_backstepping_position_lyapunov(const double motion_in[4], const doubl
  *   out  tau_m[1] in N m
  * Returns 0 where the link's inertia is positive and the motor's inertia is positive and the stiffness
  * is positive and K_p is positive and K_d is positive and K_3 is positive and K_4 is positive and C_t
- * is positive and C_s is positive; elsewhere 1, and what is not defined is NaN.
+ * is positive and C_s is positive; else 1, and outputs without a value are NaN.
  * Cost: 22 add, 16 mul, 4 div.
  */
 int awiwi_backstepping_impedance(const double state_in[4], const double desired_in[5], const double external_in[2], const double plant_in[3], const double gains_in[4], const double weights_in[2], double tau_m_out[1]);
@@ -2084,7 +2084,7 @@ void awiwi_backstepping_impedance_lyapunov(const double state_in[4], const doubl
  *   out  tau_m[1] in N m
  * Returns 0 where the link's inertia is positive and the motor's inertia is positive and the spring's
  * slope is positive and K_p is positive and K_d is positive and K_3 is positive and K_4 is positive
- * and C_t is positive and C_s is positive; elsewhere 1, and what is not defined is NaN.
+ * and C_t is positive and C_s is positive; else 1, and outputs without a value are NaN.
  * Cost: 23 add, 20 mul, 4 div.
  */
 int awiwi_backstepping_nonlinear(const double state_in[4], const double desired_in[5], const double external_in[2], const double bodies_in[2], const double spring_in[2], const double gains_in[4], const double weights_in[2], double tau_m_out[1]);
@@ -2109,8 +2109,8 @@ int awiwi_backstepping_nonlinear(const double state_in[4], const double desired_
  * inertia is positive and slope 1 is positive and slope 2 is positive and K_p is positive and K_d is
  * positive and K_3 of motor 1 is positive and K_4 of motor 1 is positive and C_t of motor 1 is
  * positive and C_s of motor 1 is positive and K_3 of motor 2 is positive and K_4 of motor 2 is
- * positive and C_t of motor 2 is positive and C_s of motor 2 is positive; elsewhere 1, and what is not
- * defined is NaN.
+ * positive and C_t of motor 2 is positive and C_s of motor 2 is positive; else 1, and outputs without
+ * a value are NaN.
  * Cost: 42 add, 32 mul, 7 div.
  */
 int awiwi_backstepping_antagonistic(const double joint_in[2], const double torques_in[4], const double desired_in[5], const double pretension_in[3], const double external_in[2], const double inertias_in[3], const double springs_in[4], const double impedance_in[2], const double tunings_in[8], double tau_m_out[2]);
@@ -2153,8 +2153,8 @@ void awiwi_backstepping_antagonistic_lyapunov(const double joint_in[2], const do
  * inertia is positive and slope 1 is positive and slope 2 is positive and K_p is positive and K_d is
  * positive and K_3 of motor 1 is positive and K_4 of motor 1 is positive and C_t of motor 1 is
  * positive and C_s of motor 1 is positive and K_3 of motor 2 is positive and K_4 of motor 2 is
- * positive and C_t of motor 2 is positive and C_s of motor 2 is positive; elsewhere 1, and what is not
- * defined is NaN.
+ * positive and C_t of motor 2 is positive and C_s of motor 2 is positive; else 1, and outputs without
+ * a value are NaN.
  * Cost: 48 add, 40 mul, 7 div.
  */
 int awiwi_backstepping_antagonistic_decoupled(const double joint_in[2], const double torques_in[4], const double desired_in[5], const double pretension_in[3], const double external_in[2], const double inertias_in[3], const double springs_in[4], const double impedance_in[2], const double tunings_in[8], double tau_m_out[2]);
@@ -2195,8 +2195,8 @@ void awiwi_backstepping_state_gains_derivatives(const double plant_in[3], const 
  *   out  rates[2] in 1/s
  * Returns 0 where the link's inertia is positive and the motor's inertia is positive and the stiffness
  * is positive and K_p is positive and K_d is positive and C_t is positive and C_s is positive and K_3
- * and K_4 are real and differ and their sum is positive and their product is positive; elsewhere 1,
- * and what is not defined is NaN.
+ * and K_4 are real and differ and their sum is positive and their product is positive; else 1, and
+ * outputs without a value are NaN.
  * Cost: 7 add, 8 mul, 5 div, 3 neg, 1 sqrt.
  */
 int awiwi_optimal_backstepping_rates(const double K_opt_in[4], const double plant_in[3], const double impedance_in[2], const double weights_in[2], double rates_out[2]);
@@ -2213,7 +2213,7 @@ int awiwi_optimal_backstepping_rates(const double K_opt_in[4], const double plan
  *   out  weights[2] in rad/(N m), rad s^2/(N m)
  * Returns 0 where the link's inertia is positive and the motor's inertia is positive and the stiffness
  * is positive and K_p is positive and K_d is positive and C_t is positive and K_3 is positive and K_4
- * is positive and C_s is positive; elsewhere 1, and what is not defined is NaN.
+ * is positive and C_s is positive; else 1, and outputs without a value are NaN.
  * Cost: 8 add, 10 mul, 5 div, 3 neg.
  */
 int awiwi_optimal_backstepping_weights(const double K_opt_in[4], const double plant_in[3], const double impedance_in[2], double rates_out[2], double weights_out[2]);
@@ -2231,7 +2231,7 @@ int awiwi_optimal_backstepping_weights(const double K_opt_in[4], const double pl
  *   out  impedance[2] in N m/rad, N m s/rad
  *   out  rates[2] in 1/s
  * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
- * Cost: at most 40 times that of backstepping_state_gains and backstepping_state_gains_derivatives, and the solver's own.
+ * Cost: the solver's own work and calls, at most: 40 of backstepping_state_gains, 40 of backstepping_state_gains_derivatives.
  */
 int awiwi_optimal_backstepping(const double K_opt_in[4], const double plant_in[3], const double weights_in[2], const double start_in[4], double impedance_out[2], double rates_out[2]);
 
@@ -2246,8 +2246,8 @@ int awiwi_optimal_backstepping(const double K_opt_in[4], const double plant_in[3
  *   in   delay[1] in s, 0.005 to 0.1
  *   in   period[1] in s, 0.0001 to 0.01
  *   out  motion_next[5] in rad, rad/s, rad/s^2, rad/s^3, rad/s^4
- * Returns 0 where the delay is positive and the period is positive; elsewhere 1, and what is not
- * defined is NaN.
+ * Returns 0 where the delay is positive and the period is positive; else 1, and outputs without a
+ * value are NaN.
  * Cost: 45 add, 50 mul, 5 div.
  */
 int awiwi_reference_filter(const double motion_in[5], const double desired_in[5], const double delay_in[1], const double period_in[1], double motion_next_out[5]);
@@ -2294,7 +2294,7 @@ void awiwi_antagonistic_observer(const double memory_in[13], const double thetas
  *   in   damping[1] in N m s/rad, 0 to 0.005
  *   out  x_des[6] in rad, rad/s, from [-3, -50, -3, -50, -3, -50] to [3, 50, 3, 50, 3, 50]
  *   out  u_des[2] in N m
- * Returns 0 where slope 1 is positive and slope 2 is positive; elsewhere 1, and what is not defined is
+ * Returns 0 where slope 1 is positive and slope 2 is positive; else 1, and outputs without a value are
  * NaN.
  * Cost: 15 add, 15 mul, 2 div.
  */
@@ -2355,8 +2355,8 @@ void awiwi_antagonistic_sharing(const double torque_in[1], const double pretensi
  * inertia is positive and slope 1 is positive and slope 2 is positive and K_p is positive and K_d is
  * positive and K_3 of motor 1 is positive and K_4 of motor 1 is positive and C_t of motor 1 is
  * positive and C_s of motor 1 is positive and K_3 of motor 2 is positive and K_4 of motor 2 is
- * positive and C_t of motor 2 is positive and C_s of motor 2 is positive; elsewhere 1, and what is not
- * defined is NaN.
+ * positive and C_t of motor 2 is positive and C_s of motor 2 is positive; else 1, and outputs without
+ * a value are NaN.
  * Cost: 49 add, 37 mul, 7 div.
  */
 int awiwi_backstepping_adaptive(const double joint_in[2], const double torques_in[4], const double desired_in[5], const double pretension_in[3], const double external_in[2], const double inertias_in[3], const double springs_in[4], const double damping_in[1], const double impedance_in[2], const double tunings_in[8], const double resistance_in[2], double tau_m_out[2]);

@@ -13,7 +13,7 @@
  *   out  S[4][4] in 1
  *   out  residual[1] in 1
  * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
- * Cost: the solver's own.
+ * Cost: the solver's own work.
  */
 #include "numerics.h"
 #include "awiwi_regulators.h"

@@ -4,7 +4,7 @@
  * Source: eq. 5.6, 5.9, 5.21.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   out  P[8][4] in m/rad
- * Cost: nothing but moves.
+ * Cost: copies only.
  * Inputs: sha256 6a98ac93d320159725bea4ee759d5d3b1d512df899adaef986e09318a6fe1430.
  */
 #include "numerics.h"

@@ -14,7 +14,7 @@
  *   in   motor_kd[1] in N m s/rad, 0.001 to 1
  *   out  tau[1] in N m
  * Returns 0 where the pulley's radius is positive and the proportional gain is positive and the
- * derivative gain is positive; elsewhere 1, and what is not defined is NaN.
+ * derivative gain is positive; else 1, and outputs without a value are NaN.
  * Cost: 4 add, 3 mul.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */

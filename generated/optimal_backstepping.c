@@ -12,7 +12,7 @@
  *   out  impedance[2] in N m/rad, N m s/rad
  *   out  rates[2] in 1/s
  * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
- * Cost: at most 40 times that of backstepping_state_gains and backstepping_state_gains_derivatives, and the solver's own.
+ * Cost: the solver's own work and calls, at most: 40 of backstepping_state_gains, 40 of backstepping_state_gains_derivatives.
  */
 #include "numerics.h"
 #include "awiwi_solvers.h"

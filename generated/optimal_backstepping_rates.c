@@ -9,8 +9,8 @@
  *   out  rates[2] in 1/s
  * Returns 0 where the link's inertia is positive and the motor's inertia is positive and the stiffness
  * is positive and K_p is positive and K_d is positive and C_t is positive and C_s is positive and K_3
- * and K_4 are real and differ and their sum is positive and their product is positive; elsewhere 1,
- * and what is not defined is NaN.
+ * and K_4 are real and differ and their sum is positive and their product is positive; else 1, and
+ * outputs without a value are NaN.
  * Cost: 7 add, 8 mul, 5 div, 3 neg, 1 sqrt.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */

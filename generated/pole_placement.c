@@ -13,8 +13,8 @@
  *   out  K[4] in N m/rad, N m s/rad
  * Returns 0 where the link's inertia is positive and the motor's inertia is positive and the stiffness
  * is positive and the first frequency is positive and the second frequency is positive and the first
- * damping ratio is positive and the second damping ratio is positive; elsewhere 1, and what is not
- * defined is NaN.
+ * damping ratio is positive and the second damping ratio is positive; else 1, and outputs without a
+ * value are NaN.
  * Cost: 14 add, 26 mul, 2 div.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */

@@ -10,7 +10,7 @@
  *   in   xi0[1] in 1, 0.2 to 2
  *   out  K[2] in N m/rad, N m s/rad
  * Returns 0 where the motor's inertia is positive and the target's frequency is positive and the
- * target's damping ratio is positive; elsewhere 1, and what is not defined is NaN.
+ * target's damping ratio is positive; else 1, and outputs without a value are NaN.
  * Cost: 2 add, 4 mul.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */

@@ -10,8 +10,8 @@
  *   in   delay[1] in s, 0.005 to 0.1
  *   in   period[1] in s, 0.0001 to 0.01
  *   out  motion_next[5] in rad, rad/s, rad/s^2, rad/s^3, rad/s^4
- * Returns 0 where the delay is positive and the period is positive; elsewhere 1, and what is not
- * defined is NaN.
+ * Returns 0 where the delay is positive and the period is positive; else 1, and outputs without a
+ * value are NaN.
  * Cost: 45 add, 50 mul, 5 div.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */

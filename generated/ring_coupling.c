@@ -4,7 +4,7 @@
  * Source: eq. 5.6, 5.9, 5.21.
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   out  P[6][3] in m/rad
- * Cost: nothing but moves.
+ * Cost: copies only.
  * Inputs: sha256 f80c5937d3fb31c3c493cc21c311bbee377d7e4a85c9442b26bfcff48d3c3dd6.
  */
 #include "numerics.h"

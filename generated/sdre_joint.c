@@ -16,7 +16,7 @@
  *   out  K[4] in N m/rad, N m s/rad
  *   out  u[1] in N m
  * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
- * Cost: at most 1 times that of secant_stiffness and pole_placement_law, and the solver's own.
+ * Cost: the solver's own work and calls, at most: 1 of secant_stiffness, 1 of pole_placement_law.
  */
 #include "numerics.h"
 #include "awiwi_regulators.h"

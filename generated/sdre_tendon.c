@@ -14,7 +14,7 @@
  *   out  K[2] in N m/rad, N m s/rad
  *   out  u[1] in N m
  * Returns 0 where the motor's inertia is positive and the torque's weight is positive and the angle's
- * weight is positive and the speed's weight is positive; elsewhere 1, and what is not defined is NaN.
+ * weight is positive and the speed's weight is positive; else 1, and outputs without a value are NaN.
  * Cost: 12 add, 18 mul, 2 div, 2 neg, 2 sqrt.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */

@@ -7,8 +7,8 @@
  *   out  force[1] in N
  *   out  stiffness[1] in N/m
  * Returns 0 where the roller is clear of the motor's pulley and the roller is clear of the fixed
- * pulley and the tendon turns the lever towards its taut end and the spring is stretched; elsewhere 1,
- * and what is not defined is NaN.
+ * pulley and the tendon turns the lever towards its taut end and the spring is stretched; else 1, and
+ * outputs without a value are NaN.
  * Cost: 38 add, 54 mul, 7 div, 3 sqrt, 1 sincos, 2 calls.
  * Inputs: sha256 6a5695bb7e492700563a99433621bd21f8005fce81d41ed26a0365bf35bb62e3.
  */

@@ -4,8 +4,8 @@
  * Source: figure 4.7.
  *   in   x[1] in m, 0 to 0.0100745
  *   out  k[1] in N/m
- * Returns 0 where the argument is within the lever's travel, give or take a hundredth; elsewhere 1,
- * and what is not defined is NaN.
+ * Returns 0 where the argument is within the lever's travel, give or take a hundredth; else 1, and
+ * outputs without a value are NaN.
  * Cost: 18 add, 18 mul.
  * Inputs: sha256 6a5695bb7e492700563a99433621bd21f8005fce81d41ed26a0365bf35bb62e3.
  */

@@ -11,7 +11,7 @@
  * Returns 0 where pivot 0 of K_eff is positive and pivot 1 of K_eff is positive and pivot 2 of K_eff
  * is positive and pivot 3 of K_eff is positive and pivot 0 of K_mech - K_eff is positive and pivot 1
  * of K_mech - K_eff is positive and pivot 2 of K_mech - K_eff is positive and pivot 3 of K_mech -
- * K_eff is positive; elsewhere 1, and what is not defined is NaN.
+ * K_eff is positive; else 1, and outputs without a value are NaN.
  * Cost: 91 add, 111 mul, 7 div, 5 neg.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */

@@ -7,8 +7,8 @@
  *   in   k_mech[1] in N m/rad, 3.5 to 20
  *   out  k_imp[1] in N m/rad
  *   out  sensitivity[1] in 1
- * Returns 0 where k_eff is positive and k_mech - k_eff is positive; elsewhere 1, and what is not
- * defined is NaN.
+ * Returns 0 where k_eff is positive and k_mech - k_eff is positive; else 1, and outputs without a
+ * value are NaN.
  * Cost: 1 add, 4 mul, 2 div, 3 neg.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */

@@ -15,7 +15,7 @@
  *   in   kd[1] in m s, 1e-06 to 0.1
  *   out  tau[1] in N m
  * Returns 0 where the pulley's radius is positive and the proportional gain is positive and the
- * derivative gain is positive; elsewhere 1, and what is not defined is NaN.
+ * derivative gain is positive; else 1, and outputs without a value are NaN.
  * Cost: 5 add, 3 mul.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */

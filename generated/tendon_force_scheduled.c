@@ -20,7 +20,7 @@
  *   out  gains[2] in m, m s
  * Returns 0 where the pulley's radius is positive and the motor's inertia is positive and the tendon's
  * stiffness is positive and the target's frequency is positive and the target's damping ratio is
- * positive and the proportional gain is positive; elsewhere 1, and what is not defined is NaN.
+ * positive and the proportional gain is positive; else 1, and outputs without a value are NaN.
  * Cost: 6 add, 15 mul, 1 div.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */

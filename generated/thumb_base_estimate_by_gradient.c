@@ -6,7 +6,7 @@
  *   in   start[2] in rad, -0.610865 to 0.610865
  *   out  q[2] in rad
  * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
- * Cost: at most 51 times that of thumb_tendon_lengths and thumb_coupling, and the solver's own.
+ * Cost: the solver's own work and calls, at most: 51 of thumb_tendon_lengths, 51 of thumb_coupling.
  */
 #include "numerics.h"
 #include "awiwi_solvers.h"

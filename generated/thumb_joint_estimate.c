@@ -6,7 +6,7 @@
  *   in   start[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   out  q[4] in rad
  * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
- * Cost: at most 24 times that of thumb_tendon_lengths and thumb_coupling, and the solver's own.
+ * Cost: the solver's own work and calls, at most: 24 of thumb_tendon_lengths, 24 of thumb_coupling.
  */
 #include "numerics.h"
 #include "awiwi_solvers.h"

@@ -12,7 +12,7 @@
  *   in   f_max[1] in N, 76.0811 to 100.149
  *   out  f[8] in N
  * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
- * Cost: at most 357 times that of thumb_coupling and thumb_tendon_stiffness and thumb_coupling_derivative, and the solver's own.
+ * Cost: the solver's own work and calls, at most: 1 of thumb_coupling, 357 of thumb_tendon_stiffness, 1 of thumb_coupling_derivative.
  */
 #include "numerics.h"
 #include "awiwi_distribution.h"

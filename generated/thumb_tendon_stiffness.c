@@ -7,8 +7,8 @@
  *   out  k[8] in N/m
  *   out  slope[8] in 1/m
  *   out  curvature[8] in 1/(N m)
- * Returns 0 where every tension is on its spring's curve, give or take a hundredth; elsewhere 1, and
- * what is not defined is NaN.
+ * Returns 0 where every tension is on its spring's curve, give or take a hundredth; else 1, and
+ * outputs without a value are NaN.
  * Cost: 198 add, 198 mul, 7 calls.
  * Inputs: sha256 b64c46b637f0a464ed4766b60f7050b3f882b2c8a66fc18598209e2c9ff07328.
  */

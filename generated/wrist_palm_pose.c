@@ -6,7 +6,7 @@
  *   in   q73[1] in rad, 0.6234 to 1.32153
  *   out  T[4][4] in 1, m
  * Returns 0 where the side bars are short of the line B0C0 (q73 between 0 and pi) and their plane is
- * short of A0 and bar AA0 reaches; elsewhere 1, and what is not defined is NaN.
+ * short of A0 and bar AA0 reaches; else 1, and outputs without a value are NaN.
  * Cost: 24 add, 48 mul, 2 div, 1 neg, 1 sqrt, 2 sincos.
  * Inputs: sha256 f3c3c5f8b9f1a1e1c692bd3c2cc78649d46a5699c6bfe9fac97394eae1cedb18.
  */

@@ -8,7 +8,7 @@
  *   out  B[3] in m
  *   out  C[3] in m
  * Returns 0 where the side bars are short of the line B0C0 (q73 between 0 and pi) and their plane is
- * short of A0 and bar AA0 reaches; elsewhere 1, and what is not defined is NaN.
+ * short of A0 and bar AA0 reaches; else 1, and outputs without a value are NaN.
  * Cost: 20 add, 39 mul, 2 div, 1 neg, 1 sqrt, 2 sincos.
  * Inputs: sha256 db74b2a34f56c6ccad41684846d922ba049b7832368c63b234f7fba0d2100dce.
  */

@@ -6,7 +6,7 @@
  *   in   q73[1] in rad, 0.6234 to 1.32153
  *   out  h[38] in m
  * Returns 0 where the side bars are short of the line B0C0 (q73 between 0 and pi) and their plane is
- * short of A0 and bar AA0 reaches; elsewhere 1, and what is not defined is NaN.
+ * short of A0 and bar AA0 reaches; else 1, and outputs without a value are NaN.
  * Cost: 180 add, 143 mul, 2 div, 39 sqrt, 2 sincos.
  * Inputs: sha256 c9e8bcef7946e105e81ceb55d9a65cfc81331bce477c734136b5eb268c572442.
  */
