@@ -2,7 +2,22 @@
 #ifndef AWIWI_DENSE_H
 #define AWIWI_DENSE_H
 
+#include <math.h>
+
 #include "twofold.h"
+
+/* The C library's functions in the scalar type of the build. */
+#if AWIWI_REAL_BITS == 64
+#define awiwi_sqrt sqrt
+#define awiwi_fmax fmax
+#define awiwi_frexp frexp
+#define awiwi_ldexp ldexp
+#else
+#define awiwi_sqrt sqrtf
+#define awiwi_fmax fmaxf
+#define awiwi_frexp frexpf
+#define awiwi_ldexp ldexpf
+#endif
 
 static inline awiwi_real awiwi_size(awiwi_real x)
 {

@@ -9,9 +9,6 @@
    (t c3^2 + c1^2/t)/2, a zero of a parabola bounds it from above for any t > 0, closely if t is near c1/c3. From there
    Newton's method converges from above without fail. A last gain only says where to start. */
 #include "numerics.h"
-
-#include <tgmath.h>
-
 #include "awiwi_regulators.h"
 #include "dense.h"
 
@@ -30,13 +27,13 @@ typedef struct gains {
 
 static awiwi_real root(awiwi_real x)
 {
-    return x > 0 ? sqrt(x) : 0;
+    return x > 0 ? awiwi_sqrt(x) : 0;
 }
 
 static scaled scale(const awiwi_joint *j, const awiwi_real *q, awiwi_real R)
 {
-    const awiwi_real cost = 1 / (R * j->motor * j->motor), sum = sqrt((q[0] + q[2]) * cost);
-    const awiwi_real rate2 = sqrt(j->spring / j->link * sum), time2 = 1 / rate2, time = sqrt(time2);
+    const awiwi_real cost = 1 / (R * j->motor * j->motor), sum = awiwi_sqrt((q[0] + q[2]) * cost);
+    const awiwi_real rate2 = awiwi_sqrt(j->spring / j->link * sum), time2 = 1 / rate2, time = awiwi_sqrt(time2);
     return (scaled){.time = time,
                     .link = j->spring / j->link * time2,
                     .motor = j->spring / j->motor * time2,
@@ -111,7 +108,8 @@ static int polish(const scaled *p, gains *x)
         const awiwi_real de = (P * Ug - Pg * U) / det, dg = (Pe * U - P * Ue) / det;
         x->e -= de;
         x->g -= dg;
-        rest = fmax(awiwi_size(de) / (awiwi_size(e) + awiwi_size(h)), awiwi_size(dg) / (awiwi_size(g) + awiwi_size(f)));
+        rest = awiwi_fmax(awiwi_size(de) / (awiwi_size(e) + awiwi_size(h)),
+                          awiwi_size(dg) / (awiwi_size(g) + awiwi_size(f)));
         if (!(rest > 4 * AWIWI_REAL_EPSILON))
             break;
     }

@@ -1,8 +1,5 @@
 /* What can be said of the poles of up to four states without finding them. */
 #include "numerics.h"
-
-#include <tgmath.h>
-
 #include "dense.h"
 
 enum { N = 4 };
@@ -96,7 +93,7 @@ static int extend(int n, int count, known *directions, known v, awiwi_real least
                               ROUNDING * awiwi_size(share * along->value[i]);
         }
     }
-    const awiwi_real length = sqrt(awiwi_dot(v.value, v.value, n));
+    const awiwi_real length = awiwi_sqrt(awiwi_dot(v.value, v.value, n));
     for (int i = 0; i < n; i++)
         is_new = is_new || awiwi_size(v.value[i]) > v.error[i];
     if (count == n || !is_new || !(length > least))

@@ -2,9 +2,6 @@
    doubling: a Cayley transform makes it a discrete one, whose closed loop is squared until it vanishes. Then Newton's
    method, after Kleinman, from residuals with twice the digits: so gains are right to the last one. */
 #include "numerics.h"
-
-#include <tgmath.h>
-
 #include "awiwi_regulators.h"
 #include "dense.h"
 
@@ -45,8 +42,8 @@ static void balance(plant *p)
         const awiwi_real ratio = row / column;
         if (!(ratio > 0 && ratio <= AWIWI_REAL_MAX))
             continue;
-        (void)frexp(ratio, &exponent);
-        const awiwi_real f = ldexp((awiwi_real)1, exponent / 2);
+        (void)awiwi_frexp(ratio, &exponent);
+        const awiwi_real f = awiwi_ldexp((awiwi_real)1, exponent / 2);
         p->d[i] *= f;
         p->b[i] /= f;
         for (int j = 0; j < n; j++) {
@@ -83,8 +80,8 @@ static awiwi_real mean_pole(const plant *p)
         square += v[i] * awiwi_dot(p->Q + i * n, v, n) / p->R;
     if (!(square > 0 && square <= AWIWI_REAL_MAX))
         return awiwi_largest(p->A, n * n);
-    (void)frexp(square, &exponent);
-    return ldexp((awiwi_real)1, exponent / (2 * n));
+    (void)awiwi_frexp(square, &exponent);
+    return awiwi_ldexp((awiwi_real)1, exponent / (2 * n));
 }
 
 /* Cayley transform: the discrete equation's A, G and H, which are blocks of the inverse of a Hamiltonian matrix. */
@@ -184,7 +181,7 @@ static void weigh(const plant *p, solution *x)
         terms[i] += awiwi_size(p->Q[i * n + i]) + awiwi_size(x->K[i].high * Sb[i].high);
     largest = awiwi_largest(terms, n);
     for (int i = 0; i < n; i++) /* what costs nothing has no terms but rounding */
-        terms[i] = sqrt(terms[i] > AWIWI_REAL_EPSILON * largest ? terms[i] : AWIWI_REAL_EPSILON * largest);
+        terms[i] = awiwi_sqrt(terms[i] > AWIWI_REAL_EPSILON * largest ? terms[i] : AWIWI_REAL_EPSILON * largest);
     x->residual = 0;
     for (int i = 0; i < n * n; i++) {
         const awiwi_real part = awiwi_size(x->E[i]), whole = terms[i / n] * terms[i % n];
@@ -227,7 +224,7 @@ static int is_sound(const plant *p)
     for (int i = 0; i < n * n; i++) {
         const awiwi_real own = p->Q[i / n * (n + 1)];
         transposed[i] = p->A[i % n * n + i / n];
-        seen[i] = own > 0 ? p->Q[i] / sqrt(own) : 0;
+        seen[i] = own > 0 ? p->Q[i] / awiwi_sqrt(own) : 0;
     }
     return awiwi_is_semidefinite(n, p->Q) && awiwi_rest_decays(n, p->A, 1, p->b) &&
            awiwi_rest_decays(n, transposed, n, seen);
@@ -292,7 +289,7 @@ static int search(plant *p, int iterations, solution *x)
     const awiwi_real pole = mean_pole(p);
     for (int k = 0; k < 3 && !found; k++) {
         solution here;
-        if (!double_up(p, ldexp(pole, exponents[k]), iterations, &here))
+        if (!double_up(p, awiwi_ldexp(pole, exponents[k]), iterations, &here))
             continue;
         refine_all(p, &here);
         found = holds(p, &here);

@@ -10,13 +10,11 @@ from typing import Any
 import numpy as np
 
 from awiwi_gen.build import FLAGS, compiler
+from awiwi_gen.emit.files import scalar_files
+from awiwi_gen.emit.options import Options
 from awiwi_gen.resources import CSRC
 
-REAL = """#pragma once
-typedef double awiwi_real;
-#define AWIWI_REAL_MAX 1.7976931348623157e+308
-#define AWIWI_REAL_EPSILON 2.220446049250313e-16
-"""
+REAL = scalar_files(Options())["real.h"]
 NUMBERS = ctypes.POINTER(ctypes.c_double)
 CURVE = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, NUMBERS, NUMBERS, NUMBERS, NUMBERS)
 OK, OUT_OF_DOMAIN, NOT_CONVERGED, NOT_FINITE, INFEASIBLE = range(5)

@@ -11,9 +11,13 @@ import pytest
 import awiwi_gen.ir.passes as passes
 from awiwi_gen.budget import BUDGET, excess, require_budget
 from awiwi_gen.derive import Deriver
+from awiwi_gen.emit.c import CFunction
 from awiwi_gen.emit.options import Options
+from awiwi_gen.emit.solver import solver_function
 from awiwi_gen.errors import BudgetError
 from awiwi_gen.hand import Hand
+from awiwi_gen.ir.cost import Cost, operations_text
+from awiwi_gen.kernels import catalog
 from awiwi_gen.pipeline import Job, generate
 from awiwi_gen.records import make_records
 from bench.sizes import excesses
@@ -100,3 +104,23 @@ def test_sizes_beyond_their_grain_are_excesses():
         "f takes 96 bytes of stack, committed are 64",
         "g takes 1040 bytes of code, committed are 1000",
     ]
+
+
+def test_a_solver_costs_every_kernel_as_often_as_it_calls_it(hand):
+    (kernel,) = (kernel for kernel in catalog(hand) if kernel.name == "thumb_tendon_distribution")
+    used = {
+        family: CFunction(family, "void f(void)", "", (), (), Cost(add=number), ())
+        for family, number in (("coupling", 1), ("coupling_derivative", 10), ("tendon_stiffness", 100))
+    }
+    function, _ = solver_function(kernel, kernel.solver, "awiwi", Options(), used, runtime=False)
+
+    assert function.cost == Cost(add=1 + 10 + 100 * kernel.solver.iterations)
+    assert function.comment[-1] == (
+        "Cost: the solver's own work and calls, at most: 1 of coupling, 1 of coupling_derivative, 357 of tendon_stiffness."
+    )
+
+
+def test_tables_do_not_call_the_uncounted_work_of_a_solver_nothing():
+    entries = [{"route": route, "cost": {"operations": count}} for route in ("sympy", "solver") for count in (0, 5)]
+
+    assert [operations_text(entry) for entry in entries] == ["0", "5", "solver", "5 + solver"]

@@ -142,6 +142,49 @@ def test_a_solver_built_with_contraction_by_default_fuses_nothing(source, tree):
     assert fused(source, ["-march=x86-64-v3"], tree) == 0
 
 
+M7 = ["-mcpu=cortex-m7", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv5-d16"]
+CROSS = {
+    "aarch64": (["aarch64-linux-gnu-gcc"], r"\bfn?m(add|sub|la|ls)\b"),
+    "cortex-m7": (["arm-none-eabi-gcc", *M7], r"\bvfn?m[as]\b"),
+    "clang": (["clang", "-ffp-contract=on", *(["-mfma"] if X86 else [])], r"\b(vfn?m(add|sub)|fn?m(add|sub|la|ls)\b)"),
+}
+
+
+@pytest.mark.parametrize("name", ["index_inverse_dynamics", "fifth_link_poses", "motor_friction", "riccati", "poles"])
+@pytest.mark.parametrize("target", CROSS)
+def test_other_compilers_fuse_nothing_either_unless_it_is_allowed(target, name, tree):
+    command, instruction = CROSS[target]
+    if not shutil.which(command[0]):
+        pytest.skip(f"there is no {command[0]} here")
+    folder = tree if (tree / f"{name}.c").exists() else CSRC
+    for allowed in ([], ["-DAWIWI_ALLOW_CONTRACTION"]):
+        words = [
+            *command,
+            "-std=gnu99",
+            "-O2",
+            *allowed,
+            f"-I{tree}",
+            f"-I{CSRC}",
+            "-S",
+            f"{folder / name}.c",
+            "-o",
+            "-",
+        ]
+        text = subprocess.run(words, capture_output=True, text=True, check=True).stdout
+
+        assert bool(re.search(instruction, text)) == bool(allowed)
+
+
+@pytest.mark.skipif(not shutil.which("clang"), reason="there is no clang here")
+@pytest.mark.parametrize(("flag", "sentence"), [("-ffast-math", "compile without"), ("-ffinite-math-only", "NaN")])
+def test_clang_stops_as_well(flag, sentence, tree):
+    words = ["clang", "-std=c99", flag, f"-I{tree}", f"-I{CSRC}", "-fsyntax-only", str(CSRC / "dense.c")]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+
+    assert done.returncode != 0
+    assert sentence in done.stderr
+
+
 @pytest.mark.skipif(not X86 or not shutil.which("gcc"), reason="reads x86-64 instructions")
 def test_the_public_header_leaves_the_arithmetic_of_the_user_alone(tree, tmp_path):
     (tmp_path / "user.c").write_text(

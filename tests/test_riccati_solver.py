@@ -10,15 +10,13 @@ from tendon_solvers import REAL
 from test_riccati import random_plants
 
 from awiwi_gen.build import FLAGS, compiler
+from awiwi_gen.emit.files import scalar_files
+from awiwi_gen.emit.options import Options
 from awiwi_gen.resources import CSRC
 from awiwi_gen.verify.problems_riccati import optimum
 
 OK, OUT_OF_DOMAIN, NOT_CONVERGED, NOT_FINITE = range(4)
-SINGLE = """#pragma once
-typedef float awiwi_real;
-#define AWIWI_REAL_MAX 3.4028235e+38f
-#define AWIWI_REAL_EPSILON 1.1920929e-07f
-"""
+SINGLE = scalar_files(Options("f32"))["real.h"]
 ROUNDING = {np.float64: 2.0**-53, np.float32: 2.0**-24}
 
 
