@@ -26,7 +26,7 @@ with open("hand.xml", "w") as file:
     file.write("""
 <mujoco>
   <compiler angle="radian"/>
-  <worldbody><body><joint name="j" axis="0 0 1" range="0 1.5" ref="0.5"/>
+  <worldbody><body name="link"><joint name="j" axis="0 0 1" range="0 1.5" ref="0.5"/>
     <inertial pos="0.1 0 0" mass="1" diaginertia="1 1 1"/></body></worldbody>
 </mujoco>""")
 mj, pin = mujoco.MjModel.from_xml_path("hand.xml"), pinocchio.buildModelFromMJCF("hand.xml")
