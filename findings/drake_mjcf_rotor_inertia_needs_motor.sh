@@ -1,8 +1,8 @@
 #!/bin/sh
 # Drake 1.51.1 reading MJCF: rotor inertia of a joint disappears unless a motor acts on that very joint.
 #
-# Expected. `armature` is an attribute of the joint: inertia on the diagonal of the mass matrix, whether something drives
-#   the joint or not. The reader warns of the attributes it does not support (frictionloss, stiffness).
+# Expected. `armature` is an attribute of the joint: inertia on the diagonal of the mass matrix, whether something
+#   drives the joint or not. The reader warns of the attributes it does not support (frictionloss, stiffness).
 # Observed. `armature` is stored as rotor inertia of the joint's actuator. If the joint has none, it is dropped; of
 #   its relatives it is the one dropped without a warning. Motors that pull tendons count as none.
 # Cost. In a tendon-driven hand no motor acts on a joint. All reflected motor inertia is gone: in a finger that is
@@ -12,7 +12,7 @@ tmp=$(mktemp -d)
 trap 'rm -rf "$tmp"' EXIT INT TERM
 cd "$tmp"
 python3 -m venv venv
-venv/bin/pip install --quiet --disable-pip-version-check drake==1.51.1 numpy==2.4.6
+venv/bin/pip install --quiet --no-compile --disable-pip-version-check drake==1.51.1 numpy==2.4.6
 
 venv/bin/python - <<'EOF'
 import sys

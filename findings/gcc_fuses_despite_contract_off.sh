@@ -1,10 +1,10 @@
 #!/bin/sh
 # gcc 12.2 on x86-64: -ffp-contract=off still fuses a multiplication with an addition when it vectorizes.
 #
-# Expected. The manual says that -ffp-contract=off disables contraction: a*b + c*d is rounded three times, with and without
-#   an FMA unit, so that results do not depend on the processor. The compiler obeys that for scalars and for loops.
-# Observed. Two statements that subtract and add products (rotation of a plane vector, product of complex numbers) become
-#   one vfmaddsub instruction, which rounds less often. At -O2, where gcc 12 began to vectorize, a function of two
+# Expected. The manual says that -ffp-contract=off disables contraction: a*b + c*d is rounded three times, with or
+#   without an FMA unit. Results do not depend on the processor. The compiler obeys for scalars and for loops.
+# Observed. Two statements that subtract and add products (a rotation in the plane, a complex product) become one
+#   vfmaddsub instruction, which rounds less often. At -O2, where gcc 12 began to vectorize, a function of two
 #   lines is enough. -fno-tree-slp-vectorize avoids it; clang 14 does not do it.
 # Cost. A rotation by sine and cosine is the commonest statement of kinematics code. Its bits differ between -O1 and
 #   -O2, and between machines with and without FMA, in a build whose flags promise that they do not.

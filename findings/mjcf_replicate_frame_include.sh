@@ -1,5 +1,5 @@
 #!/bin/sh
-# MJCF in three readers (MuJoCo 4.0.0, Drake 1.51.1, Pinocchio 4.1.0): fingers written by `replicate`, `frame` or `include`.
+# MJCF in three readers (MuJoCo 4.0.0, Drake 1.51.1, Pinocchio 4.1.0): fingers in `replicate`, `frame` or `include`.
 #
 # Expected. All three are elements of the format that only say where or how often bodies stand. Each reader either
 #   builds the bodies or refuses the file.
@@ -11,7 +11,8 @@ tmp=$(mktemp -d)
 trap 'rm -rf "$tmp"' EXIT INT TERM
 cd "$tmp"
 python3 -m venv venv
-venv/bin/pip install --quiet --disable-pip-version-check mujoco==4.0.0 drake==1.51.1 pin==4.1.0 libpinocchio==4.1.0 numpy==2.4.6
+venv/bin/pip install --quiet --no-compile --disable-pip-version-check \
+    mujoco==4.0.0 drake==1.51.1 pin==4.1.0 libpinocchio==4.1.0 numpy==2.4.6
 
 venv/bin/python - <<'EOF'
 import sys

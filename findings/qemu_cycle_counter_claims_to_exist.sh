@@ -60,7 +60,8 @@ static void reset(void)
 
 __attribute__((section(".vectors"), used)) static void *const vectors[] = {(void *)0x20010000, (void *)reset};
 EOF
-arm-none-eabi-gcc -std=gnu99 -O1 -mcpu=cortex-m4 -mthumb -ffreestanding -nostdlib -T board.ld cycles.c -o cycles.elf 2>log || { cat log; exit 2; }
+arm-none-eabi-gcc -std=gnu99 -O1 -mcpu=cortex-m4 -mthumb -ffreestanding -nostdlib \
+    -T board.ld cycles.c -o cycles.elf 2>log || { cat log; exit 2; }
 timeout 60 qemu-system-arm -M mps2-an386 -nographic -semihosting -kernel cycles.elf > observed 2>&1
 echo "expected: bit 25 set (no counter), or at least 100000 cycles"
 echo "observed:"

@@ -12,7 +12,7 @@ tmp=$(mktemp -d)
 trap 'rm -rf "$tmp"' EXIT INT TERM
 cd "$tmp"
 python3 -m venv venv
-venv/bin/pip install --quiet --disable-pip-version-check sympy==1.14.0 mpmath==1.3.0
+venv/bin/pip install --quiet --no-compile --disable-pip-version-check sympy==1.14.0 mpmath==1.3.0
 
 venv/bin/python - <<'EOF'
 import subprocess

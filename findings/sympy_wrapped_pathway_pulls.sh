@@ -2,25 +2,27 @@
 # SymPy 1.14.0, physics.mechanics: a wrapped pathway pulls where a straight one pushes, for the same force.
 #
 # Expected. All pathways share one sign: the documentation of `to_loads` says for both classes that a positive force is
-#   expansile. Its power is then force times the rate of the length, for a pathway in a straight line and for one around a
-#   cylinder alike (virtual work).
+#   expansile. Its power is then force times the rate of the length, in a straight line and around a cylinder
+#   alike (virtual work).
 # Observed. For LinearPathway the power is +F dL/dt, for WrappingPathway -F dL/dt. The rate of the length itself is
 #   right in both. A force actuator along a wrapped pathway has the opposite sense of the documented one.
-# Cost. A tendon modelled in straight spans and arcs over pulleys pulls in its spans and pushes in its arcs. Equations of
-#   motion derived from it have torques of the wrong sign; an energy balance finds it, a dimension check does not.
+# Cost. A tendon modelled in straight spans and arcs over pulleys pulls in its spans and pushes in its arcs. Torques
+#   derived from it have the wrong sign; an energy balance finds it, a check of dimensions does not.
 set -eu
 tmp=$(mktemp -d)
 trap 'rm -rf "$tmp"' EXIT INT TERM
 cd "$tmp"
 python3 -m venv venv
-venv/bin/pip install --quiet --disable-pip-version-check sympy==1.14.0 mpmath==1.3.0
+venv/bin/pip install --quiet --no-compile --disable-pip-version-check sympy==1.14.0 mpmath==1.3.0
 
 venv/bin/python - <<'EOF'
 import sys
 
 import sympy
 from sympy import symbols
-from sympy.physics.mechanics import LinearPathway, Point, ReferenceFrame, WrappingCylinder, WrappingPathway, dynamicsymbols
+from sympy.physics.mechanics import (
+    LinearPathway, Point, ReferenceFrame, WrappingCylinder, WrappingPathway, dynamicsymbols,
+)
 
 F, r, x, u = symbols("F r x u", positive=True)
 q = dynamicsymbols("q")

@@ -1,8 +1,8 @@
 #!/bin/sh
 # urchin 0.0.30: a link without inertia weighs a kilogram after the robot is saved.
 #
-# Expected. `inertial` is optional in URDF; without it a link has no mass and no inertia. Frames of sensors, fingertips and
-#   axes are written so. Reading and saving a file keeps the physics.
+# Expected. `inertial` is optional in URDF; without it a link has no mass and no inertia. Frames of sensors and
+#   fingertips are written so. Reading and saving a file keeps the physics.
 # Observed. In memory and in the saved file each such link has mass 1 and the unit matrix as inertia, in kg and kg m^2.
 # Cost. A phalanx weighs 10 g. One fingertip frame makes the finger a hundred times heavier, and its inertia about a
 #   joint about a million times larger.
@@ -11,7 +11,7 @@ tmp=$(mktemp -d)
 trap 'rm -rf "$tmp"' EXIT INT TERM
 cd "$tmp"
 python3 -m venv venv
-venv/bin/pip install --quiet --disable-pip-version-check urchin==0.0.30 numpy==2.4.6
+venv/bin/pip install --quiet --no-compile --disable-pip-version-check urchin==0.0.30 numpy==2.4.6
 
 venv/bin/python - <<'EOF'
 import sys

@@ -1,12 +1,12 @@
 #!/bin/sh
 # URDF in five readers: a joint that mimics a joint that mimics a joint.
 #
-# Expected. `mimic` gives value = multiplier * (value of the other joint) + offset. Nothing in the format forbids that the
-#   other joint mimics too: a four-bar finger is written so (distal follows middle, middle follows proximal).
+# Expected. `mimic` gives value = multiplier * (value of the other joint) + offset. Nothing in the format forbids that
+#   the other joint mimics too: a coupled finger is written so (distal follows middle, middle follows proximal).
 # Observed, for one valid file. urchin 0.0.30 leaves the last joint at 0 without a word. yourdfpy 0.0.60 takes the
 #   value of the middle joint as 0 (and logs so), so that the last joint stands at its bare offset. Pinocchio 4.1.0
-#   with mimic=True raises an error about argument sizes. MuJoCo 4.0.0 makes two soft equalities, and three independent
-#   joints; Drake 1.51.1 two constraints. urdf_parser_py, of ROS, keeps what it reads, but gives None for a multiplier
+#   with mimic=True raises an error about argument sizes. MuJoCo 4.0.0 makes two soft equalities on three
+#   independent joints. urdf_parser_py 0.0.4, of ROS, keeps what it reads, but gives None for a multiplier
 #   that is not written, where the format says 1.
 # Cost. The fingertip stands somewhere else in every tool. Here its direction differs by 2.3 rad.
 set -eu
@@ -14,7 +14,8 @@ tmp=$(mktemp -d)
 trap 'rm -rf "$tmp"' EXIT INT TERM
 cd "$tmp"
 python3 -m venv venv
-venv/bin/pip install --quiet --disable-pip-version-check yourdfpy==0.0.60 urchin==0.0.30 urdf-parser-py==0.0.4 pin==4.1.0 libpinocchio==4.1.0 mujoco==4.0.0 numpy==2.4.6
+venv/bin/pip install --quiet --no-compile --disable-pip-version-check \
+    yourdfpy==0.0.60 urchin==0.0.30 urdf-parser-py==0.0.4 pin==4.1.0 libpinocchio==4.1.0 mujoco==4.0.0 numpy==2.4.6
 
 venv/bin/python - <<'EOF'
 import sys

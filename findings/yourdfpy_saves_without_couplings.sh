@@ -1,8 +1,8 @@
 #!/bin/sh
 # yourdfpy 0.0.60: writing a URDF leaves out the couplings and safety limits that were read.
 #
-# Expected. The library reads `mimic`, `safety_controller` and `calibration` into its objects, uses the first in its kinematics,
-#   and can save the robot. Saving what was read keeps it.
+# Expected. The library reads `mimic`, `safety_controller` and `calibration` into its objects, uses the first in its
+#   kinematics, and can save the robot. Saving what was read keeps it.
 # Observed. The written file has none of the three. It is valid, and says something else: joints that followed others
 #   are free. Nothing is reported.
 # Cost. Opening a hand to rename a link or to move a mesh unties every coupled finger joint in the saved file.
@@ -11,7 +11,7 @@ tmp=$(mktemp -d)
 trap 'rm -rf "$tmp"' EXIT INT TERM
 cd "$tmp"
 python3 -m venv venv
-venv/bin/pip install --quiet --disable-pip-version-check yourdfpy==0.0.60 numpy==2.4.6
+venv/bin/pip install --quiet --no-compile --disable-pip-version-check yourdfpy==0.0.60 numpy==2.4.6
 
 venv/bin/python - <<'EOF'
 import sys
@@ -25,7 +25,8 @@ with open("finger.urdf", "w") as file:
     <safety_controller k_velocity="1" k_position="2" soft_lower_limit="-0.5" soft_upper_limit="0.5"/>
     <calibration rising="0.1"/></joint>
   <joint name="distal" type="revolute"><parent link="one"/><child link="two"/><axis xyz="0 0 1"/>
-    <limit effort="1" velocity="1" lower="-1" upper="1"/><mimic joint="proximal" multiplier="2" offset="0.1"/></joint></robot>""")
+    <limit effort="1" velocity="1" lower="-1" upper="1"/>
+    <mimic joint="proximal" multiplier="2" offset="0.1"/></joint></robot>""")
 robot = yourdfpy.URDF.load("finger.urdf")
 proximal, distal = robot.joint_map["proximal"], robot.joint_map["distal"]
 read = [type(part).__name__ for part in (distal.mimic, proximal.safety_controller, proximal.calibration)]
@@ -37,6 +38,7 @@ with open("saved.urdf") as file:
     text = file.read()
 lost = [tag for tag in ("mimic", "safety_controller", "calibration") if tag not in text]
 print("lost: expected [] observed", lost)
-sys.exit(not (read == ["Mimic", "SafetyController", "Calibration"] and lost == ["mimic", "safety_controller", "calibration"]
+sys.exit(not (read == ["Mimic", "SafetyController", "Calibration"]
+              and lost == ["mimic", "safety_controller", "calibration"]
               and again.actuated_joint_names == ["proximal", "distal"]))
 EOF
