@@ -4,8 +4,8 @@
 # Expected. A converter keeps mass and inertia. Its documentation says that the bodies it puts in for joint offsets have
 #   negligible mass; a body without `inertial` has none at all in URDF. Damping and friction have an element in URDF,
 #   `dynamics`, with the same meaning.
-# Observed. Each joint gets a body of 1 g, also where it has no offset. `damping` and `frictionloss` are dropped although
-#   URDF has them, `armature` too (URDF cannot), all without a word.
+# Observed. Each joint gets a body of 1 g, also where it has no offset. `damping` and `frictionloss` are dropped,
+#   although URDF has them, `armature` too (URDF cannot), all without a word.
 # Cost. A distal phalanx weighs a few grams. Here the inertia about the joint is 2.6e-5 instead of 2.8e-4 kg m^2. A
 #   hand of 19 joints is 19 g heavier.
 set -eu
