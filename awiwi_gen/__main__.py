@@ -19,7 +19,6 @@ import typer
 
 from awiwi_gen import exits
 from awiwi_gen.errors import AwiwiError, InputError, unknown
-from awiwi_gen.exits import system_errors
 
 app = typer.Typer(
     help="From the CAD numbers of a tendon-driven hand to verified real-time C.",
@@ -68,7 +67,7 @@ def command(function: Callable[..., int | None]) -> Callable[..., None]:
     @wraps(function)
     def run(**options: Any) -> None:
         try:
-            with system_errors():
+            with exits.system_errors():
                 code = function(**options)
         except AwiwiError as error:
             if options.get("as_json"):
@@ -383,7 +382,12 @@ def read_json_inputs() -> dict[str, Any]:
         raise InputError(f"standard input is not JSON: {error}") from None
     if not isinstance(given, dict):
         raise InputError('standard input must be one JSON object such as {"q": [0.1, 0.2, 0.3, 0.4]}')
-    return given
+    return {name: with_nan(value) for name, value in given.items()}
+
+
+def with_nan(value: Any) -> Any:
+    """JSON's null as NaN, which is what `print_json` writes it for."""
+    return [*map(with_nan, value)] if isinstance(value, list) else float("nan") if value is None else value
 
 
 def main() -> None:
