@@ -2,6 +2,7 @@
 # make test   all tests              make lint   ruff, mypy, layers
 # make check  is generated/ fresh?   make bench  us and the peers, side by side
 # make report the figures of the source, computed again, with all proofs: build/report/index.html
+# make firmware  every kernel on every target: equal bits, committed figures (ACCEPT=1 writes them)
 # make clean  remove what make made (generated/ stays: it is checked in)
 
 PYTHON ?= python3
@@ -36,6 +37,9 @@ report: .venv/installed
 bench: .venv/installed .venv-bench/installed
 	@$(BIN)/python -m bench
 
+firmware: .venv/installed
+	@$(BIN)/python -m tests.targets $(if $(ACCEPT),--accept)
+
 # The peers live in an environment of their own. Where one cannot be installed, the others are compared.
 .venv-bench/installed: bench/requirements.lock
 	$(PYTHON) -m venv .venv-bench
@@ -48,4 +52,4 @@ clean:
 	rm -rf .venv .venv-bench .cache build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
-.PHONY: all test lint check report bench clean
+.PHONY: all test lint check report bench firmware clean

@@ -53,7 +53,8 @@ def compile_object(source: Path, includes: Sequence[Path], target: Target) -> Pa
     """The object of a C file for a target; beside it its call graph with stack sizes (.ci), which gcc writes."""
     headers = sorted(path for folder in includes for path in folder.glob("*.h"))
     command = [target.compiler, *FLAGS, *target.flags, *(f"-I{folder}" for folder in includes)]
-    if target.clock:
+    graphs = bool(target.emulator)  # the targets whose stack the table has; all of them compile with gcc
+    if graphs:
         command.append("-fcallgraph-info=su")
     key = hashlib.sha256("\0".join([*command, version(target.compiler), source.name]).encode())
     for path in (source, *headers):
@@ -63,7 +64,7 @@ def compile_object(source: Path, includes: Sequence[Path], target: Target) -> Pa
         OBJECTS.mkdir(parents=True, exist_ok=True)
         partial = made.with_suffix(f".{os.getpid()}.o")
         run_tool(*command, "-c", source, "-o", partial)
-        if target.clock:
+        if graphs:
             partial.with_suffix(".ci").replace(made.with_suffix(".ci"))
         partial.replace(made)
     return made
