@@ -3,6 +3,7 @@
 # make check  is generated/ fresh?   make bench  us and the peers, side by side
 # make report the figures of the source, computed again, with all proofs: build/report/index.html
 # make firmware  every kernel on every target: equal bits, committed figures (ACCEPT=1 writes them)
+# make analysis  gcc -fanalyzer, clang-tidy and cppcheck: no finding without a reason
 # make clean  remove what make made (generated/ stays: it is checked in)
 
 PYTHON ?= python3
@@ -40,6 +41,9 @@ bench: .venv/installed .venv-bench/installed
 firmware: .venv/installed
 	@$(BIN)/python -m tests.targets $(if $(ACCEPT),--accept)
 
+analysis: .venv/installed
+	@$(BIN)/python -m tests.targets.analysis
+
 # The peers live in an environment of their own. Where one cannot be installed, the others are compared.
 .venv-bench/installed: bench/requirements.lock
 	$(PYTHON) -m venv .venv-bench
@@ -52,4 +56,4 @@ clean:
 	rm -rf .venv .venv-bench .cache build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
-.PHONY: all test lint check report bench firmware clean
+.PHONY: all test lint check report bench firmware analysis clean

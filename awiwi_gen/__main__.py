@@ -145,6 +145,20 @@ def check(
 
 
 @command
+def amalgamate(
+    directory: Annotated[Path, typer.Argument(help="A generated directory.")] = GENERATED,
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder for awiwi.h and awiwi.c.")] = Path("build/one"),
+    as_json: Json = False,
+) -> None:
+    """Write all C of a generated directory as one header and one C file."""
+    from awiwi_gen.amalgamate import write
+    from awiwi_gen.report import print_json
+
+    files = [str(path) for path in write(directory, output)]
+    print_json({"files": files}) if as_json else print("\n".join(files))
+
+
+@command
 def build(hand: HandFile = None, output: Output = GENERATED, as_json: Json = False) -> int:
     """Compile a generated directory and load it, as Python does."""
     from awiwi_gen.build import load

@@ -23,7 +23,7 @@ COMPILER = [
 TOP = [
     ["derive", "records", "budget"],
     ["pipeline"],
-    ["report", "explain", "simulate", "studies"],
+    ["report", "explain", "simulate", "studies", "amalgamate"],
     ["__init__"],
     ["__main__"],
 ]

@@ -60,7 +60,9 @@ def main() -> int:
         for scalar in chosen.scalar or ["f64", "f32"]:
             for target, result in run_all(Job(hand, Options(scalar), chosen.only), targets).items():
                 column = f"{target.name} {scalar}"
-                print(f"{column}: {len(result.runs)} kernels, {'FAILED' if result.faults else 'equal bits'}", flush=True)
+                print(
+                    f"{column}: {len(result.runs)} kernels, {'FAILED' if result.faults else 'equal bits'}", flush=True
+                )
                 faults += [f"{column}: {fault}" for fault in result.faults]
                 if result.figures:
                     table[column], compilers[column] = result.figures, version(target.compiler)

@@ -11,7 +11,6 @@ from awiwi_gen.pipeline import Job, cached_tree
 from .programs import PATIENCE
 from .toolchains import BOARD, ROOT
 
-
 CASES = (("cortex-m7", "f64"), ("cortex-m4", "f32"))
 OVERLOAD = 50  # how often the overloaded tick does its work; once takes a seventh of the period at most
 

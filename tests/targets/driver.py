@@ -23,7 +23,6 @@ Array = np.ndarray[Any, Any]
 ORDINARY = (0, 1, 2, 3, 5, 8, 16, 21)  # straight, lower and upper limits, corners, the inside of the ranges
 
 
-
 def golden_inputs(job: Job, manifest: Mapping[str, Any]) -> dict[str, Array]:
     """By kernel: inputs (rows, size), all ports one after the other, in double precision."""
     made = {}
@@ -54,7 +53,9 @@ def write_driver(directory: Path, manifest: Mapping[str, Any], inputs: Mapping[s
         parts += [_array(f"bits_{number}", bits), _wrapper(f"run_{number}", entry, manifest["prefix"])]
         entries.append(_entry(entry["name"], f"run_{number}", bits.shape[1], _size(entry["outputs"]), f"bits_{number}"))
     first = next(iter(inputs.values()))
-    parts.append("static int empty(const awiwi_real *in, awiwi_real *out)\n{\n    (void)in, (void)out;\n    return 0;\n}")
+    parts.append(
+        "static int empty(const awiwi_real *in, awiwi_real *out)\n{\n    (void)in, (void)out;\n    return 0;\n}"
+    )
     entries.append(_entry(EMPTY, "empty", 1, 0, "bits_0"))
     table = ",\n".join(entries)
     text = "\n\n".join(['#include "run.h"', *parts, f"const struct kernel kernels[] = {{\n{table},\n}};"])

@@ -56,14 +56,18 @@ class CallGraph:
 
         A pointer can lead to any other function of the kernel's own file: solvers call back what it handed to them.
         """
-        callbacks = [name for name in self.members[kernel] if name != function]
+        members = self.members[kernel]
 
         @cache
         def deepest(name: str, inside: tuple[str, ...]) -> int:
             if name in inside:
                 raise ValueError(f"{kernel}: {name} calls itself")
-            below = callbacks if name == INDIRECT else sorted(self.calls.get(name, ()))
-            return self.frames.get(name, 0) + max((deepest(other, (*inside, name)) for other in below), default=0)
+            targets = (
+                [other for other in members if other not in inside] if name == INDIRECT else self.calls.get(name, ())
+            )
+            return self.frames.get(name, 0) + max(
+                (deepest(other, (*inside, name)) for other in sorted(targets)), default=0
+            )
 
         return deepest(function, ()) + LIBRARY_STACK
 

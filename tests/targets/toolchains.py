@@ -64,7 +64,15 @@ class Target:
 def _bare(machine: str, cpu: str, clock: int, script: Path) -> Target:
     flags = ("-O2", "-mthumb", *cpu.split(), "-mfloat-abi=hard", "-ffunction-sections", "-fdata-sections")
     emulator = ("qemu-system-arm", "-M", machine, "-nographic", "-monitor", "none", "-serial", "none")
-    semihosting = ("-chardev", "stdio,id=text", "-semihosting-config", "enable=on,target=native,chardev=text", "-icount", f"shift={SHIFT}", "-kernel")
+    semihosting = (
+        "-chardev",
+        "stdio,id=text",
+        "-semihosting-config",
+        "enable=on,target=native,chardev=text",
+        "-icount",
+        f"shift={SHIFT}",
+        "-kernel",
+    )
     return Target(machine, "arm-none-eabi-gcc", flags, emulator + semihosting, clock, script)
 
 
