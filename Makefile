@@ -2,7 +2,7 @@
 # make test   all tests              make lint   ruff, mypy, layers
 # make check  is generated/ fresh?   make bench  us and the peers, side by side
 # make report the figures of the source, computed again, with all proofs: build/report/index.html
-# make firmware  every kernel on every target: equal bits, committed figures (ACCEPT=1 writes them)
+# make firmware  every kernel on every target: equal bits, committed figures (ACCEPT=1 writes them, ALL=1: more)
 # make analysis  gcc -fanalyzer, clang-tidy and cppcheck: no finding without a reason
 # make clean  remove what make made (generated/ stays: it is checked in)
 
@@ -39,7 +39,7 @@ bench: .venv/installed .venv-bench/installed
 	@$(BIN)/python -m bench
 
 firmware: .venv/installed
-	@$(BIN)/python -m tests.targets $(if $(ACCEPT),--accept)
+	@$(BIN)/python -m tests.targets $(if $(ACCEPT),--accept) $(if $(ALL),--all)
 
 analysis: .venv/installed
 	@$(BIN)/python -m tests.targets.analysis

@@ -29,6 +29,7 @@ TYPE = re.compile(
     re.M,
 )
 ENUMERATORS = re.compile(r"^(?:typedef )?enum(?: \w+)? \{([^}]*)\}", re.M)
+STRUCT = re.compile(r"struct \w* ?\{([^}]*)\}")
 MACRO = re.compile(r"^#define (\w+)", re.M)
 
 
@@ -41,11 +42,12 @@ def amalgamate(directory: Path) -> dict[str, str]:
     sources = {name: text for name, text in files.items() if name.endswith(".c")}
     public = _ordered(HEADER, files)
     private = [name for text in sources.values() for name in _ordered_includes(text, files)]
-    declared = {m["name"] for name in {*public, *private} for m in TOKEN.finditer(files[name])}
+    bodies = [body for name in {*public, *private} for body in STRUCT.findall(files[name])]
+    members = {match["name"] for body in bodies for match in TOKEN.finditer(body)}
     parts = [BANNER, f'#include "{HEADER}"\n', QUIET]
     parts += [_without_includes(files[name]) for name in dict.fromkeys(private) if name not in public]
     for name, text in sources.items():
-        parts.append(f"/* {name} */\n" + _renamed(_without_includes(text), Path(name).stem, declared))
+        parts.append(f"/* {name} */\n" + _renamed(_without_includes(text), Path(name).stem, members))
         parts.append("".join(f"#undef {macro}\n" for macro in dict.fromkeys(MACRO.findall(text))))
     return {HEADER: BANNER + "\n".join(_without_includes(files[n]) for n in public), SOURCE: "\n".join(parts)}
 
@@ -91,12 +93,12 @@ def _local_names(text: str) -> set[str]:
     return {*STATIC.findall(bare), *types, *constants}
 
 
-def _renamed(text: str, prefix: str, declared: set[str]) -> str:
-    """A C file with its local names prefixed; comments and strings stay, and so do members that headers declare."""
+def _renamed(text: str, prefix: str, members: set[str]) -> str:
+    """A C file with its local names prefixed; comments and strings stay, and so do members of structs in headers."""
     own = _local_names(text)
 
     def rename(match: re.Match[str]) -> str:
         access, name = match["access"] or "", match["name"]
-        return match[0] if name not in own or (access and name in declared) else f"{access}{prefix}_{name}"
+        return match[0] if name not in own or (access and name in members) else f"{access}{prefix}_{name}"
 
     return TOKEN.sub(rename, text)

@@ -1,6 +1,7 @@
 """`make firmware`: every kernel on every target, with the same bits and within the committed figures.
 
-python -m tests.targets                        all kernels, double and single precision, all targets
+python -m tests.targets                        all kernels on all targets; single precision at -O2 only
+python -m tests.targets --all                  and at -O0, -O1, -O3
 python -m tests.targets --only 'index_*' --target M7 --scalar f64
 python -m tests.targets --accept               write the figures instead of comparing them
 
@@ -47,6 +48,7 @@ def main() -> int:
     parser.add_argument("--only", default="*", help="pattern of kernel names")
     parser.add_argument("--scalar", choices=["f64", "f32"], action="append")
     parser.add_argument("--target", choices=[target.name for target in TARGETS], action="append")
+    parser.add_argument("--all", action="store_true", help="all optimisation levels in single precision too")
     parser.add_argument("--accept", action="store_true", help="write the figures instead of comparing them")
     chosen = parser.parse_args()
     targets = [t for t in TARGETS if t == REFERENCE or not chosen.target or t.name in chosen.target]
@@ -58,7 +60,9 @@ def main() -> int:
     compilers = {}
     try:
         for scalar in chosen.scalar or ["f64", "f32"]:
-            for target, result in run_all(Job(hand, Options(scalar), chosen.only), targets).items():
+            everything = scalar == "f64" or chosen.all or chosen.target
+            selected = [t for t in targets if everything or "-O2" in t.flags]
+            for target, result in run_all(Job(hand, Options(scalar), chosen.only), selected).items():
                 column = f"{target.name} {scalar}"
                 print(
                     f"{column}: {len(result.runs)} kernels, {'FAILED' if result.faults else 'equal bits'}", flush=True
