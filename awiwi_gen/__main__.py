@@ -145,17 +145,11 @@ def check(
 
 
 @command
-def amalgamate(
-    directory: Annotated[Path, typer.Argument(help="A generated directory.")] = GENERATED,
-    output: Annotated[Path, typer.Option("--output", "-o", help="Folder for awiwi.h and awiwi.c.")] = Path("build/one"),
-    as_json: Json = False,
-) -> None:
-    """Write all C of a generated directory as one header and one C file."""
-    from awiwi_gen.amalgamate import write
-    from awiwi_gen.report import print_json
+def amalgamate(directory: Path = GENERATED, output: Output = Path("build/one"), as_json: Json = False) -> None:
+    """Write all C of the directory as one header and one C file, awiwi.h and awiwi.c in the output directory."""
+    from awiwi_gen.amalgamate import run
 
-    files = [str(path) for path in write(directory, output)]
-    print_json({"files": files}) if as_json else print("\n".join(files))
+    run(directory, output, as_json)
 
 
 @command

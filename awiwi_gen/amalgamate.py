@@ -7,6 +7,7 @@ are undefined after it.
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import tempfile
@@ -69,6 +70,12 @@ def write(directory: Path, output: Path) -> list[Path]:
         os.chmod(partial.name, 0o644)
         os.replace(partial.name, path)
     return targets
+
+
+def run(directory: Path, output: Path, as_json: bool) -> None:
+    """Write both files and print their names: what the command does."""
+    files = [str(path) for path in write(directory, output)]
+    print(json.dumps({"files": files}) if as_json else "\n".join(files))
 
 
 def _ordered(name: str, files: Mapping[str, str]) -> list[str]:
