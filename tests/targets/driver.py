@@ -23,13 +23,16 @@ Array = np.ndarray[Any, Any]
 ORDINARY = (0, 1, 2, 3, 5, 8, 16, 21)  # straight, lower and upper limits, corners, the inside of the ranges
 
 
-def golden_inputs(job: Job, manifest: Mapping[str, Any]) -> dict[str, Array]:
-    """By kernel: inputs (rows, size), all ports one after the other, in double precision."""
-    made = {}
+def golden_inputs(job: Job, manifest: Mapping[str, Any], rows: int = 0) -> dict[str, Array]:
+    """By kernel: inputs (rows, size), all ports one after the other, in double precision.
+
+    ``rows`` takes that many samples instead of the `ORDINARY` ones.
+    """
+    made, chosen = {}, list(range(rows) if rows else ORDINARY)
     for kernel in job.kernels:
         samples = job.records[kernel.name].inputs or draw(kernel.inputs, kernel.path)
         flat = np.concatenate([np.reshape(samples[p], (len(samples[p]), -1)) for p in kernel.inputs], axis=1)
-        made[kernel.name] = np.concatenate([flat[list(ORDINARY)], _extreme(flat[21])]).astype(np.float64)
+        made[kernel.name] = np.concatenate([flat[chosen], _extreme(flat[21])]).astype(np.float64)
     return {entry["name"]: made[entry["name"]] for entry in manifest["kernels"]}
 
 
