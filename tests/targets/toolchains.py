@@ -32,8 +32,7 @@ SHIFT = 6  # QEMU's virtual clock advances by 2^SHIFT ns per instruction: more t
 class Target:
     """A processor or a compiler setting that kernels are run on.
 
-    ``clock`` is SysTick's frequency [Hz], 0 where programs run in an operating system. ``every`` selects all kernels;
-    other targets run those of `REPRESENTATIVE` parts, where that is all that fits the time.
+    ``clock`` is SysTick's frequency [Hz], 0 where programs run in an operating system. ``script`` links bare metal.
     """
 
     name: str
