@@ -87,14 +87,17 @@ def declarations(directory: Path, store: Cache, shared: str) -> str:
     return store.memo("declarations", key(shared, compiler().identity), preprocess)
 
 
-def load(directory: Path, store: Cache | None = None) -> Library:
-    """Compile a generated directory and load it as a Library.
+def load(directory: str | Path, store: Cache | None = None) -> Library:
+    """Compile a generated directory and load it as NumPy functions; compiled objects are kept in a cache.
 
-    Raises InputError where nothing was generated, BuildError where the compiler refuses the code.
+    Needs NumPy, cffi and a C compiler, but no library that derives kernels.
+
+    Raises InputError where nothing was generated, NoCompilerError where there is no C compiler that works, BuildError
+    where it refuses the code.
     """
     from awiwi_gen.library import Library
 
-    store = store or Cache()
+    directory, store = Path(directory), store or Cache()
     manifest = read_manifest(directory)
     if manifest is None:
         raise InputError(f"{directory}: nothing generated here; run awiwi-gen generate -o {directory}")

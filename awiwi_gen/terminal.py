@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from awiwi_gen import extras
 from awiwi_gen.errors import InputError, unknown
 
 
@@ -50,6 +51,26 @@ def no_kernel(hand: Any, file: Path | None, name: str, known: Any) -> InputError
     """The exception for a kernel that a hand does not have."""
     reason = why_absent(hand, name)
     return InputError(reason) if reason else unknown("kernel", name, known, f"see {listing(file)}")
+
+
+def find_kernel(name: str, file: Path | None, output: Path | None) -> Any:
+    """A compiled kernel of a hand file, or of a generated directory. Raises InputError where it does not exist."""
+    import awiwi_gen
+
+    if output is None:
+        extras.require("call without -o", *extras.GENERATE)
+        hand = awiwi_gen.Hand.load(file)
+        library = awiwi_gen.build(hand)
+        if name not in library:
+            raise no_kernel(hand, file, name, library)
+    elif file is None:
+        require(output)
+        library = awiwi_gen.load(output)
+        if name not in library:
+            raise unknown("kernel", name, library, f"see awiwi-gen list -o {output}")
+    else:
+        raise InputError("call: --hand and -o name two sources of one kernel; leave one of them out")
+    return library[name]
 
 
 def parse_inputs(texts: list[str], function: Any) -> dict[str, Any]:
