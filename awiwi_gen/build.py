@@ -212,7 +212,8 @@ def _compile_batch(source: Path, scratch: Path) -> Path:
     flags, machine = native()
     flags += () if "clang" in compiler().version else GCC_FLAGS
     for without in UNFUSED if "__x86_64__" in machine else ((),):
-        compiler().run(*BATCH_FLAGS, *flags, *without, "-S", str(source), "-o", str(assembly))
+        includes = (f"-I{source.parent.parent}", f"-I{CSRC}")
+        compiler().run(*BATCH_FLAGS, *flags, *without, *includes, "-S", str(source), "-o", str(assembly))
         if not FUSED.search(assembly.read_text(encoding="utf-8")):
             compiler().run("-shared", str(assembly), "-o", str(made), "-lm")
             return made

@@ -100,4 +100,9 @@ def read_json_inputs() -> dict[str, Any]:
         raise InputError(f"standard input is not JSON: {error}") from None
     if not isinstance(given, dict):
         raise InputError('standard input must be one JSON object such as {"q": [0.1, 0.2, 0.3, 0.4]}')
-    return given
+    return {name: _with_nan(value) for name, value in given.items()}
+
+
+def _with_nan(value: Any) -> Any:
+    """JSON's null as NaN, which is what `print_json` writes it for."""
+    return [*map(_with_nan, value)] if isinstance(value, list) else float("nan") if value is None else value

@@ -3,8 +3,8 @@
 #
 # Expected. The reference says that the axis is normalized, so that any length other than 0 may be written: "1 1 0 40"
 #   is 40 degrees about the diagonal. MuJoCo and Drake 1.51 do that.
-# Observed. Pinocchio puts the axis into Rodrigues' formula as it stands. The placement of the joint has determinant 2.07
-#   instead of 1: bodies behind it are stretched and sheared, and an inertia becomes another one. There is no
+# Observed. Pinocchio puts the axis into Rodrigues' formula as it stands. The placement of the joint has determinant
+#   2.07 instead of 1: bodies behind it are stretched and sheared, and an inertia becomes another one. There is no
 #   error. The same reader normalizes `quat` and `zaxis`.
 # Cost. Oblique axes are what thumbs have. Lengths of links change with the pose, which no later step can repair.
 set -eu

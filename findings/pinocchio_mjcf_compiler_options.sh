@@ -1,8 +1,8 @@
 #!/bin/sh
 # Pinocchio 4.1.0 reading MJCF: two options of `compiler` that change the model are misread, or not read.
 #
-# Expected. In `eulerseq` lower-case letters are rotations about the turned axes and capitals about the fixed ones: "XYZ"
-#   is roll, pitch and yaw of URDF. `inertiagrouprange` names the groups of shapes that have mass, so that shapes for
+# Expected. In `eulerseq` lower-case letters are rotations about the turned axes and capitals about the fixed ones:
+#   "XYZ" is roll, pitch and yaw of URDF. `inertiagrouprange` names the groups of shapes that have mass, so that shapes for
 #   display have none. MuJoCo does both; Drake 1.51 reads "XYZ" alike.
 # Observed. Capitals are taken as lower case: the body of this example is turned by 12 degrees. Shapes for display
 #   count: the body here has nine times its mass. There is no message.

@@ -277,7 +277,7 @@ def test_inputs_that_do_not_fit_are_told(arguments, message):
         ("", "standard input is not JSON"),
         ("{q: 1}", "standard input is not JSON"),
         ("[1, 2]", "standard input must be one JSON object"),
-        ('{"q": "x"}', "is not an array of numbers"),
+        ('{"q": "x"}', "is not an array of real numbers"),
         ('{"Q": [1, 2, 3, 4]}', "unknown ['Q']"),
     ],
 )

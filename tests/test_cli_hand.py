@@ -117,7 +117,7 @@ def test_a_full_standard_output_is_one_sentence():
             stdout=full, stderr=subprocess.PIPE, text=True, check=False,
         )  # fmt: skip
 
-    assert (done.returncode, done.stderr) == (2, "no space left on device\n")
+    assert (done.returncode, done.stderr) == (2, "standard output or a temporary file: no space left on device\n")
 
 
 def test_text_of_a_hand_file_reaches_no_terminal_raw(tmp_path):

@@ -157,7 +157,7 @@ def test_a_hand_without_a_motor_has_none_of_its_kernels():
         ('travel = "5 rad"', 'travel = "50 rad"', "turns the rotor by 5000 rad"),
         ("harmonic = 3", "harmonic = 1", "which ripple[2] is already"),
         ("harmonic = 3", 'harmonic = "3"', 'harmonic = "3" is not a whole number; expected something such as 1'),
-        ("harmonic = 3", "harmonic = 0", "is below the least, 1"),
+        ("harmonic = 3", "harmonic = 0", "is too small; expected at least 1"),
         ('\npulley = "4 mm"', '\npulley = "5 mm"', 'is not motor.pulley = "5 mm"'),
     ],
 )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import keyword
 import re
 import subprocess
@@ -20,6 +19,7 @@ from awiwi_gen.emit.c import CFunction, c_function
 from awiwi_gen.emit.files import kernel_file, shared_files
 from awiwi_gen.emit.names import C99_SIGNIFICANT, csrc_names, require_names, short_name
 from awiwi_gen.emit.options import Options
+from awiwi_gen.emit.tree import sealed
 from awiwi_gen.errors import InputError
 from awiwi_gen.ir.builder import Builder
 from awiwi_gen.ir.cost import cost
@@ -114,7 +114,7 @@ def write_tree(directory: Path, prefix: str, kernels: list[Kernel]) -> None:
     entries = [entry(one_kernel) for one_kernel in kernels]
     files = shared_files(prefix, functions, "0" * 64, {}, Options()) | batch_files(entries, prefix, Options())
     files |= {f"{function.name}.c": kernel_file(function, "0" * 64) for function in functions}
-    files["manifest.json"] = json.dumps({"hand": "", "prefix": prefix, "c_type": "double", "kernels": entries})
+    files["manifest.json"] = sealed({"hand": "", "prefix": prefix, "c_type": "double", "kernels": entries})
     for name, text in files.items():
         (directory / name).parent.mkdir(exist_ok=True, parents=True)
         (directory / name).write_text(text)

@@ -122,9 +122,9 @@ def test_a_failed_verification_names_the_kernel_and_exits_with_1(generated):
 def test_an_error_in_the_last_bit_is_found_by_bit_equality_alone(small, generated):
     file = generated / "jaw_coupling.c"
     text = file.read_text()
-    literal = re.search(r"P\[0\] = (\S+);", text)[1]
+    literal = re.search(r"P_out\[0\] = (\S+);", text)[1]
     above = repr(float(literal) * (1 + 2**-52))
-    file.write_text(text.replace(f"P[0] = {literal};", f"P[0] = {above};"))
+    file.write_text(text.replace(f"P_out[0] = {literal};", f"P_out[0] = {above};"))
     proof = verify(Job(small, only=PATTERN), generated)
 
     (failed,) = [verdict for verdict in proof.verdicts if not verdict.passed]
