@@ -20,10 +20,10 @@ from awiwi_gen.errors import AwiwiError, InputError, printable
 from awiwi_gen.extras import GENERATE, HAND
 from awiwi_gen.terminal import find_kernel, fix, listing, no_kernel, parse_inputs, read_json_inputs, require, why_absent
 
-try:
-    import typer
-except ModuleNotFoundError:
-    exits.leave(exits.SYSTEM, f'{extras.missing("awiwi-gen", "typer")}; Python alone has awiwi_gen.load("generated")')
+if absent := extras.missing("awiwi-gen", *extras.COMMAND_LINE):
+    exits.leave(exits.SYSTEM, f'{absent}; Python alone has awiwi_gen.load("generated")')
+
+import typer
 
 app = typer.Typer(
     help="From the CAD numbers of a tendon-driven hand to verified real-time C.",

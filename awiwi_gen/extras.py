@@ -9,6 +9,7 @@ from importlib.util import find_spec
 
 from awiwi_gen.errors import MissingExtraError
 
+ORDER = ("cli", "generate", "studies")  # each includes those before it
 # The module, the package that has it, and the extra that installs it.
 EXTRAS = {
     "casadi": ("casadi", "generate"),
@@ -18,10 +19,11 @@ EXTRAS = {
     "sympy": ("sympy", "generate"),
     "tree_sitter": ("tree-sitter", "generate"),
     "tree_sitter_toml": ("tree-sitter-toml", "generate"),
-    "typer": ("typer", "generate"),
+    "typer": ("typer", "cli"),
     "matplotlib": ("matplotlib", "studies"),
     "scipy": ("scipy", "studies"),
 }
+COMMAND_LINE = ("typer", "pydantic")  # the latter is used by the former
 HAND = ("pydantic", "tree_sitter", "tree_sitter_toml")  # to read a hand file
 GENERATE = ("casadi", "flint", "jinja2", "sympy", *HAND)  # to derive, emit and prove
 
@@ -36,7 +38,7 @@ def missing(purpose: str, *modules: str) -> str:
     """The sentence about those modules that are not installed, or nothing."""
     absent = [EXTRAS[module] for module in modules if find_spec(module) is None]
     packages = [package for package, _ in absent]
-    extra = "studies" if any(extra == "studies" for _, extra in absent) else "generate"  # studies include generate
+    extra = max((extra for _, extra in absent), key=ORDER.index, default="")
     listed = " and ".join([", ".join(packages[:-1])] * (len(packages) > 1) + packages[-1:])
     them = "it" if len(packages) == 1 else "them"
     return f"{purpose} needs {listed}; install {them}: pip install 'awiwi_gen[{extra}]'" if absent else ""

@@ -2,7 +2,7 @@
 
 Ports cannot collide with anything: port ``x`` is the C parameter ``x_in`` or ``x_out``, and no keyword, standard macro,
 type of ours or local variable of generated code ends like that. Kernels keep their names behind the hand's prefix;
-`require_names` checks those against the table.
+`require_names` checks those against the table. Kernels are also attributes of a Python library, beside its own.
 """
 
 from __future__ import annotations
@@ -41,6 +41,11 @@ WORD = re.compile(r"[A-Za-z_]\w*")
 COMMENT = re.compile(r'/\*.*?\*/|"[^"\n]*"', re.DOTALL)
 # Ports are also arguments and result fields of Python functions, beside these of our own.
 TAKEN_PORTS = {*keyword.kwlist, "self", "out", "status", GUARDS}
+# Kernels are attributes of `library.Library`, beside these, and name the types of their results.
+TAKEN_KERNELS = {
+    *keyword.kwlist, "c", "digest", "dtype", "ffi", "get", "items", "keys", "manifest", "origin", "pointer", "threads",
+    "values", "vectorise_after", "vectorised",
+}  # fmt: skip
 
 
 def input_name(port: str) -> str:
@@ -101,6 +106,8 @@ def require_names(prefix: str, kernels: Iterable[Kernel]) -> None:
             continue
         if owner := taken.get(name):
             faults.append(f"{who}: its C name {name} is taken by {owner}; choose another kernel name or prefix")
+        if kernel.name in TAKEN_KERNELS:
+            faults.append(f"{who}: Python or the Python interface has this name; choose another")
         if owner := files.get(kernel.name):
             faults.append(f"{who}: its file {kernel.name}.c would collide with {owner}; choose another name")
         for external in (name, f"{name}_batch"):
