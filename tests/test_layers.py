@@ -15,7 +15,8 @@ from awiwi_gen.kernels import catalog
 
 PACKAGE = Path(__file__).resolve().parent.parent / "awiwi_gen"
 PHYSICS = [
-    ["errors", "units", "resources", "exits"],
+    ["errors", "units", "resources"],
+    ["extras", "exits"],
     ["hand", "kernel", "structure"],
     ["definitions", "witnesses"],
     ["kernels"],

@@ -17,7 +17,7 @@ from awiwi_gen.cache import Cache
 from awiwi_gen.emit.batch import batch_files
 from awiwi_gen.emit.c import CFunction, c_function
 from awiwi_gen.emit.files import kernel_file, shared_files
-from awiwi_gen.emit.names import C99_SIGNIFICANT, csrc_names, require_names, short_name
+from awiwi_gen.emit.names import C99_SIGNIFICANT, TAKEN_KERNELS, csrc_names, require_names, short_name
 from awiwi_gen.emit.options import Options
 from awiwi_gen.emit.tree import sealed
 from awiwi_gen.errors import InputError
@@ -26,6 +26,7 @@ from awiwi_gen.ir.cost import cost
 from awiwi_gen.ir.graph import Graph, Output
 from awiwi_gen.kernel import Kernel, Port
 from awiwi_gen.kernels import catalog
+from awiwi_gen.library import Library
 from awiwi_gen.resources import CSRC, TEMPLATES
 from awiwi_gen.units import one
 
@@ -204,11 +205,21 @@ def test_keywords_macros_and_our_own_identifiers_are_kernels_that_compile_or_are
         ("own", "dense", "dense.c would collide with csrc/dense.c"),
         ("own", "model", "model.c would collide with model.c"),
         ("own", "a b", "not a usable name"),
+        ("own", "threads", "kernel 'threads': Python or the Python interface has this name"),
+        ("own", "lambda", "kernel 'lambda': Python or the Python interface has this name"),
     ],
 )
 def test_a_kernel_whose_name_is_taken_is_refused_with_the_owner(prefix, name, reason):
     with pytest.raises(InputError, match=re.escape(reason)):
         require_names(prefix, [kernel(name, ["x"], ["y"])])
+
+
+def test_the_names_that_kernels_may_not_have_are_the_members_of_a_library(own):
+    lib, kernels, _ = own
+    members = {name for name in (*dir(Library), *vars(lib)) if re.fullmatch(r"[a-z](_?[a-z0-9])*", name)}
+
+    assert members == TAKEN_KERNELS - {*keyword.kwlist}
+    assert all(getattr(lib, each.name) is lib[each.name] for each in kernels)
 
 
 def test_kernels_that_agree_in_63_characters_or_but_for_case_are_refused():
