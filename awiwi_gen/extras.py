@@ -15,7 +15,7 @@ EXTRAS = {
     "casadi": ("casadi", "generate"),
     "flint": ("python-flint", "generate"),
     "jinja2": ("jinja2", "generate"),
-    "pydantic": ("pydantic", "generate"),
+    "pydantic": ("pydantic", "cli"),
     "sympy": ("sympy", "generate"),
     "tree_sitter": ("tree-sitter", "generate"),
     "tree_sitter_toml": ("tree-sitter-toml", "generate"),
@@ -23,7 +23,7 @@ EXTRAS = {
     "matplotlib": ("matplotlib", "studies"),
     "scipy": ("scipy", "studies"),
 }
-COMMAND_LINE = ("typer", "pydantic")  # the latter is used by the former
+COMMAND_LINE = ("typer", "pydantic")  # Typer imports pydantic
 HAND = ("pydantic", "tree_sitter", "tree_sitter_toml")  # to read a hand file
 GENERATE = ("casadi", "flint", "jinja2", "sympy", *HAND)  # to derive, emit and prove
 
