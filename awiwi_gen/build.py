@@ -26,7 +26,7 @@ from awiwi_gen.compiler import bindings, compiler, native
 from awiwi_gen.emit.names import input_name, output_name
 from awiwi_gen.emit.options import GCC_FLAGS, VECTOR_FLAGS
 from awiwi_gen.emit.tree import read_manifest
-from awiwi_gen.errors import BuildError, InputError, OutputError
+from awiwi_gen.errors import BuildError, InputError, NoCompilerError, OutputError
 from awiwi_gen.resources import CSRC
 
 if TYPE_CHECKING:
@@ -90,10 +90,10 @@ def declarations(directory: Path, store: Cache, shared: str) -> str:
 def load(directory: str | Path, store: Cache | None = None) -> Library:
     """Compile a generated directory and load it as NumPy functions; compiled objects are kept in a cache.
 
-    Needs NumPy, cffi and a C compiler, but no library that derives kernels.
+    Needs NumPy, cffi, a C compiler and Python's headers, but no library that derives kernels.
 
-    Raises InputError where nothing was generated, NoCompilerError where there is no C compiler that works, BuildError
-    where it refuses the code.
+    Raises InputError where nothing was generated, NoCompilerError where there is no C compiler that works or no Python.h,
+    BuildError where it refuses the code.
     """
     from awiwi_gen.library import Library
 
@@ -272,6 +272,11 @@ def _glue_object(name: str, glue: str, directory: Path, store: Cache, scratch: P
     if found is not None:
         made.write_bytes(found)
         return made
+    python = sysconfig.get_paths()["include"]
+    if not Path(python, "Python.h").is_file():
+        raise NoCompilerError(
+            f"{python} has no Python.h; install Python's headers (Debian: apt-get install python3-dev)"
+        )
     import cffi.recompiler
 
     parts = json.loads(glue)
@@ -280,7 +285,6 @@ def _glue_object(name: str, glue: str, directory: Path, store: Cache, scratch: P
     preamble = '#include "awiwi.h"\n' + OPTIMISED.format("\n".join(parts["loops"]))
     source = scratch / f"{name}.c"
     cffi.recompiler.make_c_source(ffi, name, preamble, str(source))
-    python = sysconfig.get_paths()["include"]
     compiler().run(*GLUE_FLAGS, f"-I{python}", f"-I{directory}", f"-I{CSRC}", "-c", str(source), "-o", str(made))
     store.write("objects", digest, made.read_bytes())
     return made
