@@ -98,7 +98,7 @@ def test_the_wheel_of_the_sdist_is_the_wheel_of_the_checkout(wheel, tmp_path):
         "Makefile",
         "requirements.lock",
         "generated/manifest.json",
-        "tests/test_packages.py",
+        "tests/test_wheel.py",
         "csrc/awiwi.h",
     }
 
