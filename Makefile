@@ -3,6 +3,9 @@
 # make check  is generated/ fresh?   make bench  us and the peers, side by side
 # make report the figures of the source, computed again, with all proofs: build/report/index.html
 # make torture  hours: 10 000 mutated hand files, 200 random hands, 10 000 damaged caches, 200 kills
+# make firmware  every kernel on every target: equal bits, committed figures (ACCEPT=1 writes them, ALL=1: more)
+# make analysis  gcc -fanalyzer, clang-tidy and cppcheck: no finding without a reason
+# make mutants  change one operator or constant of csrc/ at a time (COUNT=60: some of them); hours for all
 # make clean  remove what make made (generated/ stays: it is checked in)
 
 PYTHON ?= python3
@@ -42,6 +45,15 @@ report: .venv/installed
 bench: .venv/installed .venv-bench/installed
 	@$(BIN)/python -m bench
 
+firmware: .venv/installed
+	@$(BIN)/python -m tests.targets $(if $(ACCEPT),--accept) $(if $(ALL),--all)
+
+analysis: .venv/installed
+	@$(BIN)/python -m tests.targets.analysis
+
+mutants: .venv/installed
+	@$(BIN)/python -m tests.targets.mutants $(if $(COUNT),--count $(COUNT))
+
 # The peers live in an environment of their own. Where one cannot be installed, the others are compared.
 .venv-bench/installed: bench/requirements.lock
 	$(PYTHON) -m venv .venv-bench
@@ -54,4 +66,4 @@ clean:
 	rm -rf .venv .venv-bench .cache build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
-.PHONY: all test lint torture check report bench clean
+.PHONY: all test lint torture check report bench firmware analysis mutants clean

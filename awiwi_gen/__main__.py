@@ -175,6 +175,14 @@ def check(
 
 
 @command()
+def amalgamate(directory: Path = GENERATED, output: Output = Path("build/one"), as_json: Json = False) -> None:
+    """Write all C of the directory as one header and one C file, awiwi.h and awiwi.c in the output directory."""
+    from awiwi_gen.amalgamate import run
+
+    run(directory, output, as_json)
+
+
+@command()
 def build(hand: HandFile = None, output: Output = GENERATED, as_json: Json = False) -> int:
     """Compile a generated directory and load it, as Python does."""
     from awiwi_gen.build import load

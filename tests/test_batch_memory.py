@@ -104,7 +104,7 @@ def test_results_are_written_to_nothing_else(jaw):
     for place, told in (
         (np.zeros((69, 2, 2)), shape),
         (np.zeros((70, 2, 2), np.float32), shape),
-        ("somewhere", shape),
+        ("somewhere", "out is or holds a str; expected one array of NumPy"),
         ((), shape),
         (np.zeros((70, 2, 4))[..., ::2], lies),
         (jaw.jaw_mass_matrix(np.asfortranarray(q)), lies),

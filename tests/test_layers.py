@@ -36,7 +36,7 @@ TOP = [
     ["judge"],
     ["parallel", "tasks"],
     ["pipeline"],
-    ["report", "explain", "terminal", "simulate", "results"],
+    ["report", "explain", "terminal", "simulate", "results", "amalgamate"],
     ["loops", "identify"],
     [*ROOMS],
     ["__init__"],

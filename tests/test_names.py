@@ -293,7 +293,9 @@ def test_short_names_differ_in_31_characters_and_the_program_links(own, hand, tm
     assert any(len(name) > C99_SIGNIFICANT for name in names)
     assert all(len(name) <= C99_SIGNIFICANT for name in external)
     assert len({*external}) == len(names)
-    assert max(len(name) for name in csrc_names() if name.startswith("awiwi_")) <= C99_SIGNIFICANT
+    types = ("awiwi_real_must", "awiwi_compile_without")  # they stop a wrong build and have no linkage
+    linked = [name for name in csrc_names() if name.startswith("awiwi_") and not name.startswith(types)]
+    assert max(map(len, linked)) <= C99_SIGNIFICANT
 
     long = [kernel(f"{'k' * 40}_{word}", ["x"], ["y"]) for word in ("first", "second")]
     write_tree(tmp_path, "own", long)

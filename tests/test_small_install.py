@@ -97,6 +97,7 @@ def test_the_command_line_alone_lists_compiles_and_calls_what_was_generated(smal
     lib = awiwi_gen.load(small)
     assert {entry["name"] for entry in told("list")} == set(lib)
     assert told("build")["digest"] == lib.digest
+    assert command("amalgamate", small, "-o", tmp_path / "one", hidden=BEYOND_CLI, cwd=tmp_path).returncode == 0
     assert told("call", "jaw_tendon_lengths", "q=0.1,0.2") == {"h": lib.jaw_tendon_lengths([0.1, 0.2]).tolist()}
 
 

@@ -19,7 +19,6 @@ from awiwi_gen.cache import code_digest
 from awiwi_gen.pipeline import GENERATOR
 
 ROOT = Path(__file__).resolve().parent.parent
-SOURCES = (".py", ".c", ".h", ".j2", ".toml", ".typed")
 PIP = ("-m", "pip", "--disable-pip-version-check", "--quiet")
 NO_INDEX = ("--no-index", "--no-deps", "--no-build-isolation")
 
@@ -81,7 +80,7 @@ def test_the_wheel_holds_the_package_with_its_templates_and_its_c(wheel):
         f"{inside}/{path.relative_to(ROOT / folder).as_posix()}"
         for folder, inside in folders.items()
         for path in (ROOT / folder).rglob("*")
-        if path.suffix in SOURCES
+        if path.is_file() and "__pycache__" not in path.parts
     }
 
     assert {name for name in contents(wheel) if ".dist-info/" not in name} == wanted

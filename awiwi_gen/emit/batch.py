@@ -20,7 +20,7 @@ BATCHES = "batches"  # the directory of these files inside the generated one
 USAGE = (
     "Kernels over many samples, for hosts with vector units. Compile each file that you call with",
     f"  cc -march=native -mno-fma {' '.join(VECTOR_FLAGS)} \\",
-    f"     {' '.join(GCC_FLAGS)} -c {BATCHES}/KERNEL.c",
+    f"     {' '.join(GCC_FLAGS)} -I. -I../csrc -c {BATCHES}/KERNEL.c",
     "(-mno-fma is for x86, the second line's flags are for gcc), and link it instead of KERNEL.c or with it.",
     "",
     "Element e of sample i of an array x is at x[i*x_sample + e*x_element]. Steps of 1 and n are a structure of arrays,",

@@ -66,6 +66,8 @@ def replace(new: Path, directory: Path, listed: Listed, check: Callable[[Path], 
     if exchange(new, directory):
         try:
             check(new)
+        except FileNotFoundError:  # another run has cleared the old one away
+            return
         except BaseException:  # somebody wrote into the old one in the meantime
             exchange(new, directory)
             raise

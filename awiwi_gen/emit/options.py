@@ -6,8 +6,6 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Literal
 
-import numpy as np
-
 # What batches are compiled with on top of the flags for the machine; batches.h and build.py both read it here.
 VECTOR_FLAGS = ("-std=c99", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math")
 GCC_FLAGS = ("-fschedule-insns", "-fsched-pressure", "-fno-tree-loop-distribute-patterns")  # for long loops
@@ -34,6 +32,8 @@ class Options:
     @property
     def dtype(self) -> type:
         """The NumPy scalar type."""
+        import numpy as np
+
         return np.float64 if self.scalar == "f64" else np.float32
 
     def literal(self, value: Fraction) -> str:
@@ -41,6 +41,8 @@ class Options:
         rounded = value.numerator / value.denominator
         if self.scalar == "f64":
             return repr(rounded)
+        import numpy as np
+
         text = str(np.float32(rounded))
         return (text if any(c in text for c in ".en") else text + ".0") + "f"
 

@@ -2,7 +2,7 @@
  *
  * Kernels over many samples, for hosts with vector units. Compile each file that you call with
  *   cc -march=native -mno-fma -std=c99 -O3 -ffp-contract=off -fno-math-errno -fno-trapping-math \
- *      -fschedule-insns -fsched-pressure -fno-tree-loop-distribute-patterns -c batches/KERNEL.c
+ *      -fschedule-insns -fsched-pressure -fno-tree-loop-distribute-patterns -I. -I../csrc -c batches/KERNEL.c
  * (-mno-fma is for x86, the second line's flags are for gcc), and link it instead of KERNEL.c or with it.
  *
  * Element e of sample i of an array x is at x[i*x_sample + e*x_element]. Steps of 1 and n are a structure of arrays,

@@ -1,0 +1,167 @@
+"""The C in other people's builds: one file, CMake, pkg-config, make, C++; everywhere the bits that Python has."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+from samples import ONE_FINGER
+from targets.driver import golden_inputs, python_digests, write_driver
+from targets.programs import run_tool
+from targets.toolchains import HERE
+
+import awiwi_gen
+from awiwi_gen.amalgamate import BANNER, amalgamate, write
+from awiwi_gen.build import load
+from awiwi_gen.errors import InputError, OutputError
+from awiwi_gen.pipeline import Job, cached_tree
+from awiwi_gen.resources import CSRC
+
+STRICT = ["-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wdouble-promotion", "-Wshadow", "-Werror"]
+MAIN = '#include "awiwi.h"\nint main(void) { return claw_model_digest[0] == 0; }\n'
+
+
+@pytest.fixture(scope="module")
+def job() -> Job:
+    return Job(awiwi_gen.Hand.load(ONE_FINGER))
+
+
+@pytest.fixture(scope="module")
+def tree(job) -> Path:
+    return cached_tree(job)
+
+
+@pytest.fixture(scope="module")
+def driver(job, tree, tmp_path_factory) -> tuple[Path, dict[str, str]]:
+    """The folder of the driver's table, and the digests that it must print."""
+    manifest = json.loads((tree / "manifest.json").read_text())
+    inputs = golden_inputs(job, manifest)
+    folder = tmp_path_factory.mktemp("driver")
+    write_driver(folder, manifest, inputs)
+    return folder, python_digests(load(tree), inputs)
+
+
+def need(tool: str) -> str:
+    if not shutil.which(tool):
+        pytest.skip(f"there is no {tool} here")
+    return tool
+
+
+def digests(program: Path) -> dict[str, str]:
+    lines = [line.split() for line in run_tool(program).splitlines()]
+    return {name: digest for name, digest, *_ in lines if name != "(empty)"}
+
+
+@pytest.fixture(scope="module")
+def one(tree, tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("one")
+    write(tree, folder)
+    return folder
+
+
+@pytest.mark.parametrize("compiler", ["gcc", "clang"])
+def test_one_file_has_no_warning_and_the_bits_of_many(compiler, one, driver, tmp_path):
+    folder, expected = driver
+    cc = need(compiler)
+    run_tool(cc, "-std=c99", "-O1", "-ffp-contract=off", *STRICT, "-c", one / "awiwi.c", "-o", tmp_path / "awiwi.o")
+    parts = [HERE / "run.c", folder / "table.c", tmp_path / "awiwi.o"]
+    run_tool(cc, "-std=c99", f"-I{one}", f"-I{folder}", *parts, "-lm", "-o", tmp_path / "main")
+
+    assert digests(tmp_path / "main") == expected
+
+
+def test_the_driver_notices_a_change_in_one_number(job, tree, driver):
+    manifest = json.loads((tree / "manifest.json").read_text())
+    inputs = golden_inputs(job, manifest)
+    name = "jaw_tendon_lengths"
+    inputs[name] = inputs[name].copy()
+    inputs[name][5, 0] += 1e-9
+    changed = python_digests(load(tree), inputs)
+
+    assert {other for other in changed if changed[other] != driver[1][other]} == {name}
+
+
+def test_one_header_is_cpp_as_well(one, tmp_path):
+    (tmp_path / "main.cpp").write_text(MAIN)
+    run_tool(need("g++"), "-std=c++98", *STRICT, "-fsyntax-only", f"-I{one}", tmp_path / "main.cpp")
+
+
+def test_local_names_get_the_name_of_their_file_and_members_of_public_structs_stay(tree):
+    text = amalgamate(tree)["awiwi.c"]
+
+    assert "static awiwi_real least_squares_cost(" in text
+    assert "->model(" in text
+
+
+def test_an_amalgamation_replaces_itself_and_nothing_else(tree, tmp_path):
+    write(tree, tmp_path)
+    (tmp_path / "awiwi.h").write_text(BANNER + "an older one")
+    write(tree, tmp_path)
+    assert "claw_jaw_mass_matrix" in (tmp_path / "awiwi.h").read_text()
+
+    (tmp_path / "awiwi.h").write_text("somebody's thesis")
+    with pytest.raises(OutputError, match="no amalgamation"):
+        write(tree, tmp_path)
+    assert (tmp_path / "awiwi.h").read_text() == "somebody's thesis"
+
+
+def test_a_folder_without_kernels_has_no_amalgamation(tmp_path):
+    with pytest.raises(InputError, match=r"no kernels\.h"):
+        amalgamate(tmp_path)
+
+
+@pytest.fixture(scope="module")
+def installed(tree, tmp_path_factory) -> Path:
+    """The CMake package, installed."""
+    build, prefix = tmp_path_factory.mktemp("cmake"), tmp_path_factory.mktemp("prefix")
+    settings = [f"-DAWIWI_GENERATED={tree}", f"-DCMAKE_INSTALL_PREFIX={prefix}", "-DCMAKE_BUILD_TYPE=Release"]
+    run_tool(need("cmake"), "-S", CSRC, "-B", build, *settings)
+    run_tool("cmake", "--build", build, "-j2")
+    run_tool("cmake", "--install", build)
+    return prefix
+
+
+def test_cmake_finds_the_package(installed, driver, tmp_path):
+    folder, expected = driver
+    (tmp_path / "CMakeLists.txt").write_text(
+        "cmake_minimum_required(VERSION 3.15)\nproject(user C)\nfind_package(awiwi 1 REQUIRED)\n"
+        f"add_executable(user {HERE / 'run.c'} {folder / 'table.c'})\n"
+        f"target_include_directories(user PRIVATE {folder})\ntarget_link_libraries(user PRIVATE awiwi::awiwi)\n"
+    )
+    run_tool("cmake", "-S", tmp_path, "-B", tmp_path / "build", f"-DCMAKE_PREFIX_PATH={installed}")
+    run_tool("cmake", "--build", tmp_path / "build")
+
+    assert digests(tmp_path / "build" / "user") == expected
+
+
+def test_pkg_config_finds_the_library(installed, driver, tmp_path):
+    folder, expected = driver
+    found = next(installed.rglob("awiwi.pc")).parent
+    command = [need("pkg-config"), "--cflags", "--libs", "awiwi"]
+    words = subprocess.run(command, env={"PKG_CONFIG_PATH": str(found)}, capture_output=True, text=True, check=True)
+    sources = [HERE / "run.c", folder / "table.c"]
+    run_tool("gcc", "-std=c99", f"-I{folder}", *sources, *words.stdout.split(), "-o", tmp_path / "user")
+
+    assert digests(tmp_path / "user") == expected
+
+
+def test_a_generated_directory_that_is_none_stops_cmake_with_the_fix(tmp_path):
+    command = [need("cmake"), "-S", str(CSRC), "-B", str(tmp_path / "b"), f"-DAWIWI_GENERATED={tmp_path}"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+
+    assert done.returncode != 0
+    assert "has no kernels.h" in done.stderr
+
+
+def test_a_makefile_includes_the_fragment(tree, tmp_path):
+    (tmp_path / "main.c").write_text(MAIN)
+    (tmp_path / "Makefile").write_text(
+        f"all: main\nAWIWI_GENERATED := {tree}\ninclude {CSRC}/awiwi.mk\n"
+        "main: main.c $(AWIWI_OBJECTS)\n\t$(CC) $(AWIWI_CPPFLAGS) $^ -lm -o $@\n"
+    )
+    run_tool("make", "-s", "-j2", "-C", tmp_path)
+
+    run_tool(tmp_path / "main")
