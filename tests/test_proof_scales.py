@@ -16,7 +16,7 @@ from awiwi_gen.hand import Hand
 from awiwi_gen.ir.builder import Builder
 from awiwi_gen.ir.graph import Output
 from awiwi_gen.pipeline import Job, cached_tree
-from awiwi_gen.records import _problem
+from awiwi_gen.records import problem_of
 from awiwi_gen.verify.physics import Motion, the_rate_of_M_less_2C_is_skew_symmetric
 from awiwi_gen.verify.reference import ball_values, disagreement, term_size
 from awiwi_gen.verify.verdict import judge_solver
@@ -84,7 +84,7 @@ def alike():
     job = Job(Hand.parse(random_hands.hand(1, 1, {"alike"})), only="one_tendon_distribution")
     kernel = next(kernel for kernel in job.kernels if kernel.name == job.only)
     used = {family: job.records[name] for family, name in kernel.needs.items()}
-    problem, record = _problem(kernel, used), job.records[kernel.name]
+    problem, record = problem_of(kernel, used), job.records[kernel.name]
     return problem, record, load(cached_tree(job), job.store)[kernel.name]
 
 
