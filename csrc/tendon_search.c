@@ -203,32 +203,36 @@ static void combine(const task *s, const moves *m, const vector x, awiwi_real si
 static awiwi_real newton(const task *s, const model *c, const moves *m, vector step, vector bend)
 {
     const int n = m->count - m->rank;
-    const awiwi_real range = s->t->high - s->t->low;
+    const awiwi_real range = s->t->high - s->t->low, near = c->cost / (range * range);
     matrix H, full;
     vector b, x, product;
-    awiwi_real trace = 0;
+    awiwi_real trace = 0, pivot, shift = 0;
     for (int j = 0; j < n; j++) {
         const awiwi_real *v = m->along[m->rank + j];
         b[j] = -awiwi_dot(v, c->gradient, s->count);
         for (int i = 0; i < s->count; i++)
             product[i] = awiwi_dot(c->hessian[i], v, s->count);
-        for (int l = 0; l <= j; l++) {
-            const awiwi_real *w = m->along[m->rank + l];
-            H[j][l] = full[j][l] = awiwi_dot(w, product, s->count);
-            for (int i = 0; i < s->count; i++)
-                full[j][l] += v[i] * c->curvature[i] * w[i];
-        }
+        for (int l = 0; l <= j; l++)
+            H[j][l] = awiwi_dot(m->along[m->rank + l], product, s->count);
         trace += H[j][j];
     }
     for (int i = 0; i < s->count; i++)
         step[i] = bend[i] = 0;
-    const awiwi_real least = 64 * AWIWI_REAL_EPSILON * trace;
-    const awiwi_real pivot = awiwi_solve_positive(n, AWIWI_MOST_TENDONS, full[0], least, b, x);
-    if (!(pivot > least)) {
-        if (pivot < -BENT * trace)
+    const awiwi_real least = 64 * AWIWI_REAL_EPSILON * trace, flat = awiwi_sqrt(AWIWI_REAL_EPSILON) * trace;
+    do { /* little damping near the demand: where tendons do the same, the cost is flat along exchanges between them */
+        for (int j = 0; j < n; j++) {
+            for (int l = 0; l <= j; l++) {
+                full[j][l] = l == j ? H[j][l] + shift : H[j][l];
+                for (int i = 0; i < s->count; i++)
+                    full[j][l] += m->along[m->rank + j][i] * c->curvature[i] * m->along[m->rank + l][i];
+            }
+        }
+        pivot = awiwi_solve_positive(n, AWIWI_MOST_TENDONS, full[0], least, b, x);
+        if (!(shift > 0) && pivot < -BENT * trace)
             combine(s, m, x, awiwi_dot(b, x, n) < 0 ? -range : range, bend);
-        /* less damping near the demand: where tendons do the same, the cost is flat along exchanges between them */
-        const awiwi_real near = c->cost / (range * range);
+        shift = shift > 0 ? 16 * shift : (near < flat ? near : flat) + least;
+    } while (!(pivot > least) && shift < DAMPING * trace);
+    if (!(pivot > least)) {
         for (int j = 0; j < n; j++)
             H[j][j] += near < DAMPING * trace ? near + least : DAMPING * trace;
         if (!(awiwi_solve_positive(n, AWIWI_MOST_TENDONS, H[0], 0, b, x) > 0))
@@ -303,14 +307,18 @@ static int take(const task *s, const vector step, awiwi_real most, int *steps, v
 /* From f down to where no free move and no leaving tendon lowers the cost. */
 static int descend(const task *s, int steps, vector f, model *here)
 {
-    int held[AWIWI_MOST_TENDONS] = {0}, left = -1, stopped, straight = 0;
-    awiwi_real last = AWIWI_REAL_MAX;
+    int held[AWIWI_MOST_TENDONS] = {0}, left = -1, stopped, straight = 0, changed = 1;
+    awiwi_real last = 0;
     moves m;
     if (cost(s, f, here))
         return AWIWI_OUT_OF_DOMAIN;
-    split(s, held, &m);
     while (steps-- > 0) {
         vector step, bend;
+        if (changed) {
+            split(s, held, &m);
+            last = AWIWI_REAL_MAX;
+            straight = changed = 0;
+        }
         const awiwi_real gain = newton(s, here, &m, step, bend), longest = awiwi_largest(step, s->count);
         if (!(longest <= AWIWI_REAL_MAX))
             return AWIWI_NOT_FINITE;
@@ -336,9 +344,7 @@ static int descend(const task *s, int steps, vector f, model *here)
             if (left < 0)
                 return AWIWI_OK;
             held[left] = FREE;
-            last = AWIWI_REAL_MAX;
-            straight = 0;
-            split(s, held, &m);
+            changed = 1;
             continue;
         }
         if (way == step && reach(s, f, step, &stopped) > 0) {
@@ -352,9 +358,7 @@ static int descend(const task *s, int steps, vector f, model *here)
         if (stopped >= 0) {
             held[stopped] = way[stopped] < 0 ? AT_LOW : AT_HIGH;
             f[stopped] = way[stopped] < 0 ? s->t->low : s->t->high;
-            last = AWIWI_REAL_MAX;
-            straight = 0;
-            split(s, held, &m);
+            changed = 1;
         }
     }
     return AWIWI_NOT_CONVERGED;
