@@ -1,8 +1,8 @@
 /* Tendon forces by search, for tendons that are not antagonistic pairs: a primal active-set Newton method.
 
    First the torque: forces within the limits with the least |tau + P' f|. Then the stiffness, in the moves that keep
-   the torque. Tendons at a limit are held there until the slope of the cost says that they should leave; all others
-   share a Newton step that is cut where the first of them reaches a limit. So every iterate keeps both. */
+   it. Tendons at a limit are held there until the slope of the cost lets them leave; all others share a Newton step, cut
+   where the first of them reaches a limit. So every iterate keeps both. */
 #include "numerics.h"
 #include "awiwi_distribution.h"
 #include "dense.h"
@@ -40,13 +40,12 @@ typedef struct moves {
     awiwi_real square[AWIWI_MOST_TENDONS];
 } moves;
 
-enum { AT_LOW = -1, FREE = 0, AT_HIGH = 1 };
-
-static const awiwi_real LEAST_SHARE = (awiwi_real)1 / 32; /* of a unit move that is worth a direction: below 1 / 16 */
+static const awiwi_real LEAST_SHARE = (awiwi_real)1 / 32;     /* of a unit move that is worth a direction: below 1 / 16 */
 static const awiwi_real DAMPING = (awiwi_real)1 / 4096;       /* of steps where the Hessian is not positive */
-static const awiwi_real BENT = 4096 * AWIWI_REAL_EPSILON;     /* negative curvature, relative to the trace of the Hessian */
-static const awiwi_real LITTLE = (awiwi_real)1 / 16;          /* of the cost: less is too little to gain by a step */
+static const awiwi_real BENT = 4096 * AWIWI_REAL_EPSILON;     /* negative curvature, relative to the trace */
+static const awiwi_real LITTLE = (awiwi_real)1 / 16;          /* gain by a step, relative to the cost */
 enum { BENDS = 8 };                                           /* trials along a direction of negative curvature */
+enum { AT_LOW = -1, FREE = 0, AT_HIGH = 1 };
 
 /* Half of |tau + P' f|^2. */
 static int torque_cost(const task *s, const vector f, model *c)
@@ -198,8 +197,8 @@ static void combine(const task *s, const moves *m, const vector x, awiwi_real si
 }
 
 /* Newton's step of the free tendons along the moves that are allowed; where the Hessian is not positive, a damped
-   Gauss-Newton step. Returns the predicted decrease. `bend` is a downhill direction along which the cost curves down,
-   as long as the range of forces, or zero. */
+   Gauss-Newton step. Returns the predicted decrease. `bend` becomes a downhill direction along which the cost curves
+   down, as long as the range of forces. Both are zero before, and stay so where there is none. */
 static awiwi_real newton(const task *s, const model *c, const moves *m, vector step, vector bend)
 {
     const int n = m->count - m->rank;
@@ -216,8 +215,6 @@ static awiwi_real newton(const task *s, const model *c, const moves *m, vector s
             H[j][l] = awiwi_dot(m->along[m->rank + l], product, s->count);
         trace += H[j][j];
     }
-    for (int i = 0; i < s->count; i++)
-        step[i] = bend[i] = 0;
     const awiwi_real least = 64 * AWIWI_REAL_EPSILON * trace, flat = awiwi_sqrt(AWIWI_REAL_EPSILON) * trace;
     do { /* little damping near the demand: where tendons do the same, the cost is flat along exchanges between them */
         for (int j = 0; j < n; j++) {
@@ -246,7 +243,8 @@ static awiwi_real newton(const task *s, const model *c, const moves *m, vector s
    there is none. Slopes within rounding of their terms count as level. */
 static int leaving(const task *s, const model *c, const moves *m, const int *held)
 {
-    awiwi_real price[AWIWI_MOST_JOINTS] = {0}, most;
+    awiwi_real price[AWIWI_MOST_JOINTS] = {0};
+    awiwi_real most = 256 * AWIWI_REAL_EPSILON * awiwi_largest(c->gradient, s->count);
     int found = -1;
     for (int k = m->rank - 1; k >= 0; k--) {
         awiwi_real sum = -awiwi_dot(m->along[k], c->gradient, s->count) / m->square[k];
@@ -254,7 +252,6 @@ static int leaving(const task *s, const model *c, const moves *m, const int *hel
             sum -= m->lower[l][k] * price[m->joint[l]];
         price[m->joint[k]] = sum;
     }
-    most = 256 * AWIWI_REAL_EPSILON * awiwi_largest(c->gradient, s->count);
     for (int i = 0; i < s->count; i++) {
         const awiwi_real gain = (awiwi_real)held[i] * (c->gradient[i] + awiwi_dot(s->p[i], price, s->t->joints));
         if (gain > most) {
@@ -284,7 +281,7 @@ static awiwi_real reach(const task *s, const vector f, const vector step, int *s
    steps left. */
 static int take(const task *s, const vector step, awiwi_real most, int *steps, vector f, model *here, int *stopped)
 {
-    for (awiwi_real share = reach(s, f, step, stopped); share > 0; share /= 2) {
+    for (awiwi_real share = reach(s, f, step, stopped); share > 0; share /= 2, *stopped = -1) {
         vector trial;
         model there;
         for (int i = 0; i < s->count; i++)
@@ -299,7 +296,6 @@ static int take(const task *s, const vector step, awiwi_real most, int *steps, v
         }
         if (--*steps <= 0)
             break;
-        *stopped = -1;
     }
     return AWIWI_NOT_CONVERGED;
 }
@@ -313,7 +309,7 @@ static int descend(const task *s, int steps, vector f, model *here)
     if (cost(s, f, here))
         return AWIWI_OUT_OF_DOMAIN;
     while (steps-- > 0) {
-        vector step, bend;
+        vector step = {0}, bend = {0};
         if (changed) {
             split(s, held, &m);
             last = AWIWI_REAL_MAX;
@@ -368,7 +364,7 @@ int awiwi_search_forces(const awiwi_tendons *t, const awiwi_real *tau, const awi
                         awiwi_real *f)
 {
     const awiwi_real starts[3] = {t->low + (t->high - t->low) / 2, t->low, t->high};
-    task s = {t, tau, K, {0}, {0}, t->searched, 0, 0, f};
+    task s = {t, tau, K, {0}, {0}, t->searched, 1, tolerance, f};
     awiwi_real least = 0;
     vector best, trial;
     model found;
@@ -381,11 +377,10 @@ int awiwi_search_forces(const awiwi_tendons *t, const awiwi_real *tau, const awi
     for (int start = 0; start < 3; start++) {
         for (int i = 0; i < s.count; i++)
             trial[i] = starts[start];
-        s.keep_torque = 0;
-        s.tolerance = 4 * AWIWI_REAL_EPSILON;
-        int ended = descend(&s, AWIWI_MOST_TORQUE_STEPS, trial, &found);
-        s.keep_torque = 1;
-        s.tolerance = tolerance;
+        task torque = s;
+        torque.keep_torque = 0;
+        torque.tolerance = 4 * AWIWI_REAL_EPSILON;
+        int ended = descend(&torque, AWIWI_MOST_TORQUE_STEPS, trial, &found);
         if (ended == AWIWI_OK)
             ended = descend(&s, AWIWI_MOST_STIFFNESS_STEPS, trial, &found);
         if (ended != AWIWI_OK && ended != AWIWI_NOT_CONVERGED)

@@ -27,8 +27,8 @@ TO_LIMIT = 0.95  # share of the way to the nearest limit that a step may take
 class Demands:
     """Demands of some samples with forces f (s, m) that give their torque.
 
-    K (s, n, n) for coupling P (s, m, n), its derivatives `slope` (s, m, n, n), limits low and high (s). Only the forces of a `group`
-    of tendons change, and none that is `fixed` (s, m).
+    K (s, n, n) for coupling P (s, m, n), its derivatives `slope` (s, m, n, n), limits low and high (s). Only the forces
+    of a `group` of tendons change, and none that is `fixed` (s, m).
     """
 
     f: Array
