@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 Array = np.ndarray[Any, Any]
 
-STARTS_PER_DIMENSION = 6  # of the null space
+STARTS = 16  # for each demand
 WALK = 8  # random moves from the centre of the permitted forces to each start
 CENTRING = 40  # Newton steps to that centre, at most
 BARRIERS = 10.0 ** -np.arange(3, 13)  # weights of the limits, one after the other, relative to the distance to beat
@@ -42,16 +43,19 @@ class Demands:
 
     def of(self, samples: Array) -> Demands:
         """Some of the samples."""
-        return Demands(
-            *(each[samples] for each in (self.f, self.K, self.P, self.slope, self.low, self.high, self.fixed)),
-            self.group,
-        )
+        f, K, P, slope = (each[samples] for each in (self.f, self.K, self.P, self.slope))
+        return Demands(f, K, P, slope, self.low[samples], self.high[samples], self.fixed[samples], self.group)
+
+    @cached_property
+    def pairs(self) -> Array:
+        """Products p_i p_i' (s, m, n, n) of the couplings of each tendon."""
+        return np.asarray(self.P[..., :, None] * self.P[..., None, :])
 
     def stiffness(self, f: Array, k: Array) -> Array:
         """Joint stiffness (s, starts, n, n) of forces and stiffnesses of tendons (s, starts, m)."""
-        return np.asarray(
-            np.einsum("sti,sia,sib->stab", k, self.P, self.P) + np.einsum("sti,siab->stab", f, self.slope)
-        )
+        flat = (*self.P.shape[:2], -1)
+        found = k @ self.pairs.reshape(flat) + f @ self.slope.reshape(flat)
+        return np.asarray(found.reshape(*f.shape[:2], *self.K.shape[1:]))
 
 
 def minima(demands: Demands, curve: Callable[..., Any]) -> Array:
@@ -60,14 +64,13 @@ def minima(demands: Demands, curve: Callable[..., Any]) -> Array:
     Samples whose limits leave no room keep their forces.
     """
     moves = _moves(demands)
-    starts = max(1, STARTS_PER_DIMENSION * moves.shape[2])
-    found = np.repeat(demands.f[:, None], starts, axis=1)
+    found = np.repeat(demands.f[:, None], STARTS, axis=1)
     centre, has_room = _Descent(demands, curve, moves).centre()
     if not has_room.any():
         return found
     inner = demands.of(has_room)
     descent = _Descent(inner, curve, moves[has_room])
-    f = descent.scatter(centre[has_room], starts, np.random.default_rng(starts))
+    f = descent.scatter(centre[has_room])
     scale = np.abs(inner.K).max(axis=(1, 2))
     excess = inner.stiffness(inner.f[:, None], curve(inner.f.T, "k")[0].T[:, None])[:, 0] - inner.K
     beat = np.maximum((excess**2).sum(axis=(1, 2)) / 2, (1e-5 * scale) ** 2)
@@ -90,7 +93,8 @@ class _Descent:
         g, d = f[..., self.demands.group], self.demands
         fixed = d.fixed[:, None, d.group]
         below, above = g - (d.low - slack)[:, None, None], (d.high + slack)[:, None, None] - g
-        return np.where(fixed, d.high[:, None, None], below), np.where(fixed, d.high[:, None, None], above)
+        wide = d.high[:, None, None]
+        return np.where(fixed, wide, below), np.where(fixed, wide, above)
 
     def _clear(self, f: Array) -> list[Array]:
         """The same distances, of forces within the limits up to rounding."""
@@ -106,15 +110,15 @@ class _Descent:
         for _ in range(CENTRING):
             below, above = self.room(f, slack)
             gradient, hessian = 1 / above - 1 / below, 1 / above**2 + 1 / below**2
-            step = self._step(gradient, np.einsum("sti,ij->stij", hessian, np.eye(len(d.group))))
+            step = self._step(gradient, hessian[..., None] * np.eye(len(d.group)))
             f = self._moved(f, step, self._reach(step, below, above)[..., None])
             outside = -np.minimum(*self.room(f)).min(axis=(1, 2))
             slack = np.where(outside < 0, 0, np.minimum(slack, 1.5 * outside + 1e-9 * d.high))
         return f, np.minimum(*self.room(f)).min(axis=(1, 2)) > 1e-6 * (d.high - d.low)
 
-    def scatter(self, centre: Array, starts: int, random: np.random.Generator) -> Array:
+    def scatter(self, centre: Array) -> Array:
         """Random forces (s, starts, m) within the limits, by walks from the centre."""
-        f = np.repeat(centre, starts, axis=1)
+        f, random = np.repeat(centre, STARTS, axis=1), np.random.default_rng(STARTS)
         for _ in range(WALK):
             step = random.normal(size=(*f.shape[:2], self.moves.shape[2])) @ self.moves.swapaxes(1, 2)
             below, above = self.room(f)
@@ -128,19 +132,18 @@ class _Descent:
         d, group = self.demands, self.demands.group
         k, slope, curvature = self._curves(f, "k", "slope", "curvature")
         excess = d.stiffness(f, k) - d.K[:, None]
-        pp = np.einsum("sia,sib->siab", d.P[:, group], d.P[:, group])
-        growth = slope[..., group, None, None] * pp[:, None] + d.slope[:, None, group]
+        pairs, rates = (each[:, group].reshape(len(f), len(group), -1) for each in (d.pairs, d.slope))
+        growth, flat = slope[..., group, None] * pairs[:, None] + rates[:, None], excess.reshape(*f.shape[:2], -1)
         below, above = self._clear(f)
         w = weight[:, None, None]
-        gradient = np.einsum("stiab,stab->sti", growth, excess) + w * (1 / above - 1 / below)
-        diagonal = curvature[..., group] * np.einsum("siab,stab->sti", pp, excess) + w * (1 / above**2 + 1 / below**2)
-        hessian = np.einsum("stiab,stjab->stij", growth, growth)
-        hessian += np.einsum("sti,ij->stij", diagonal, np.eye(len(group)))
+        gradient = (growth @ flat[..., None])[..., 0] + w * (1 / above - 1 / below)
+        diagonal = curvature[..., group] * (flat @ pairs.swapaxes(1, 2)) + w * (1 / above**2 + 1 / below**2)
+        hessian = growth @ growth.swapaxes(2, 3) + diagonal[..., None] * np.eye(len(group))
         step = self._step(gradient, hessian)
         most = self._reach(step, below, above)
         tried = [self._moved(f, step, (share * most)[..., None]) for share in SHARES]
         best = np.argmin([self._total(each, weight) for each in tried], axis=0)
-        return np.take_along_axis(np.array(tried), best[None, ..., None], axis=0)[0]
+        return np.asarray(np.take_along_axis(np.array(tried), best[None, ..., None], axis=0)[0])
 
     def _curves(self, f: Array, *names: str) -> list[Array]:
         m = f.shape[-1]
@@ -155,13 +158,11 @@ class _Descent:
     def _step(self, gradient: Array, hessian: Array) -> Array:
         """Newton's step (s, starts, g) along the moves."""
         moves = self.moves[:, None]
-        values, vectors = np.linalg.eigh(np.swapaxes(moves, 2, 3) @ hessian @ moves)
+        values, vectors = np.linalg.eigh(moves.swapaxes(2, 3) @ hessian @ moves)
         least = 1e-12 * np.abs(values).max(axis=-1, keepdims=True) + 1e-300
-        along = np.einsum(
-            "stij,stgi,stg->stj", vectors, np.broadcast_to(moves, (*gradient.shape, moves.shape[3])), gradient
-        )
+        along = ((gradient @ self.moves)[..., None, :] @ vectors)[..., 0, :]
         shares = -along / np.maximum(np.abs(values), least)
-        return np.asarray(np.einsum("sgi,stij,stj->stg", self.moves, vectors, shares))
+        return np.asarray((vectors @ shares[..., None])[..., 0] @ self.moves.swapaxes(1, 2))
 
     def _reach(self, step: Array, below: Array, above: Array, most: float = 1.0) -> Array:
         """The share (s, starts) of a step that stays clear of the limits."""

@@ -161,7 +161,7 @@ class Distribution(Problem):
         """
         group = [int(i) for i in self.solver.strings["searched"].split(",") if i]
         if not group:
-            return np.ones((2, len(answers)), bool)
+            return np.ones(len(answers), bool), np.ones(len(answers), bool)
         f, K = (np.array([getattr(answer, name) for answer in answers]) for name in ("f", "K"))
         torque_limits = np.array([(answer.held != 0) & (not answer.feasible) for answer in answers])
         demands = Demands(f, K, P, dP, low, high, torque_limits, group)
