@@ -59,13 +59,11 @@ def friction(library: Any, motor: Motor) -> Figure:
         axes.legend()
 
     return Figure(
-        number="3.3",
-        title="Friction found from the mean motor torque at constant speeds",
-        claim="The mean torques at constant speeds follow atan(g1 w) g2 + g3 w.",
-        found=f"The fit finds the friction of the simulated motor within {error:.2%} of its largest value.",
-        holds=error < 0.02,
-        draw=draw,
-    )
+        "3.3", "Friction found from the mean motor torque at constant speeds",
+        "The mean torques at constant speeds follow atan(g1 w) g2 + g3 w.",
+        f"The fit finds the friction of the simulated motor within {error:.2%} of its largest value.", error < 0.02,
+        draw,
+    )  # fmt: skip
 
 
 # -- figures 3.4 to 3.6: one simulation of several motors -------------------------------------------------
@@ -161,13 +159,11 @@ def repeatability(recordings: Recordings) -> Figure:
     share = spread / float(np.std(mean))
 
     return Figure(
-        number="3.4",
-        title=f"Commanded torque of {RUNS} motions at {recordings.speed:g} rad/s from the same angle",
-        claim="The disturbance repeats: it depends on the position.",
-        found=f"Runs differ by {share:.0%} of what they have in common.",
-        holds=share < 0.2,
-        draw=curves(recordings.theta, recordings.repeated.T, "output angle [rad]", "commanded torque [N m]"),
-    )
+        "3.4", f"Commanded torque of {RUNS} motions at {recordings.speed:g} rad/s from the same angle",
+        "The disturbance repeats: it depends on the position.",
+        f"Runs differ by {share:.0%} of what they have in common.", share < 0.2,
+        curves(recordings.theta, recordings.repeated.T, "output angle [rad]", "commanded torque [N m]"),
+    )  # fmt: skip
 
 
 def frequencies(recordings: Recordings) -> Figure:
@@ -180,13 +176,12 @@ def frequencies(recordings: Recordings) -> Figure:
 
     shown = {f"{speed:g} rad/s": (speed * lines / (2 * np.pi), amplitude) for speed, lines, amplitude in spectra}
     return Figure(
-        number="3.5",
-        title="Frequencies of the disturbance at two speeds",
-        claim="The main line moves with the rotor's speed, so the disturbance depends on the position.",
-        found=f"At twice the speed it is at {shift:.3g} times the frequency, {heights:.2f} times as high.",
-        holds=abs(shift - 2) < 1e-6 and abs(heights - 1) < 0.1,
-        draw=curves(None, shown, "frequency [Hz]", "torque amplitude [N m]", xlim=(0, recordings.highest)),
-    )
+        "3.5", "Frequencies of the disturbance at two speeds",
+        "The main line moves with the rotor's speed, so the disturbance depends on the position.",
+        f"At twice the speed it is at {shift:.3g} times the frequency, {heights:.2f} times as high.",
+        abs(shift - 2) < 1e-6 and abs(heights - 1) < 0.1,
+        curves(None, shown, "frequency [Hz]", "torque amplitude [N m]", xlim=(0, recordings.highest)),
+    )  # fmt: skip
 
 
 def compensation(recordings: Recordings) -> Figure:
@@ -199,13 +194,11 @@ def compensation(recordings: Recordings) -> Figure:
         lines, amplitude = recordings.spectrum(torque)
         shown[label] = lines * recordings.speed / (2 * np.pi), amplitude
     return Figure(
-        number="3.6",
-        title="Frequencies of the controller's torque with and without compensation",
-        claim="Feeding the disturbance forward attenuates the rotor's main line.",
-        found=f"Of its amplitude {left:.0%} is left.",
-        holds=left < 0.25,
-        draw=curves(None, shown, "frequency [Hz]", "torque amplitude [N m]", xlim=(0, recordings.highest)),
-    )
+        "3.6", "Frequencies of the controller's torque with and without compensation",
+        "Feeding the disturbance forward attenuates the rotor's main line.",
+        f"Of its amplitude {left:.0%} is left.", left < 0.25,
+        curves(None, shown, "frequency [Hz]", "torque amplitude [N m]", xlim=(0, recordings.highest)),
+    )  # fmt: skip
 
 
 # -- figure 4.7 -------------------------------------------------------------------------------------------
@@ -232,13 +225,8 @@ def characteristic(library: Any) -> Figure:
         other.set_ylabel("tendon stiffness (dashed) [N/mm]", color="tab:red")
 
     return Figure(
-        number="4.7",
-        title="Force and stiffness of the tendon's mechanism",
-        claim="The stiffness rises with the force, and a polynomial is enough for either.",
-        found=(
-            f"It rises from {stiff.min() / 1e3:.1f} to {stiff.max() / 1e3:.1f} N/mm up to {pulled.max():.0f} N; "
-            f"polynomials give the force within {error:.0e} of its largest value."
-        ),
-        holds=progressive and error < 1e-6,
-        draw=draw,
-    )
+        "4.7", "Force and stiffness of the tendon's mechanism",
+        "The stiffness rises with the force, and a polynomial is enough for either.",
+        f"It rises from {stiff.min() / 1e3:.1f} to {stiff.max() / 1e3:.1f} N/mm up to {pulled.max():.0f} N; "
+        f"polynomials give the force within {error:.0e} of its largest value.", progressive and error < 1e-6, draw,
+    )  # fmt: skip

@@ -82,13 +82,11 @@ def convergence(library: Any) -> Figure:
     falling, left = bool((np.diff(V, axis=0) <= 1e-12).all()), np.abs(trace[-1, ..., 0]).max()
 
     return Figure(
-        number="15.1",
-        title="The example for 50 pairs of gains",
-        claim="Every pair of positive gains brings the state to the origin.",
-        found=f"All runs end within {left:.0e} after 60 s, and V falls all the way (eq. 15.10, corrected).",
-        holds=falling and bool(left < 0.1),
-        draw=curves(np.linspace(0, 10, 501), trace[:501, :, 0], "t", "x1"),
-    )
+        "15.1", "The example for 50 pairs of gains",
+        "Every pair of positive gains brings the state to the origin.",
+        f"All runs end within {left:.0e} after 60 s, and V falls all the way (eq. 15.10, corrected).",
+        falling and bool(left < 0.1), curves(np.linspace(0, 10, 501), trace[:501, :, 0], "t", "x1"),
+    )  # fmt: skip
 
 
 def phases(library: Any, number: str, gains: tuple[float, float]) -> Figure:
@@ -104,13 +102,10 @@ def phases(library: Any, number: str, gains: tuple[float, float]) -> Figure:
         axes.set(xlabel="x1", ylabel="x1'")
 
     return Figure(
-        number=number,
-        title=f"The example's phases for k1 = {gains[0]:g}, k2 = {gains[1]:g}",
-        claim="Every initial state comes to the origin.",
-        found=f"All runs end within {left:.0e} after 60 s, and V falls all the way.",
-        holds=falling and bool(left < 0.1),
-        draw=draw,
-    )
+        number, f"The example's phases for k1 = {gains[0]:g}, k2 = {gains[1]:g}",
+        "Every initial state comes to the origin.",
+        f"All runs end within {left:.0e} after 60 s, and V falls all the way.", falling and bool(left < 0.1), draw,
+    )  # fmt: skip
 
 
 # -- section 15.2 ------------------------------------------------------------------------------------------
@@ -135,13 +130,11 @@ def sweep(library: Any, which: int, name: str, build: Builder) -> Figure:
 
     lines = {f"K{which} = {value:g}": run for value, run in runs.items()}
     return Figure(
-        number=f"15.{6 + which} ({name})",
-        title=f"Influence of K{which} on a step of {STEP:g} rad, {name}",
-        claim=f"{effect}.",
-        found=f"Rise time and overshoot at K{which} = {shown}.",
-        holds=holds,
-        draw=curves(times, lines, "t [s]", "q [rad]", xlim=(0, 10)),
-    )
+        f"15.{6 + which} ({name})", f"Influence of K{which} on a step of {STEP:g} rad, {name}",
+        f"{effect}.",
+        f"Rise time and overshoot at K{which} = {shown}.", holds,
+        curves(times, lines, "t [s]", "q [rad]", xlim=(0, 10)),
+    )  # fmt: skip
 
 
 def monotone(values: Sequence[float]) -> bool:
@@ -196,25 +189,18 @@ def saturation(library: Any) -> list[Figure]:
     )
     return [
         Figure(
-            number="15.10",
-            title="A step with saturated torque: link, plant of table 16.1",
-            claim="The law stays stable in spite of the limit.",
-            found=f"Both runs end within {left:.1%} of the step.",
-            holds=left < 0.02,
-            draw=curves(None, angles, "t [s]", "q [rad]"),
+            "15.10", "A step with saturated torque: link, plant of table 16.1",
+            "The law stays stable in spite of the limit.",
+            f"Both runs end within {left:.1%} of the step.", left < 0.02, curves(None, angles, "t [s]", "q [rad]"),
         ),
         Figure(
-            number="15.11",
-            title="A step with saturated torque: command, plant of table 16.1",
-            claim="The limit of 0.0005 N m cuts the command strongly.",
-            found=(
-                f"With table 15.1, as captioned, the command stays below {peaks[0]:.1e} N m all by itself; with table "
-                f"16.1, shown here, it would reach {peaks[1]:.1e} N m."
-            ),
-            holds=peaks[0] > SATURATION,
-            draw=curves(None, torques, "t [s]", "torque [N m]", xlim=(0, 0.3)),
+            "15.11", "A step with saturated torque: command, plant of table 16.1",
+            "The limit of 0.0005 N m cuts the command strongly.",
+            f"With table 15.1, as captioned, the command stays below {peaks[0]:.1e} N m all by itself; with table "
+            f"16.1, shown here, it would reach {peaks[1]:.1e} N m.", peaks[0] > SATURATION,
+            curves(None, torques, "t [s]", "torque [N m]", xlim=(0, 0.3)),
         ),
-    ]
+    ]  # fmt: skip
 
 
 def delay(library: Any) -> Figure:
@@ -225,10 +211,8 @@ def delay(library: Any) -> Figure:
     margin = position_loop(library, TABLE_15_1, gains).delay_margin()
     lines = {f"{late * 1e3:g} ms": (runs[late].time[::10], runs[late]["x"][::10, 0]) for late in DELAYS}
     return Figure(
-        number="15.13",
-        title="A step behind delays",
-        claim="At the 333 us of a round trip nothing oscillates, even with these large gains.",
-        found=f"With table 15.1 it then overshoots by {overshoot:.0%}; the delay margin is {margin * 1e3:.2f} ms.",
-        holds=overshoot < 0.02,
-        draw=curves(None, lines, "t [s]", "q [rad]", ylim=(-0.2, 2.0)),
-    )
+        "15.13", "A step behind delays",
+        "At the 333 us of a round trip nothing oscillates, even with these large gains.",
+        f"With table 15.1 it then overshoots by {overshoot:.0%}; the delay margin is {margin * 1e3:.2f} ms.",
+        overshoot < 0.02, curves(None, lines, "t [s]", "q [rad]", ylim=(-0.2, 2.0)),
+    )  # fmt: skip

@@ -45,16 +45,12 @@ def swing(library: Any) -> Figure:
     left = {name: float(np.ptp(run[times > 0.1]) / STEP) for name, run in runs.items()}
 
     return Figure(
-        number="15.15",
-        title="A step with a PD controller of the motor and with the backstepping law (simulated)",
-        claim="Unlike a PD controller of the motor, the backstepping law moves the link without oscillations.",
-        found=(
-            f"After 100 ms the link still swings over {left['PD on the motor']:.1%} of the step with the one and over "
-            f"{left['backstepping']:.1%} with the other, on the plant of table 16.1 without friction."
-        ),
-        holds=left["backstepping"] < 0.01 < left["PD on the motor"],
-        draw=curves(times * 1e3, runs, "t [ms]", "link angle [rad]"),
-    )
+        "15.15", "A step with a PD controller of the motor and with the backstepping law (simulated)",
+        "Unlike a PD controller of the motor, the backstepping law moves the link without oscillations.",
+        f"After 100 ms the link still swings over {left['PD on the motor']:.1%} of the step with the one and over "
+        f"{left['backstepping']:.1%} with the other, on the plant of table 16.1 without friction.",
+        left["backstepping"] < 0.01 < left["PD on the motor"], curves(times * 1e3, runs, "t [ms]", "link angle [rad]"),
+    )  # fmt: skip
 
 
 def rendered(library: Any) -> Figure:
@@ -68,15 +64,10 @@ def rendered(library: Any) -> Figure:
     worst = {name: float(np.abs(torque - expected).max()) for name, torque in torques.items()}
 
     return Figure(
-        number="15.18",
-        title=f"Torque at an imposed error of the position, {RENDERED[0]:g} N m/rad (simulated)",
-        claim="The torque is that of the desired stiffness.",
-        found=(
-            f"Within {worst['outer torque fed']:.0e} N m if the law is fed the outer torque, up to "
-            f"{worst['not fed']:.2g} N m off if it is not."
-        ),
-        holds=worst["outer torque fed"] < 1e-6,
-        draw=curves(
+        "15.18", f"Torque at an imposed error of the position, {RENDERED[0]:g} N m/rad (simulated)",
+        "The torque is that of the desired stiffness.",
+        f"Within {worst['outer torque fed']:.0e} N m if the law is fed the outer torque, up to "
+        f"{worst['not fed']:.2g} N m off if it is not.", worst["outer torque fed"] < 1e-6, curves(
             imposed,
             torques | {"expected": expected},
             "error of the position [rad]",
@@ -85,7 +76,7 @@ def rendered(library: Any) -> Figure:
             "o-",
             ":",
         ),
-    )
+    )  # fmt: skip
 
 
 def contact(library: Any) -> Figure:
@@ -105,16 +96,11 @@ def contact(library: Any) -> Figure:
         axes.legend()
 
     return Figure(
-        number="15.22",
-        title=f"A step into an obstacle with {STIFFNESSES[0]:g}, then with {STIFFNESSES[1]:g} N m/rad (simulated)",
-        claim="The link stops at the obstacle and presses on it as its impedance says, at either stiffness.",
-        found=(
-            f"It comes to rest with {torque[ends[0]]:.3f} and {torque[ends[1]]:.3f} N m; stiffness times the error of the "
-            f"position makes {expected[0]:.3f} and {expected[1]:.3f} N m."
-        ),
-        holds=bool(worst < 0.01),
-        draw=draw,
-    )
+        "15.22", f"A step into an obstacle with {STIFFNESSES[0]:g}, then with {STIFFNESSES[1]:g} N m/rad (simulated)",
+        "The link stops at the obstacle and presses on it as its impedance says, at either stiffness.",
+        f"It comes to rest with {torque[ends[0]]:.3f} and {torque[ends[1]]:.3f} N m; stiffness times the error of the "
+        f"position makes {expected[0]:.3f} and {expected[1]:.3f} N m.", bool(worst < 0.01), draw,
+    )  # fmt: skip
 
 
 def run_contact(library: Any) -> Trace:

@@ -73,18 +73,14 @@ def coriolis(library: Any, hand: Hand, spring: Spring) -> Figure:
         axes.legend()
 
     return Figure(
-        number="5.7",
-        title="What Coriolis and centrifugal terms change in the motion of the index finger",
-        claim="Without these terms the finger moves the same, within the resolution of its sensors.",
-        found=(
-            f"A count of the sensors is {seen * 1e3:.2g} mrad, an error of 0.5 mm in the lengths {coarse * 1e3:.0f} "
-            f"mrad. Damping read as {listed}. The difference is a drift of phase, growing with time, less with damping. "
-            f"Less than a count of the sensors it remains with {unseen or 'none of these'}. Abduction is moved too, by "
-            f"{np.abs(release.full[0, :, 0]).max() * 1e3:.2g} mrad, for the links are not symmetric."
-        ),
-        holds=bool(worst[0] < seen),
-        draw=draw,
-    )
+        "5.7", "What Coriolis and centrifugal terms change in the motion of the index finger",
+        "Without these terms the finger moves the same, within the resolution of its sensors.",
+        f"A count of the sensors is {seen * 1e3:.2g} mrad, an error of 0.5 mm in the lengths {coarse * 1e3:.0f} "
+        f"mrad. Damping read as {listed}. The difference is a drift of phase, growing with time, less with damping. "
+        f"Less than a count of the sensors it remains with {unseen or 'none of these'}. Abduction is moved too, by "
+        f"{np.abs(release.full[0, :, 0]).max() * 1e3:.2g} mrad, for the links are not symmetric.",
+        bool(worst[0] < seen), draw,
+    )  # fmt: skip
 
 
 def released(library: Any, hand: Hand) -> Release:
@@ -187,27 +183,18 @@ def estimates(library: Any, hand: Hand, finger: str) -> list[Figure]:
 
     return [
         Figure(
-            number="5.16",
-            title=f"Base joints of the {finger} by the gradient search, 30 iterations from (0, 0)",
-            claim="30 iterations find the joints, but for the corners.",
-            found=(
-                f"The corrected search finds the corners too. From exact lengths its largest errors are {clean} iterations; "
-                f"the figure shows {visible:.1e} rad."
-            ),
-            holds=bool(result.error(0.0, 30) < visible),
-            draw=draw_one,
+            "5.16", f"Base joints of the {finger} by the gradient search, 30 iterations from (0, 0)",
+            "30 iterations find the joints, but for the corners.",
+            f"The corrected search finds the corners too. From exact lengths its largest errors are {clean} iterations; "
+            f"the figure shows {visible:.1e} rad.", bool(result.error(0.0, 30) < visible), draw_one,
         ),
         Figure(
-            number="5.17",
-            title=f"The same for {COUNTS[0]}, {COUNTS[1]} and {COUNTS[2]} iterations, from lengths with errors",
-            claim="Few iterations are enough, for errors of the lengths soon decide.",
-            found=(
-                f"Largest errors after {', '.join(map(str, COUNTS))} iterations, for lengths wrong by up to {noisy}."
-            ),
-            holds=enough,
-            draw=draw_all,
+            "5.17", f"The same for {COUNTS[0]}, {COUNTS[1]} and {COUNTS[2]} iterations, from lengths with errors",
+            "Few iterations are enough, for errors of the lengths soon decide.",
+            f"Largest errors after {', '.join(map(str, COUNTS))} iterations, for lengths wrong by up to {noisy}.",
+            enough, draw_all,
         ),
-    ]
+    ]  # fmt: skip
 
 
 def estimated(search: BaseSearch) -> Estimates:

@@ -63,22 +63,18 @@ def stiffness(library: Any) -> list[Figure]:
     )
     return [
         Figure(
-            number="15.16 (deflexion)",
-            title="A step and a load at three stiffnesses",
-            claim=f"The stiffness decides the deflexion under {LOAD:g} N m.",
-            found=f"{', '.join(f'{rest:.3g}' for rest in rests)} rad, load over stiffness, once the load is fed to the law.",
-            holds=bool(np.allclose(np.array(rests) * STIFFNESSES, LOAD, rtol=1e-6)),
-            draw=draw,
+            "15.16 (deflexion)", "A step and a load at three stiffnesses",
+            f"The stiffness decides the deflexion under {LOAD:g} N m.",
+            f"{', '.join(f'{rest:.3g}' for rest in rests)} rad, load over stiffness, once the load is fed to the law.",
+            bool(np.allclose(np.array(rests) * STIFFNESSES, LOAD, rtol=1e-6)), draw,
         ),
         Figure(
-            number="15.16 (rise)",
-            title="The rise at three stiffnesses",
-            claim="The rise times are identical, for the motor imposes them.",
-            found=f"The slowest time constants are {', '.join(f'{t:.2g}' for t in slow)} s: K_d / K_p.",
-            holds=max(slow) < 1.1 * min(slow),
-            draw=draw,
+            "15.16 (rise)", "The rise at three stiffnesses",
+            "The rise times are identical, for the motor imposes them.",
+            f"The slowest time constants are {', '.join(f'{t:.2g}' for t in slow)} s: K_d / K_p.",
+            max(slow) < 1.1 * min(slow), draw,
         ),
-    ]
+    ]  # fmt: skip
 
 
 def damping(library: Any) -> Figure:
@@ -89,13 +85,11 @@ def damping(library: Any) -> Figure:
     arrivals = [float(settling(times[moving] - STEP_AT, run[moving], STEP, 0.0)) for run in runs]
     lines = {f"K_d = {K_d:g} N m s/rad": run for K_d, run in zip(DAMPINGS, runs, strict=True)}
     return Figure(
-        number="15.17",
-        title="A step and a load at three dampings",
-        claim="More damping settles later.",
-        found=f"The step is within 2 % after {', '.join(f'{t:.3g}' for t in arrivals)} s.",
-        holds=arrivals == sorted(arrivals) and arrivals[0] < arrivals[-1],
-        draw=curves(times, lines, "t [s]", "q [rad]"),
-    )
+        "15.17", "A step and a load at three dampings",
+        "More damping settles later.",
+        f"The step is within 2 % after {', '.join(f'{t:.3g}' for t in arrivals)} s.",
+        arrivals == sorted(arrivals) and arrivals[0] < arrivals[-1], curves(times, lines, "t [s]", "q [rad]"),
+    )  # fmt: skip
 
 
 def neglected_rate(library: Any) -> Figure:
@@ -109,13 +103,11 @@ def neglected_rate(library: Any) -> Figure:
         peaks.append(float(runs[name][1].max()))
 
     return Figure(
-        number="15.16 (rate of the load)",
-        title="A load step whose rate is not fed to the law",
-        claim="It is practically sufficient to neglect the rate of the outer torque.",
-        found=f"The link goes to {' and '.join(f'{peak:.3g}' for peak in peaks)} times its deflexion.",
-        holds=max(peaks) < 1.1,
-        draw=curves(None, runs, "t K_p / K_d", "deflexion in parts of the static one"),
-    )
+        "15.16 (rate of the load)", "A load step whose rate is not fed to the law",
+        "It is practically sufficient to neglect the rate of the outer torque.",
+        f"The link goes to {' and '.join(f'{peak:.3g}' for peak in peaks)} times its deflexion.", max(peaks) < 1.1,
+        curves(None, runs, "t K_p / K_d", "deflexion in parts of the static one"),
+    )  # fmt: skip
 
 
 # -- nonlinear spring --------------------------------------------------------------------------------------
@@ -163,38 +155,29 @@ def nonlinear(library: Any) -> list[Figure]:
     changes = [float(change[part].max()) for part in (moving, loaded)]
     return [
         Figure(
-            number="15.19",
-            title="Linear and nonlinear law behind a nonlinear spring",
-            claim="In free motion both laws do the same; under load the nonlinear one settles sooner, overshoots more.",
-            found=(
-                f"In free motion they differ by {apart:.1e} rad at most; under load the nonlinear and the linear law "
-                f"settle after {settled[0][0]:.1f} and {settled[0][1]:.1f} ms and overshoot by "
-                f"{over[0][0]:.0%} and {over[0][1]:.0%}."
-            ),
-            holds=bool(apart < 0.02 * STEP and settled[0][0] < settled[0][1] and over[0][0] > over[0][1]),
-            draw=curves(times, angles[0], "t [s]", "q [rad]"),
+            "15.19", "Linear and nonlinear law behind a nonlinear spring",
+            "In free motion both laws do the same; under load the nonlinear one settles sooner, overshoots more.",
+            f"In free motion they differ by {apart:.1e} rad at most; under load the nonlinear and the linear law "
+            f"settle after {settled[0][0]:.1f} and {settled[0][1]:.1f} ms and overshoot by "
+            f"{over[0][0]:.0%} and {over[0][1]:.0%}.",
+            bool(apart < 0.02 * STEP and settled[0][0] < settled[0][1] and over[0][0] > over[0][1]),
+            curves(times, angles[0], "t [s]", "q [rad]"),
         ),
         Figure(
-            number="15.20",
-            title="Stiffness of the spring during figure 15.19",
-            claim="Accelerating the link changes the stiffness little, loading it much.",
-            found=f"By {changes[0]:.0%} and by {changes[1]:.0%}.",
-            holds=changes[0] < 0.1 * changes[1],
-            draw=curves(times, stiffness, "t [s]", "k [N m/rad]"),
+            "15.20", "Stiffness of the spring during figure 15.19",
+            "Accelerating the link changes the stiffness little, loading it much.",
+            f"By {changes[0]:.0%} and by {changes[1]:.0%}.", changes[0] < 0.1 * changes[1],
+            curves(times, stiffness, "t [s]", "k [N m/rad]"),
         ),
         Figure(
-            number="15.21",
-            title=f"The same with torques cut at {SATURATION:g} N m",
-            claim="Saturation makes the laws more alike; the nonlinear one still settles sooner.",
-            found=(
-                "The nonlinear and the linear law overshoot by "
-                f"{over[1][0]:.0%} and {over[1][1]:.0%} and settle after {settled[1][0]:.0f} and "
-                f"{settled[1][1]:.0f} ms, {settled[0][0]:.0f} and {settled[0][1]:.0f} ms without saturation."
-            ),
-            holds=bool(
+            "15.21", f"The same with torques cut at {SATURATION:g} N m",
+            "Saturation makes the laws more alike; the nonlinear one still settles sooner.",
+            "The nonlinear and the linear law overshoot by "
+            f"{over[1][0]:.0%} and {over[1][1]:.0%} and settle after {settled[1][0]:.0f} and "
+            f"{settled[1][1]:.0f} ms, {settled[0][0]:.0f} and {settled[0][1]:.0f} ms without saturation.",
+            bool(
                 abs(settled[1][0] - settled[1][1]) < abs(settled[0][0] - settled[0][1])
                 and settled[1][0] < settled[1][1]
-            ),
-            draw=curves(times, angles[1], "t [s]", "q [rad]"),
+            ), curves(times, angles[1], "t [s]", "q [rad]"),
         ),
-    ]
+    ]  # fmt: skip

@@ -77,18 +77,14 @@ def algorithm_2(library: Any, finger: str) -> Figure:
     lines = {"limits violated by [N]": violated, "stiffness missed by [N m/rad]": missed}
     log: dict[str, Any] = {"xscale": "log", "yscale": "log"}
     return Figure(
-        number="7 (algorithm 2)",
-        title="Algorithm 2, corrected, on feasible demands",
-        claim="The force limits are in practice achieved, since their weight can be large.",
-        found=(
-            "One case in ten "
-            f"violates them by {violated.max():.2g} N or more at a light weight and misses the stiffness by "
-            f"{missed.max():.2g} N m/rad or more at a heavy one; the closed form violates nothing and misses "
-            f"{demands.miss(ours).max():.0e}."
-        ),
-        holds=bool(np.any((violated < VISIBLE) & (missed < 0.01))),
-        draw=curves(WEIGHTS, lines, "weight of the penalty", "90th percentile", "o-", "s-", **log),
-    )
+        "7 (algorithm 2)", "Algorithm 2, corrected, on feasible demands",
+        "The force limits are in practice achieved, since their weight can be large.",
+        "One case in ten "
+        f"violates them by {violated.max():.2g} N or more at a light weight and misses the stiffness by "
+        f"{missed.max():.2g} N m/rad or more at a heavy one; the closed form violates nothing and misses "
+        f"{demands.miss(ours).max():.0e}.", bool(np.any((violated < VISIBLE) & (missed < 0.01))),
+        curves(WEIGHTS, lines, "weight of the penalty", "90th percentile", "o-", "s-", **log),
+    )  # fmt: skip
 
 
 # -- chapter 8 ----------------------------------------------------------------------------------------------
@@ -122,16 +118,12 @@ def correction(library: Any, joint: Joint) -> Figure:
         axes.set_ylim(top=1.15 * axes.get_ylim()[1])
 
     return Figure(
-        number="8.3",
-        title="Stiffness correction under a disturbance",
-        claim=(
-            f"The felt stiffness stays around {' and '.join(f'{felt:g}' for felt in FELT)} N m/rad although the "
-            "disturbance changes that of the tendons."
-        ),
-        found=f"It stays within {worst:.1%}, while the stiffness of the tendons changes by {changes:.0%}.",
-        holds=bool(worst < 0.1 and not any(np.any(curve[4]) for curve in shown)),
-        draw=draw,
-    )
+        "8.3", "Stiffness correction under a disturbance",
+        f"The felt stiffness stays around {' and '.join(f'{felt:g}' for felt in FELT)} N m/rad although the "
+        "disturbance changes that of the tendons.",
+        f"It stays within {worst:.1%}, while the stiffness of the tendons changes by {changes:.0%}.",
+        bool(worst < 0.1 and not any(np.any(curve[4]) for curve in shown)), draw,
+    )  # fmt: skip
 
 
 # -- chapter 9 ----------------------------------------------------------------------------------------------
@@ -145,16 +137,12 @@ def observer(library: Any) -> Figure:
     lines = {"desired": runs[True][0], "without compensation": runs[False][1], "with compensation": runs[True][1]}
     times = np.arange(len(runs[True][0])) * PERIOD
     return Figure(
-        number="9.3",
-        title="A slow sine with and without friction compensation",
-        claim="Compensating the observed friction clearly improves the tracking.",
-        found=(
-            f"The error falls from {errors[False] * 1e3:.0f} to {errors[True] * 1e3:.1f} mrad (r.m.s.), and the torque "
-            f"travels {busy[True] / busy[False]:.1f} times as far; the text has it react violently."
-        ),
-        holds=errors[True] < errors[False] / 3,
-        draw=curves(times, lines, "t [s]", "joint angle [rad]", ":"),
-    )
+        "9.3", "A slow sine with and without friction compensation",
+        "Compensating the observed friction clearly improves the tracking.",
+        f"The error falls from {errors[False] * 1e3:.0f} to {errors[True] * 1e3:.1f} mrad (r.m.s.), and the torque "
+        f"travels {busy[True] / busy[False]:.1f} times as far; the text has it react violently.",
+        errors[True] < errors[False] / 3, curves(times, lines, "t [s]", "joint angle [rad]", ":"),
+    )  # fmt: skip
 
 
 def tracked(library: Any, compensate: bool) -> tuple[Array, Array, Array]:
@@ -267,14 +255,12 @@ def force_steps(bench: Bench) -> list[Figure]:
         arrivals = settling(TIMES[:-STEP_AT], forces[STEP_AT:], wanted[-1], wanted[0], 0.1) * 1e3
         lines = {"desired": wanted, "without": forces[:, 0], "with": forces[:, 1]}
         found.append(Figure(
-            number=number, title=f"A step of the tendon force with and without {subject}",
-            claim=f"The {subject} improves the force step.",
-            found=(
-                f"At {TICKS * PERIOD:.1f} s the error is {errors[0]:.2g} N without and {errors[1]:.2g} N with it; the force "
-                f"stays within 10 % of the step {_after(arrivals[0])} and {_after(arrivals[1])}."
-            ),
-            holds=bool(errors[1] < errors[0] / 2 and arrivals[1] <= arrivals[0]),
-            draw=curves(TIMES, lines, "t [s]", "tendon force [N]", "--", ":"),
+            number, f"A step of the tendon force with and without {subject}",
+            f"The {subject} improves the force step.",
+            f"At {TICKS * PERIOD:.1f} s the error is {errors[0]:.2g} N without and {errors[1]:.2g} N with it; the force "
+            f"stays within 10 % of the step {_after(arrivals[0])} and {_after(arrivals[1])}.",
+            bool(errors[1] < errors[0] / 2 and arrivals[1] <= arrivals[0]),
+            curves(TIMES, lines, "t [s]", "tendon force [N]", "--", ":"),
         ))  # fmt: skip
     return found
 
@@ -327,13 +313,9 @@ def sweep(bench: Bench) -> Figure:
     peaks = np.array(SWEEP)[gain.argmax(axis=0)]
     lines = {f"pretension {f:g} N": each for f, each in zip(TENSIONS, gain.T, strict=True)}
     return Figure(
-        number="11.4",
-        title="Gain of the joint over frequency at three pretensions (simulated)",
-        claim="The resonance moves with the mechanical stiffness, so two time scales hold in a limited range.",
-        found=(
-            f"The gain is highest at {', '.join(f'{peak:g}' for peak in peaks)} Hz, where it is "
-            f"{', '.join(f'{peak:.2f}' for peak in gain.max(axis=0))}. {CHOSEN}"
-        ),
-        holds=bool(np.all(np.diff(peaks) > 0)),
-        draw=curves(SWEEP, lines, "frequency [Hz]", "amplitude of the angle per desired angle", *["o-"] * 3),
-    )
+        "11.4", "Gain of the joint over frequency at three pretensions (simulated)",
+        "The resonance moves with the mechanical stiffness, so two time scales hold in a limited range.",
+        f"The gain is highest at {', '.join(f'{peak:g}' for peak in peaks)} Hz, where it is "
+        f"{', '.join(f'{peak:.2f}' for peak in gain.max(axis=0))}. {CHOSEN}", bool(np.all(np.diff(peaks) > 0)),
+        curves(SWEEP, lines, "frequency [Hz]", "amplitude of the angle per desired angle", *["o-"] * 3),
+    )  # fmt: skip
