@@ -68,8 +68,7 @@ OBSERVED = (
 )
 STATE = ("joint", "motors")
 SETPOINT = Block(
-    "antagonistic_setpoint",
-    {"desired": "motion", "inertias": "known_inertias", "damping": "known_damping"},
+    "antagonistic_setpoint", {"desired": "motion", "inertias": "known_inertias", "damping": "known_damping"}
 )
 FEEDBACK = Block("antagonistic_feedback", {"x": STATE, "resistance": "modelled", "tau_m": "wanted"})
 COMPENSATED = Block(  # adds friction compensation to a law without it

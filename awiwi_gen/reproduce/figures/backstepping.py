@@ -13,17 +13,8 @@ from typing import Any
 import numpy as np
 
 from awiwi_gen.hand import Hand
-from awiwi_gen.loops.joint import (
-    TABLE_15_1,
-    TABLE_16_1,
-    Plant,
-    normalised_loop,
-    position_loop,
-    state_gains,
-)
-from awiwi_gen.loops.joint import (
-    Loop as LinearLoop,
-)
+from awiwi_gen.loops.joint import TABLE_15_1, TABLE_16_1, Plant, normalised_loop, position_loop, state_gains
+from awiwi_gen.loops.joint import Loop as LinearLoop
 from awiwi_gen.results import Figure, curves
 from awiwi_gen.simulate import Actuator, Array, Block, Element, Loop, Scenario, Sum, Trace, simulate
 
