@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 from scipy.linalg import expm
 
-from awiwi_gen.loops.sampled import PERIOD, delay_margin, sampled
-
-Array = np.ndarray[Any, Any]
+from awiwi_gen.loops.sampled import delay_margin, sampled
+from awiwi_gen.simulate import Array
 
 UNIT_WEIGHTS = (1.0, 1.0)
 
@@ -126,7 +125,7 @@ class Loop:
 
     def sampled_radius(self, delay: int = 1) -> float:
         """Spectral radius when the law runs on the hand's clock and acts ``delay`` ticks later."""
-        return float(np.abs(np.linalg.eigvals(sampled(self.A, self.B, self.K, PERIOD, delay))).max())
+        return float(np.abs(np.linalg.eigvals(sampled(self.A, self.B, self.K, delay=delay))).max())
 
     def delay_margin(self) -> float:
         """The shortest delay [s] that moves a pole to the imaginary axis; infinite if none does."""

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from awiwi_gen.loops.joint import TABLE_16_1, Array, Loop, Plant, slopes
+from awiwi_gen.loops.joint import TABLE_16_1, Loop, Plant, slopes
+from awiwi_gen.simulate import Array
 
 SIDES = np.array([1.0, -1.0])
 TUNING = (100.0, 100.0, 1.0, 1.0)  # K_3, K_4, C_t, C_s of either motor

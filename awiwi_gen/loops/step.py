@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
-Array = np.ndarray[Any, Any]
+from awiwi_gen.simulate import Array
 
 
 def overshoot(values: Array, goal: Array | float, start: Array | float) -> Array:

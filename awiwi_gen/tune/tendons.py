@@ -30,9 +30,10 @@ from awiwi_gen.hand.file import HandFile
 from awiwi_gen.hand.gains import TendonGains
 from awiwi_gen.hand.parts import Measure, Part
 from awiwi_gen.loops.hand_joint import joints_of
-from awiwi_gen.loops.joint import Array, Loop, Plant
+from awiwi_gen.loops.joint import Loop, Plant
+from awiwi_gen.loops.nearest import least
 from awiwi_gen.loops.regulator import Gains, cancelling, exact_gains, loop_of, pretension_loop, regulator
-from awiwi_gen.loops.sampled import PERIOD
+from awiwi_gen.simulate import PERIOD, Array
 from awiwi_gen.units import Quantity
 
 Rows = tuple[tuple[float, ...], ...]
@@ -42,7 +43,8 @@ GAINS = {
     for note in field.metadata
     if isinstance(note, Measure)
 }
-DEAREST = 1e12  # largest factor on R that is tried
+DECADES = 12  # of the largest factor on R that is tried
+HALVINGS = 8  # of a decade: to 1 %
 
 
 def _cost_matrix(value: object) -> Rows:
@@ -204,20 +206,15 @@ def _regulated(library: Any, plant: Plant, Q: Array, R: float) -> tuple[Gains, t
 def _way_out(library: Any, plant: Plant, Q: Array, R: float) -> str:
     """The least stable R, found by bisection, in words."""
 
-    def works(factor: float) -> bool:
-        _, loops = _regulated(library, plant, Q, factor * R)
+    def works(share: float) -> bool:
+        _, loops = _regulated(library, plant, Q, 10 ** (DECADES * share) * R)
         return all(loop.sampled_radius() < 1 for loop in loops)
 
-    low, high = 1.0, 10.0
-    while not works(high):
-        low, high = high, 10 * high
-        if high > DEAREST:
-            ringing = np.sqrt(plant.k * (1 / plant.m + 1 / plant.b)) / (2 * np.pi)
-            return f"no R helps, for link and spring ring at {ringing:.0f} Hz"
-    while high / low > 1.01:
-        middle = float(np.sqrt(low * high))
-        low, high = (low, middle) if works(middle) else (middle, high)
-    return f"R = {high * R:.3g} is the least that works"
+    bracket = least(works, DECADES, HALVINGS)
+    if bracket is None:
+        ringing = np.sqrt(plant.k * (1 / plant.m + 1 / plant.b)) / (2 * np.pi)
+        return f"no R helps, for link and spring ring at {ringing:.0f} Hz"
+    return f"R = {10 ** (DECADES * bracket[1]) * R:.3g} is the least that works"
 
 
 def write_gains(path: Path, tuned: list[Tuned]) -> None:

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from awiwi_gen.hand import Hand
-from awiwi_gen.loops.joint import TABLE_15_1, TABLE_16_1, UNIT_WEIGHTS, Array, Plant, impedance_loop
+from awiwi_gen.loops.joint import TABLE_15_1, TABLE_16_1, UNIT_WEIGHTS, Plant, impedance_loop
 from awiwi_gen.loops.step import overshoot, settling
 from awiwi_gen.results import Figure, curves
-from awiwi_gen.simulate import Actuator, Block, Loop, Scenario, Trace, simulate
+from awiwi_gen.simulate import Actuator, Array, Block, Loop, Scenario, Trace, simulate
 
 STEP = np.pi / 4
 LOAD = 0.2  # N m, as captioned

@@ -13,11 +13,11 @@ import numpy as np
 from scipy.optimize import brentq
 
 from awiwi_gen.hand import Hand
-from awiwi_gen.loops.joint import TABLE_12_1, TABLE_12_1_TARGET, TABLE_13_1, TABLE_14_2, Array
+from awiwi_gen.loops.joint import TABLE_12_1, TABLE_12_1_TARGET, TABLE_13_1, TABLE_14_2
 from awiwi_gen.loops.sampled import is_implementable, report
 from awiwi_gen.loops.step import settling
 from awiwi_gen.results import Draw, Figure, curves
-from awiwi_gen.simulate import PERIOD, Actuator, Block, Loop, Scenario, simulate
+from awiwi_gen.simulate import PERIOD, Actuator, Array, Block, Loop, Scenario, simulate
 
 STIFFNESSES = np.linspace(0.43, 1.15, 73)  # N m/rad, as captioned
 COSTS_13 = (0.0001, 0.01, 1.0)

@@ -12,8 +12,7 @@ import numpy as np
 
 from awiwi_gen.hand import Hand, Wrist
 from awiwi_gen.results import Figure, curves
-
-Array = np.ndarray[Any, Any]
+from awiwi_gen.simulate import Array
 
 FLEXION, ABDUCTION = np.radians(30.0), np.radians(20.0)
 EXACT = 1e-15  # m; what "numerical inaccuracies" may mean for lengths of some centimetres

@@ -20,9 +20,9 @@ from awiwi_gen.loops.joint import (
 )
 from awiwi_gen.loops.pair import TABLE_PAIR, TUNING, at_rest, literal_loop, pair_loop
 from awiwi_gen.loops.regulator import cancelling, regulator
-from awiwi_gen.loops.sampled import PERIOD
 from awiwi_gen.reproduce.gain_search import PRINTED_BOX, draw, nearest
 from awiwi_gen.results import Printed, compared
+from awiwi_gen.simulate import PERIOD
 
 FIGURE_15_13 = (5.0, 1.0, 100.0, 100.0)  # K1 .. K4
 FIGURE_15_16 = (0.5, 0.05, 100.0, 100.0)  # K_p, K_d, K3, K4

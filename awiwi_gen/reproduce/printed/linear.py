@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 
 from awiwi_gen.hand import Hand
-from awiwi_gen.loops.joint import TABLE_12_1, TABLE_12_1_TARGET, TABLE_13_1, TABLE_14_2, Array, Plant
+from awiwi_gen.loops.joint import TABLE_12_1, TABLE_12_1_TARGET, TABLE_13_1, TABLE_14_2, Plant
 from awiwi_gen.loops.sampled import is_implementable
 from awiwi_gen.reproduce.figures.linear import stable_band
 from awiwi_gen.reproduce.figures.tendon import DAMPING, FREQUENCY, STEPS, TUNED_AT, Bench
 from awiwi_gen.results import Printed, compared
+from awiwi_gen.simulate import Array
 
 OTHER_TARGET = {"omega": (100.0, 10.0), "xi": (1.0, 1.0)}
 RISE = 0.03  # s, of the steps in figure 10.2
