@@ -53,6 +53,11 @@ def compared(where: str, printed: str, ours: float, reason: str, otherwise: Verd
     return Printed(where, printed, f"{ours:.7g}", "agrees" if agrees else otherwise, reason)
 
 
+def listed(values: Any, spec: str, separator: str = ", ") -> str:
+    """Numbers in one format, as text."""
+    return separator.join(f"{value:{spec}}" for value in values)
+
+
 def same_digits(printed: str, ours: float) -> bool:
     """Whether our value, rounded to the printed digits, is the printed value.
 

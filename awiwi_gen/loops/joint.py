@@ -115,6 +115,20 @@ class Loop:
             states.append(step @ states[-1])
         return np.array(states)[:, :n]
 
+    def step(self, height: float, times: Array) -> Array:
+        """Position (times,) of the link after a step of the desired one, from rest at 0."""
+        position: Array = height + self.response([-height, *np.zeros(len(self.A) - 1)], times)[:, 0]
+        return position
+
+    def loaded(self, start: Array, times: Array, torque: float) -> Array:
+        """States (times, n) from ``start`` after a step of the outer torque [N m], whose rate is an impulse."""
+        return self.response(start + (self.E + self.B @ self.H) @ [0.0, torque], times, [torque, 0.0])
+
+    @property
+    def stiffness(self) -> float:
+        """Of the link at rest [N m/rad]: outer torque per deflexion."""
+        return float(1 / self.at_rest([1.0, 0.0])[0])
+
     def at_rest(self, w: Any) -> Array:
         """The state at rest under a constant w."""
         return -np.linalg.solve(self.closed, self._drift(w))

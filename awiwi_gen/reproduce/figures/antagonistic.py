@@ -68,10 +68,8 @@ def deflexion(library: Any) -> Figure:
     """Figure 15.23, continuous: a step, then a torque on the link."""
     loop, _ = pair_loop(library.backstepping_antagonistic, TABLE_PAIR, IMPEDANCE)
     times, torque, goal = np.linspace(0, 1.5, 1501), 0.1, np.pi / 4
-    start = np.array([-goal, 0, 0, 0, 0, 0])
-    moved = loop.response(start, times)
-    jump = (loop.E + loop.B @ loop.H) @ [0.0, torque]
-    loaded = loop.response(moved[-1] + jump, times, [torque, 0.0])
+    moved = loop.response([-goal, 0, 0, 0, 0, 0], times)
+    loaded = loop.loaded(moved[-1], times, torque)
     q = goal + np.concatenate([moved[:, 0], loaded[:, 0]])
     end = goal + torque / IMPEDANCE[0]
 

@@ -12,9 +12,10 @@ import numpy as np
 
 from awiwi_gen.hand import Hand
 from awiwi_gen.loops.joint import TABLE_15_1, TABLE_16_1, impedance_loop, joint_loop
+from awiwi_gen.loops.step import run
 from awiwi_gen.reproduce.figures.impedance import GAINS, SPRING_JOINT
 from awiwi_gen.results import Figure, curves
-from awiwi_gen.simulate import Actuator, Block, Element, Loop, Scenario, Sum, Trace, Wire, simulate
+from awiwi_gen.simulate import Block, Element, Scenario, Sum, Trace, Wire
 
 STEP = 0.8  # rad
 MOTOR = 200.0  # rad/s, of a critically damped motor under its own controller
@@ -41,7 +42,7 @@ def swing(library: Any) -> Figure:
         "backstepping": impedance_loop(library, TABLE_16_1, GAINS),
     }
     times = np.linspace(0, 0.2, 4001)
-    runs = {name: STEP + loop.response([-STEP, 0, 0, 0], times)[:, 0] for name, loop in loops.items()}
+    runs = {name: loop.step(STEP, times) for name, loop in loops.items()}
     left = {name: float(np.ptp(run[times > 0.1]) / STEP) for name, run in runs.items()}
 
     return Figure(
@@ -107,24 +108,16 @@ def run_contact(library: Any) -> Trace:
     """A step into the obstacle, a spring with a damper; the law acts as if in continuous time."""
     ticks = round(2 * PHASE / TICK)
     gains = np.array([(STIFFNESSES[int(tick * TICK >= PHASE)], *CONTACT) for tick in range(ticks)])
-    obstacle: dict[str, Wire] = {
-        "stretches": ("depth", "zeros[0]"),
-        "speeds": ("x[1]", "zeros[0]"),
-        "torques": "wall",
-        "springs": "unused",
-    }
+    obstacle: dict[str, Wire] = {"stretches": ("depth", "zeros[0]"), "speeds": ("x[1]", "zeros[0]"), "tendons": "walls"}
     plant: list[Element] = [
         Sum("depth", (1.0, "x[0]"), (-OBSTACLE, "one")),
-        Block("antagonistic_springs", obstacle | {"tendons": "walls"}),
+        Block("antagonistic_springs", obstacle | {"torques": "wall", "springs": "unused"}),
         Sum("load", (-1.0, "wall[0]"), (-WALL_DAMPING / WALL, "wall[1]")),
         Block("plant_joint_nonlinear"),
     ]
     law: dict[str, Wire] = {"state": ("x[0:2]", "tau"), "external": ("load", "zeros[0]"), "tau_m": "command"}
-    loop = Loop(
-        plant, [Block("backstepping_nonlinear", law)], {"x": "xd"},
-        actuators=[Actuator("command", "u", late=False)], period=TICK,
-    )  # fmt: skip
     values = SPRING_JOINT | {
         "x": np.zeros(4), "zeros": np.zeros(1), "one": 1.0, "walls": [(WALL, 0.0, 0.0)] * 2, "desired": (GOAL, 0, 0, 0, 0),
     }  # fmt: skip
-    return simulate(library, loop, [Scenario(values, ticks, {"gains": gains})], ["x", "tau"])[0]
+    scenario = Scenario(values, ticks, {"gains": gains})
+    return run(library, plant, [Block("backstepping_nonlinear", law)], scenario, ["x", "tau"], TICK)

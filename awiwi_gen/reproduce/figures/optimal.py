@@ -37,7 +37,7 @@ def draws(library: Any, number: str, title: str, R: float, box: Box, runs: int, 
     found = [nearest(library, TABLE_16_1, wanted, draw(box, samples, seed), corrected) for seed in range(runs)]
     loops = [impedance_loop(library, TABLE_16_1, each.gains) for each in found]
     times = np.linspace(0, END, 501)
-    steps = np.array([STEP + loop.response([-STEP, 0, 0, 0], times)[:, 0] for loop in loops])
+    steps = np.array([loop.step(STEP, times) for loop in loops])
     slowest = [float(loop.poles().real.max()) for loop in loops]
     apart = float(np.ptp(steps, axis=0).max() / STEP)
     arrived = float(steps[:, -1].min() / STEP)
