@@ -36,9 +36,6 @@ def figures(library: Any, hand: Hand) -> list[Figure]:
     return found
 
 
-# -- figure 3.3 -------------------------------------------------------------------------------------------
-
-
 def friction(library: Any, motor: Motor) -> Figure:
     """Figure 3.3: mean torques at constant speeds give the friction curve, in spite of ripple."""
     generator = np.random.default_rng(33)
@@ -64,9 +61,6 @@ def friction(library: Any, motor: Motor) -> Figure:
         f"The fit finds the friction of the simulated motor within {error:.2%} of its largest value.", error < 0.02,
         draw,
     )  # fmt: skip
-
-
-# -- figures 3.4 to 3.6: one simulation of several motors -------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -157,7 +151,6 @@ def repeatability(recordings: Recordings) -> Figure:
     mean = recordings.repeated.mean(axis=0)
     spread = float(np.std(recordings.repeated - mean))
     share = spread / float(np.std(mean))
-
     return Figure(
         "3.4", f"Commanded torque of {RUNS} motions at {recordings.speed:g} rad/s from the same angle",
         "The disturbance repeats: it depends on the position.",
@@ -195,13 +188,9 @@ def compensation(recordings: Recordings) -> Figure:
         shown[label] = lines * recordings.speed / (2 * np.pi), amplitude
     return Figure(
         "3.6", "Frequencies of the controller's torque with and without compensation",
-        "Feeding the disturbance forward attenuates the rotor's main line.",
-        f"Of its amplitude {left:.0%} is left.", left < 0.25,
-        curves(None, shown, "frequency [Hz]", "torque amplitude [N m]", xlim=(0, recordings.highest)),
+        "Feeding the disturbance forward attenuates the rotor's main line.", f"Of its amplitude {left:.0%} is left.",
+        left < 0.25, curves(None, shown, "frequency [Hz]", "torque amplitude [N m]", xlim=(0, recordings.highest)),
     )  # fmt: skip
-
-
-# -- figure 4.7 -------------------------------------------------------------------------------------------
 
 
 def characteristic(library: Any) -> Figure:

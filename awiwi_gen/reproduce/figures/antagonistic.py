@@ -72,7 +72,6 @@ def deflexion(library: Any) -> Figure:
     loaded = loop.loaded(moved[-1], times, torque)
     q = goal + np.concatenate([moved[:, 0], loaded[:, 0]])
     end = goal + torque / IMPEDANCE[0]
-
     return Figure(
         "15.23", "A step and a torque on the link, exact law",
         "The link arrives, then yields to the torque as its impedance says.",
@@ -92,7 +91,6 @@ def pretension(library: Any) -> Figure:
         rest = at_rest(loop, constant)
         runs[name] = (rest + loop.response(start - rest, times))[:, 2::2].mean(axis=1)
     left = {name: float(run[-1]) for name, run in runs.items()}
-
     return Figure(
         "15.23 (pretension)", "The pretension under the printed decoupling",
         "Motors can be treated as not aware of one another, and the pretension be added.",

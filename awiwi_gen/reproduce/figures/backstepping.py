@@ -111,8 +111,7 @@ def sweep(library: Any, which: int, name: str, build: Callable[..., LinearLoop])
     lines = {f"K{which} = {value:g}": run for value, run in runs.items()}
     return Figure(
         f"15.{6 + which} ({name})", f"Influence of K{which} on a step of {STEP:g} rad, {name}",
-        f"{effect}.",
-        f"Rise time and overshoot at K{which} = {shown}.", holds,
+        f"{effect}.", f"Rise time and overshoot at K{which} = {shown}.", holds,
         curves(times, lines, "t [s]", "q [rad]", xlim=(0, 10)),
     )  # fmt: skip
 
@@ -159,8 +158,8 @@ def saturation(library: Any) -> list[Figure]:
     return [
         Figure(
             "15.10", "A step with saturated torque: link, plant of table 16.1",
-            "The law stays stable in spite of the limit.",
-            f"Both runs end within {left:.1%} of the step.", left < 0.02, curves(None, angles, "t [s]", "q [rad]"),
+            "The law stays stable in spite of the limit.", f"Both runs end within {left:.1%} of the step.", left < 0.02,
+            curves(None, angles, "t [s]", "q [rad]"),
         ),
         Figure(
             "15.11", "A step with saturated torque: command, plant of table 16.1",

@@ -44,7 +44,6 @@ def swing(library: Any) -> Figure:
     times = np.linspace(0, 0.2, 4001)
     runs = {name: loop.step(STEP, times) for name, loop in loops.items()}
     left = {name: float(np.ptp(run[times > 0.1]) / STEP) for name, run in runs.items()}
-
     return Figure(
         "15.15", "A step with a PD controller of the motor and with the backstepping law (simulated)",
         "Unlike a PD controller of the motor, the backstepping law moves the link without oscillations.",
@@ -63,19 +62,14 @@ def rendered(library: Any) -> Figure:
         torques[name] = -imposed / at_rest[0] * at_rest[2]
     expected = RENDERED[0] * imposed
     worst = {name: float(np.abs(torque - expected).max()) for name, torque in torques.items()}
-
     return Figure(
         "15.18", f"Torque at an imposed error of the position, {RENDERED[0]:g} N m/rad (simulated)",
         "The torque is that of the desired stiffness.",
         f"Within {worst['outer torque fed']:.0e} N m if the law is fed the outer torque, up to "
-        f"{worst['not fed']:.2g} N m off if it is not.", worst["outer torque fed"] < 1e-6, curves(
-            imposed,
-            torques | {"expected": expected},
-            "error of the position [rad]",
-            "torque of the spring [N m]",
-            "o-",
-            "o-",
-            ":",
+        f"{worst['not fed']:.2g} N m off if it is not.", worst["outer torque fed"] < 1e-6,
+        curves(
+            imposed, torques | {"expected": expected}, "error of the position [rad]", "torque of the spring [N m]",
+            "o-", "o-", ":",
         ),
     )  # fmt: skip
 

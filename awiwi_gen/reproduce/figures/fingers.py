@@ -31,9 +31,6 @@ def figures(library: Any, hand: Hand) -> list[Figure]:
     return found + [figure for name in based[:1] for figure in estimates(library, hand, name)]
 
 
-# -- figure 5.7 -------------------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True)
 class Release:
     """The index finger let go, its motors standing still: one motion for each reading of the damping.
@@ -139,9 +136,6 @@ def damping_readings(library: Any, q: Array) -> dict[str, Array]:
     return modal | {"1e-3 N m s/rad in each joint": 1e-3 * np.eye(len(q))}
 
 
-# -- figures 5.16 and 5.17 --------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True)
 class Estimates:
     """Base joints of a grid of poses, estimated from (0, 0): poses (points, n), found[noise][count] (points, n)."""
@@ -215,9 +209,6 @@ def scatter(axes: Any, poses: Array, found: Array) -> None:
     """Circles where the joints are, crosses where they are found."""
     axes.plot(*poses.T, "o", color="tab:red", fillstyle="none", markersize=4)
     axes.plot(*found.T, "x", color="tab:blue", markersize=4)
-
-
-# -- resolution of the sensors ----------------------------------------------------------------------------
 
 
 def resolution(library: Any, spring: Spring, finger: str) -> float:

@@ -14,7 +14,7 @@ from awiwi_gen.hand import Hand
 from awiwi_gen.loops.joint import TABLE_15_1, TABLE_16_1, UNIT_WEIGHTS, impedance_loop
 from awiwi_gen.loops.joint import Loop as LinearLoop
 from awiwi_gen.loops.step import overshoot, run, settling
-from awiwi_gen.results import Figure, curves
+from awiwi_gen.results import Figure, curves, listed
 from awiwi_gen.simulate import Array, Block, Scenario, Trace
 
 STEP = np.pi / 4
@@ -58,14 +58,13 @@ def stiffness(library: Any) -> list[Figure]:
         Figure(
             "15.16 (deflexion)", "A step and a load at three stiffnesses",
             f"The stiffness decides the deflexion under {LOAD:g} N m.",
-            f"{', '.join(f'{rest:.3g}' for rest in rests)} rad, load over stiffness, once the load is fed to the law.",
+            f"{listed(rests, '.3g')} rad, load over stiffness, once the load is fed to the law.",
             bool(np.allclose(np.array(rests) * STIFFNESSES, LOAD, rtol=1e-6)), draw,
         ),
         Figure(
             "15.16 (rise)", "The rise at three stiffnesses",
             "The rise times are identical, for the motor imposes them.",
-            f"The slowest time constants are {', '.join(f'{t:.2g}' for t in slow)} s: K_d / K_p.",
-            max(slow) < 1.1 * min(slow), draw,
+            f"The slowest time constants are {listed(slow, '.2g')} s: K_d / K_p.", max(slow) < 1.1 * min(slow), draw,
         ),
     ]  # fmt: skip
 
@@ -80,8 +79,7 @@ def damping(library: Any) -> Figure:
     lines = {f"K_d = {K_d:g} N m s/rad": run for K_d, run in zip(DAMPINGS, runs, strict=True)}
     return Figure(
         "15.17", "A step and a load at three dampings",
-        "More damping settles later.",
-        f"The step is within 2 % after {', '.join(f'{t:.3g}' for t in arrivals)} s.",
+        "More damping settles later.", f"The step is within 2 % after {listed(arrivals, '.3g')} s.",
         arrivals == sorted(arrivals) and arrivals[0] < arrivals[-1], curves(times, lines, "t [s]", "q [rad]"),
     )  # fmt: skip
 
@@ -98,7 +96,7 @@ def neglected_rate(library: Any) -> Figure:
     return Figure(
         "15.16 (rate of the load)", "A load step whose rate is not fed to the law",
         "It is practically sufficient to neglect the rate of the outer torque.",
-        f"The link goes to {' and '.join(f'{peak:.3g}' for peak in peaks)} times its deflexion.", max(peaks) < 1.1,
+        f"The link goes to {listed(peaks, '.3g', ' and ')} times its deflexion.", max(peaks) < 1.1,
         curves(None, runs, "t K_p / K_d", "deflexion in parts of the static one"),
     )  # fmt: skip
 

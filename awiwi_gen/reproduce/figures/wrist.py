@@ -34,9 +34,8 @@ def bars(library: Any, wrist: Wrist) -> Figure:
     labels = "step of the motion", "largest error of a bar's length [m]"
     return Figure(
         "6.9", "Errors of the six distances between the points of the wrist",
-        "The distances stay constant up to rounding.",
-        f"Within {worst:.0e} m over the whole range of the wrist.", bool(worst < EXACT),
-        curves(np.arange(len(errors)), errors, *labels, ylim=(0, 1.5 * worst)),
+        "The distances stay constant up to rounding.", f"Within {worst:.0e} m over the whole range of the wrist.",
+        bool(worst < EXACT), curves(np.arange(len(errors)), errors, *labels, ylim=(0, 1.5 * worst)),
     )  # fmt: skip
 
 
