@@ -101,11 +101,6 @@ class Loop:
         poles: Array = np.linalg.eigvals(self.closed)
         return poles
 
-    @property
-    def stable(self) -> bool:
-        """Whether all poles lie in the left half plane."""
-        return bool(self.poles().real.max() < 0)
-
     def response(self, start: Any, times: Array, w: Any = 0.0) -> Array:
         """States (times, n) from ``start`` under a constant w; the times are evenly spaced and begin at the start."""
         n = len(self.A)

@@ -153,9 +153,15 @@ def sines(library: Any) -> list[Figure]:
 
 
 def rendered(library: Any) -> Figure:
-    """Figure 15.27: the torque at a deflexion, for three stiffnesses."""
-    imposed = np.linspace(0, 0.4, 5)
-    torques = {K_p: static_torques(library, K_p, imposed) for K_p in STIFFNESSES}
+    """Figure 15.27: the torque at a deflexion, for three stiffnesses.
+
+    A fixture holds the link and is felt by the law; its torque is the load under which the link would stand there.
+    """
+    imposed, torques = np.linspace(0, 0.4, 5), {}
+    for K_p in STIFFNESSES:
+        loop, _ = pair_loop(library.backstepping_antagonistic, TABLE_PAIR, (K_p, 0.05))
+        unit = loop.at_rest([1.0, 0.0])
+        torques[K_p] = imposed / unit[0] * (unit[4] - unit[2])
     worst = max(float(np.abs(t - K_p * imposed).max()) for K_p, t in torques.items())
 
     lines = {f"K_p = {K_p:g} N m/rad": torque for K_p, torque in torques.items()}
@@ -165,14 +171,3 @@ def rendered(library: Any) -> Figure:
         f"It is, within {worst:.0e} N m.", worst < 1e-9,
         curves(imposed, lines, "imposed deflexion [rad]", "torque of the tendons [N m]", *["o-"] * 3),
     )  # fmt: skip
-
-
-def static_torques(library: Any, K_p: float, imposed: Array) -> Array:
-    """Torque [N m] of the tendons against a fixture that holds the link at deflexions [rad] and is felt by the law.
-
-    The fixture's torque is the load under which the link would stand there by itself.
-    """
-    loop, _ = pair_loop(library.backstepping_antagonistic, TABLE_PAIR, (K_p, 0.05))
-    unit = loop.at_rest([1.0, 0.0])
-    torques: Array = imposed / unit[0] * (unit[4] - unit[2])
-    return torques

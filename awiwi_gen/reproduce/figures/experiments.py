@@ -82,19 +82,13 @@ def contact(library: Any) -> Figure:
     expected = [K_p * (GOAL - q[end]) for K_p, end in zip(STIFFNESSES, ends, strict=True)]
     worst = max(abs(torque[end] / wanted - 1) for end, wanted in zip(ends, expected, strict=True))
 
-    def draw(axes: Any) -> None:
-        axes.plot(trace.time, q, linewidth=0.8, label="link angle [rad]")
-        axes.plot(trace.time, torque, linewidth=0.8, label="torque of the spring [N m]")
-        axes.axhline(GOAL, linestyle=":", color="black", linewidth=0.8, label="desired angle [rad]")
-        axes.axvline(PHASE, color="black", linewidth=0.5)
-        axes.set(xlabel="t [s]", ylabel="angle [rad], torque [N m]")
-        axes.legend()
-
+    lines = {"link angle [rad]": q, "torque of the spring [N m]": torque, "desired angle [rad]": np.full(len(q), GOAL)}
     return Figure(
         "15.22", f"A step into an obstacle with {STIFFNESSES[0]:g}, then with {STIFFNESSES[1]:g} N m/rad (simulated)",
         "The link stops at the obstacle and presses on it as its impedance says, at either stiffness.",
         f"It comes to rest with {torque[ends[0]]:.3f} and {torque[ends[1]]:.3f} N m; stiffness times the error of the "
-        f"position makes {expected[0]:.3f} and {expected[1]:.3f} N m.", bool(worst < 0.01), draw,
+        f"position makes {expected[0]:.3f} and {expected[1]:.3f} N m.", bool(worst < 0.01),
+        curves(trace.time, lines, "t [s]", "angle [rad], torque [N m]", *"--:"),
     )  # fmt: skip
 
 

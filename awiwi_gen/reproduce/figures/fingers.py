@@ -11,7 +11,7 @@ from awiwi_gen.hand import Hand, Spring
 from awiwi_gen.hand.lever import Lever
 from awiwi_gen.kernels.base_estimate import base_of
 from awiwi_gen.reproduce.base_search import BaseSearch
-from awiwi_gen.results import Figure
+from awiwi_gen.results import Figure, curves
 from awiwi_gen.simulate import Array, Block, Loop, Scenario, Sum, simulate
 
 RELEASE, JOINT = 0.1, 1  # rad, at the joint for flexion
@@ -63,12 +63,9 @@ def coriolis(library: Any, hand: Hand, spring: Spring) -> Figure:
         for reading, a, b in zip(release.readings, early, worst, strict=True)
     )
 
-    def draw(axes: Any) -> None:
-        axes.plot(release.times, change[0] * 1e3, linewidth=0.8, label=hand.fingers["index"].joints)
-        axes.axhline(seen * 1e3, color="black", linestyle=":", linewidth=0.8, label="resolution of the sensors")
-        axes.set(xlabel="time [s]", ylabel="change of the joint angles [mrad]", title=release.readings[0])
-        axes.legend()
-
+    lines = dict(zip(hand.fingers["index"].joints, change[0].T * 1e3, strict=True))
+    lines |= {"resolution of the sensors": np.full(STEPS, seen * 1e3)}
+    styles, labels = ["-"] * (len(lines) - 1) + [":"], ("time [s]", "change of the joint angles [mrad]")
     return Figure(
         "5.7", "What Coriolis and centrifugal terms change in the motion of the index finger",
         "Without these terms the finger moves the same, within the resolution of its sensors.",
@@ -76,7 +73,7 @@ def coriolis(library: Any, hand: Hand, spring: Spring) -> Figure:
         f"mrad. Damping read as {listed}. The difference is a drift of phase, growing with time, less with damping. "
         f"Less than a count of the sensors it remains with {unseen or 'none of these'}. Abduction is moved too, by "
         f"{np.abs(release.full[0, :, 0]).max() * 1e3:.2g} mrad, for the links are not symmetric.",
-        bool(worst[0] < seen), draw,
+        bool(worst[0] < seen), curves(release.times, lines, *labels, *styles, title=release.readings[0]),
     )  # fmt: skip
 
 
