@@ -157,17 +157,10 @@ def scheduled(_: Any, believed: Joint, force: float, gains: Mapping[str, float])
         return matrix
 
     return rest(believed, force) | {
-        "mass": first(float(believed.inertias[0])),
-        "coriolis": np.diag([believed.damping, 0, 0, 0]),
-        "three": np.zeros(3),
-        "four": np.zeros(4),
-        "stiff": first(gains["K_p"]),
-        "damp": first(gains["K_d"]),
-        "omega0": gains["omega"],
-        "xi0": gains["xi"],
-        "force_gains": np.zeros(4),
-        "wound": np.zeros(2),
-    }
+        "mass": first(float(believed.inertias[0])), "coriolis": np.diag([believed.damping, 0, 0, 0]),
+        "three": np.zeros(3), "four": np.zeros(4), "stiff": first(gains["K_p"]), "damp": first(gains["K_d"]),
+        "omega0": gains["omega"], "xi0": gains["xi"], "force_gains": np.zeros(4), "wound": np.zeros(2),
+    }  # fmt: skip
 
 
 def backstepped(_: Any, believed: Joint, force: float, gains: Mapping[str, float]) -> Values:
@@ -203,11 +196,9 @@ def state_dependent(_: Any, believed: Joint, force: float, gains: Mapping[str, f
 
 STIFFNESS = {"K_p": Gain(0.5, "N m/rad", 2), "K_d": Gain(0.003, "N m s/rad", 1)}
 STEPS = {
-    "K_3": Gain(150.0, "1/s"),
-    "K_4": Gain(150.0, "1/s"),
-    "C_t": Gain(100.0, "rad/(N m)", 0),
+    "K_3": Gain(150.0, "1/s"), "K_4": Gain(150.0, "1/s"), "C_t": Gain(100.0, "rad/(N m)", 0),
     "C_s": Gain(0.01, "rad s^2/(N m)", -2),
-}
+}  # fmt: skip
 
 
 def pair_law(name: str, kernel: str, source: str, says: str) -> Law:

@@ -33,14 +33,9 @@ SAMPLES, SEED = 20000, 1
 def printed_numbers(library: Any, hand: Hand) -> list[Printed]:
     """The table for chapters 15 and 16, in the order of the source."""
     return [
-        *example(library),
-        *single_joint(library),
-        *impedance(library),
-        *nonlinear(library),
-        *antagonistic(library),
-        *state_feedback(library),
-        *optimum(library, hand),
-    ]
+        *example(library), *single_joint(library), *impedance(library), *nonlinear(library), *antagonistic(library),
+        *state_feedback(library), *optimum(library, hand),
+    ]  # fmt: skip
 
 
 def example(library: Any) -> Iterator[Printed]:
