@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from awiwi_gen.compare.clock import Clocked, clocked
@@ -36,9 +36,8 @@ class Row:
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
-        return {
-            "law": self.law, "force": self.force, "plant": self.plant, **self.score.as_dict(), "goal": self.score.good,
-        }  # fmt: skip
+        head = {"law": self.law, "force": self.force, "plant": self.plant}
+        return head | asdict(self.score) | {"goal": self.score.good}
 
     def cells(self) -> tuple[str, ...]:
         """The row as text; a run that did not end has no numbers."""

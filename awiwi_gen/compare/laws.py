@@ -180,18 +180,12 @@ def state_dependent(_: Any, believed: Joint, force: float, gains: Mapping[str, f
     slope = believed.slopes(force * believed.arm).mean()
     weight = gains["error"] ** 2
     return rest(believed, force) | {
-        "both": 2 * believed.inertias[1],
-        "no_drag": 0.0,
+        "both": 2 * believed.inertias[1], "no_drag": 0.0,
         "difference": [2 * slope, 0.0, 2 * k3],  # phi(p + d) - phi(p - d)
-        "spring": believed.tendons.mean(axis=0),
-        "weights": [weight, 1e-6, 1e-6, gains["speed"] ** 2],
-        "pull_weights": [weight, gains["speed"] ** 2],
-        "R": 1.0,
-        "K_kept": np.zeros(4),
-        "K_pull": np.zeros(2),
-        "sum_wanted": force * believed.arm,
-        "together_wanted": [p.mean(), 0.0],
-    }
+        "spring": believed.tendons.mean(axis=0), "R": 1.0, "K_kept": np.zeros(4), "K_pull": np.zeros(2),
+        "weights": [weight, 1e-6, 1e-6, gains["speed"] ** 2], "pull_weights": [weight, gains["speed"] ** 2],
+        "sum_wanted": force * believed.arm, "together_wanted": [p.mean(), 0.0],
+    }  # fmt: skip
 
 
 STIFFNESS = {"K_p": Gain(0.5, "N m/rad", 2), "K_d": Gain(0.003, "N m s/rad", 1)}

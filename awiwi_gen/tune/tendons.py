@@ -29,7 +29,7 @@ from awiwi_gen.hand import Finger, Hand
 from awiwi_gen.hand.file import HandFile
 from awiwi_gen.hand.gains import TendonGains
 from awiwi_gen.hand.parts import Measure, Part
-from awiwi_gen.loops.hand_joint import joints_of
+from awiwi_gen.loops.hand_joint import drives
 from awiwi_gen.loops.joint import Loop, Plant
 from awiwi_gen.loops.nearest import least
 from awiwi_gen.loops.regulator import Gains, cancelling, exact_gains, loop_of, pretension_loop, regulator
@@ -168,20 +168,14 @@ def plants(library: Any, hand: Hand, name: str, finger: Finger, force: float) ->
     """
     if hand.motor is None or hand.spring is None:
         raise InputError("gains need a hand with the sections [motor] and [spring]")
-    inertia = 2 * float(library.motor_energy(1.0))
     elongation = library.spring_elongation(force)
     if elongation.status:
         raise InputError(f"pretension = {force:g} N is beyond what the hand's springs can hold")
-    stiffness = float(library.spring_stiffness(elongation.x).k)
-    straight = np.zeros(len(finger.joints))
-    arms = np.abs(library[f"{name}_coupling"](straight))
-    masses = np.diagonal(library[f"{name}_mass_matrix"](straight))
-    found = []
-    for arm, joint in zip(arms, joints_of(arms), strict=True):
-        ratio = float(arm[joint]) / float(hand.motor.pulley)
-        pair = Plant(float(masses[joint]), 2 * inertia * ratio**2, 2 * stiffness * float(arm[joint]) ** 2)
-        found.append((finger.joints[joint], pair))
-    return found
+    k = float(library.spring_stiffness(elongation.x).k)
+    return [
+        (finger.joints[each.joint], Plant(each.link, 2 * each.motor, 2 * k * each.arm**2))
+        for each in drives(library, name, float(hand.motor.pulley))
+    ]
 
 
 def tune_tendon(library: Any, tendon: int, joint: str, plant: Plant, Q: Array, R: float) -> Tuned:

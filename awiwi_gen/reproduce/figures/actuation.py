@@ -182,8 +182,7 @@ def frequencies(recordings: Recordings) -> Figure:
         "3.5", "Frequencies of the disturbance at two speeds",
         "The main line moves with the rotor's speed, so the disturbance depends on the position.",
         f"At twice the speed it is at {shift:.3g} times the frequency, {heights:.2f} times as high.",
-        abs(shift - 2) < 1e-6 and abs(heights - 1) < 0.1,
-        recordings.drawing(shown),
+        abs(shift - 2) < 1e-6 and abs(heights - 1) < 0.1, recordings.drawing(shown),
     )  # fmt: skip
 
 

@@ -56,21 +56,17 @@ def single_joint(library: Any) -> Iterator[Printed]:
     yield compared(
         "tables 15.1, 15.2: b", "2e-4", TABLE_16_1.b, "2e-7 kg m^2 times the square of the printed gear ratio of 100",
     )  # fmt: skip
-    loops = {"position law": position_loop(library, TABLE_15_1, FIGURE_15_13)}
-    loops["impedance law, m = 1"] = normalised_loop(library, TABLE_15_1, FIGURE_15_13)
-    for name, loop in loops.items():
+    laws = {"position law": position_loop, "impedance law, m = 1": normalised_loop}
+    for name, build in laws.items():
+        loop = build(library, TABLE_15_1, FIGURE_15_13)
         margin, radius = loop.delay_margin(), loop.sampled_radius()
         yield judged(
             False, "section 15.2.4, figure 15.13", "333 us should not make it oscillate",
             f"{name}: delay margin {margin * 1e6:.0f} us",
             f"at {1 / PERIOD:.0f} Hz and one sample of delay the spectral radius is {radius:.3f}",
         )  # fmt: skip
-    slow = (1.0, 1.0, 100.0, 100.0)
-    for name, loop in {
-        "position law": position_loop(library, TABLE_15_1, slow),
-        "impedance law, m = 1": normalised_loop(library, TABLE_15_1, slow),
-    }.items():
-        peak = peak_torque(loop, 0.8)
+    for name, build in laws.items():
+        peak = peak_torque(build(library, TABLE_15_1, (1.0, 1.0, 100.0, 100.0)), 0.8)
         yield judged(
             False, "figures 15.10, 15.11", "strong saturation at 0.0005", f"{name}: largest torque {peak:.2g} N m",
             "with b of table 15.1 the torque never gets there",
@@ -96,29 +92,27 @@ def impedance(library: Any) -> Iterator[Printed]:
     yield misprint(
         "eq. 15.70, gain of tau", f"{third:.7g}", f"{ours.K[2]:.7g}",
         "sign of k (m + b) / (m b), and 1 / m left out; as printed the static stiffness is "
-        f"{0.1 / wrong.at_rest([0.1, 0.0])[0]:.2g} N m/rad instead of {K_p:g}",
+        f"{wrong.stiffness:.2g} N m/rad instead of {K_p:g}",
     )  # fmt: skip
     fed, unfed = (impedance_loop(library, TABLE_15_1, FIGURE_15_16, fed=(part, 0.0)) for part in (1.0, 0.0))
-    stiffness = [0.1 / loop.at_rest([0.1, 0.0])[0] for loop in (fed, unfed)]
     yield judged(
-        False, "section 15.3.5", f"stiffness {K_p:g} N m/rad from tau and tau' alone", f"{stiffness[1]:.2g} N m/rad",
-        f"tau_ext must be fed; then it is {stiffness[0]:.7g}",
+        False, "section 15.3.5", f"stiffness {K_p:g} N m/rad from tau and tau' alone", f"{unfed.stiffness:.2g} N m/rad",
+        f"tau_ext must be fed; then it is {fed.stiffness:.7g}",
     )  # fmt: skip
     times = np.linspace(0, 10 * K_d / K_p, 4001)
-    overshoot = fed.response(np.zeros(4), times, [0.1, 0.0])[:, 0].max() / fed.at_rest([0.1, 0.0])[0]
+    overshoot = fed.response(np.zeros(4), times, [1.0, 0.0])[:, 0].max() * fed.stiffness
     yield judged(
         False, "section 15.3.5", "sufficient to neglect the rate of tau_ext",
         f"a load step overshoots to {overshoot:.3g} times its deflexion",
         "the error that the step makes of the torque's rate takes K_d / K_p to die",
     )  # fmt: skip
-    soft = impedance_loop(library, TABLE_15_1, (0.02, *FIGURE_15_16[1:]))
-    deflexions = [soft.at_rest([torque, 0.0])[0] for torque in (1.0, 0.2)]
+    loops = [impedance_loop(library, TABLE_15_1, (K, *FIGURE_15_16[1:])) for K in (0.02, 0.1, 0.5)]
+    deflexions = [torque / loops[0].stiffness for torque in (1.0, 0.2)]
     yield misprint(
-        "figure 15.16", "1 N m in the text, 0.2 N m in the caption",
-        " and ".join(f"{deflexion:.3g} rad" for deflexion in deflexions),
+        "figure 15.16", "1 N m in the text, 0.2 N m in the caption", listed(deflexions, ".3g", " rad and ") + " rad",
         "deflexions at the softest gain; no finger has them. The third label, q_ss at 0.2, means K_p = 0.5",
     )  # fmt: skip
-    slowest = [impedance_loop(library, TABLE_15_1, (K, *FIGURE_15_16[1:])).poles().real.max() for K in (0.02, 0.1, 0.5)]
+    slowest = [loop.poles().real.max() for loop in loops]
     yield judged(
         False, "figure 15.16", "rise times are identical", listed(slowest, ".2f") + " 1/s",
         "slowest poles at the three gains: near -K_p / K_d, not the motor's",

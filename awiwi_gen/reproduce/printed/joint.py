@@ -77,8 +77,8 @@ def search(library: Any, hand: Hand) -> Iterator[Printed]:
             )  # fmt: skip
         missed = np.abs(corrected @ demands.P + demands.tau).max()
         yield judged(
-            missed < 1e-12, "section 7.2", "the torque is exactly achieved", f"to {missed:.0e} N m", "null space"
-        )
+            missed < 1e-12, "section 7.2", "the torque is exactly achieved", f"to {missed:.0e} N m", "null space",
+        )  # fmt: skip
 
 
 def stiffness(library: Any) -> Iterator[Printed]:

@@ -25,26 +25,21 @@ GAINS_13_11 = ("-126.21", "-0.11", "159.37", "1.52")
 
 def printed_numbers(library: Any, hand: Hand) -> list[Printed]:
     """The table for chapters 10, 12, 13 and 14, in the order of the source."""
-    return [*tendon(library, hand), *poles(library), *sensitivity(library), *optimum(library), *pointwise(library)]
-
-
-# -- chapter 10 -----------------------------------------------------------------------------------------------
+    gains = [library.pole_placement(**TABLE_12_1.ports, **target).K for target in (TABLE_12_1_TARGET, OTHER_TARGET)]
+    return [*tendon(library, hand), *poles(*gains), *sensitivity(*gains), *optimum(library), *pointwise(library)]
 
 
 def tendon(library: Any, hand: Hand) -> Iterator[Printed]:
     """The law, its scheduled gains, and what is said of its damping."""
-    given = {"f": 20.0, "fd": 0.0, "f_des": 20.0, "fd_des": 0.0, "f_hat": 20.0, "r": 0.004, "kp": 1.0, "kd": 1e-3}
-    ours = [float(library.tendon_force_pd(**given, friction=friction).tau) for friction in (0.0, 0.5)]
+    given = {"f": 20.0, "fd": 0.0, "f_des": 20.0, "fd_des": 0.0, "f_hat": 20.0, "r": 0.004}
+    ours = [float(library.tendon_force_pd(**given, kp=1.0, kd=1e-3, friction=each).tau) for each in (0.0, 0.5)]
     left = [-(ours[0] + 0.004 * 20.0), ours[1] - 0.5 - 0.004 * 20.0]
     yield misprint(
         "eq. 10.1, 10.2: torque left at rest", f"{2 * (0.5 + 0.004 * 20.0):.3g} N m, by the printed signs",
         f"{abs(round(left[1], 9)):.3g} N m",
         "at 20 N on a pulley of 4 mm with 0.5 N m of friction: estimates are to oppose what they estimate",
     )  # fmt: skip
-    scheduled = {
-        **{name: given[name] for name in ("f", "fd", "f_des", "fd_des", "f_hat", "r")}, "friction": 0.0, "b": 2e-3,
-        "stiffness": 8000.0, "omega0": 100.0, "xi0": 1.0,
-    }  # fmt: skip
+    scheduled = given | {"friction": 0.0, "b": 2e-3, "stiffness": 8000.0, "omega0": 100.0, "xi0": 1.0}
     resting = library.tendon_force_scheduled(**scheduled, stiffness_rate=0.0)
     yield misprint(
         "eq. 10.10, 10.11: K_p", "omega^2 B/beta, endless where the force rests", f"{resting.gains[0]:.4g} m",
@@ -75,11 +70,8 @@ def tendon(library: Any, hand: Hand) -> Iterator[Printed]:
     )  # fmt: skip
 
 
-# -- chapter 12 -----------------------------------------------------------------------------------------------
-
-
-def poles(library: Any) -> Iterator[Printed]:
-    """Equations 12.14 to 12.18."""
+def poles(table: Array, other: Array) -> Iterator[Printed]:
+    """Equations 12.14 to 12.18, for gains (4,) by the target of table 12.1 and by that of eq. 12.17."""
     m, b, k = TABLE_12_1.m, TABLE_12_1.b, TABLE_12_1.k
     wrong, right = m * b / k * (m + b), k * (m + b)
     yield misprint(
@@ -89,8 +81,6 @@ def poles(library: Any) -> Iterator[Printed]:
     reach = np.stack([np.linalg.matrix_power(TABLE_12_1.A, i) @ TABLE_12_1.B for i in range(4)], axis=1)
     printed = k**2 / (m**2 * b**4)
     yield compared("eq. 12.16, det(J)", f"{printed:.6g}", abs(float(np.linalg.det(reach))), "that of controllability")
-    table = library.pole_placement(**TABLE_12_1.ports, **TABLE_12_1_TARGET).K
-    other = library.pole_placement(**TABLE_12_1.ports, **OTHER_TARGET).K
     placed, meant = (_sorted(TABLE_12_1.loop(K).poles()) for K in (table, other))
     for index, text in enumerate(POLES_12_17):
         yield judged(
@@ -106,11 +96,9 @@ def poles(library: Any) -> Iterator[Printed]:
         )  # fmt: skip
 
 
-def sensitivity(library: Any) -> Iterator[Printed]:
-    """Equation 12.19 and section 12.3."""
+def sensitivity(table: Array, other: Array) -> Iterator[Printed]:
+    """Equation 12.19 and section 12.3, for the same gains."""
     softer = TABLE_12_1.with_(k=0.6)
-    table = library.pole_placement(**TABLE_12_1.ports, **TABLE_12_1_TARGET).K
-    other = library.pole_placement(**TABLE_12_1.ports, **OTHER_TARGET).K
     ours, meant = (_sorted(softer.loop(K).poles()) for K in (table, other))
     total = float(np.trace(softer.loop(other).closed))
     for index, text in enumerate(POLES_12_19):
@@ -130,9 +118,6 @@ def sensitivity(library: Any) -> Iterator[Printed]:
         "figure 12.3: D_q", "0.43 to 1.15", f"{TABLE_12_1.dq:g} N m s/rad in table 12.1",
         "the range is that of the spring",
     )  # fmt: skip
-
-
-# -- chapter 13 -----------------------------------------------------------------------------------------------
 
 
 def optimum(library: Any) -> Iterator[Printed]:
@@ -172,9 +157,6 @@ def fit_13_11(library: Any) -> Plant:
         move = np.linalg.solve(slopes, wanted - here)
         joint = joint.with_(b=joint.b + float(move[0]), dq=joint.dq + float(move[1]))
     return joint
-
-
-# -- chapter 14 -----------------------------------------------------------------------------------------------
 
 
 def pointwise(library: Any) -> Iterator[Printed]:
