@@ -24,7 +24,7 @@ def hand_text(*changes: tuple[str, str]) -> str:
     return text
 
 
-ALL = "[cgmst][aeopu][ilnrt]*"  # motor_*, spring_*, calibration_*, guiding_* and tendon_*, in one library
+ALL = "[cgmpst][aeopu][ilnrt]*"  # motor_*, spring_*, calibration_*, guiding_*, tendon_* and pole_*, in one library
 
 
 def compiled(*changes: tuple[str, str], only: str = ALL) -> Library:

@@ -68,8 +68,7 @@ OBSERVED = (
 )
 STATE = ("joint", "motors")
 SETPOINT = Block(
-    "antagonistic_setpoint",
-    {"desired": "motion", "inertias": "known_inertias", "damping": "known_damping"},
+    "antagonistic_setpoint", {"desired": "motion", "inertias": "known_inertias", "damping": "known_damping"}
 )
 FEEDBACK = Block("antagonistic_feedback", {"x": STATE, "resistance": "modelled", "tau_m": "wanted"})
 COMPENSATED = Block(  # adds friction compensation to a law without it
@@ -158,17 +157,10 @@ def scheduled(_: Any, believed: Joint, force: float, gains: Mapping[str, float])
         return matrix
 
     return rest(believed, force) | {
-        "mass": first(float(believed.inertias[0])),
-        "coriolis": np.diag([believed.damping, 0, 0, 0]),
-        "three": np.zeros(3),
-        "four": np.zeros(4),
-        "stiff": first(gains["K_p"]),
-        "damp": first(gains["K_d"]),
-        "omega0": gains["omega"],
-        "xi0": gains["xi"],
-        "force_gains": np.zeros(4),
-        "wound": np.zeros(2),
-    }
+        "mass": first(float(believed.inertias[0])), "coriolis": np.diag([believed.damping, 0, 0, 0]),
+        "three": np.zeros(3), "four": np.zeros(4), "stiff": first(gains["K_p"]), "damp": first(gains["K_d"]),
+        "omega0": gains["omega"], "xi0": gains["xi"], "force_gains": np.zeros(4), "wound": np.zeros(2),
+    }  # fmt: skip
 
 
 def backstepped(_: Any, believed: Joint, force: float, gains: Mapping[str, float]) -> Values:
@@ -188,27 +180,19 @@ def state_dependent(_: Any, believed: Joint, force: float, gains: Mapping[str, f
     slope = believed.slopes(force * believed.arm).mean()
     weight = gains["error"] ** 2
     return rest(believed, force) | {
-        "both": 2 * believed.inertias[1],
-        "no_drag": 0.0,
+        "both": 2 * believed.inertias[1], "no_drag": 0.0,
         "difference": [2 * slope, 0.0, 2 * k3],  # phi(p + d) - phi(p - d)
-        "spring": believed.tendons.mean(axis=0),
-        "weights": [weight, 1e-6, 1e-6, gains["speed"] ** 2],
-        "pull_weights": [weight, gains["speed"] ** 2],
-        "R": 1.0,
-        "K_kept": np.zeros(4),
-        "K_pull": np.zeros(2),
-        "sum_wanted": force * believed.arm,
-        "together_wanted": [p.mean(), 0.0],
-    }
+        "spring": believed.tendons.mean(axis=0), "R": 1.0, "K_kept": np.zeros(4), "K_pull": np.zeros(2),
+        "weights": [weight, 1e-6, 1e-6, gains["speed"] ** 2], "pull_weights": [weight, gains["speed"] ** 2],
+        "sum_wanted": force * believed.arm, "together_wanted": [p.mean(), 0.0],
+    }  # fmt: skip
 
 
 STIFFNESS = {"K_p": Gain(0.5, "N m/rad", 2), "K_d": Gain(0.003, "N m s/rad", 1)}
 STEPS = {
-    "K_3": Gain(150.0, "1/s"),
-    "K_4": Gain(150.0, "1/s"),
-    "C_t": Gain(100.0, "rad/(N m)", 0),
+    "K_3": Gain(150.0, "1/s"), "K_4": Gain(150.0, "1/s"), "C_t": Gain(100.0, "rad/(N m)", 0),
     "C_s": Gain(0.01, "rad s^2/(N m)", -2),
-}
+}  # fmt: skip
 
 
 def pair_law(name: str, kernel: str, source: str, says: str) -> Law:

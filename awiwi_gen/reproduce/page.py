@@ -24,15 +24,9 @@ if TYPE_CHECKING:
 
 SIZE = (6.4, 3.9)  # inches
 STYLE = {
-    "svg.fonttype": "path",
-    "font.size": 9.0,
-    "axes.grid": True,
-    "grid.alpha": 0.3,
-    "grid.linewidth": 0.5,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "legend.frameon": False,
-}
+    "svg.fonttype": "path", "font.size": 9.0, "axes.grid": True, "grid.alpha": 0.3, "grid.linewidth": 0.5,
+    "axes.spines.top": False, "axes.spines.right": False, "legend.frameon": False,
+}  # fmt: skip
 FIRST_OF_PART_II = 7  # chapter
 COUNTED: dict[Verdict, str] = {
     "agrees": "agree",
