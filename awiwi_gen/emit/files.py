@@ -13,7 +13,7 @@ import numpy as np
 from awiwi_gen.emit.c import CFunction, identifier
 from awiwi_gen.emit.names import C99_SIGNIFICANT, function_name, require_fields, short_name
 from awiwi_gen.emit.options import Options
-from awiwi_gen.ir.elementary import numbers
+from awiwi_gen.ir.elementary import OWN, numbers
 from awiwi_gen.ir.trig import constants
 from awiwi_gen.kernel import Kernel, Port
 from awiwi_gen.resources import TEMPLATES
@@ -123,11 +123,18 @@ def shared_files(
             functions=functions,
             aliases=aliases(prefix, functions),
             fields=fields if runtime else [],
+            library=_wrapped(", ".join(library_functions(options)) + "."),
         ),
         "model.c": render(
             "model.c.j2", banner=banner(), prefix=prefix, digest=digest, values=values if runtime else []
         ),
     }
+
+
+def library_functions(options: Options) -> list[str]:
+    """The functions of the C library that generated C and csrc call at most."""
+    names = {"fabs", "fmax", "frexp", "ldexp", "sqrt"}
+    return sorted(map(options.function, names | (set(OWN) if options.math == "libm" else set())))
 
 
 def scalar_files(options: Options) -> dict[str, str]:
