@@ -19,14 +19,26 @@ WINGS = {
 
 @dataclass(frozen=True)
 class Route:
-    """A function of a wing, by name; its module is imported at the first call."""
+    """A function of a wing, by name; its module is imported at the first call.
+
+    ``domain`` is another function of the wing with the same arguments, which gives guards only.
+    """
 
     module: str
     function: str
+    domain: Route | None = None
 
     def __call__(self, part: Any, *arguments: Any) -> Any:
         """Outputs, then guards, from a part with symbols for its numbers and one column of symbols per input port."""
-        return getattr(import_module(self.module), self.function)(part, *arguments)
+        result = getattr(import_module(self.module), self.function)(part, *arguments)
+        if self.domain is None:
+            return result
+        return *(result if isinstance(result, tuple) else (result,)), self.domain(part, *arguments)
+
+    @property
+    def modules(self) -> tuple[str, ...]:
+        """The modules that it calls."""
+        return (self.module, *(self.domain.modules if self.domain else ()))
 
 
 @dataclass(frozen=True)

@@ -67,7 +67,7 @@ class Record:
 def derivation_key(kernel: Kernel, route: str) -> str:
     """Key of a derivation: the structure of the part, the ports and the code of the route, but no number."""
     derived = kernel.routes[route]
-    code = code_of("awiwi_gen.derive", derived.module, type(kernel.part).__module__)
+    code = code_of("awiwi_gen.derive", *derived.modules, type(kernel.part).__module__)
     ports = [(name, port.shape, port.unit) for side in (kernel.inputs, kernel.outputs) for name, port in side.items()]
     return key(kernel.structure, derived.module, derived.function, ports, kernel.guards, code, libraries())
 

@@ -33,7 +33,7 @@ COMPILER = [
 ROOMS = ("reproduce", "compare", "tune")
 TOP = [
     ["derive", "records", "budget"],
-    ["judge"],
+    ["judge", "golden"],
     ["parallel", "tasks"],
     ["pipeline"],
     ["report", "explain", "terminal", "simulate", "results", "amalgamate"],

@@ -7,7 +7,7 @@ from fractions import Fraction
 
 from awiwi_gen.emit.c import CFunction, signature
 from awiwi_gen.emit.files import banner, describe, render
-from awiwi_gen.emit.names import function_name
+from awiwi_gen.emit.names import function_name, input_name
 from awiwi_gen.emit.options import Options
 from awiwi_gen.ir.cost import Cost
 from awiwi_gen.kernel import Kernel, Solver
@@ -49,6 +49,7 @@ def solver_function(
         m=len(solver.equations),
         equations=", ".join(map(str, solver.equations)),
         unknowns=", ".join(map(str, solver.unknowns)),
+        checked=_checked(kernel),
         arrays=[_array(name, values, options) for name, values in solver.arrays.items()],
         tolerance=options.literal(Fraction(STOP[options.scalar])),
         **solver.strings,
@@ -56,6 +57,12 @@ def solver_function(
     total = sum((function.cost * calls[family] for family, function in used.items()), Cost())
     function = CFunction(kernel.name, prototype, definition, comment, (), total, ())
     return function, text
+
+
+def _checked(kernel: Kernel) -> str:
+    """The status, unless it is AWIWI_OK although an input is not finite."""
+    finite = [f"awiwi_all_finite({input_name(name)}, {port.size})" for name, port in kernel.inputs.items()]
+    return f"status == AWIWI_OK && !({' && '.join(finite)}) ? AWIWI_NOT_FINITE : status"
 
 
 def _array(name: str, values: tuple[float, ...], options: Options) -> str:

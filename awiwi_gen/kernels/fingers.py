@@ -9,7 +9,7 @@ from awiwi_gen.hand import Hand
 from awiwi_gen.hand.lever import Lever
 from awiwi_gen.hand.parts import Finger, Tendon
 from awiwi_gen.kernel import Kernel, Port, Solver
-from awiwi_gen.kernels.declare import Family
+from awiwi_gen.kernels.declare import Family, within
 from awiwi_gen.units import J, N, Unit, kg, m, one, rad, s
 
 
@@ -31,7 +31,14 @@ def finger_kernels(hand: Hand, name: str, finger: Finger) -> list[Kernel]:
     """All kernels of one finger."""
     size = Size(len(finger.joints), len(finger.tendons), len(finger.links))
     ports = input_ports(hand, finger, size)
-    return per_finger.kernels(name, finger, f"fingers.{name}", finger.structure(), ports, size)
+    kernels = per_finger.kernels(name, finger, f"fingers.{name}", finger.structure(), ports, size)
+    loops = tuple(f"the four-bar of {link.joint} closes" for link in finger.links if link.four_bar)
+    return [within(k, "domain", "loops_close", loops) if loops and moves_the_chain(k) else k for k in kernels]
+
+
+def moves_the_chain(kernel: Kernel) -> bool:
+    """Whether a kernel depends on where the links are; tendons only depend on angles."""
+    return any(route.module.endswith((".kinematics", ".dynamics")) for route in kernel.routes.values())
 
 
 def input_ports(hand: Hand, finger: Finger, size: Size) -> dict[str, Port]:
@@ -269,7 +276,11 @@ def nonlinear_estimate(finger: Finger, iterations: int = 24) -> Solver | None:
     solver=nonlinear_estimate,
 )
 def joint_estimate(finger: Any, h: Any, start: Any) -> Any:
-    """Joint angles whose tendon lengths are nearest to the measured h (least squares); start is the last estimate."""
+    """Joint angles whose tendon lengths are nearest to the measured h (least squares); start is the last estimate.
+
+    Where the coupling is constant the estimate is linear, and not limited: lengths that no pose has give angles beyond the
+    joint limits. Otherwise it is within them.
+    """
 
 
 @per_finger(
