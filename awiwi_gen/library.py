@@ -308,6 +308,7 @@ class Library(Mapping[str, KernelFunction]):
         ffi: Any,
         vectorised: Callable[[Mapping[str, Any]], Any],
         origin: tuple[Callable[..., Library], tuple[str, ...]],
+        numbers: Any = None,
     ) -> None:
         self.dtype = np.dtype(np.float64 if manifest["c_type"] == "double" else np.float32)
         prefix = manifest["prefix"]
@@ -319,10 +320,20 @@ class Library(Mapping[str, KernelFunction]):
         self.origin = origin  # a function and its arguments that load this library in another process
         self._vectorised = vectorised
         self._kernels = {}
+        self.numbers: Any = None
+        if manifest.get("params"):
+            self.numbers = getattr(lib, f"{prefix}_default_numbers") if numbers is None else numbers
+            self.params = lib.FlatParams if numbers is None else ffi.new(f"{prefix}_params *")[0]
+            getattr(lib, f"{prefix}_params_derive")(ffi.addressof(self.numbers), ffi.addressof(self.params))
         for place, entry in enumerate(manifest["kernels"]):
-            params = lib.DefaultParams() if entry["params"] else None
+            params = ffi.addressof(self.params) if entry["params"] else None
             loop = getattr(lib, f"Batch_{entry['name']}")
             self._kernels[entry["name"]] = KernelFunction(entry, self, loop, lib.FlatKernels[place], params)
+
+    def with_numbers(self, values: Iterable[float]) -> Library:
+        """The same kernels with other numbers, where they read any: in the order of the manifest's list of numbers."""
+        numbers = self.ffi.new(f"{self.manifest['prefix']}_numbers *", list(values))
+        return Library(self.manifest, self.c, self.ffi, self._vectorised, self.origin, numbers[0])
 
     def pointer(self, array: Array) -> Any:
         """Where an array's first element is; the array must outlive the pointer."""

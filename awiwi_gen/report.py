@@ -43,8 +43,8 @@ def proof_rows(verdicts: Iterable[Verdict], manifest: Mapping[str, Any]) -> list
     return [
         (
             v.name,
-            operations_text(entries[v.name]),
-            str(entries[v.name]["cost"]["sincos"]),
+            operations_text(entries[v.name]) if v.name in entries else "at load",
+            str(entries[v.name]["cost"]["sincos"]) if v.name in entries else "at load",
             f"{v.worst_ulp:.3g}",
             f"{v.worst_scaled_error:.1e}",
             f"{v.agreement:.0e}",

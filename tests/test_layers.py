@@ -31,7 +31,7 @@ COMPILER = [
 ]
 ROOMS = ("reproduce", "compare", "tune")
 TOP = [
-    ["derive", "records", "budget"],
+    ["derive", "records", "budget", "parameters"],
     ["judge"],
     ["parallel", "tasks"],
     ["pipeline"],

@@ -11,8 +11,10 @@ from collections.abc import Callable, Sequence
 from fractions import Fraction
 from typing import Any
 
-from awiwi_gen.ir.builder import Builder, shorten
+from awiwi_gen.ir.builder import FRACTION_BITS, Builder
 from awiwi_gen.ir.graph import Ref
+
+ROUNDED_BITS = FRACTION_BITS - 2
 
 
 class Traced(Fraction):
@@ -27,7 +29,8 @@ class Traced(Fraction):
         constant = numbers.value(ref)
         if constant is not None:
             return constant
-        value = shorten(value)
+        if value.denominator.bit_length() > FRACTION_BITS:  # a builder would shorten it and lose the expression
+            value = Fraction(round(value * (1 << ROUNDED_BITS)), 1 << ROUNDED_BITS)
         made = cls(value.numerator, value.denominator)
         made.numbers, made.ref = numbers, ref
         return made

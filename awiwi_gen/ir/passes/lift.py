@@ -10,16 +10,19 @@ most of a kernel vanishes with it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from fractions import Fraction
 from functools import cache
 from math import frexp
 
 from awiwi_gen.ir.builder import ONE, Builder, copy_node
 from awiwi_gen.ir.exact import exact_values
-from awiwi_gen.ir.graph import LEAVES, Graph, Node, Output, Ref, canonical, node_of
+from awiwi_gen.ir.graph import LEAVES, Graph, Node, Output, Ref, canonical, node_of, operands
 from awiwi_gen.ir.passes.bind import fold
+from awiwi_gen.ir.passes.finish import orient, quotients
 from awiwi_gen.ir.passes.flatten import flatten
+from awiwi_gen.ir.passes.schedule import schedule
+from awiwi_gen.ir.passes.signs import signs
 from awiwi_gen.ir.traced import Traced
 
 DERIVED = "derived."  # begins the path of a derived number
@@ -46,7 +49,7 @@ class _Lifting:
         """The graph with traced constants."""
         terms: list[Term] = []
         for node in self.graph.nodes:
-            terms.append(self.split(node, [self.signed(terms[node_of(ref)], ref) for ref in node_refs(node)]))
+            terms.append(self.split(node, [self.signed(terms[node_of(ref)], ref) for ref in operands(node)]))
         outputs = [
             Output(o.name, o.shape, tuple(self.joined(self.signed(terms[node_of(ref)], ref)) for ref in o.elements))
             for o in self.graph.outputs
@@ -131,11 +134,6 @@ def generic(index: int, near: Fraction) -> Fraction:
     return Fraction(primes()[index]) * Fraction(2) ** (frexp(float(abs(near)))[1] - PRIME_BITS)
 
 
-def node_refs(node: Node) -> tuple[Ref, ...]:
-    """The operands of a node."""
-    return () if node[0] in LEAVES else node[1:]
-
-
 @cache
 def primes() -> tuple[int, ...]:
     """The primes of 17 bits."""
@@ -163,6 +161,7 @@ class _Settling:
         self.derived: dict[str, Output] = {}
         self.nodes: list[Node] = []
         self.leaves: dict[Ref, Ref] = {}
+        self.named: dict[Node, int] = {}
         self.renamed: list[Ref] = []
 
     def settled(self) -> tuple[Graph, Graph]:
@@ -194,8 +193,11 @@ class _Settling:
             kind, value = self.graph.nodes[node_of(ref)]
             if kind == "param" or isinstance(value, Traced):
                 inner = int(value) if kind == "param" else value.ref
-                self.leaves[ref] = len(self.nodes)
-                self.nodes.append(("param", self.path(inner if ref >= 0 else ~inner)))
+                node = ("param", self.path(inner if ref >= 0 else ~inner))
+                if node not in self.named:
+                    self.named[node] = len(self.nodes)
+                    self.nodes.append(node)
+                self.leaves[ref] = self.named[node]
             elif ref < 0:
                 self.leaves[ref] = ~self.leaf(~ref)
             else:
@@ -211,3 +213,16 @@ class _Settling:
         path = DERIVED + self.numbers.graph([Output("", (1,), (ref,))]).digest[:12]
         self.derived[path] = Output(path, (1,), (ref,))
         return path
+
+
+def merge(derivations: Iterable[Graph]) -> Graph:
+    """The derived numbers of several kernels as one graph: equal expressions are computed once."""
+    builder = Builder()
+    outputs: dict[str, Output] = {}
+    for graph in derivations:
+        renamed: list[Ref] = []
+        for node in graph.nodes:
+            refs = [renamed[ref] if ref >= 0 else ~renamed[~ref] for ref in operands(node)]
+            renamed.append(copy_node(builder, node, tuple(refs)))
+        outputs |= {output.name: output.renamed(renamed) for output in graph.outputs}
+    return schedule(signs(orient(quotients(builder.graph([outputs[path] for path in sorted(outputs)])))))
