@@ -1,6 +1,6 @@
-/* Reads a flat file of numbers, see awiwi_params.h: no heap, no recursion, nothing is written before all is checked. */
+/* Reads a flat file of numbers, see awiwi_params_file.h: no heap, no recursion, nothing is written before all is checked. */
 #include "numerics.h"
-#include "awiwi_params.h"
+#include "awiwi_params_file.h"
 #include "bits.h"
 
 enum { VERSION_AT = 8, SCALAR_AT = 12, COUNT_AT = 16, SIZE_AT = 20, DIGEST_AT = 24, CRC_AT = 60, CRC_SIZE = 4 };

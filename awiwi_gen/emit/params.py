@@ -11,9 +11,11 @@ from awiwi_gen.emit.c import Printer, headers_of, identifier
 from awiwi_gen.emit.files import banner, render
 from awiwi_gen.emit.names import require_fields
 from awiwi_gen.emit.options import Options
+from awiwi_gen.ir.algebras import Dimensions
 from awiwi_gen.ir.graph import Graph
+from awiwi_gen.ir.interpret import evaluate
 from awiwi_gen.ir.passes.lift import DERIVED
-from awiwi_gen.units import Quantity
+from awiwi_gen.units import Quantity, Unit, one
 
 ROW = 8  # numbers in a line of C
 Range = tuple[Fraction, Fraction]
@@ -67,8 +69,16 @@ def struct_fields(numbers: Numbers, options: Options) -> tuple[list[str], list[s
     derived = []
     for part, graph in numbers.derivations.items():
         derived.append(f"/* derived from {part or 'the hand'} */")
-        derived += [f"{options.c_type} {identifier(f'{part}.{o.name}')};" for o in graph.outputs]
+        units = units_of(part, graph, numbers.quantities)
+        derived += [f"{options.c_type} {identifier(f'{part}.{o.name}')}; /* {units[o.name]} */" for o in graph.outputs]
     return given, derived
+
+
+def units_of(part: str, graph: Graph, quantities: Mapping[str, Quantity]) -> dict[str, Unit]:
+    """The units of derived numbers, by path."""
+    start = f"{part}." if part else ""
+    found = evaluate(graph, Dimensions(), lambda node: quantities[start + node[1]].unit)
+    return {path: elements[0] or one for path, elements in found.items()}
 
 
 def params_files(prefix: str, numbers: Numbers, options: Options) -> dict[str, str]:

@@ -1,4 +1,4 @@
-"""The flat file of numbers that C reads without a compiler; csrc/awiwi_params.h has its layout."""
+"""The flat file of numbers that C reads without a compiler; csrc/awiwi_params_file.h has its layout."""
 
 from __future__ import annotations
 

@@ -13,8 +13,8 @@
  *       60     4  CRC-32 (as in zlib) of all other bytes of the file
  *       64        the scalars, in the order of the struct of numbers
  */
-#ifndef AWIWI_PARAMS_H
-#define AWIWI_PARAMS_H
+#ifndef AWIWI_PARAMS_FILE_H
+#define AWIWI_PARAMS_FILE_H
 
 #include <stddef.h>
 
@@ -38,8 +38,8 @@ enum awiwi_params_status {
     AWIWI_PARAMS_WRONG_MODEL = 7,  /* numbers of a hand with another structure, or of other kernels */
     AWIWI_PARAMS_WRONG_COUNT = 8,  /* more or fewer numbers than these kernels read */
     AWIWI_PARAMS_NOT_FINITE = 9,   /* a number is infinite or NaN */
-    AWIWI_PARAMS_OUT_OF_RANGE = 10, /* a number is not in its range */
-    AWIWI_PARAMS_UNUSABLE = 11     /* a derived number is infinite or NaN: the numbers do not fit each other */
+    AWIWI_PARAMS_OUT_OF_RANGE = 10,/* a number is not in its range */
+    AWIWI_PARAMS_UNUSABLE = 11      /* a derived number is infinite or NaN: the numbers do not fit each other */
 };
 
 /* What a file must hold. */
