@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from hashlib import sha256
+from pathlib import Path
 from typing import Any
 
 from awiwi_gen.emit.options import Options
 from awiwi_gen.emit.params import Numbers, paths_read
 from awiwi_gen.emit.params_file import pack
-from awiwi_gen.errors import InputError
+from awiwi_gen.errors import InputError, OutputError
 from awiwi_gen.hand import Hand
 from awiwi_gen.hand.ranges import ranges
 from awiwi_gen.ir.graph import Graph
@@ -61,6 +63,17 @@ class NumbersFile:
 
     rows: list[dict[str, Any]]
     data: bytes
+
+    def write(self, path: Path) -> None:
+        """Write the bytes, all or nothing. Raises OutputError where the system refuses."""
+        unfinished = path.with_name(f"{path.name}.{os.getpid()}.tmp")
+        try:
+            unfinished.write_bytes(self.data)
+            os.replace(unfinished, path)
+        except OSError as error:
+            raise OutputError(f"{path} cannot be written: {error.strerror}") from None
+        finally:
+            unfinished.unlink(missing_ok=True)
 
 
 def numbers_file(hand: Hand, manifest: Mapping[str, Any], directory: str) -> NumbersFile:

@@ -309,7 +309,7 @@ def _judged(job: Job, directory: Path, library: Library, records: Mapping[str, R
         examine = partial(judge_record, kernel, record, used, loaded, job.options)
         verdicts.append(job.store.memo("verdicts", digest, examine))
         job.progress("verify", len(verdicts), len(job.kernels))
-    if library.numbers is not None:
+    if library.params is not None:
         verdicts.append(judge_derivation(loaded, job.options))
     return verdicts
 

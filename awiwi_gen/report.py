@@ -54,6 +54,17 @@ def proof_rows(verdicts: Iterable[Verdict], manifest: Mapping[str, Any]) -> list
     ]
 
 
+def print_numbers(rows: Sequence[Mapping[str, Any]], file: Path | None, size: int) -> None:
+    """The numbers that kernels read at run time, with units and ranges, or the file that they were written to."""
+    if file is not None:
+        print(f"{file}: {len(rows)} numbers, {size} bytes")
+        return
+    table = [
+        (row["path"], f"{row['value']:.9g}", row["unit"], f"{row['low']:.6g} to {row['high']:.6g}") for row in rows
+    ]
+    print_table(("number", "value", "unit", "range"), table)
+
+
 def print_proof(proof: Proof, manifest: Mapping[str, Any]) -> None:
     """The proof sheet: a table of kernels, the laws of physics, a sentence."""
     rows = proof_rows(proof.verdicts, manifest)
