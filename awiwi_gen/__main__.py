@@ -282,6 +282,27 @@ def explain(
     return 0
 
 
+@command(*GENERATE)
+def params(
+    hand: HandFile = None, as_json: Json = False,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="File to write for the C.")] = None,
+    generated: Annotated[Path, typer.Option("--generated", help="Directory that reads the file.")] = GENERATED,
+) -> int:  # fmt: skip
+    """Write the numbers of a hand to a file that C of --params runtime loads, or list them."""
+    from awiwi_gen.hand import Hand
+    from awiwi_gen.parameters import numbers_file
+    from awiwi_gen.report import print_json, print_numbers
+
+    found = numbers_file(Hand.load(hand), require(generated, hand), str(generated))
+    if output is not None:
+        found.write(output)
+    if as_json:
+        print_json({"file": output and str(output), "bytes": len(found.data), "numbers": found.rows})
+    else:
+        print_numbers(found.rows, output, len(found.data))
+    return 0
+
+
 @command("matplotlib", "scipy", *GENERATE)
 def report(
     hand: HandFile = None, as_json: Json = False,

@@ -224,10 +224,11 @@ def _glue_source(manifest: dict[str, Any], declared: str) -> str:
     """JSON of what the wrapper is made from: declarations, loops over samples, and the kernels in a uniform shape."""
     loops, prototypes = [], []
     scalar, prefix = manifest["c_type"], manifest["prefix"]
-    if any(entry["params"] for entry in manifest["kernels"]):
-        head = f"const {prefix}_params *DefaultParams(void)"
-        prototypes.append(f"{head};")
-        loops.append(f"static {head} {{ return &{prefix}_default_params; }}")
+    if manifest.get("params"):
+        prototypes.append(f"void {prefix}_params_derive(const {prefix}_numbers *numbers, {prefix}_params *params);")
+        prototypes.append(f"int {prefix}_params_load(const void *bytes, size_t size, {prefix}_params *out);")
+        prototypes.append(f"extern {prefix}_params FlatParams;")
+        loops.append(f"static {prefix}_params FlatParams;")  # of the kernels that are called with flat arrays
     for entry in manifest["kernels"]:
         inputs = [input_name(p["name"]) for p in entry["inputs"]]
         sizes = {output_name(p["name"]): prod(p["shape"]) for p in entry["outputs"]}
@@ -254,7 +255,7 @@ def _glue_source(manifest: dict[str, Any], declared: str) -> str:
 
 def _flat_source(entry: dict[str, Any], prefix: str, scalar: str) -> str:
     """A kernel with all inputs in one array and all outputs in another, so that C code can call any of them."""
-    arguments = [f"&{prefix}_default_params"] if entry["params"] else []
+    arguments = ["&FlatParams"] if entry["params"] else []
     for side, array in (("inputs", "in"), ("outputs", "out")):
         place = 0
         for port in entry[side]:
@@ -282,7 +283,8 @@ def _glue_object(name: str, glue: str, directory: Path, store: Cache, scratch: P
     parts = json.loads(glue)
     ffi = cffi.FFI()
     ffi.cdef(re.sub(r"^#.*$", "", parts["declared"], flags=re.M) + "\n".join(parts["prototypes"]))
-    preamble = '#include "awiwi.h"\n' + OPTIMISED.format("\n".join(parts["loops"]))
+    own = '#include "params.h"\n' if "_params_load" in glue else ""
+    preamble = f'#include "awiwi.h"\n{own}' + OPTIMISED.format("\n".join(parts["loops"]))
     source = scratch / f"{name}.c"
     cffi.recompiler.make_c_source(ffi, name, preamble, str(source))
     compiler().run(*GLUE_FLAGS, f"-I{python}", f"-I{directory}", f"-I{CSRC}", "-c", str(source), "-o", str(made))

@@ -15,6 +15,7 @@ from awiwi_gen.ir.algebras import Bounded, Floats
 from awiwi_gen.ir.elementary import OWN
 from awiwi_gen.ir.graph import Graph
 from awiwi_gen.kernel import Kernel
+from awiwi_gen.parameters import derivations
 from awiwi_gen.records import Record, solver_of, values_of
 from awiwi_gen.verify.samples import draw
 from awiwi_gen.verify.verdict import STATUS, float_values, stack
@@ -31,10 +32,12 @@ def self_test_files(
     kernels: Sequence[Kernel], records: Mapping[str, Record], prefix: str, options: Options
 ) -> dict[str, str]:
     """The C file of the self-test and its header."""
-    tests = [_test(kernel, records[kernel.name], prefix, options) for kernel in kernels]
+    derived = derivations(kernels, records)
+    tests = [_test(kernel, records[kernel.name], prefix, options, derived.get(kernel.path)) for kernel in kernels]
     strings = {
         "banner": banner(),
         "prefix": prefix,
+        "reads_params": any("_params *" in records[kernel.name].function.prototype for kernel in kernels),
         "most": max(sum(port.size for port in kernel.outputs.values()) for kernel in kernels),
     }
     return {
@@ -43,8 +46,8 @@ def self_test_files(
     }
 
 
-def _test(kernel: Kernel, record: Record, prefix: str, options: Options) -> dict[str, Any]:
-    """Everything that the template prints for one kernel."""
+def _test(kernel: Kernel, record: Record, prefix: str, options: Options, derivation: Graph | None) -> dict[str, Any]:
+    """Everything that the template prints for one kernel; ``derivation`` is the graph of its part's derived numbers."""
     graph = record.graph
     is_exact = graph is not None and not (options.math == "libm" and _calls_library(graph))
     inputs, outputs = (sum(port.size for port in side.values()) for side in (kernel.inputs, kernel.outputs))
@@ -54,9 +57,9 @@ def _test(kernel: Kernel, record: Record, prefix: str, options: Options) -> dict
     near: Array = np.zeros((0, 2), options.dtype)
     digest = 0
     if is_exact and graph is not None:
-        digest = digest_of(_mirrored(kernel, graph, given, options))
+        digest = digest_of(_mirrored(kernel, graph, given, options, derivation))
     else:
-        near = _near(kernel, record, given, rows, options)
+        near = _near(kernel, record, given, rows, options, derivation)
     flat = np.concatenate([given[name] for name in kernel.inputs], axis=1)
     symbol = f"near_{kernel.name}" if len(near) else "0"
     sizes = f"{len(rows)}, {inputs}, {outputs}"
@@ -89,23 +92,29 @@ def _given(kernel: Kernel, record: Record, options: Options, rows: list[int]) ->
     return {name: np.asarray(inputs[name]).reshape(len(inputs[name]), -1)[rows] for name in kernel.inputs}
 
 
-def _mirrored(kernel: Kernel, graph: Graph, given: Mapping[str, Array], options: Options) -> Array:
+def _mirrored(
+    kernel: Kernel, graph: Graph, given: Mapping[str, Array], options: Options, derivation: Graph | None
+) -> Array:
     """All outputs in the precision of the C (samples, outputs), to the last bit."""
     floats = Floats(options.dtype, options.math == "own")
-    found = float_values(graph, given, values_of(kernel), floats)
+    found = float_values(graph, given, values_of(kernel), floats, derivation)
     samples = len(next(iter(given.values())))
     columns = [column for name in kernel.outputs for column in found[name]]
     mirrored: Array = stack(columns, samples).astype(options.dtype)
     return mirrored
 
 
-def _near(kernel: Kernel, record: Record, given: Mapping[str, Array], rows: list[int], options: Options) -> Array:
+def _near(
+    kernel: Kernel, record: Record, given: Mapping[str, Array], rows: list[int], options: Options,
+    derivation: Graph | None,
+) -> Array:  # fmt: skip
     """Every output and its largest error (samples outputs, 2): as verified, or any finite number where none is known."""
     columns = []
     known = record.reference.high
     bounds: dict[str, Any] = {}
     if record.graph is not None:
-        bounds = float_values(record.graph, given, values_of(kernel), Bounded(options.dtype, options.math == "own"))
+        algebra = Bounded(options.dtype, options.math == "own")
+        bounds = float_values(record.graph, given, values_of(kernel), algebra, derivation)
     for name, port in kernel.outputs.items():
         if name not in known:
             value = np.zeros((len(rows), port.size))
@@ -134,14 +143,15 @@ def digest_of(values: Array) -> int:
 
 def _call(kernel: Kernel, record: Record, prefix: str) -> str:
     """The statements that call a kernel with its arrays in a row, and return its status."""
-    arguments = [f"&{prefix}_default_params"] if "_params *" in record.function.prototype else []
+    arguments = ["params"] if "_params *" in record.function.prototype else []
     for side, array in ((kernel.inputs, "in"), (kernel.outputs, "out")):
         place = 0
         for port in side.values():
             arguments.append(f"{array} + {place}" if place else array)
             place += port.size
+    unused = "" if arguments[0] == "params" else "(void)params; "
     call = f"{function_name(prefix, kernel.name)}({', '.join(arguments)});"
-    return f"return {call}" if record.function.prototype.startswith("int ") else f"{call} return 0;"
+    return unused + (f"return {call}" if record.function.prototype.startswith("int ") else f"{call} return 0;")
 
 
 def _lines(values: Array, options: Options) -> list[str]:

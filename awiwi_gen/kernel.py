@@ -85,6 +85,7 @@ class Solver:
     unchanged. ``problem`` names an entry of `verify.problems.PROBLEMS`, which draws well-posed inputs and has their exact
     solutions; a compiled result may differ from these by ``tolerance`` of the largest element, per scalar type.
     ``iterations`` is the number of calls of the used kernels in the worst case; those in ``once`` are called once.
+    ``limits`` are the paths of the numbers in ``arrays`` that are read at run time where others are.
     """
 
     template: str
@@ -97,6 +98,7 @@ class Solver:
     iterations: int
     tolerance: Mapping[str, float]
     once: tuple[str, ...] = ()
+    limits: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -49,7 +49,7 @@ if TYPE_CHECKING:
 GENERATOR = (
     *(f"awiwi_gen/{room}" for room in ("definitions", "witnesses", "kernels", "ir", "emit", "verify")),
     *(f"awiwi_gen/{file}.py" for file in ("structure", "kernel", "units", "derive", "records", "golden", "budget")),
-    "awiwi_gen/pipeline.py",
+    *(f"awiwi_gen/{file}.py" for file in ("parameters", "pipeline")),
     "templates",
 )
 ALL = "*"
@@ -212,20 +212,22 @@ def emit(job: Job, records: Mapping[str, Record], directory: Path) -> dict[str, 
     from awiwi_gen.budget import BUDGET, budget_text, require_budget
     from awiwi_gen.emit.batch import batch_files
     from awiwi_gen.emit.files import shared_files
+    from awiwi_gen.emit.params import params_files, struct_fields
     from awiwi_gen.golden import self_test_files
+    from awiwi_gen.parameters import numbers_of
     from awiwi_gen.records import manifest_entry
 
     files = {f"{name}.c": record.file for name, record in records.items()}
     files[BUDGET] = budget_text(job.kernels, records, job.options)
     if not job.accept_cost:
         require_budget(directory, files[BUDGET])
-    graphs = [(kernel.path, records[kernel.name].graph) for kernel in job.kernels]
-    read = {f"{path}.{param}".lstrip(".") for path, graph in graphs if graph for param in graph.params}
-    everything = job.hand.quantities().items()
-    quantities = {path: q for path, q in everything if not path.startswith("limits.") or path in read}
     functions = [record.function for record in records.values()]
-    files |= shared_files(job.hand.prefix, functions, job.hand.digest(), quantities, job.options)
+    numbers = numbers_of(job.hand, job.kernels, records) if job.options.params == "runtime" else None
+    fields = struct_fields(numbers, job.options) if numbers else ((), ())
+    files |= shared_files(job.hand.prefix, functions, job.hand.digest(), job.options, fields)
     files |= self_test_files(job.kernels, records, job.hand.prefix, job.options)
+    if numbers:
+        files |= params_files(job.hand.prefix, numbers, job.options)
     entries = [manifest_entry(kernel, records[kernel.name]) for kernel in job.kernels]
     files |= batch_files(entries, job.hand.prefix, job.options)
     manifest = {
@@ -236,6 +238,7 @@ def emit(job: Job, records: Mapping[str, Record], directory: Path) -> dict[str, 
         "inputs": job.inputs,
         "files": {name: sha256(text) for name, text in sorted(files.items())},
         "kernels": entries,
+        **({"params": numbers.layout()} if numbers else {}),
     }
     return {**files, MANIFEST: sealed(manifest)}
 
@@ -291,17 +294,23 @@ def _examine(job: Job, directory: Path) -> Proof:
 def _judged(job: Job, directory: Path, library: Library, records: Mapping[str, Record]) -> list[Verdict]:
     from awiwi_gen.build import headers
     from awiwi_gen.compiler import compiler, machine
-    from awiwi_gen.judge import judge_record, verdict_key
+    from awiwi_gen.judge import Loaded, judge_derivation, judge_record, verdict_key
+    from awiwi_gen.parameters import derivations
 
     shared = headers(directory)
+    derived = derivations(job.kernels, records)
+    loaded = Loaded(library, job.hand.quantities(), derived)
     verdicts = []
     for kernel in job.kernels:
         record, used = records[kernel.name], {family: records[name] for family, name in kernel.needs.items()}
         text = (directory / f"{kernel.name}.c").read_text(encoding="utf-8")
-        digest = verdict_key(record, key(text, shared, compiler().identity, machine()))
-        examine = partial(judge_record, kernel, record, used, library[kernel.name], job.options)
+        numbers = derived[kernel.path].digest if kernel.path in derived else ""
+        digest = verdict_key(record, key(text, shared, numbers, compiler().identity, machine()))
+        examine = partial(judge_record, kernel, record, used, loaded, job.options)
         verdicts.append(job.store.memo("verdicts", digest, examine))
         job.progress("verify", len(verdicts), len(job.kernels))
+    if library.params is not None:
+        verdicts.append(judge_derivation(loaded, job.options))
     return verdicts
 
 

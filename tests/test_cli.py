@@ -182,7 +182,7 @@ def test_every_kind_of_c_is_verified(scalar, params, tmp_path):
     header = (tmp_path / "out" / "kernels.h").read_text()
 
     assert answer("build", "-o", tmp_path / "out")["scalar"] == {"f64": "double", "f32": "float"}[scalar]
-    assert ("claw_default_params" in header) == (params == "runtime")
+    assert ("claw_default_numbers" in header) == (params == "runtime")
     assert ("double" in header) == (scalar == "f64")
     assert all(verdict["passed"] for verdict in answer("verify", *options))
 

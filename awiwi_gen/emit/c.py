@@ -17,6 +17,7 @@ from awiwi_gen.emit.options import Options
 from awiwi_gen.ir.cost import Cost, cost
 from awiwi_gen.ir.elementary import OWN
 from awiwi_gen.ir.graph import LEAVES, Graph, Node, Ref, node_of, operands
+from awiwi_gen.ir.passes.lift import DERIVED
 from awiwi_gen.ir.passes.sincos_groups import angle_groups
 from awiwi_gen.kernel import GUARDS
 
@@ -57,15 +58,12 @@ def c_function(
     part: str = "",
 ) -> CFunction:
     """Print a graph. ``inputs`` maps port names to shapes; ``part`` is the path of its part in the hand file."""
-    printer = Printer(graph, options, f"params->{identifier(part)}_" if part else "params->", inputs)
+    printer = Printer(graph, options, part, inputs)
     outputs = {o.name: o.shape for o in graph.outputs if o.name != GUARDS}
     result = "int" if len(outputs) < len(graph.outputs) else "void"
     head = f"{result} {function_name(prefix, name)}"
     prototype, definition = signature(head, inputs, outputs, options, graph.params and prefix)
     read = {node[1] for node in graph.nodes if node[0] == "input"}
-    functions = {node[0] for node in graph.nodes} - LEAVES - {"add", "mul", "div", "inv"}
-    own = functions & OWN.keys() if options.math == "own" else set()
-    headers = {'"sincos.h"' if function in ("sin", "cos") else '"elementary.h"' for function in own}
     unread = inputs if result == "void" else {}  # a status reads all inputs
     unused = tuple(f"(void){input_name(port)};" for port in unread if port not in read)
     statements = printer.statements()
@@ -77,8 +75,16 @@ def c_function(
         comment=comment,
         statements=(*unused, *statements),
         cost=cost(graph),
-        includes=("<math.h>",) * bool(functions - own) + ("<string.h>",) * clears + tuple(sorted(headers)),
+        includes=headers_of(graph, options, clears),
     )
+
+
+def headers_of(graph: Graph, options: Options, clears: bool = False) -> tuple[str, ...]:
+    """The headers of the functions that a graph calls, and of memset if it ``clears`` an output."""
+    functions = {node[0] for node in graph.nodes} - LEAVES - {"add", "mul", "div", "inv"}
+    own = functions & OWN.keys() if options.math == "own" else set()
+    headers = {'"sincos.h"' if function in ("sin", "cos") else '"elementary.h"' for function in own}
+    return ("<math.h>",) * bool(functions - own) + ("<string.h>",) * clears + tuple(sorted(headers))
 
 
 def signature(
@@ -102,10 +108,10 @@ def is_continued(graph: Graph, node: Node) -> bool:
 
 
 class Printer:
-    """Turns the nodes of one graph into C text."""
+    """Turns the nodes of one graph into C text. ``part`` is the path of its part in the hand file."""
 
-    def __init__(self, graph: Graph, options: Options, params: str, inputs: Mapping[str, Shape] | None = None) -> None:
-        self.graph, self.options, self.params = graph, options, params
+    def __init__(self, graph: Graph, options: Options, part: str, inputs: Mapping[str, Shape] | None = None) -> None:
+        self.graph, self.options, self.part = graph, options, part
         self.inputs = inputs or {}  # whose finiteness a status tells
         self.sincos_of: dict[Ref, str] = {}  # a format for the text of an angle's sine and cosine
         self.groups = angle_groups(graph) if options.math == "own" else {}
@@ -227,8 +233,9 @@ class Printer:
         return f"{name}({', '.join(self.operand(r, SUM) for r in refs)})", ATOM
 
     def parameter(self, path: str) -> str:
-        """The field of the parameter struct that holds a number of the hand."""
-        return self.params + identifier(path)
+        """The field of the parameter struct that holds a number of the hand, or one derived from such."""
+        struct = "params->" if path.startswith(DERIVED) else "params->numbers."
+        return struct + identifier(f"{self.part}.{path}")
 
     def input_element(self, port: str, element: int) -> str:
         """The C of an element of an input."""

@@ -80,13 +80,17 @@ def csrc_names() -> dict[str, str]:
 
 def taken_names(prefix: str) -> dict[str, str]:
     """The table: every external name that a kernel may not have, and who has it."""
-    own = {f"{prefix}_{name}": "kernels.h" for name in ("params", "default_params", "model_digest")}
+    ours = ("params", "numbers", "default_numbers", "params_derive", "params_load", "model_digest")
+    own = {f"{prefix}_{name}": "kernels.h or params.h" for name in ours}
     return dict.fromkeys(STANDARD, "the C or C++ standard") | csrc_names() | own
 
 
 def taken_files() -> dict[str, str]:
     """File names (without suffix) that a kernel may not have: their files or objects would overwrite each other."""
-    return {path.stem: f"csrc/{path.name}" for path in sorted(CSRC.glob("*.c"))} | {"model": "model.c"}
+    return {path.stem: f"csrc/{path.name}" for path in sorted(CSRC.glob("*.c"))} | {
+        "model": "model.c",
+        "params": "params.c",
+    }
 
 
 def require_names(prefix: str, kernels: Iterable[Kernel]) -> None:

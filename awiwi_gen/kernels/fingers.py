@@ -83,6 +83,12 @@ def joint_limits(finger: Finger) -> tuple[tuple[float, ...], tuple[float, ...]]:
     return tuple(float(k.low or 0) for k in free), tuple(float(k.high or 0) for k in free)
 
 
+def limit_paths(finger: Finger) -> dict[str, tuple[str, ...]]:
+    """Paths of the lower and upper limits of the independent joints; empty where a joint has none."""
+    free = [(i, link) for i, link in enumerate(finger.links) if link.joint in finger.joints]
+    return {end: tuple(f"links[{i}].{end}" if getattr(k, end) else "" for i, k in free) for end in ("low", "high")}
+
+
 def length_range(finger: Finger, tendon: Tendon) -> tuple[float, float]:
     """Bounds of a tendon's path length over all poses [m]: joints at their limits, spans from zero to their longest."""
     rest, reach = float(tendon.rest), 0.0
@@ -266,6 +272,7 @@ def nonlinear_estimate(finger: Finger, iterations: int = 24) -> Solver | None:
         strings={"search": f"awiwi_least_squares(&problem, h_in, start_in, {iterations}, tolerance, q_out)"},
         iterations=iterations,
         tolerance={"f64": 1e-12, "f32": 1e-5},
+        limits=limit_paths(finger),
     )
 
 
