@@ -83,12 +83,8 @@ PAIR: Wires = {"desired": "motion", "external": ("load_seen", "nothing"), "inert
 
 def rest(believed: Joint, force: float) -> Values:
     """Known elongations and stiffness of the springs at rest."""
-    torque = force * believed.arm
-    return {
-        "elongations": believed.elongations(torque),
-        "slopes": believed.slopes(torque),
-        "no_feedback": np.zeros((2, 6)),
-    }
+    p, k = (of(force * believed.arm) for of in (believed.elongations, believed.slopes))
+    return {"elongations": p, "slopes": k, "no_feedback": np.zeros((2, 6))}
 
 
 def of_modes(link: Array, pull: Array) -> Array:
@@ -148,13 +144,9 @@ def regulated(library: Any, believed: Joint, force: float, gains: Mapping[str, f
 
 def scheduled(_: Any, believed: Joint, force: float, gains: Mapping[str, float]) -> Values:
     """Impedance of the link over force loops of both tendons; three of the law's four joints stand still."""
-    others = np.eye(4)
-    others[0, 0] = 0
 
     def first(value: float) -> Array:
-        matrix: Array = others.copy()
-        matrix[0, 0] = value
-        return matrix
+        return np.diag([value, 1.0, 1.0, 1.0])
 
     return rest(believed, force) | {
         "mass": first(float(believed.inertias[0])), "coriolis": np.diag([believed.damping, 0, 0, 0]),
@@ -166,11 +158,8 @@ def scheduled(_: Any, believed: Joint, force: float, gains: Mapping[str, float])
 def backstepped(_: Any, believed: Joint, force: float, gains: Mapping[str, float]) -> Values:
     """Gains of all backstepping laws of a pair."""
     tuning = [gains[name] for name in ("K_3", "K_4", "C_t", "C_s")]
-    return rest(believed, force) | {
-        "impedance": [gains["K_p"], gains["K_d"]],
-        "tunings": [tuning, tuning],
-        "torques_wanted": np.zeros(2),
-    }
+    impedance = [gains["K_p"], gains["K_d"]]
+    return rest(believed, force) | {"impedance": impedance, "tunings": [tuning] * 2, "torques_wanted": np.zeros(2)}
 
 
 def state_dependent(_: Any, believed: Joint, force: float, gains: Mapping[str, float]) -> Values:
@@ -296,10 +285,7 @@ LAWS = {
         Law(
             "backstepping_adaptive", "eq. 15.82 to 15.106, mended and extended",
             "the same with damping, springs that are learnt, and whatever the motors must overcome", STIFFNESS | STEPS,
-            (
-                *OBSERVED,
-                Block("backstepping_adaptive", PAIR | {"damping": "known_damping", "tau_m": "wanted"}),
-            ),
+            (*OBSERVED, Block("backstepping_adaptive", PAIR | {"damping": "known_damping", "tau_m": "wanted"})),
             backstepped,
         ),
     )

@@ -12,7 +12,7 @@ from awiwi_gen.hand.lever import Lever
 from awiwi_gen.kernels.base_estimate import base_of
 from awiwi_gen.reproduce.base_search import BaseSearch
 from awiwi_gen.results import Figure, curves
-from awiwi_gen.simulate import Array, Block, Loop, Scenario, Sum, simulate
+from awiwi_gen.simulate import Array, Block, Element, Loop, Scenario, Sum, simulate
 
 RELEASE, JOINT = 0.1, 1  # rad, at the joint for flexion
 PRETENSION = 20.0  # N in every tendon
@@ -85,38 +85,27 @@ def released(library: Any, hand: Hand) -> Release:
     dampings = damping_readings(library, straight)
     springs = [Block("spring_force", {"x": f"elongations[{i}]", "f": f"forces[{i}]"}) for i in range(m)]
     damping = [(f"damping[{i * n}:{i * n + n}]", f"qd[{i}]") for i in range(n)]  # row by row: the matrix is symmetric
-    paths = {
-        name: simulate(
-            library,
-            Loop(
-                [
-                    Sum("speeds", (1.0, "qd")),
-                    Block("index_tendon_lengths", {"h": "lengths"}),
-                    Sum("elongations", (1.0, "lengths"), (-1.0, "slack_lengths")),
-                    *springs,
-                    Block("index_joint_torque", {"f": "forces", "tau": "pull"}),
-                    Sum("tau", (1.0, "pull"), *damping),
-                    Block("index_forward_dynamics", {"qd": seen}),
-                ],
-                [], {"q": "speeds", "qd": "qdd"}, period=DURATION / (STEPS - 1),
-            ),
-            [
-                Scenario(
-                    {
-                        "q": start, "qd": straight, "at_rest": straight, "damping": -D, "forces": np.zeros(m),
-                        "slack_lengths": library.index_tendon_lengths(straight) - library.spring_elongation(PRETENSION).x,
-                        "g": np.zeros(3),
-                    },
-                    STEPS,
-                )
-                for D in dampings.values()
-            ],
-            ["q"],
-        )
-        for name, seen in (("full", "qd"), ("reduced", "at_rest"))
+    values = {
+        "q": start, "qd": straight, "at_rest": straight, "forces": np.zeros(m), "g": np.zeros(3),
+        "slack_lengths": library.index_tendon_lengths(straight) - library.spring_elongation(PRETENSION).x,
     }  # fmt: skip
-    full, reduced = (np.stack([trace["q"] for trace in traces]) for traces in paths.values())
-    return Release(tuple(dampings), np.linspace(0.0, DURATION, STEPS), full, reduced)
+    scenarios = [Scenario(values | {"damping": -D}, STEPS) for D in dampings.values()]
+
+    def motion(seen: str) -> Array:
+        plant: list[Element] = [
+            Sum("speeds", (1.0, "qd")),
+            Block("index_tendon_lengths", {"h": "lengths"}),
+            Sum("elongations", (1.0, "lengths"), (-1.0, "slack_lengths")),
+            *springs,
+            Block("index_joint_torque", {"f": "forces", "tau": "pull"}),
+            Sum("tau", (1.0, "pull"), *damping),
+            Block("index_forward_dynamics", {"qd": seen}),
+        ]
+        loop = Loop(plant, [], {"q": "speeds", "qd": "qdd"}, period=DURATION / (STEPS - 1))
+        return np.stack([trace["q"] for trace in simulate(library, loop, scenarios, ["q"])])
+
+    times = np.linspace(0.0, DURATION, STEPS)
+    return Release(tuple(dampings), times, full=motion("qd"), reduced=motion("at_rest"))
 
 
 def damping_readings(library: Any, q: Array) -> dict[str, Array]:

@@ -188,7 +188,7 @@ class Bench:
             for i in (0, 1)
         ]  # fmt: skip
         friction = [Block("motor_friction", {"thd": f"speeds[{i}]", "tau": f"modelled[{i}]"}) for i in (0, 1)]
-        D = critical(self.joint, SOFT) if K else 0.0
+        D = float(2 * np.sqrt(SOFT * self.joint.inertias[0])) if K else 0.0
         law: list[Element] = [
             Sum("tau_link", (K, "q_des"), (-K, "x[0]"), (-D, "x[1]")),
             Block("antagonistic_sharing", {"torque": "tau_link"}),
@@ -215,11 +215,6 @@ class Bench:
             inputs = {"q_des": goal, "pretension": pretension, "elongations": elongations, "compliances": compliances}
             scenarios.append(Scenario(values, len(goal), inputs))
         return simulate(self.library, loop_around(plant, law), scenarios, ["x", "tau"])
-
-
-def critical(joint: Joint, K: float) -> float:
-    """Damping [N m s/rad] that would be critical for the link on a spring of stiffness K."""
-    return float(2 * np.sqrt(K * joint.inertias[0]))
 
 
 def force_steps(bench: Bench) -> list[Figure]:
