@@ -18,7 +18,17 @@ from typing import Annotated, Any
 from awiwi_gen import exits, extras
 from awiwi_gen.errors import AwiwiError, InputError, printable
 from awiwi_gen.extras import GENERATE, HAND
-from awiwi_gen.terminal import find_kernel, fix, listing, no_kernel, parse_inputs, read_json_inputs, require, why_absent
+from awiwi_gen.terminal import (
+    find_kernel,
+    fix,
+    listing,
+    no_kernel,
+    parse_inputs,
+    prove,
+    read_json_inputs,
+    require,
+    why_absent,
+)
 
 if absent := extras.missing("awiwi-gen", *extras.COMMAND_LINE):
     exits.leave(exits.SYSTEM, f'{absent}; Python alone has awiwi_gen.load("generated")')
@@ -359,28 +369,6 @@ def simulate(
     shown = one_run(hand, law, gains, scenario, force, plant) if one else benchmark(hand, law, gains)
     shown.show(as_json)
     return 0
-
-
-def prove(job: Any, hand: Path | None, output: Path, as_json: bool) -> int:
-    """Verify a directory, print the proof sheet, return the exit code."""
-    from awiwi_gen.pipeline import state
-    from awiwi_gen.pipeline import verify as examine
-    from awiwi_gen.report import print_json, print_proof, state_lines
-
-    found = state(job, output)
-    if found.stale or found.lost:
-        lines = state_lines(found, str(output), fix(job, hand, output))
-        if as_json:
-            print_json({"error": "stale", "message": "\n".join(lines), **vars(found)})
-        else:
-            print("\n".join(lines), file=sys.stderr)
-        return 1
-    proof = examine(job, output)
-    if as_json:
-        print_json([verdict.as_dict() for verdict in proof.verdicts])
-    else:
-        print_proof(proof, require(output))
-    return 0 if proof.passed else 1
 
 
 def main() -> None:

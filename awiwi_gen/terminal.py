@@ -106,3 +106,25 @@ def read_json_inputs() -> dict[str, Any]:
 def _with_nan(value: Any) -> Any:
     """JSON's null as NaN, which is what `print_json` writes it for."""
     return [*map(_with_nan, value)] if isinstance(value, list) else float("nan") if value is None else value
+
+
+def prove(job: Any, hand: Path | None, output: Path, as_json: bool) -> int:
+    """Verify a directory, print the proof sheet, return the exit code."""
+    from awiwi_gen.pipeline import state
+    from awiwi_gen.pipeline import verify as examine
+    from awiwi_gen.report import print_json, print_proof, state_lines
+
+    found = state(job, output)
+    if found.stale or found.lost:
+        lines = state_lines(found, str(output), fix(job, hand, output))
+        if as_json:
+            print_json({"error": "stale", "message": "\n".join(lines), **vars(found)})
+        else:
+            print("\n".join(lines), file=sys.stderr)
+        return 1
+    proof = examine(job, output)
+    if as_json:
+        print_json([verdict.as_dict() for verdict in proof.verdicts])
+    else:
+        print_proof(proof, require(output))
+    return 0 if proof.passed else 1

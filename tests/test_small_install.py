@@ -36,16 +36,16 @@ def test_a_generated_directory_is_loaded_called_and_pickled_without_any_extra(sm
 import json, pickle, awiwi_gen
 lib = awiwi_gen.load(sys.argv[1])
 lib.vectorise_after = 0  # the loop for vector units is compiled too
-again = pickle.loads(pickle.dumps(lib.jaw_fingertip_pose))
+again = pickle.loads(pickle.dumps(lib.jaw_coupling))
 q = [[0.1, 0.2], [0.3, 0.1]]
-print(json.dumps([lib.jaw_fingertip_pose(q).tolist(), again(q[0]).tolist(), sorted(sys.modules)]))
+print(json.dumps([lib.jaw_coupling(q).tolist(), again(q[0]).tolist(), sorted(sys.modules)]))
 """
     done = python(code, small, hidden=EXTRAS, cwd=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
-    pose, again, modules = json.loads(done.stdout)
-    expected = awiwi_gen.load(str(small)).jaw_fingertip_pose([[0.1, 0.2], [0.3, 0.1]])
+    coupling, again, modules = json.loads(done.stdout)
+    expected = awiwi_gen.load(str(small)).jaw_coupling([[0.1, 0.2], [0.3, 0.1]])
 
-    assert np.array_equal(pose, expected)
+    assert np.array_equal(coupling, expected)
     assert np.array_equal(again, expected[0])
     assert not [name for name in modules if "definitions" in name or "witnesses" in name]
 
