@@ -63,15 +63,19 @@ def replace(new: Path, directory: Path, listed: Listed, check: Callable[[Path], 
     with suppress(OSError):  # there is one already
         new.rename(directory)
         return
-    if exchange(new, directory):
-        try:
-            check(new)
-        except FileNotFoundError:  # another run has cleared the old one away
+    old = _locked(directory, wait=True)  # so that no other run clears the old one away while it is checked
+    try:
+        if exchange(new, directory):
+            if old is None or _is_same(old, new):  # else another run came first: its directory holds nothing else
+                try:
+                    check(new)
+                except BaseException:  # somebody wrote into the old one in the meantime
+                    exchange(new, directory)
+                    raise
             return
-        except BaseException:  # somebody wrote into the old one in the meantime
-            exchange(new, directory)
-            raise
-        return
+    finally:
+        if old is not None:
+            os.close(old)
     complete = _complete(directory)
     while True:
         try:
@@ -82,6 +86,13 @@ def replace(new: Path, directory: Path, listed: Listed, check: Callable[[Path], 
                 raise
             finish_replacement(directory, listed)  # of another run
     _move(complete, directory, listed)
+
+
+def _is_same(handle: int, path: Path) -> bool:
+    """Whether a path still leads to an open directory."""
+    with suppress(OSError):
+        return os.path.samestat(os.fstat(handle), os.stat(path))
+    return False
 
 
 def exchange(a: Path, b: Path) -> bool:
