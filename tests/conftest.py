@@ -10,7 +10,10 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 os.environ.setdefault("AWIWI_GEN_CACHE", str(ROOT / ".cache"))
 
-import awiwi_gen  # noqa: E402 the cache is chosen first
+from trees import version  # noqa: E402 the cache is chosen first
+
+import awiwi_gen  # noqa: E402
+from awiwi_gen.emit.tree import install  # noqa: E402
 
 
 def pytest_sessionstart(session):
@@ -32,3 +35,11 @@ def hand():
 @pytest.fixture(scope="session")
 def lib(hand):
     return awiwi_gen.build(hand)
+
+
+@pytest.fixture
+def tree(tmp_path):
+    """A small generated directory."""
+    directory = tmp_path / "home" / "generated"
+    install(directory, version("old"))
+    return directory
