@@ -1,6 +1,6 @@
 """Dynamics of a finger by Lagrange's equation."""
 
-from awiwi_gen.definitions.dynamics.lagrange import (
+from awiwi_gen.definitions.dynamics.lagrange import (  # noqa: F401 the kernels find them here
     bias,
     coriolis_matrix,
     dynamics,
@@ -11,15 +11,3 @@ from awiwi_gen.definitions.dynamics.lagrange import (
     inverse_dynamics_derivatives,
     mass_matrix,
 )
-
-__all__ = [
-    "bias",
-    "coriolis_matrix",
-    "dynamics",
-    "energy",
-    "forward_dynamics",
-    "gravity",
-    "inverse_dynamics",
-    "inverse_dynamics_derivatives",
-    "mass_matrix",
-]

@@ -1,6 +1,6 @@
 """Dynamics of a finger by recursion along the chain."""
 
-from awiwi_gen.witnesses.dynamics.recursion import (
+from awiwi_gen.witnesses.dynamics.recursion import (  # noqa: F401 the kernels find them here
     bias,
     coriolis_matrix,
     dynamics,
@@ -11,15 +11,3 @@ from awiwi_gen.witnesses.dynamics.recursion import (
     inverse_dynamics_derivatives,
     mass_matrix,
 )
-
-__all__ = [
-    "bias",
-    "coriolis_matrix",
-    "dynamics",
-    "energy",
-    "forward_dynamics",
-    "gravity",
-    "inverse_dynamics",
-    "inverse_dynamics_derivatives",
-    "mass_matrix",
-]
