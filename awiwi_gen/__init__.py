@@ -5,27 +5,51 @@
 >>> lib = awiwi_gen.build(hand)             # generate, compile, load; cached by digest
 >>> lib.index_mass_matrix([0.1, 0.2, 0.3, 0.4]).shape
 (4, 4)
+
+What is generated already needs neither the hand file nor the libraries that derive, only NumPy, cffi and a C compiler:
+
+>>> lib = awiwi_gen.load("generated")
 """
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
-import awiwi_gen.build as _build  # noqa: F401 before the function of that name, which then keeps it
-from awiwi_gen.errors import AwiwiError, BuildError, DimensionError, InputError, OutputError, VerificationError
-from awiwi_gen.hand import Hand
+from awiwi_gen.build import load  # before the function `build`, whose name the module would take
+from awiwi_gen.errors import (
+    AwiwiError,
+    BuildError,
+    DimensionError,
+    InputError,
+    MissingExtraError,
+    OutputError,
+    VerificationError,
+)
+from awiwi_gen.extras import GENERATE, HAND, require
 
 if TYPE_CHECKING:
+    from awiwi_gen.hand import Hand
     from awiwi_gen.library import Library
 
 __all__ = [
-    "AwiwiError", "BuildError", "DimensionError", "Hand", "InputError", "OutputError", "VerificationError", "build",
+    "AwiwiError", "BuildError", "DimensionError", "Hand", "InputError", "MissingExtraError", "OutputError",
+    "VerificationError", "build", "load",
 ]  # fmt: skip
 
 Scalar = Literal["f64", "f32"]
 Params = Literal["baked", "runtime"]
+
+
+def __getattr__(name: str) -> Any:
+    """Import `Hand` at its first use: a small install has no library that reads hand files."""
+    if name != "Hand":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    require("awiwi_gen.Hand", *HAND)
+    from awiwi_gen.hand import Hand
+
+    return Hand
 
 
 def build(
@@ -43,10 +67,12 @@ def build(
     ``progress(stage, done, total)`` is called as the work proceeds; without it, progress is shown on standard error
     if that is a terminal.
 
-    Raises InputError for a wrong argument, BuildError when there is no C compiler that works.
+    Raises InputError for a wrong argument, BuildError when there is no C compiler that works, MissingExtraError when
+    a library is not installed that derives kernels.
     """
-    from awiwi_gen.build import load
+    require("awiwi_gen.build", *GENERATE)
     from awiwi_gen.emit.options import Options
+    from awiwi_gen.hand import Hand
     from awiwi_gen.parallel import silent
     from awiwi_gen.pipeline import Job, cached_tree
 

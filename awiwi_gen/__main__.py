@@ -15,11 +15,25 @@ from functools import wraps
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
-
-from awiwi_gen import exits
+from awiwi_gen import exits, extras
 from awiwi_gen.errors import AwiwiError, InputError, printable
-from awiwi_gen.terminal import fix, listing, no_kernel, parse_inputs, read_json_inputs, require, why_absent
+from awiwi_gen.extras import GENERATE, HAND
+from awiwi_gen.terminal import (
+    find_kernel,
+    fix,
+    listing,
+    no_kernel,
+    parse_inputs,
+    prove,
+    read_json_inputs,
+    require,
+    why_absent,
+)
+
+if absent := extras.missing("awiwi-gen", *extras.COMMAND_LINE):
+    exits.leave(exits.SYSTEM, f'{absent}; Python alone has awiwi_gen.load("generated")')
+
+import typer
 
 app = typer.Typer(
     help="From the CAD numbers of a tendon-driven hand to verified real-time C.",
@@ -62,26 +76,32 @@ GENERATED = Path("generated")
 PAGE = Path("build/report/index.html")
 
 
-def command(function: Callable[..., int | None]) -> Callable[..., None]:
-    """Register a command: an error becomes one message and an exit code, in JSON with --json."""
+def command(*needs: str) -> Callable[[Callable[..., int | None]], Callable[..., None]]:
+    """Register a command that needs some modules: an error becomes one message and an exit code, in JSON with --json."""
 
-    @wraps(function)
-    def run(**options: Any) -> None:
-        try:
-            with exits.system_errors():
-                code = function(**options)
-        except AwiwiError as known:
-            if options.get("as_json"):
-                from awiwi_gen.report import error_entry, print_json
+    def register(function: Callable[..., int | None]) -> Callable[..., None]:
+        name = function.__name__.removesuffix("_")
 
-                print_json(error_entry(known))
-            else:
-                print(printable(str(known)), file=sys.stderr)
-            code = known.exit_code
-        raise typer.Exit(code or 0)
+        @wraps(function)
+        def run(**options: Any) -> None:
+            try:
+                with exits.system_errors():
+                    extras.require(name, *needs)
+                    code = function(**options)
+            except AwiwiError as known:
+                if options.get("as_json"):
+                    from awiwi_gen.report import error_entry, print_json
 
-    app.command(function.__name__.removesuffix("_"))(run)
-    return run
+                    print_json(error_entry(known))
+                else:
+                    print(printable(str(known)), file=sys.stderr)
+                code = known.exit_code
+            raise typer.Exit(code or 0)
+
+        app.command(name)(run)
+        return run
+
+    return register
 
 
 def make_job(
@@ -105,7 +125,7 @@ def make_job(
     return job
 
 
-@command
+@command(*GENERATE)
 def generate(
     hand: HandFile = None, output: Output = GENERATED, scalar: ScalarOption = Scalar.f64,
     params: ParamsOption = Params.baked, math: MathOption = Math.own, only: Only = "*", as_json: Json = False,
@@ -122,7 +142,10 @@ def generate(
 
         compiler()  # without one nothing can be verified: an error before anything is replaced
     if job.hand.gains:
-        with_studies("the check of its gains", "tune").require_running_gains(job.hand, job.store)
+        extras.require("the check of the hand's gains", "scipy")
+        from awiwi_gen.tune import require_running_gains
+
+        require_running_gains(job.hand, job.store)
     changed = generate(job, output)
     if verify:
         return prove(job, hand, output, as_json)
@@ -133,7 +156,7 @@ def generate(
     return 0
 
 
-@command
+@command(*GENERATE)
 def check(
     hand: HandFile = None, output: Output = GENERATED, scalar: ScalarOption = Scalar.f64,
     params: ParamsOption = Params.baked, math: MathOption = Math.own, only: Only = "*", as_json: Json = False,
@@ -161,7 +184,7 @@ def check(
     return 0 if found.fresh or (found.missing and not found.foreign) else 1
 
 
-@command
+@command()
 def amalgamate(directory: Path = GENERATED, output: Output = Path("build/one"), as_json: Json = False) -> None:
     """Write all C of the directory as one header and one C file, awiwi.h and awiwi.c in the output directory."""
     from awiwi_gen.amalgamate import run
@@ -169,7 +192,7 @@ def amalgamate(directory: Path = GENERATED, output: Output = Path("build/one"), 
     run(directory, output, as_json)
 
 
-@command
+@command()
 def build(hand: HandFile = None, output: Output = GENERATED, as_json: Json = False) -> int:
     """Compile a generated directory and load it, as Python does."""
     from awiwi_gen.build import load
@@ -185,7 +208,7 @@ def build(hand: HandFile = None, output: Output = GENERATED, as_json: Json = Fal
     return 0
 
 
-@command
+@command(*GENERATE)
 def verify(
     hand: HandFile = None, output: Output = GENERATED, scalar: ScalarOption = Scalar.f64,
     params: ParamsOption = Params.baked, math: MathOption = Math.own, only: Only = "*", as_json: Json = False,
@@ -195,15 +218,20 @@ def verify(
     return prove(make_job(hand, scalar, params, only, math), hand, output, as_json)
 
 
-@command
+@command()
 def list_(
     hand: HandFile = None, as_json: Json = False,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="List what was generated there.")] = None,
     assumed: Annotated[bool, typer.Option("--assumed", help="The hand's numbers without a source.")] = False,
 ) -> int:  # fmt: skip
     """List the kernels of the hand with their ports and costs, or its numbers that are assumed."""
-    from awiwi_gen.hand import Hand
     from awiwi_gen.report import kernel_entries, print_json, print_kernels, print_table
+
+    if output is not None and hand is None and not assumed:
+        (print_json if as_json else print_kernels)(require(output)["kernels"])
+        return 0
+    extras.require("list without -o", *HAND)
+    from awiwi_gen.hand import Hand
 
     if assumed:
         guesses = {path: str(quantity) for path, quantity in Hand.load(hand).assumed().items()}
@@ -212,30 +240,23 @@ def list_(
         else:
             print_table(("number", "assumed value"), list(guesses.items()))
         return 0
-    there = output is not None and hand is None
-    entries = require(output or GENERATED)["kernels"] if there else kernel_entries(Hand.load(hand), output or GENERATED)
-    (print_json if as_json else print_kernels)(entries)
+    (print_json if as_json else print_kernels)(kernel_entries(Hand.load(hand), output or GENERATED))
     return 0
 
 
-@command
+@command()
 def call(
     kernel: Annotated[str, typer.Argument(help="Name of a kernel, see list.")],
     inputs: Annotated[list[str] | None, typer.Argument(help="Inputs such as q=0.1,0.2,0.3,0.4")] = None,
     hand: HandFile = None, as_json: Json = False,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Call what was generated there.")] = None,
 ) -> int:  # fmt: skip
     """Evaluate a compiled kernel. With --json, inputs come as one JSON object from standard input."""
     import numpy as np
 
-    import awiwi_gen
-    from awiwi_gen.hand import Hand
     from awiwi_gen.report import print_json
 
-    shape = Hand.load(hand)
-    library = awiwi_gen.build(shape)
-    if kernel not in library:
-        raise no_kernel(shape, hand, kernel, library)
-    function = library[kernel]
+    function = find_kernel(kernel, hand, output)
     given = parse_inputs(inputs or [], function) if inputs or not as_json else read_json_inputs()
     result = function(**given)
     values = result._asdict() if hasattr(result, "_asdict") else {function.outputs[0]["name"]: result}
@@ -250,7 +271,7 @@ def call(
     return 0
 
 
-@command
+@command(*GENERATE)
 def explain(
     kernel: Annotated[str, typer.Argument(help="Name of a kernel, see list.")],
     hand: HandFile = None, as_json: Json = False,
@@ -271,16 +292,38 @@ def explain(
     return 0
 
 
-@command
+@command(*GENERATE)
+def params(
+    hand: HandFile = None, as_json: Json = False,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="File to write for the C.")] = None,
+    generated: Annotated[Path, typer.Option("--generated", help="Directory that reads the file.")] = GENERATED,
+) -> int:  # fmt: skip
+    """Write the numbers of a hand to a file that C of --params runtime loads, or list them."""
+    from awiwi_gen.hand import Hand
+    from awiwi_gen.parameters import numbers_file
+    from awiwi_gen.report import print_json, print_numbers
+
+    found = numbers_file(Hand.load(hand), require(generated, hand), str(generated))
+    if output is not None:
+        found.write(output)
+    if as_json:
+        print_json({"file": output and str(output), "bytes": len(found.data), "numbers": found.rows})
+    else:
+        print_numbers(found.rows, output, len(found.data))
+    return 0
+
+
+@command("matplotlib", "scipy", *GENERATE)
 def report(
     hand: HandFile = None, as_json: Json = False,
     page: Annotated[Path, typer.Option("--page", "-o", help="HTML file to write.")] = PAGE,
 ) -> int:  # fmt: skip
     """Reproduce the source's figures and numbers on one page, with the proof of every kernel."""
+    from awiwi_gen.compare import comparison
     from awiwi_gen.report import print_json
     from awiwi_gen.reproduce import publish, summary, verdict
 
-    results = publish(make_job(hand), page, with_studies("figures", "compare").comparison)
+    results = publish(make_job(hand), page, comparison)
     if as_json:
         print_json(results.as_dict())
     else:
@@ -289,7 +332,7 @@ def report(
     return 0 if results.proof.passed else 1
 
 
-@command
+@command("scipy", *GENERATE)
 def tune(
     costs: Annotated[Path, typer.Option("--costs", help="TOML file of what motion and torque cost.")],
     hand: HandFile = None, as_json: Json = False,
@@ -297,10 +340,10 @@ def tune(
 ) -> int:  # fmt: skip
     """Find gains of the backstepping law for every tendon, and write a file that the hand file can name."""
     from awiwi_gen.report import print_json
+    from awiwi_gen.tune import tune_hand, write_gains
 
-    studies = with_studies("tuning", "tune")
-    tuned = studies.tune_hand(make_job(hand).hand, costs)
-    studies.write_gains(output, tuned)
+    tuned = tune_hand(make_job(hand).hand, costs)
+    write_gains(output, tuned)
     if as_json:
         print_json([each.as_dict() for each in tuned])
     else:
@@ -310,7 +353,7 @@ def tune(
     return 0
 
 
-@command
+@command("scipy", *GENERATE)
 def simulate(
     law: Annotated[str, typer.Argument(help="A law; all of them if left out.")] = "",
     gains: Annotated[str, typer.Option("--gains", help="Gains such as K_p=0.5,K_d=0.003.")] = "",
@@ -320,43 +363,12 @@ def simulate(
     hand: HandFile = None, as_json: Json = False,
 ) -> int:  # fmt: skip
     """Simulate control laws on a joint between two tendons, at the hand's clock rate, and compare the results."""
-    studies = with_studies("simulation", "compare")
+    from awiwi_gen.compare import benchmark, one_run
+
     one = scenario != ""
-    shown = studies.one_run(hand, law, gains, scenario, force, plant) if one else studies.benchmark(hand, law, gains)
+    shown = one_run(hand, law, gains, scenario, force, plant) if one else benchmark(hand, law, gains)
     shown.show(as_json)
     return 0
-
-
-def with_studies(purpose: str, room: str) -> Any:
-    """A room that needs the extra "studies". Raises InputError where a library is missing that it needs."""
-    from importlib import import_module
-
-    try:
-        return import_module(f"awiwi_gen.{room}")
-    except ModuleNotFoundError as error:
-        raise InputError(f"{error.name} needed for {purpose}; install it: pip install 'awiwi_gen[studies]'") from None
-
-
-def prove(job: Any, hand: Path | None, output: Path, as_json: bool) -> int:
-    """Verify a directory, print the proof sheet, return the exit code."""
-    from awiwi_gen.pipeline import state
-    from awiwi_gen.pipeline import verify as examine
-    from awiwi_gen.report import print_json, print_proof, state_lines
-
-    found = state(job, output)
-    if found.stale or found.lost:
-        lines = state_lines(found, str(output), fix(job, hand, output))
-        if as_json:
-            print_json({"error": "stale", "message": "\n".join(lines), **vars(found)})
-        else:
-            print("\n".join(lines), file=sys.stderr)
-        return 1
-    proof = examine(job, output)
-    if as_json:
-        print_json([verdict.as_dict() for verdict in proof.verdicts])
-    else:
-        print_proof(proof, require(output))
-    return 0 if proof.passed else 1
 
 
 def main() -> None:

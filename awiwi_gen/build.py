@@ -26,7 +26,7 @@ from awiwi_gen.compiler import bindings, compiler, native
 from awiwi_gen.emit.names import input_name, output_name
 from awiwi_gen.emit.options import GCC_FLAGS, VECTOR_FLAGS
 from awiwi_gen.emit.tree import read_manifest
-from awiwi_gen.errors import BuildError, InputError, OutputError
+from awiwi_gen.errors import BuildError, InputError, NoCompilerError, OutputError
 from awiwi_gen.resources import CSRC
 
 if TYPE_CHECKING:
@@ -87,14 +87,17 @@ def declarations(directory: Path, store: Cache, shared: str) -> str:
     return store.memo("declarations", key(shared, compiler().identity), preprocess)
 
 
-def load(directory: Path, store: Cache | None = None) -> Library:
-    """Compile a generated directory and load it as a Library.
+def load(directory: str | Path, store: Cache | None = None) -> Library:
+    """Compile a generated directory and load it as NumPy functions; compiled objects are kept in a cache.
 
-    Raises InputError where nothing was generated, BuildError where the compiler refuses the code.
+    Needs NumPy, cffi, a C compiler and Python's headers, but no library that derives kernels.
+
+    Raises InputError where nothing was generated, NoCompilerError where there is no C compiler that works or no Python.h,
+    BuildError where it refuses the code.
     """
     from awiwi_gen.library import Library
 
-    store = store or Cache()
+    directory, store = Path(directory), store or Cache()
     manifest = read_manifest(directory)
     if manifest is None:
         raise InputError(f"{directory}: nothing generated here; run awiwi-gen generate -o {directory}")
@@ -221,10 +224,11 @@ def _glue_source(manifest: dict[str, Any], declared: str) -> str:
     """JSON of what the wrapper is made from: declarations, loops over samples, and the kernels in a uniform shape."""
     loops, prototypes = [], []
     scalar, prefix = manifest["c_type"], manifest["prefix"]
-    if any(entry["params"] for entry in manifest["kernels"]):
-        head = f"const {prefix}_params *DefaultParams(void)"
-        prototypes.append(f"{head};")
-        loops.append(f"static {head} {{ return &{prefix}_default_params; }}")
+    if manifest.get("params"):
+        prototypes.append(f"void {prefix}_params_derive(const {prefix}_numbers *numbers, {prefix}_params *params);")
+        prototypes.append(f"int {prefix}_params_load(const void *bytes, size_t size, {prefix}_params *out);")
+        prototypes.append(f"extern {prefix}_params FlatParams;")
+        loops.append(f"static {prefix}_params FlatParams;")  # of the kernels that are called with flat arrays
     for entry in manifest["kernels"]:
         inputs = [input_name(p["name"]) for p in entry["inputs"]]
         sizes = {output_name(p["name"]): prod(p["shape"]) for p in entry["outputs"]}
@@ -251,7 +255,7 @@ def _glue_source(manifest: dict[str, Any], declared: str) -> str:
 
 def _flat_source(entry: dict[str, Any], prefix: str, scalar: str) -> str:
     """A kernel with all inputs in one array and all outputs in another, so that C code can call any of them."""
-    arguments = [f"&{prefix}_default_params"] if entry["params"] else []
+    arguments = ["&FlatParams"] if entry["params"] else []
     for side, array in (("inputs", "in"), ("outputs", "out")):
         place = 0
         for port in entry[side]:
@@ -269,15 +273,20 @@ def _glue_object(name: str, glue: str, directory: Path, store: Cache, scratch: P
     if found is not None:
         made.write_bytes(found)
         return made
+    python = sysconfig.get_paths()["include"]
+    if not Path(python, "Python.h").is_file():
+        raise NoCompilerError(
+            f"{python} has no Python.h; install Python's headers (Debian: apt-get install python3-dev)"
+        )
     import cffi.recompiler
 
     parts = json.loads(glue)
     ffi = cffi.FFI()
     ffi.cdef(re.sub(r"^#.*$", "", parts["declared"], flags=re.M) + "\n".join(parts["prototypes"]))
-    preamble = '#include "awiwi.h"\n' + OPTIMISED.format("\n".join(parts["loops"]))
+    own = '#include "params.h"\n' if "_params_load" in glue else ""
+    preamble = f'#include "awiwi.h"\n{own}' + OPTIMISED.format("\n".join(parts["loops"]))
     source = scratch / f"{name}.c"
     cffi.recompiler.make_c_source(ffi, name, preamble, str(source))
-    python = sysconfig.get_paths()["include"]
     compiler().run(*GLUE_FLAGS, f"-I{python}", f"-I{directory}", f"-I{CSRC}", "-c", str(source), "-o", str(made))
     store.write("objects", digest, made.read_bytes())
     return made

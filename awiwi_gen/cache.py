@@ -49,20 +49,23 @@ def key(*parts: object) -> str:
 def code_digest(*rooms: str) -> str:
     """Digest of the package's own source text: of some rooms (files or folders), or of all that decides bytes.
 
-    Line endings do not matter: a checkout may have converted them.
+    Line endings do not matter: a checkout may have converted them. Raises ValueError for a room without a file.
     """
-    wanted = rooms or ("",)
-    total = hashlib.sha256()
+    total, empty = hashlib.sha256(), set(rooms)
     for root in SOURCES:
         for path in sorted(root.rglob("*")):
             relative = path.relative_to(root.parent).as_posix()
-            if path.suffix in (".py", ".j2", ".c", ".h") and any(_inside(relative, room) for room in wanted):
+            inside = {room for room in rooms if _inside(relative, room)}
+            if path.suffix in (".py", ".j2", ".c", ".h") and (inside or not rooms):
+                empty -= inside
                 total.update(relative.encode() + b"\0" + path.read_bytes().replace(b"\r\n", b"\n"))
+    if empty:
+        raise ValueError(f"no source text in {', '.join(sorted(empty))}")
     return total.hexdigest()
 
 
 def _inside(path: str, room: str) -> bool:
-    return not room or path == room or path.startswith(room.rstrip("/") + "/")
+    return path == room or path.startswith(room.rstrip("/") + "/")
 
 
 @cache

@@ -30,6 +30,10 @@ class Deriver:
 
         from awiwi_gen.ir.from_sympy import lower_sympy
 
+        def of_port(port: str, i: int) -> Any:
+            """Its name ends like no path of a number, since SymPy takes symbols of one name for one symbol."""
+            return sympy.Symbol(f"{port}[{i}] input", real=True)
+
         builder = Builder()
         leaves: dict[Any, int] = {}
         if "sympy" not in self._trees:
@@ -38,7 +42,7 @@ class Deriver:
             leaves[sympy.Symbol(path, real=True)] = builder.param(path)
         arguments = []
         for port, spec in kernel.inputs.items():
-            symbols = [sympy.Symbol(f"{port}[{i}]", real=True) for i in range(spec.size)]
+            symbols = [of_port(port, i) for i in range(spec.size)]
             leaves |= {symbol: builder.input(port, i) for i, symbol in enumerate(symbols)}
             arguments.append(sympy.Matrix(symbols))
         result = kernel.routes["sympy"](self._trees["sympy"], *arguments)

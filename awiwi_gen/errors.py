@@ -2,7 +2,8 @@
 
     AwiwiError                an error that a user can read and act on; exit code 1
     ├── InputError            the input is wrong: a hand file, an argument; exit code 2; lists its faults
-    │   └── OutputError       the output directory is missing, locked or not ours
+    │   ├── OutputError       the output directory is missing, locked or not ours
+    │   └── MissingExtraError a library is not installed; names the extra that brings it
     ├── DimensionError        an expression adds metres to newtons: the physics is wrong, not the file
     ├── BuildError            the C compiler refused the generated code
     │   └── NoCompilerError   there is no working C compiler; exit code 2
@@ -20,8 +21,8 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 __all__ = [
-    "AwiwiError", "BudgetError", "BuildError", "DimensionError", "Fault", "InputError", "NoCompilerError", "OutputError",
-    "VerificationError", "printable", "unknown",
+    "AwiwiError", "BudgetError", "BuildError", "DimensionError", "Fault", "InputError", "MissingExtraError",
+    "NoCompilerError", "OutputError", "VerificationError", "printable", "unknown",
 ]  # fmt: skip
 
 MOST_FAULTS = 100  # shown in one error; nobody scrolls back further
@@ -93,6 +94,10 @@ def unknown(kind: str, name: str, known: Iterable[str], otherwise: str = "see aw
 
 class OutputError(InputError):
     """The output directory cannot be written, or holds files that this program did not make."""
+
+
+class MissingExtraError(InputError, ImportError):
+    """A library that the task needs is not installed."""
 
 
 class DimensionError(AwiwiError):

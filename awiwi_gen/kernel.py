@@ -19,14 +19,26 @@ WINGS = {
 
 @dataclass(frozen=True)
 class Route:
-    """A function of a wing, by name; its module is imported at the first call."""
+    """A function of a wing, by name; its module is imported at the first call.
+
+    ``domain`` is another function of the wing with the same arguments, which gives guards only.
+    """
 
     module: str
     function: str
+    domain: Route | None = None
 
     def __call__(self, part: Any, *arguments: Any) -> Any:
         """Outputs, then guards, from a part with symbols for its numbers and one column of symbols per input port."""
-        return getattr(import_module(self.module), self.function)(part, *arguments)
+        result = getattr(import_module(self.module), self.function)(part, *arguments)
+        if self.domain is None:
+            return result
+        return *(result if isinstance(result, tuple) else (result,)), self.domain(part, *arguments)
+
+    @property
+    def modules(self) -> tuple[str, ...]:
+        """The modules that it calls."""
+        return (self.module, *(self.domain.modules if self.domain else ()))
 
 
 @dataclass(frozen=True)
@@ -73,6 +85,7 @@ class Solver:
     unchanged. ``problem`` names an entry of `verify.problems.PROBLEMS`, which draws well-posed inputs and has their exact
     solutions; a compiled result may differ from these by ``tolerance`` of the largest element, per scalar type.
     ``iterations`` is the number of calls of the used kernels in the worst case; those in ``once`` are called once.
+    ``limits`` are the paths of the numbers in ``arrays`` that are read at run time where others are.
     """
 
     template: str
@@ -85,6 +98,7 @@ class Solver:
     iterations: int
     tolerance: Mapping[str, float]
     once: tuple[str, ...] = ()
+    limits: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

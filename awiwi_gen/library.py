@@ -297,8 +297,8 @@ class Library(Mapping[str, KernelFunction]):
     this machine's vector units, which takes a second and is cached; 0 compiles at the first call, infinity never. Neither
     changes a bit of any result.
 
-    ``c`` and ``ffi`` are what cffi made of the firmware's header: every function of it, kernels and solvers, called as
-    in C, as in ``library.c.awiwi_index_mass_matrix(q, M)`` with arrays from ``library.ffi.new("double[4]")``.
+    ``params`` points at the numbers that kernels read at run time. ``c`` and ``ffi`` are what cffi made of the firmware's
+    header: ``library.c.awiwi_index_mass_matrix(q, M)`` with arrays from ``library.ffi.new("double[4]")``.
     """
 
     def __init__(
@@ -308,6 +308,7 @@ class Library(Mapping[str, KernelFunction]):
         ffi: Any,
         vectorised: Callable[[Mapping[str, Any]], Any],
         origin: tuple[Callable[..., Library], tuple[str, ...]],
+        numbers: list[float] | None = None,
     ) -> None:
         self.dtype = np.dtype(np.float64 if manifest["c_type"] == "double" else np.float32)
         prefix = manifest["prefix"]
@@ -319,10 +320,20 @@ class Library(Mapping[str, KernelFunction]):
         self.origin = origin  # a function and its arguments that load this library in another process
         self._vectorised = vectorised
         self._kernels = {}
+        self._own_numbers, self.params = numbers, None
+        if manifest.get("params"):
+            own = numbers and ffi.new(f"{prefix}_numbers *", numbers)
+            given = own or ffi.addressof(getattr(lib, f"{prefix}_default_numbers"))
+            self.params = ffi.new(f"{prefix}_params *") if own else ffi.addressof(lib, "FlatParams")
+            getattr(lib, f"{prefix}_params_derive")(given, self.params)
         for place, entry in enumerate(manifest["kernels"]):
-            params = lib.DefaultParams() if entry["params"] else None
+            params = self.params if entry["params"] else None
             loop = getattr(lib, f"Batch_{entry['name']}")
             self._kernels[entry["name"]] = KernelFunction(entry, self, loop, lib.FlatKernels[place], params)
+
+    def with_numbers(self, values: Iterable[float]) -> Library:
+        """The same kernels with other numbers, where they read any: in the order of the manifest's list of numbers."""
+        return Library(self.manifest, self.c, self.ffi, self._vectorised, self.origin, list(values))
 
     def pointer(self, array: Array) -> Any:
         """Where an array's first element is; the array must outlive the pointer."""
@@ -344,7 +355,8 @@ class Library(Mapping[str, KernelFunction]):
         return f"<library {hand}: {len(self)} kernels, {scalar}, model {self.digest[:12]}>"
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _restored, (self.origin, self.threads, self.vectorise_after)
+        numbers = None if self._own_numbers is None else list(self._own_numbers)
+        return _restored, (self.origin, self.threads, self.vectorise_after, numbers)
 
     def __getattr__(self, name: str) -> KernelFunction:
         try:
@@ -372,9 +384,16 @@ class Library(Mapping[str, KernelFunction]):
         return [*super().__dir__(), *self._kernels]
 
 
-def _restored(origin: tuple[Callable[..., Library], tuple[str, ...]], threads: int, vectorise_after: float) -> Library:
-    """A pickled library, loaded again, with the same settings."""
+def _restored(
+    origin: tuple[Callable[..., Library], tuple[str, ...]],
+    threads: int,
+    vectorise_after: float,
+    numbers: list[float] | None = None,
+) -> Library:
+    """A pickled library, loaded again, with the same settings and numbers."""
     load, arguments = origin
     library = load(*arguments)
+    if numbers is not None:
+        library = library.with_numbers(numbers)
     library.threads, library.vectorise_after = threads, vectorise_after
     return library

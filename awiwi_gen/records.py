@@ -7,8 +7,8 @@ kernels that use it.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import partial
 from typing import Any
@@ -20,9 +20,11 @@ from awiwi_gen.emit.options import Options
 from awiwi_gen.emit.solver import solver_function
 from awiwi_gen.errors import VerificationError
 from awiwi_gen.ir.cost import cost
+from awiwi_gen.ir.exact import exact_values
 from awiwi_gen.ir.graph import Graph
 from awiwi_gen.ir.passes import optimise
 from awiwi_gen.ir.passes.bind import bind, fill
+from awiwi_gen.ir.passes.lift import lift, settle
 from awiwi_gen.kernel import Kernel, Solver
 from awiwi_gen.sources import code_of
 from awiwi_gen.verify.problem import Problem
@@ -33,10 +35,11 @@ from awiwi_gen.verify.reference import (
     ball_values,
     ball_values_together,
     disagreement,
+    domain,
     reference,
     term_size,
 )
-from awiwi_gen.verify.samples import draw
+from awiwi_gen.verify.samples import draw, varied
 
 ROUTES_AGREE = 1e-40  # level 4 of docs/verification.md
 PASSES_AGREE = 1e-50  # level 2
@@ -49,6 +52,9 @@ class Record:
 
     ``values`` are the numbers of the hand that its graph reads at run time. ``costs`` has, after each pass, the number
     of operations and their weight. ``inputs`` are the samples of its reference if a problem chose them.
+
+    Where numbers are read at run time, ``derivation`` is the graph of the derived ones, ``zeros`` are paths of numbers
+    that stay constants because they are zero, and ``varied`` is a second reference, with other numbers.
     """
 
     digest: str
@@ -62,12 +68,23 @@ class Record:
     values: Mapping[str, Fraction] = field(default_factory=dict)
     costs: tuple[tuple[str, int, int], ...] = ()
     inputs: Mapping[str, Any] = field(default_factory=dict)
+    derivation: Graph | None = None
+    zeros: tuple[str, ...] = ()
+    varied: Varied | None = None
+
+
+@dataclass(frozen=True)
+class Varied:
+    """The reference of a kernel with other numbers, at those samples (``rows``) that are in its domain then."""
+
+    rows: tuple[int, ...]
+    reference: Reference
 
 
 def derivation_key(kernel: Kernel, route: str) -> str:
     """Key of a derivation: the structure of the part, the ports and the code of the route, but no number."""
     derived = kernel.routes[route]
-    code = code_of("awiwi_gen.derive", derived.module, type(kernel.part).__module__)
+    code = code_of("awiwi_gen.derive", *derived.modules, type(kernel.part).__module__)
     ports = [(name, port.shape, port.unit) for side in (kernel.inputs, kernel.outputs) for name, port in side.items()]
     return key(kernel.structure, derived.module, derived.function, ports, kernel.guards, code, libraries())
 
@@ -128,15 +145,35 @@ def cheapest(bound: Mapping[str, Graph]) -> tuple[str, list[tuple[str, Graph]]]:
 
 
 @dataclass(frozen=True)
-class Candidate:
-    """A kernel with its graphs bound and the cheapest of them optimised, before they are compared."""
+class Prepared:
+    """Graphs with their numbers bound, the cheapest of them optimised, and the graph of derived numbers, if any."""
 
-    kernel: Kernel
-    digest: str
     bound: Mapping[str, Graph]
     route: str
     stages: Sequence[tuple[str, Graph]]
-    inputs: Mapping[str, Any]
+    derivation: Graph | None = None
+
+
+def prepare(graphs: Mapping[str, Graph], values: Mapping[str, Fraction], options: Options) -> Prepared:
+    """Bind all numbers, or only those that are zero where the others are read at run time, and optimise."""
+    if options.params == "baked" or not any(graph.params for graph in graphs.values()):
+        bound = {route: bind(graph, values) for route, graph in graphs.items()}
+        return Prepared(bound, *cheapest(bound))
+    zeros = {path: value for path, value in values.items() if value == 0}
+    bound = {route: bind(graph, zeros) for route, graph in graphs.items()}
+    lifted = {route: lift(graph, values) for route, graph in bound.items()}
+    route, stages = cheapest({route: graph for route, (graph, _) in lifted.items()})
+    final, derivation = settle(stages[-1][1], lifted[route][1])
+    return Prepared(bound, route, [*stages[:-1], (stages[-1][0], final)], derivation)
+
+
+@dataclass(frozen=True)
+class Candidate(Prepared):
+    """A kernel with its graphs prepared, before they are compared; ``values`` are its numbers, derived ones included."""
+
+    kernel: Kernel = field(kw_only=True)
+    digest: str = field(kw_only=True)
+    inputs: Mapping[str, Any] = field(kw_only=True)
 
     @property
     def final(self) -> Graph:
@@ -152,23 +189,50 @@ def make_records(
     Raises VerificationError where two routes, or the graphs before and after a pass, differ.
     """
     values = values_of(tasks[0][0])
-    numbers = values if options.params == "baked" else {}
-    known: dict[tuple[str, ...], tuple[Mapping[str, Graph], str, Sequence[tuple[str, Graph]]]] = {}
+    known: dict[tuple[str, ...], Prepared] = {}
     candidates = []
     for kernel, graphs, digest in tasks:
         digests = tuple(graph.digest for graph in graphs.values())
         if digests not in known:
-            bound = {route: bind(graph, numbers) for route, graph in graphs.items()}
-            known[digests] = (bound, *cheapest(bound))
+            known[digests] = prepare(graphs, values, options)
         inputs = draw(kernel.inputs, kernel.path, options.dtype)
-        candidates.append(Candidate(kernel, digest, *known[digests], inputs))
+        candidates.append(Candidate(**vars(known[digests]), kernel=kernel, digest=digest, inputs=inputs))
+    derivations = [c.derivation for c in candidates if c.derivation is not None]
+    values = with_derived(values, derivations)
     cases = [(graph, c.inputs) for c in candidates for graph in (*c.bound.values(), c.final)]
     found = iter(ball_values_together(cases, values))
     made = []
     for (_, graphs, _), candidate in zip(tasks, candidates, strict=True):
         exact = {route: next(found) for route in candidate.bound}
         made.append(_record(candidate, graphs, exact, next(found), values, prefix, options))
+    if not derivations:
+        return made
+    first = tasks[0][0]
+    others = with_derived(varied(values_of(first), first.path), derivations)
+    found = iter(ball_values_together(cases, others))
+    for position, candidate in enumerate(candidates):
+        exact_there = [next(found) for _ in (*candidate.bound, "final")]
+        if candidate.derivation is not None:
+            made[position] = replace(made[position], varied=_varied(candidate, exact_there))
     return made
+
+
+def with_derived(values: Mapping[str, Fraction], derivations: Iterable[Graph]) -> Mapping[str, Fraction]:
+    """The numbers of a part, and those derived from them, to 400 bits."""
+    return {**values, **{k: v for graph in derivations for k, v in exact_values(graph, values).items()}}
+
+
+def _varied(candidate: Candidate, exact: Sequence[BallArrays]) -> Varied:
+    """The reference with other numbers. Raises VerificationError where the routes or the emitted graph differ."""
+    definition = exact[0]
+    rows = domain(definition)
+    if 2 * len(rows) < len(next(iter(candidate.inputs.values()))):
+        raise VerificationError(f"{candidate.kernel.name}: a thousandth more or less leaves its domain at most samples")
+    there = [{name: [[column[i] for i in rows] for column in each] for name, each in one.items()} for one in exact]
+    worst = max(disagreement(there[0], other, lambda _: 1.0) for other in there[1:])
+    if not worst <= ROUTES_AGREE:
+        raise VerificationError(f"{candidate.kernel.name}: with other numbers its graphs differ by {worst:.1e}")
+    return Varied(tuple(rows), reference(there[0]))
 
 
 def _record(
@@ -208,8 +272,10 @@ def _record(
     left = {path: values[path] for path in final.params}
     steps = [(step, cost(graph)) for step, graph in [("derivation", candidate.bound[route]), *candidate.stages]]
     costs = tuple((step, spent.operations, round(spent.weight)) for step, spent in steps)
+    zeros = tuple(sorted({path for graph in graphs.values() for path in graph.params if values[path] == 0}))
     return Record(
-        candidate.digest, final, function, text, route, agreement, passes, reference(definition), left, costs
+        candidate.digest, final, function, text, route, agreement, passes, reference(definition), left, costs,
+        derivation=candidate.derivation, zeros=zeros if options.params == "runtime" else (),
     )  # fmt: skip
 
 
@@ -232,6 +298,7 @@ def make_solver_record(
     """Bind a solver to the kernels it uses, and find the exact solutions of its samples."""
     solver = solver_of(kernel)
     runtime = any(record.graph is not None and record.graph.params for record in used.values())
+    runtime |= options.params == "runtime" and bool(solver.limits)
     functions = {family: record.function for family, record in used.items()}
     function, text = solver_function(kernel, solver, prefix, options, functions, runtime)
     problem = problem_of(kernel, used)
@@ -240,10 +307,17 @@ def make_solver_record(
     return Record(digest, None, function, text, "solver", 0.0, 0.0, problem.solve(inputs), costs=costs, inputs=inputs)
 
 
-def problem_of(kernel: Kernel, used: Mapping[str, Record]) -> Problem:
-    """The problem of a kernel with a solver. Kernels that it calls may be of other parts, so their numbers are bound."""
-    solver = solver_of(kernel)
-    graphs = {family: fill(record.graph, record.values) for family, record in used.items() if record.graph is not None}
+def problem_of(kernel: Kernel, used: Mapping[str, Record], rounded: Mapping[str, Fraction] | None = None) -> Problem:
+    """The problem of a kernel with a solver. Kernels that it calls may be of other parts, so their numbers are bound.
+
+    ``rounded`` are derived numbers as the C has computed them, by path, in place of the exact ones.
+    """
+    solver, own = solver_of(kernel), rounded or {}
+    graphs = {
+        family: fill(record.graph, {path: own.get(path, value) for path, value in record.values.items()})
+        for family, record in used.items()
+        if record.graph is not None
+    }
     return PROBLEMS[solver.problem](solver, graphs, values_of(kernel))
 
 

@@ -43,8 +43,8 @@ def proof_rows(verdicts: Iterable[Verdict], manifest: Mapping[str, Any]) -> list
     return [
         (
             v.name,
-            operations_text(entries[v.name]),
-            str(entries[v.name]["cost"]["sincos"]),
+            operations_text(entries[v.name]) if v.name in entries else "at load",
+            str(entries[v.name]["cost"]["sincos"]) if v.name in entries else "at load",
             f"{v.worst_ulp:.3g}",
             f"{v.worst_scaled_error:.1e}",
             f"{v.agreement:.0e}",
@@ -52,6 +52,17 @@ def proof_rows(verdicts: Iterable[Verdict], manifest: Mapping[str, Any]) -> list
         )
         for v in verdicts
     ]
+
+
+def print_numbers(rows: Sequence[Mapping[str, Any]], file: Path | None, size: int) -> None:
+    """The numbers that kernels read at run time, with units and ranges, or the file that they were written to."""
+    if file is not None:
+        print(f"{file}: {len(rows)} numbers, {size} bytes")
+        return
+    table = [
+        (row["path"], f"{row['value']:.9g}", row["unit"], f"{row['low']:.6g} to {row['high']:.6g}") for row in rows
+    ]
+    print_table(("number", "value", "unit", "range"), table)
 
 
 def print_proof(proof: Proof, manifest: Mapping[str, Any]) -> None:

@@ -53,6 +53,21 @@ def compared(where: str, printed: str, ours: float, reason: str, otherwise: Verd
     return Printed(where, printed, f"{ours:.7g}", "agrees" if agrees else otherwise, reason)
 
 
+def misprint(where: str, printed: str, ours: str, reason: str) -> Printed:
+    """Something that the source prints wrong, and what is right."""
+    return Printed(where, printed, ours, "misprint", reason)
+
+
+def judged(holds: bool, where: str, printed: str, ours: str, reason: str) -> Printed:
+    """A statement of the source that agrees with what we compute, or cannot be reproduced."""
+    return Printed(where, printed, ours, "agrees" if holds else "not reproducible", reason)
+
+
+def listed(values: Any, spec: str, separator: str = ", ") -> str:
+    """Numbers in one format, as text."""
+    return separator.join(f"{value:{spec}}" for value in values)
+
+
 def same_digits(printed: str, ours: float) -> bool:
     """Whether our value, rounded to the printed digits, is the printed value.
 

@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from awiwi_gen import extras
 from awiwi_gen.errors import InputError, unknown
 
 
@@ -52,6 +53,26 @@ def no_kernel(hand: Any, file: Path | None, name: str, known: Any) -> InputError
     return InputError(reason) if reason else unknown("kernel", name, known, f"see {listing(file)}")
 
 
+def find_kernel(name: str, file: Path | None, output: Path | None) -> Any:
+    """A compiled kernel of a hand file, or of a generated directory. Raises InputError where it does not exist."""
+    import awiwi_gen
+
+    if output is None:
+        extras.require("call without -o", *extras.GENERATE)
+        hand = awiwi_gen.Hand.load(file)
+        library = awiwi_gen.build(hand)
+        if name not in library:
+            raise no_kernel(hand, file, name, library)
+    elif file is None:
+        require(output)
+        library = awiwi_gen.load(output)
+        if name not in library:
+            raise unknown("kernel", name, library, f"see awiwi-gen list -o {output}")
+    else:
+        raise InputError("call: --hand and -o name two sources of one kernel; leave one of them out")
+    return library[name]
+
+
 def parse_inputs(texts: list[str], function: Any) -> dict[str, Any]:
     """``q=0.1,0.2`` as named arrays; as many numbers as an input has elements take its shape."""
     import numpy as np
@@ -85,3 +106,25 @@ def read_json_inputs() -> dict[str, Any]:
 def _with_nan(value: Any) -> Any:
     """JSON's null as NaN, which is what `print_json` writes it for."""
     return [*map(_with_nan, value)] if isinstance(value, list) else float("nan") if value is None else value
+
+
+def prove(job: Any, hand: Path | None, output: Path, as_json: bool) -> int:
+    """Verify a directory, print the proof sheet, return the exit code."""
+    from awiwi_gen.pipeline import state
+    from awiwi_gen.pipeline import verify as examine
+    from awiwi_gen.report import print_json, print_proof, state_lines
+
+    found = state(job, output)
+    if found.stale or found.lost:
+        lines = state_lines(found, str(output), fix(job, hand, output))
+        if as_json:
+            print_json({"error": "stale", "message": "\n".join(lines), **vars(found)})
+        else:
+            print("\n".join(lines), file=sys.stderr)
+        return 1
+    proof = examine(job, output)
+    if as_json:
+        print_json([verdict.as_dict() for verdict in proof.verdicts])
+    else:
+        print_proof(proof, require(output))
+    return 0 if proof.passed else 1

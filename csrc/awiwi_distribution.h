@@ -49,7 +49,10 @@ typedef struct awiwi_tendons {
    nearest to stiffness[joints][joints] in the Frobenius norm. AWIWI_INFEASIBLE where the limits forbid the torque.
    Pairs: the optimum in closed form, up to one inversion of the curve for each. Other tendons: an active-set Newton
    method from three starts. `tolerance` is that of forces, relative to the upper limit. The curve is evaluated at most
-   AWIWI_MOST_CURVES times. Returns an awiwi_status; the forces are always within the limits if low <= high. */
+   AWIWI_MOST_CURVES times.
+   Returns an awiwi_status. After AWIWI_OUT_OF_DOMAIN (a limit is outside the curve, or low > high) and AWIWI_NOT_FINITE
+   all forces are equal: in the middle of the limits if both are on the curve, at the lower limit if only that is, else
+   zero. Otherwise they are within the limits. */
 int awiwi_distribute(const awiwi_tendons *tendons, const awiwi_real *torque, const awiwi_real *stiffness,
                      awiwi_real tolerance, awiwi_real *forces);
 

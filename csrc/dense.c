@@ -79,6 +79,35 @@ int awiwi_solve(int n, int m, awiwi_real *A, awiwi_real *B)
     return 1;
 }
 
+awiwi_real awiwi_solve_positive(int n, int width, awiwi_real *H, awiwi_real least, const awiwi_real *b, awiwi_real *x)
+{
+    awiwi_real smallest = AWIWI_REAL_MAX;
+    int done = 0;
+    for (; done < n && smallest > least; done++) { /* L below the diagonal, pivots on it */
+        awiwi_real *row = H + done * width;
+        x[done] = b[done];
+        for (int k = 0; k < done; k++) {
+            awiwi_real sum = row[k];
+            for (int i = 0; i < k; i++)
+                sum -= row[i] * H[i * width + i] * H[k * width + i];
+            row[k] = sum / H[k * width + k];
+            row[done] -= row[k] * sum;
+            x[done] -= row[k] * x[k];
+        }
+        smallest = row[done] >= smallest ? smallest : row[done];
+    }
+    const int solved = smallest > least;
+    for (int i = 0; !solved && i < n; i++)
+        x[i] = i == done - 1;
+    for (int j = done - 1; j >= 0; j--) {
+        if (solved)
+            x[j] /= H[j * width + j];
+        for (int k = j + 1; k < done; k++)
+            x[j] -= H[k * width + j] * x[k];
+    }
+    return smallest;
+}
+
 /* By elimination: a pivot that vanishes must have nothing beside it. */
 int awiwi_is_semidefinite(int n, const awiwi_real *Q)
 {

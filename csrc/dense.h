@@ -44,6 +44,10 @@ void awiwi_product(int n, const awiwi_real *A, const awiwi_real *B, awiwi_real *
 /* Solve A X = B for the n x m matrix X, in place of B; A is used up. Returns 0 if A is singular. */
 int awiwi_solve(int n, int m, awiwi_real *A, awiwi_real *B);
 
+/* Solve H x = b by Cholesky's method without roots, for the lower half of H [n][n] in rows of `width`; H is used up.
+   Returns the smallest pivot. If that is not above `least`, x is instead a vector with x'H x equal to the pivot. */
+awiwi_real awiwi_solve_positive(int n, int width, awiwi_real *H, awiwi_real least, const awiwi_real *b, awiwi_real *x);
+
 /* Whether x'Q x is nowhere negative but for rounding, of a symmetric Q with n up to 4. */
 int awiwi_is_semidefinite(int n, const awiwi_real *Q);
 

@@ -179,31 +179,45 @@ static int gives(const awiwi_tendons *t, const awiwi_real *f, const awiwi_real *
     return 1;
 }
 
-/* The result where none can be found: all forces in the middle of the limits. */
-static void fall_back(const awiwi_tendons *t, int bounded, awiwi_real *f)
+static int all_at(const awiwi_tendons *t, awiwi_real force, awiwi_real *f)
 {
+    vector k, slope, curvature;
     for (int i = 0; i < t->tendons; i++)
-        f[i] = bounded ? t->low + (t->high - t->low) / 2 : 0;
+        f[i] = force;
+    return t->curve(t->context, f, k, slope, curvature) == 0;
+}
+
+/* The forces where no result can be found: all in the middle of the limits if both are on the curve, all at the lower
+   limit if only that is, else zero. Returns the status. */
+static int fall_back(const awiwi_tendons *t, int status, awiwi_real *f)
+{
+    const int ordered = t->low <= t->high && awiwi_all_finite(&t->low, 1) && awiwi_all_finite(&t->high, 1);
+    if (ordered && all_at(t, t->high, f) && all_at(t, t->low, f))
+        (void)all_at(t, t->low + (t->high - t->low) / 2, f);
+    else if (!(t->low >= 0 && t->low <= AWIWI_REAL_MAX && all_at(t, t->low, f)))
+        for (int i = 0; i < t->tendons; i++)
+            f[i] = 0;
+    return status;
 }
 
 int awiwi_distribute(const awiwi_tendons *t, const awiwi_real *tau, const awiwi_real *K, awiwi_real tolerance,
                      awiwi_real *f)
 {
-    const int bounded = awiwi_all_finite(&t->low, 1) && awiwi_all_finite(&t->high, 1);
     int status = AWIWI_OK;
-    fall_back(t, bounded, f);
-    if (!bounded || !awiwi_all_finite(tau, t->joints) || !awiwi_all_finite(K, t->joints * t->joints) ||
-        !awiwi_all_finite(t->coupling, t->tendons * t->joints))
-        return AWIWI_NOT_FINITE;
+    if (!awiwi_all_finite(&t->low, 1) || !awiwi_all_finite(&t->high, 1) || !awiwi_all_finite(tau, t->joints) ||
+        !awiwi_all_finite(K, t->joints * t->joints) || !awiwi_all_finite(t->coupling, t->tendons * t->joints))
+        return fall_back(t, AWIWI_NOT_FINITE, f);
     if (!(t->low <= t->high))
-        return AWIWI_OUT_OF_DOMAIN;
+        return fall_back(t, AWIWI_OUT_OF_DOMAIN, f);
+    for (int i = 0; i < t->tendons; i++) /* each part of the tendons leaves those of the other alone */
+        f[i] = t->low + (t->high - t->low) / 2;
     if (t->pairs > 0)
         status = distribute_pairs(t, tau, K, tolerance, f);
     if (t->searched > 0 && status == AWIWI_OK)
         status = awiwi_search_forces(t, tau, K, tolerance, f);
-    if (!awiwi_all_finite(f, t->tendons)) {
-        fall_back(t, bounded, f);
-        return AWIWI_NOT_FINITE;
-    }
+    if (!awiwi_all_finite(f, t->tendons))
+        status = AWIWI_NOT_FINITE;
+    if (status == AWIWI_OUT_OF_DOMAIN || status == AWIWI_NOT_FINITE)
+        return fall_back(t, status, f);
     return status == AWIWI_OK && !gives(t, f, tau) ? AWIWI_INFEASIBLE : status;
 }

@@ -1,8 +1,8 @@
 /* Tendon forces by search, for tendons that are not antagonistic pairs: a primal active-set Newton method.
 
    First the torque: forces within the limits with the least |tau + P' f|. Then the stiffness, in the moves that keep
-   the torque. Tendons at a limit are held there until the slope of the cost says that they should leave; all others
-   share a Newton step that is cut where the first of them reaches a limit. So every iterate keeps both. */
+   it. Tendons at a limit are held there until the slope of the cost lets them leave; all others share a Newton step, cut
+   where the first of them reaches a limit. So every iterate keeps both. */
 #include "numerics.h"
 #include "awiwi_distribution.h"
 #include "dense.h"
@@ -40,10 +40,12 @@ typedef struct moves {
     awiwi_real square[AWIWI_MOST_TENDONS];
 } moves;
 
-enum { AT_LOW = -1, FREE = 0, AT_HIGH = 1 };
-
-static const awiwi_real LEAST_SHARE = (awiwi_real)1 / 32; /* of a unit move that is worth a direction: below 1 / 16 */
+static const awiwi_real LEAST_SHARE = (awiwi_real)1 / 32;     /* of a unit move that is worth a direction: below 1 / 16 */
 static const awiwi_real DAMPING = (awiwi_real)1 / 4096;       /* of steps where the Hessian is not positive */
+static const awiwi_real BENT = 4096 * AWIWI_REAL_EPSILON;     /* negative curvature, relative to the trace */
+static const awiwi_real LITTLE = (awiwi_real)1 / 16;          /* gain by a step, relative to the cost */
+enum { BENDS = 8 };                                           /* trials along a direction of negative curvature */
+enum { AT_LOW = -1, FREE = 0, AT_HIGH = 1 };
 
 /* Half of |tau + P' f|^2. */
 static int torque_cost(const task *s, const vector f, model *c)
@@ -181,67 +183,59 @@ static void split(const task *s, const int *held, moves *m)
     }
 }
 
-/* x of H x = b by Cholesky without roots; 0 where H is not positive definite by a margin. */
-static int solve(int n, matrix H, awiwi_real least, const vector b, vector x)
+/* The sum of the moves that keep the torque, x times each; its largest entry is `size` if that is not 0. */
+static void combine(const task *s, const moves *m, const vector x, awiwi_real size, vector sum)
 {
-    matrix L;
-    vector d;
-    for (int j = 0; j < n; j++) {
-        d[j] = H[j][j];
-        x[j] = b[j];
-        for (int k = 0; k < j; k++) {
-            awiwi_real sum = H[j][k];
-            for (int i = 0; i < k; i++)
-                sum -= L[j][i] * d[i] * L[k][i];
-            L[j][k] = sum / d[k];
-            d[j] -= L[j][k] * sum;
-            x[j] -= L[j][k] * x[k];
-        }
-        if (!(d[j] > least))
-            return 0;
+    for (int i = 0; i < s->count; i++) {
+        sum[i] = 0;
+        for (int j = m->rank; j < m->count; j++)
+            sum[i] += x[j - m->rank] * m->along[j][i];
     }
-    for (int j = n - 1; j >= 0; j--) {
-        x[j] /= d[j];
-        for (int k = j + 1; k < n; k++)
-            x[j] -= L[k][j] * x[k];
-    }
-    return 1;
+    const awiwi_real largest = awiwi_largest(sum, s->count);
+    for (int i = 0; awiwi_size(size) > 0 && i < s->count; i++)
+        sum[i] *= size / largest;
 }
 
 /* Newton's step of the free tendons along the moves that are allowed; where the Hessian is not positive, a damped
-   Gauss-Newton step. Returns the predicted decrease. */
-static awiwi_real newton(const task *s, const model *c, const moves *m, vector step)
+   Gauss-Newton step. Returns the predicted decrease. `bend` becomes a downhill direction along which the cost curves
+   down, as long as the range of forces. Both are zero before, and stay so where there is none. */
+static awiwi_real newton(const task *s, const model *c, const moves *m, vector step, vector bend)
 {
     const int n = m->count - m->rank;
+    const awiwi_real range = s->t->high - s->t->low, near = c->cost / (range * range);
     matrix H, full;
     vector b, x, product;
-    awiwi_real trace = 0;
+    awiwi_real trace = 0, pivot, shift = 0;
     for (int j = 0; j < n; j++) {
         const awiwi_real *v = m->along[m->rank + j];
         b[j] = -awiwi_dot(v, c->gradient, s->count);
         for (int i = 0; i < s->count; i++)
             product[i] = awiwi_dot(c->hessian[i], v, s->count);
-        for (int l = 0; l <= j; l++) {
-            const awiwi_real *w = m->along[m->rank + l];
-            H[j][l] = full[j][l] = awiwi_dot(w, product, s->count);
-            for (int i = 0; i < s->count; i++)
-                full[j][l] += v[i] * c->curvature[i] * w[i];
-        }
+        for (int l = 0; l <= j; l++)
+            H[j][l] = awiwi_dot(m->along[m->rank + l], product, s->count);
         trace += H[j][j];
     }
-    for (int i = 0; i < s->count; i++)
-        step[i] = 0;
-    if (!solve(n, full, 64 * AWIWI_REAL_EPSILON * trace, b, x)) {
-        /* less damping near the demand: where tendons do the same, the cost is flat along exchanges between them */
-        const awiwi_real range = s->t->high - s->t->low, near = c->cost / (range * range);
+    const awiwi_real least = 64 * AWIWI_REAL_EPSILON * trace, flat = awiwi_sqrt(AWIWI_REAL_EPSILON) * trace;
+    do { /* little damping near the demand: where tendons do the same, the cost is flat along exchanges between them */
+        for (int j = 0; j < n; j++) {
+            for (int l = 0; l <= j; l++) {
+                full[j][l] = l == j ? H[j][l] + shift : H[j][l];
+                for (int i = 0; i < s->count; i++)
+                    full[j][l] += m->along[m->rank + j][i] * c->curvature[i] * m->along[m->rank + l][i];
+            }
+        }
+        pivot = awiwi_solve_positive(n, AWIWI_MOST_TENDONS, full[0], least, b, x);
+        if (!(shift > 0) && pivot < -BENT * trace)
+            combine(s, m, x, awiwi_dot(b, x, n) < 0 ? -range : range, bend);
+        shift = shift > 0 ? 16 * shift : (near < flat ? near : flat) + least;
+    } while (!(pivot > least) && shift < DAMPING * trace);
+    if (!(pivot > least)) {
         for (int j = 0; j < n; j++)
-            H[j][j] += near < DAMPING * trace ? near + 64 * AWIWI_REAL_EPSILON * trace : DAMPING * trace;
-        if (!solve(n, H, 0, b, x))
+            H[j][j] += near < DAMPING * trace ? near + least : DAMPING * trace;
+        if (!(awiwi_solve_positive(n, AWIWI_MOST_TENDONS, H[0], 0, b, x) > 0))
             return 0;
     }
-    for (int j = 0; j < n; j++)
-        for (int i = 0; i < s->count; i++)
-            step[i] += x[j] * m->along[m->rank + j][i];
+    combine(s, m, x, 0, step);
     return awiwi_dot(b, x, n) / 2;
 }
 
@@ -249,7 +243,8 @@ static awiwi_real newton(const task *s, const model *c, const moves *m, vector s
    there is none. Slopes within rounding of their terms count as level. */
 static int leaving(const task *s, const model *c, const moves *m, const int *held)
 {
-    awiwi_real price[AWIWI_MOST_JOINTS] = {0}, most;
+    awiwi_real price[AWIWI_MOST_JOINTS] = {0};
+    awiwi_real most = 256 * AWIWI_REAL_EPSILON * awiwi_largest(c->gradient, s->count);
     int found = -1;
     for (int k = m->rank - 1; k >= 0; k--) {
         awiwi_real sum = -awiwi_dot(m->along[k], c->gradient, s->count) / m->square[k];
@@ -257,7 +252,6 @@ static int leaving(const task *s, const model *c, const moves *m, const int *hel
             sum -= m->lower[l][k] * price[m->joint[l]];
         price[m->joint[k]] = sum;
     }
-    most = 256 * AWIWI_REAL_EPSILON * awiwi_largest(c->gradient, s->count);
     for (int i = 0; i < s->count; i++) {
         const awiwi_real gain = (awiwi_real)held[i] * (c->gradient[i] + awiwi_dot(s->p[i], price, s->t->joints));
         if (gain > most) {
@@ -283,60 +277,84 @@ static awiwi_real reach(const task *s, const vector f, const vector step, int *s
     return share > 0 ? share : 0;
 }
 
+/* Take as much of a step as the limits allow and the cost permits: at most `most` afterwards. Each trial is one of the
+   steps left. */
+static int take(const task *s, const vector step, awiwi_real most, int *steps, vector f, model *here, int *stopped)
+{
+    for (awiwi_real share = reach(s, f, step, stopped); share > 0; share /= 2, *stopped = -1) {
+        vector trial;
+        model there;
+        for (int i = 0; i < s->count; i++)
+            trial[i] = awiwi_clamp(f[i] + share * step[i], s->t->low, s->t->high);
+        if (cost(s, trial, &there))
+            return AWIWI_OUT_OF_DOMAIN;
+        if (there.cost <= most) {
+            for (int i = 0; i < s->count; i++)
+                f[i] = trial[i];
+            *here = there;
+            return AWIWI_OK;
+        }
+        if (--*steps <= 0)
+            break;
+    }
+    return AWIWI_NOT_CONVERGED;
+}
+
 /* From f down to where no free move and no leaving tendon lowers the cost. */
 static int descend(const task *s, int steps, vector f, model *here)
 {
-    int held[AWIWI_MOST_TENDONS] = {0}, left = -1, stopped;
-    awiwi_real last = AWIWI_REAL_MAX;
-    model there;
+    int held[AWIWI_MOST_TENDONS] = {0}, left = -1, stopped, straight = 0, changed = 1;
+    awiwi_real last = 0;
     moves m;
     if (cost(s, f, here))
         return AWIWI_OUT_OF_DOMAIN;
-    split(s, held, &m);
     while (steps-- > 0) {
-        vector step, trial;
-        const awiwi_real gain = newton(s, here, &m, step), longest = awiwi_largest(step, s->count);
+        vector step = {0}, bend = {0};
+        if (changed) {
+            split(s, held, &m);
+            last = AWIWI_REAL_MAX;
+            straight = changed = 0;
+        }
+        const awiwi_real gain = newton(s, here, &m, step, bend), longest = awiwi_largest(step, s->count);
         if (!(longest <= AWIWI_REAL_MAX))
             return AWIWI_NOT_FINITE;
-        awiwi_real share = reach(s, f, step, &stopped);
         const int rounding = gain <= here->blur && 2 * longest >= last; /* nothing to gain, and no nearer */
+        const int ended = longest <= s->tolerance * s->t->high || rounding;
+        const awiwi_real *way = step;
         last = longest;
-        if (longest <= s->tolerance * s->t->high || rounding) {
+        if ((ended || (!straight && gain <= LITTLE * here->cost)) && here->cost > here->blur && steps > BENDS
+            && awiwi_largest(bend, s->count) > 0) { /* off a saddle, or from the way to one */
+            int trials = BENDS;
+            const int status = take(s, bend, here->cost - here->blur, &trials, f, here, &stopped);
+            if (status == AWIWI_OUT_OF_DOMAIN)
+                return status;
+            steps -= BENDS - trials;
+            straight = status != AWIWI_OK;
+            way = straight ? step : bend;
+        }
+        if (way == step && ended) {
+            const awiwi_real share = reach(s, f, step, &stopped);
             for (int i = 0; i < s->count; i++)
                 f[i] = awiwi_clamp(f[i] + share * step[i], s->t->low, s->t->high);
             left = leaving(s, here, &m, held);
             if (left < 0)
                 return AWIWI_OK;
             held[left] = FREE;
-            last = AWIWI_REAL_MAX;
-            split(s, held, &m);
+            changed = 1;
             continue;
         }
-        if (share > 0) {
-            for (;;) { /* each trial is one of the steps */
-                for (int i = 0; i < s->count; i++)
-                    trial[i] = awiwi_clamp(f[i] + share * step[i], s->t->low, s->t->high);
-                if (cost(s, trial, &there))
-                    return AWIWI_OUT_OF_DOMAIN;
-                if (there.cost <= here->cost + here->blur)
-                    break;
-                if (--steps <= 0)
-                    return AWIWI_NOT_CONVERGED;
-                share /= 2;
-                stopped = -1;
-            }
-            for (int i = 0; i < s->count; i++)
-                f[i] = trial[i];
-            *here = there;
-        } else if (stopped == left) {
+        if (way == step && reach(s, f, step, &stopped) > 0) {
+            const int status = take(s, step, here->cost + here->blur, &steps, f, here, &stopped);
+            if (status != AWIWI_OK)
+                return status;
+        } else if (way == step && stopped == left) {
             return AWIWI_OK; /* leaving the limit gained nothing but rounding */
         }
         left = -1;
         if (stopped >= 0) {
-            held[stopped] = step[stopped] < 0 ? AT_LOW : AT_HIGH;
-            f[stopped] = step[stopped] < 0 ? s->t->low : s->t->high;
-            last = AWIWI_REAL_MAX;
-            split(s, held, &m);
+            held[stopped] = way[stopped] < 0 ? AT_LOW : AT_HIGH;
+            f[stopped] = way[stopped] < 0 ? s->t->low : s->t->high;
+            changed = 1;
         }
     }
     return AWIWI_NOT_CONVERGED;
@@ -346,7 +364,7 @@ int awiwi_search_forces(const awiwi_tendons *t, const awiwi_real *tau, const awi
                         awiwi_real *f)
 {
     const awiwi_real starts[3] = {t->low + (t->high - t->low) / 2, t->low, t->high};
-    task s = {t, tau, K, {0}, {0}, t->searched, 0, 0, f};
+    task s = {t, tau, K, {0}, {0}, t->searched, 1, tolerance, f};
     awiwi_real least = 0;
     vector best, trial;
     model found;
@@ -359,11 +377,10 @@ int awiwi_search_forces(const awiwi_tendons *t, const awiwi_real *tau, const awi
     for (int start = 0; start < 3; start++) {
         for (int i = 0; i < s.count; i++)
             trial[i] = starts[start];
-        s.keep_torque = 0;
-        s.tolerance = 4 * AWIWI_REAL_EPSILON;
-        int ended = descend(&s, AWIWI_MOST_TORQUE_STEPS, trial, &found);
-        s.keep_torque = 1;
-        s.tolerance = tolerance;
+        task torque = s;
+        torque.keep_torque = 0;
+        torque.tolerance = 4 * AWIWI_REAL_EPSILON;
+        int ended = descend(&torque, AWIWI_MOST_TORQUE_STEPS, trial, &found);
         if (ended == AWIWI_OK)
             ended = descend(&s, AWIWI_MOST_STIFFNESS_STEPS, trial, &found);
         if (ended != AWIWI_OK && ended != AWIWI_NOT_CONVERGED)

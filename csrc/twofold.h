@@ -1,9 +1,10 @@
 /* Numbers of twice the digits, as unevaluated sums of two, by error-free transformations (Dekker, Knuth). They need
-   arithmetic in the declared type and no contraction to fused multiply-add. Not part of the firmware interface. */
+   arithmetic in the declared type, and hold with and without contraction to fused multiply-add. Not part of the firmware
+   interface. */
 #ifndef AWIWI_TWOFOLD_H
 #define AWIWI_TWOFOLD_H
 
-#include "real.h"
+#include "bits.h"
 
 /* high + low, of which high is the nearest number. */
 typedef struct awiwi_twofold {
@@ -25,14 +26,25 @@ static inline awiwi_twofold awiwi_twofold_add(awiwi_twofold x, awiwi_twofold y)
     return awiwi_joined(sum, lost + (x.low + y.low));
 }
 
-/* a b without rounding: halves of the digits have products that fit. */
+/* The upper half of a's digits, rounded, so that what is left of a has as few; products of such halves are exact. */
+static inline awiwi_real awiwi_half(awiwi_real a)
+{
+    const awiwi_bits one = 1;
+    awiwi_bits b;
+    memcpy(&b, &a, sizeof b);
+    b += one << (AWIWI_HALF_BITS - 1);
+    b = b >> AWIWI_HALF_BITS << AWIWI_HALF_BITS;
+    memcpy(&a, &b, sizeof a);
+    return a;
+}
+
+/* a b without rounding: the sum of four products of halves. No other product is formed, for a compiler could fuse it
+   with a sum; these are exact, so that fusing them changes nothing. */
 static inline awiwi_twofold awiwi_exact_product(awiwi_real a, awiwi_real b)
 {
-    const awiwi_real split = AWIWI_REAL_EPSILON < (awiwi_real)1e-10 ? (awiwi_real)134217729 : (awiwi_real)4097;
-    const awiwi_real a1 = split * a - (split * a - a), a2 = a - a1;
-    const awiwi_real b1 = split * b - (split * b - b), b2 = b - b1, product = a * b;
-    const awiwi_twofold x = {product, a2 * b2 - (((product - a1 * b1) - a2 * b1) - a1 * b2)};
-    return x;
+    const awiwi_real a1 = awiwi_half(a), a2 = a - a1, b1 = awiwi_half(b), b2 = b - b1;
+    const awiwi_twofold first = {a1 * b1, 0}, second = {a1 * b2, 0}, third = {a2 * b1, 0}, fourth = {a2 * b2, 0};
+    return awiwi_twofold_add(awiwi_twofold_add(awiwi_twofold_add(first, second), third), fourth);
 }
 
 static inline awiwi_twofold awiwi_twofold_multiply(awiwi_twofold x, awiwi_twofold y)

@@ -26,6 +26,9 @@
  *   out  load[1] in N m
  *   out  modelled[2] in N m
  *   out  resistance[2] in N m
+ * Returns 0 where all inputs and outputs are finite and the period is positive and the link's inertia
+ * is positive and motor 1's inertia is positive and motor 2's inertia is positive; else 1, and outputs
+ * without a value are NaN.
  * Cost: 119 add, 132 mul, 13 div, 4 neg, 12 calls.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
@@ -34,7 +37,7 @@
 #include "elementary.h"
 #include "kernels.h"
 
-void awiwi_antagonistic_observer(const double memory_in[restrict 13], const double thetas_in[restrict 2], const double stretches_in[restrict 2], const double measured_in[restrict 2], const double acted_in[restrict 2], const double acting_in[restrict 2], const double inertias_in[restrict 3], const double tendons_in[restrict 6], const double damping_in[restrict 1], const double friction_in[restrict 3], const double bandwidths_in[restrict 4], const double period_in[restrict 1], double memory_next_out[restrict 13], double joint_out[restrict 2], double motors_out[restrict 4], double torques_out[restrict 4], double springs_out[restrict 4], double load_out[restrict 1], double modelled_out[restrict 2], double resistance_out[restrict 2])
+int awiwi_antagonistic_observer(const double memory_in[restrict 13], const double thetas_in[restrict 2], const double stretches_in[restrict 2], const double measured_in[restrict 2], const double acted_in[restrict 2], const double acting_in[restrict 2], const double inertias_in[restrict 3], const double tendons_in[restrict 6], const double damping_in[restrict 1], const double friction_in[restrict 3], const double bandwidths_in[restrict 4], const double period_in[restrict 1], double memory_next_out[restrict 13], double joint_out[restrict 2], double motors_out[restrict 4], double torques_out[restrict 4], double springs_out[restrict 4], double load_out[restrict 1], double modelled_out[restrict 2], double resistance_out[restrict 2])
 {
     double s0 = stretches_in[0] - stretches_in[1] + thetas_in[1];
     s0 -= thetas_in[0];
@@ -165,4 +168,18 @@ void awiwi_antagonistic_observer(const double memory_in[restrict 13], const doub
     modelled_out[1] = t78;
     resistance_out[0] = t77 - inertias_in[1]*t38;
     resistance_out[1] = t78 - inertias_in[2]*t44;
+    double nothing = 0.0*memory_in[0] + 0.0*memory_in[1] + 0.0*memory_in[2] + 0.0*memory_in[3] + 0.0*memory_in[4] + 0.0*memory_in[5];
+    nothing += 0.0*memory_in[6] + 0.0*memory_in[7] + 0.0*memory_in[8] + 0.0*memory_in[9] + 0.0*memory_in[10] + 0.0*memory_in[11];
+    nothing += 0.0*memory_in[12] + 0.0*thetas_in[0] + 0.0*thetas_in[1] + 0.0*stretches_in[0] + 0.0*stretches_in[1] + 0.0*measured_in[0];
+    nothing += 0.0*measured_in[1] + 0.0*acted_in[0] + 0.0*acted_in[1] + 0.0*acting_in[0] + 0.0*acting_in[1] + 0.0*inertias_in[0];
+    nothing += 0.0*inertias_in[1] + 0.0*inertias_in[2] + 0.0*tendons_in[0] + 0.0*tendons_in[1] + 0.0*tendons_in[2] + 0.0*tendons_in[3];
+    nothing += 0.0*tendons_in[4] + 0.0*tendons_in[5] + 0.0*damping_in[0] + 0.0*friction_in[0] + 0.0*friction_in[1] + 0.0*friction_in[2];
+    nothing += 0.0*bandwidths_in[0] + 0.0*bandwidths_in[1] + 0.0*bandwidths_in[2] + 0.0*bandwidths_in[3] + 0.0*period_in[0] + 0.0*memory_next_out[0];
+    nothing += 0.0*memory_next_out[1] + 0.0*memory_next_out[2] + 0.0*memory_next_out[3] + 0.0*memory_next_out[4] + 0.0*memory_next_out[5] + 0.0*memory_next_out[6];
+    nothing += 0.0*memory_next_out[7] + 0.0*memory_next_out[8] + 0.0*memory_next_out[9] + 0.0*memory_next_out[10] + 0.0*memory_next_out[11] + 0.0*memory_next_out[12];
+    nothing += 0.0*joint_out[0] + 0.0*joint_out[1] + 0.0*motors_out[0] + 0.0*motors_out[1] + 0.0*motors_out[2] + 0.0*motors_out[3];
+    nothing += 0.0*torques_out[0] + 0.0*torques_out[1] + 0.0*torques_out[2] + 0.0*torques_out[3] + 0.0*springs_out[0] + 0.0*springs_out[1];
+    nothing += 0.0*springs_out[2] + 0.0*springs_out[3] + 0.0*load_out[0] + 0.0*modelled_out[0] + 0.0*modelled_out[1] + 0.0*resistance_out[0];
+    nothing += 0.0*resistance_out[1];
+    return period_in[0] > 0.0 && inertias_in[0] > 0.0 && inertias_in[1] > 0.0 && inertias_in[2] > 0.0 && nothing >= 0.0 ? 0 : 1;
 }

@@ -10,8 +10,8 @@
  *   in   damping[1] in N m s/rad, 0 to 0.005
  *   out  x_des[6] in rad, rad/s, from [-3, -50, -3, -50, -3, -50] to [3, 50, 3, 50, 3, 50]
  *   out  u_des[2] in N m
- * Returns 0 where slope 1 is positive and slope 2 is positive; else 1, and outputs without a value are
- * NaN.
+ * Returns 0 where all inputs and outputs are finite and slope 1 is positive and slope 2 is positive;
+ * else 1, and outputs without a value are NaN.
  * Cost: 15 add, 15 mul, 2 div.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
@@ -40,5 +40,9 @@ int awiwi_antagonistic_setpoint(const double desired_in[restrict 5], const doubl
     s8 += pretension_in[0];
     u_des_out[0] = s8;
     u_des_out[1] = pretension_in[0] - t5 - inertias_in[2]*(desired_in[2] - t7*t3);
-    return slopes_in[0] > 0.0 && slopes_in[1] > 0.0 ? 0 : 1;
+    double nothing = 0.0*desired_in[0] + 0.0*desired_in[1] + 0.0*desired_in[2] + 0.0*desired_in[3] + 0.0*desired_in[4] + 0.0*pretension_in[0];
+    nothing += 0.0*pretension_in[1] + 0.0*pretension_in[2] + 0.0*elongations_in[0] + 0.0*elongations_in[1] + 0.0*slopes_in[0] + 0.0*slopes_in[1];
+    nothing += 0.0*inertias_in[0] + 0.0*inertias_in[1] + 0.0*inertias_in[2] + 0.0*damping_in[0] + 0.0*x_des_out[0] + 0.0*x_des_out[1];
+    nothing += 0.0*x_des_out[2] + 0.0*x_des_out[3] + 0.0*x_des_out[4] + 0.0*x_des_out[5] + 0.0*u_des_out[0] + 0.0*u_des_out[1];
+    return slopes_in[0] > 0.0 && slopes_in[1] > 0.0 && nothing >= 0.0 ? 0 : 1;
 }

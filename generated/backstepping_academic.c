@@ -5,7 +5,8 @@
  *   in   x[2] in 1, from [-3, -10] to [3, 10]
  *   in   k[2] in 1, 0.01 to 10
  *   out  u[1] in 1
- * Returns 0 where k1 is positive and k2 is positive; else 1, and outputs without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and k1 is positive and k2 is positive; else 1, and
+ * outputs without a value are NaN.
  * Cost: 6 add, 7 mul.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
@@ -18,5 +19,6 @@ int awiwi_backstepping_academic(const double x_in[restrict 2], const double k_in
     const double t1 = x_in[1] + t0;
     const double t2 = t1 - x_in[0]*t0;
     u_out[0] = x_in[0]*(-2.0*t2 - 1.0) - k_in[0]*t2 - k_in[1]*(t1 + k_in[0]*x_in[0]);
-    return k_in[0] > 0.0 && k_in[1] > 0.0 ? 0 : 1;
+    double nothing = 0.0*x_in[0] + 0.0*x_in[1] + 0.0*k_in[0] + 0.0*k_in[1] + 0.0*u_out[0];
+    return k_in[0] > 0.0 && k_in[1] > 0.0 && nothing >= 0.0 ? 0 : 1;
 }

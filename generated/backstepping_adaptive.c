@@ -15,12 +15,12 @@
  *   in   tunings[2][4] in 1/s, rad/(N m), rad s^2/(N m), from [0.1, 0.1, 0.01, 1e-06, 0.1, 0.1, 0.01, 1e-06] to [2000, 2000, 100, 100, 2000, 2000, 100, 100]
  *   in   resistance[2] in N m, -4 to 4
  *   out  tau_m[2] in N m
- * Returns 0 where the link's inertia is positive and motor 1's inertia is positive and motor 2's
- * inertia is positive and slope 1 is positive and slope 2 is positive and K_p is positive and K_d is
- * positive and K_3 of motor 1 is positive and K_4 of motor 1 is positive and C_t of motor 1 is
- * positive and C_s of motor 1 is positive and K_3 of motor 2 is positive and K_4 of motor 2 is
- * positive and C_t of motor 2 is positive and C_s of motor 2 is positive; else 1, and outputs without
- * a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and the link's inertia is positive and motor 1's
+ * inertia is positive and motor 2's inertia is positive and slope 1 is positive and slope 2 is
+ * positive and K_p is positive and K_d is positive and K_3 of motor 1 is positive and K_4 of motor 1
+ * is positive and C_t of motor 1 is positive and C_s of motor 1 is positive and K_3 of motor 2 is
+ * positive and K_4 of motor 2 is positive and C_t of motor 2 is positive and C_s of motor 2 is
+ * positive; else 1, and outputs without a value are NaN.
  * Cost: 49 add, 37 mul, 7 div.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
@@ -78,5 +78,12 @@ int awiwi_backstepping_adaptive(const double joint_in[restrict 2], const double 
     s13 += (tunings_in[4] + tunings_in[5])*s9;
     s5 += inertias_in[2]*(t16 - t11*s13);
     tau_m_out[1] = s5;
-    return inertias_in[0] > 0.0 && inertias_in[1] > 0.0 && inertias_in[2] > 0.0 && springs_in[0] > 0.0 && springs_in[2] > 0.0 && impedance_in[0] > 0.0 && impedance_in[1] > 0.0 && tunings_in[0] > 0.0 && tunings_in[1] > 0.0 && tunings_in[2] > 0.0 && tunings_in[3] > 0.0 && tunings_in[4] > 0.0 && tunings_in[5] > 0.0 && tunings_in[6] > 0.0 && tunings_in[7] > 0.0 ? 0 : 1;
+    double nothing = 0.0*joint_in[0] + 0.0*joint_in[1] + 0.0*torques_in[0] + 0.0*torques_in[1] + 0.0*torques_in[2] + 0.0*torques_in[3];
+    nothing += 0.0*desired_in[0] + 0.0*desired_in[1] + 0.0*desired_in[2] + 0.0*desired_in[3] + 0.0*desired_in[4] + 0.0*pretension_in[0];
+    nothing += 0.0*pretension_in[1] + 0.0*pretension_in[2] + 0.0*external_in[0] + 0.0*external_in[1] + 0.0*inertias_in[0] + 0.0*inertias_in[1];
+    nothing += 0.0*inertias_in[2] + 0.0*springs_in[0] + 0.0*springs_in[1] + 0.0*springs_in[2] + 0.0*springs_in[3] + 0.0*damping_in[0];
+    nothing += 0.0*impedance_in[0] + 0.0*impedance_in[1] + 0.0*tunings_in[0] + 0.0*tunings_in[1] + 0.0*tunings_in[2] + 0.0*tunings_in[3];
+    nothing += 0.0*tunings_in[4] + 0.0*tunings_in[5] + 0.0*tunings_in[6] + 0.0*tunings_in[7] + 0.0*resistance_in[0] + 0.0*resistance_in[1];
+    nothing += 0.0*tau_m_out[0] + 0.0*tau_m_out[1];
+    return inertias_in[0] > 0.0 && inertias_in[1] > 0.0 && inertias_in[2] > 0.0 && springs_in[0] > 0.0 && springs_in[2] > 0.0 && impedance_in[0] > 0.0 && impedance_in[1] > 0.0 && tunings_in[0] > 0.0 && tunings_in[1] > 0.0 && tunings_in[2] > 0.0 && tunings_in[3] > 0.0 && tunings_in[4] > 0.0 && tunings_in[5] > 0.0 && tunings_in[6] > 0.0 && tunings_in[7] > 0.0 && nothing >= 0.0 ? 0 : 1;
 }

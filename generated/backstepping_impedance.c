@@ -13,9 +13,10 @@
  *   in   gains[4] in N m/rad, N m s/rad, 1/s, from [0.01, 0.0001, 0.1, 0.1] to [50, 1, 2000, 2000]
  *   in   weights[2] in rad/(N m), rad s^2/(N m), from [0.01, 1e-06] to [100, 100]
  *   out  tau_m[1] in N m
- * Returns 0 where the link's inertia is positive and the motor's inertia is positive and the stiffness
- * is positive and K_p is positive and K_d is positive and K_3 is positive and K_4 is positive and C_t
- * is positive and C_s is positive; else 1, and outputs without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and the link's inertia is positive and the motor's
+ * inertia is positive and the stiffness is positive and K_p is positive and K_d is positive and K_3 is
+ * positive and K_4 is positive and C_t is positive and C_s is positive; else 1, and outputs without a
+ * value are NaN.
  * Cost: 22 add, 16 mul, 4 div.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
@@ -40,5 +41,9 @@ int awiwi_backstepping_impedance(const double state_in[restrict 4], const double
     s6 -= (gains_in[2]*gains_in[3] + weights_in[0]/weights_in[1])*s1;
     s6 -= (gains_in[3] + gains_in[2])*s2;
     tau_m_out[0] = state_in[2] + plant_in[1]*(t4 + s6/plant_in[2]);
-    return plant_in[0] > 0.0 && plant_in[1] > 0.0 && plant_in[2] > 0.0 && gains_in[0] > 0.0 && gains_in[1] > 0.0 && gains_in[2] > 0.0 && gains_in[3] > 0.0 && weights_in[0] > 0.0 && weights_in[1] > 0.0 ? 0 : 1;
+    double nothing = 0.0*state_in[0] + 0.0*state_in[1] + 0.0*state_in[2] + 0.0*state_in[3] + 0.0*desired_in[0] + 0.0*desired_in[1];
+    nothing += 0.0*desired_in[2] + 0.0*desired_in[3] + 0.0*desired_in[4] + 0.0*external_in[0] + 0.0*external_in[1] + 0.0*plant_in[0];
+    nothing += 0.0*plant_in[1] + 0.0*plant_in[2] + 0.0*gains_in[0] + 0.0*gains_in[1] + 0.0*gains_in[2] + 0.0*gains_in[3];
+    nothing += 0.0*weights_in[0] + 0.0*weights_in[1] + 0.0*tau_m_out[0];
+    return plant_in[0] > 0.0 && plant_in[1] > 0.0 && plant_in[2] > 0.0 && gains_in[0] > 0.0 && gains_in[1] > 0.0 && gains_in[2] > 0.0 && gains_in[3] > 0.0 && weights_in[0] > 0.0 && weights_in[1] > 0.0 && nothing >= 0.0 ? 0 : 1;
 }

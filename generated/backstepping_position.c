@@ -9,9 +9,10 @@
  *   in   rates[4] in 1/s, 0.1 to 2000
  *   in   scales[3] in s^2, s^4, s^6, from [0.0001, 1e-08, 1e-12] to [10, 10, 10]
  *   out  tau_m[1] in N m
- * Returns 0 where the link's inertia is positive and the motor's inertia is positive and the stiffness
- * is positive and k1 is positive and k2 is positive and k3 is positive and k4 is positive and c2 is
- * positive and c3 is positive and c4 is positive; else 1, and outputs without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and the link's inertia is positive and the motor's
+ * inertia is positive and the stiffness is positive and k1 is positive and k2 is positive and k3 is
+ * positive and k4 is positive and c2 is positive and c3 is positive and c4 is positive; else 1, and
+ * outputs without a value are NaN.
  * Cost: 22 add, 16 mul, 4 div.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
@@ -34,5 +35,9 @@ int awiwi_backstepping_position(const double motion_in[restrict 4], const double
     s2 += (desired_in[0] - motion_in[0])*(t3*t5 + rates_in[3]*t8);
     s2 += (desired_in[1] - motion_in[1])*(t0*t5 + t8 + rates_in[3]*t7);
     tau_m_out[0] = motion_in[2]*(plant_in[0] + plant_in[1]) + plant_in[0]*plant_in[1]/plant_in[2]*s2;
-    return plant_in[0] > 0.0 && plant_in[1] > 0.0 && plant_in[2] > 0.0 && rates_in[0] > 0.0 && rates_in[1] > 0.0 && rates_in[2] > 0.0 && rates_in[3] > 0.0 && scales_in[0] > 0.0 && scales_in[1] > 0.0 && scales_in[2] > 0.0 ? 0 : 1;
+    double nothing = 0.0*motion_in[0] + 0.0*motion_in[1] + 0.0*motion_in[2] + 0.0*motion_in[3] + 0.0*desired_in[0] + 0.0*desired_in[1];
+    nothing += 0.0*desired_in[2] + 0.0*desired_in[3] + 0.0*desired_in[4] + 0.0*plant_in[0] + 0.0*plant_in[1] + 0.0*plant_in[2];
+    nothing += 0.0*rates_in[0] + 0.0*rates_in[1] + 0.0*rates_in[2] + 0.0*rates_in[3] + 0.0*scales_in[0] + 0.0*scales_in[1];
+    nothing += 0.0*scales_in[2] + 0.0*tau_m_out[0];
+    return plant_in[0] > 0.0 && plant_in[1] > 0.0 && plant_in[2] > 0.0 && rates_in[0] > 0.0 && rates_in[1] > 0.0 && rates_in[2] > 0.0 && rates_in[3] > 0.0 && scales_in[0] > 0.0 && scales_in[1] > 0.0 && scales_in[2] > 0.0 && nothing >= 0.0 ? 0 : 1;
 }

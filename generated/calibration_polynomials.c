@@ -12,8 +12,8 @@
  *   out  dL[1] in m
  *   out  force[1] in N
  *   out  stiffness[1] in N/m
- * Returns 0 where the argument is within the lever's travel, with a margin of 0.4 %; else 1, and
- * outputs without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and the argument is within the lever's travel,
+ * with a margin of 0.4 %; else 1, and outputs without a value are NaN.
  * Cost: 23 add, 19 mul, 1 div.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
@@ -31,5 +31,10 @@ int awiwi_calibration_polynomials(const double counts_in[restrict 1], const doub
     force_out[0] = force_powers_in[0] - t1*(force_powers_in[1] - t1*t3);
     const double t4 = stiffness_powers_in[3] - t1*(stiffness_powers_in[4] - t1*(stiffness_powers_in[5] - stiffness_powers_in[6]*t1));
     stiffness_out[0] = stiffness_powers_in[0] - t1*(stiffness_powers_in[1] - t1*(stiffness_powers_in[2] - t1*t4));
-    return 1.015625 - t1*t1 > 0.0 ? 0 : 1;
+    double nothing = 0.0*counts_in[0] + 0.0*ends_in[0] + 0.0*ends_in[1] + 0.0*length_powers_in[0] + 0.0*length_powers_in[1] + 0.0*length_powers_in[2];
+    nothing += 0.0*length_powers_in[3] + 0.0*length_powers_in[4] + 0.0*length_powers_in[5] + 0.0*length_powers_in[6] + 0.0*force_powers_in[0] + 0.0*force_powers_in[1];
+    nothing += 0.0*force_powers_in[2] + 0.0*force_powers_in[3] + 0.0*force_powers_in[4] + 0.0*force_powers_in[5] + 0.0*force_powers_in[6] + 0.0*stiffness_powers_in[0];
+    nothing += 0.0*stiffness_powers_in[1] + 0.0*stiffness_powers_in[2] + 0.0*stiffness_powers_in[3] + 0.0*stiffness_powers_in[4] + 0.0*stiffness_powers_in[5] + 0.0*stiffness_powers_in[6];
+    nothing += 0.0*dL_out[0] + 0.0*force_out[0] + 0.0*stiffness_out[0];
+    return 1.015625 - t1*t1 > 0.0 && nothing >= 0.0 ? 0 : 1;
 }

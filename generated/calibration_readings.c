@@ -7,8 +7,8 @@
  *   out  dL[38] in m
  *   out  force[38] in N
  *   out  stiffness[38] in N/m
- * Returns 0 where the argument is within the lever's travel, with a margin of 0.4 %; else 1, and
- * outputs without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and the argument is within the lever's travel,
+ * with a margin of 0.4 %; else 1, and outputs without a value are NaN.
  * Cost: 1062 add, 1062 mul, 37 calls.
  * Inputs: sha256 81166638325d19ce820092fbbacf77498af1a52b1dd7a49aece0ce3925406682.
  */
@@ -435,5 +435,31 @@ int awiwi_calibration_readings(const double readings_in[restrict 38], double dL_
     const double t300 = t257 + 0.5*(t299 + fabs(2.0*t257 - t299));
     const double t301 = t260 + 0.5*(t300 + fabs(2.0*t260 - t300));
     const double t302 = t263 + 0.5*(t301 + fabs(2.0*t263 - t301));
-    return 1.015625 - t266 - 0.5*(t302 + fabs(2.0*t266 - t302)) > 0.0 ? 0 : 1;
+    double nothing = 0.0*readings_in[0] + 0.0*readings_in[1] + 0.0*readings_in[2] + 0.0*readings_in[3] + 0.0*readings_in[4] + 0.0*readings_in[5];
+    nothing += 0.0*readings_in[6] + 0.0*readings_in[7] + 0.0*readings_in[8] + 0.0*readings_in[9] + 0.0*readings_in[10] + 0.0*readings_in[11];
+    nothing += 0.0*readings_in[12] + 0.0*readings_in[13] + 0.0*readings_in[14] + 0.0*readings_in[15] + 0.0*readings_in[16] + 0.0*readings_in[17];
+    nothing += 0.0*readings_in[18] + 0.0*readings_in[19] + 0.0*readings_in[20] + 0.0*readings_in[21] + 0.0*readings_in[22] + 0.0*readings_in[23];
+    nothing += 0.0*readings_in[24] + 0.0*readings_in[25] + 0.0*readings_in[26] + 0.0*readings_in[27] + 0.0*readings_in[28] + 0.0*readings_in[29];
+    nothing += 0.0*readings_in[30] + 0.0*readings_in[31] + 0.0*readings_in[32] + 0.0*readings_in[33] + 0.0*readings_in[34] + 0.0*readings_in[35];
+    nothing += 0.0*readings_in[36] + 0.0*readings_in[37] + 0.0*dL_out[0] + 0.0*dL_out[1] + 0.0*dL_out[2] + 0.0*dL_out[3];
+    nothing += 0.0*dL_out[4] + 0.0*dL_out[5] + 0.0*dL_out[6] + 0.0*dL_out[7] + 0.0*dL_out[8] + 0.0*dL_out[9];
+    nothing += 0.0*dL_out[10] + 0.0*dL_out[11] + 0.0*dL_out[12] + 0.0*dL_out[13] + 0.0*dL_out[14] + 0.0*dL_out[15];
+    nothing += 0.0*dL_out[16] + 0.0*dL_out[17] + 0.0*dL_out[18] + 0.0*dL_out[19] + 0.0*dL_out[20] + 0.0*dL_out[21];
+    nothing += 0.0*dL_out[22] + 0.0*dL_out[23] + 0.0*dL_out[24] + 0.0*dL_out[25] + 0.0*dL_out[26] + 0.0*dL_out[27];
+    nothing += 0.0*dL_out[28] + 0.0*dL_out[29] + 0.0*dL_out[30] + 0.0*dL_out[31] + 0.0*dL_out[32] + 0.0*dL_out[33];
+    nothing += 0.0*dL_out[34] + 0.0*dL_out[35] + 0.0*dL_out[36] + 0.0*dL_out[37] + 0.0*force_out[0] + 0.0*force_out[1];
+    nothing += 0.0*force_out[2] + 0.0*force_out[3] + 0.0*force_out[4] + 0.0*force_out[5] + 0.0*force_out[6] + 0.0*force_out[7];
+    nothing += 0.0*force_out[8] + 0.0*force_out[9] + 0.0*force_out[10] + 0.0*force_out[11] + 0.0*force_out[12] + 0.0*force_out[13];
+    nothing += 0.0*force_out[14] + 0.0*force_out[15] + 0.0*force_out[16] + 0.0*force_out[17] + 0.0*force_out[18] + 0.0*force_out[19];
+    nothing += 0.0*force_out[20] + 0.0*force_out[21] + 0.0*force_out[22] + 0.0*force_out[23] + 0.0*force_out[24] + 0.0*force_out[25];
+    nothing += 0.0*force_out[26] + 0.0*force_out[27] + 0.0*force_out[28] + 0.0*force_out[29] + 0.0*force_out[30] + 0.0*force_out[31];
+    nothing += 0.0*force_out[32] + 0.0*force_out[33] + 0.0*force_out[34] + 0.0*force_out[35] + 0.0*force_out[36] + 0.0*force_out[37];
+    nothing += 0.0*stiffness_out[0] + 0.0*stiffness_out[1] + 0.0*stiffness_out[2] + 0.0*stiffness_out[3] + 0.0*stiffness_out[4] + 0.0*stiffness_out[5];
+    nothing += 0.0*stiffness_out[6] + 0.0*stiffness_out[7] + 0.0*stiffness_out[8] + 0.0*stiffness_out[9] + 0.0*stiffness_out[10] + 0.0*stiffness_out[11];
+    nothing += 0.0*stiffness_out[12] + 0.0*stiffness_out[13] + 0.0*stiffness_out[14] + 0.0*stiffness_out[15] + 0.0*stiffness_out[16] + 0.0*stiffness_out[17];
+    nothing += 0.0*stiffness_out[18] + 0.0*stiffness_out[19] + 0.0*stiffness_out[20] + 0.0*stiffness_out[21] + 0.0*stiffness_out[22] + 0.0*stiffness_out[23];
+    nothing += 0.0*stiffness_out[24] + 0.0*stiffness_out[25] + 0.0*stiffness_out[26] + 0.0*stiffness_out[27] + 0.0*stiffness_out[28] + 0.0*stiffness_out[29];
+    nothing += 0.0*stiffness_out[30] + 0.0*stiffness_out[31] + 0.0*stiffness_out[32] + 0.0*stiffness_out[33] + 0.0*stiffness_out[34] + 0.0*stiffness_out[35];
+    nothing += 0.0*stiffness_out[36] + 0.0*stiffness_out[37];
+    return 1.015625 - t266 - 0.5*(t302 + fabs(2.0*t266 - t302)) > 0.0 && nothing >= 0.0 ? 0 : 1;
 }

@@ -19,9 +19,9 @@
  *   in   force_kp[1] in 1/s^2, 100 to 1e+06
  *   in   force_kd[1] in 1/s, 10 to 10000
  *   out  tau[1] in N m
- * Returns 0 where the tendon's stiffness is positive and the pulley's radius is positive and the
- * motor's inertia is positive and the gain kp is positive and the gain kd is positive; else 1, and
- * outputs without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and the tendon's stiffness is positive and the
+ * pulley's radius is positive and the motor's inertia is positive and the gain kp is positive and the
+ * gain kd is positive; else 1, and outputs without a value are NaN.
  * Cost: 8 add, 8 mul, 2 div.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
@@ -35,5 +35,8 @@ int awiwi_cascade(const double f_in[restrict 1], const double xd_in[restrict 1],
     s0 += force_kd_in[0]*(fd_des_in[0] - stiffness_in[0]*xd_in[0]);
     s1 -= s0/stiffness_in[0];
     tau_out[0] = friction_in[0] + f_in[0]*r_in[0] - B_in[0]*(1.0/r_in[0])*s1;
-    return stiffness_in[0] > 0.0 && r_in[0] > 0.0 && B_in[0] > 0.0 && force_kp_in[0] > 0.0 && force_kd_in[0] > 0.0 ? 0 : 1;
+    double nothing = 0.0*f_in[0] + 0.0*xd_in[0] + 0.0*stiffness_in[0] + 0.0*slope_in[0] + 0.0*hdd_in[0] + 0.0*f_des_in[0];
+    nothing += 0.0*fd_des_in[0] + 0.0*fdd_des_in[0] + 0.0*friction_in[0] + 0.0*r_in[0] + 0.0*B_in[0] + 0.0*force_kp_in[0];
+    nothing += 0.0*force_kd_in[0] + 0.0*tau_out[0];
+    return stiffness_in[0] > 0.0 && r_in[0] > 0.0 && B_in[0] > 0.0 && force_kp_in[0] > 0.0 && force_kd_in[0] > 0.0 && nothing >= 0.0 ? 0 : 1;
 }

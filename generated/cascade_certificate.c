@@ -13,8 +13,8 @@
  *   in   omega[1] in rad/s, 10 to 1000
  *   out  margin[1] in 1
  *   out  S[8][3] in m/N, m s/N, m s^2/N
- * Returns 0 where the weight is positive and the frequency omega is positive; else 1, and outputs
- * without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and the weight is positive and the frequency omega
+ * is positive; else 1, and outputs without a value are NaN.
  * Cost: 166 add, 210 mul, 23 div, 20 calls.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
@@ -134,5 +134,21 @@ int awiwi_cascade_certificate(const double D_in[restrict 16], const double P_in[
     const double t77 = 0.5/kd_in[7]*(t45 + weight_in[0]*t75);
     S_out[23] = t77;
     S_out[21] = kd_in[7]*t76 + kp_in[7]*t77;
-    return weight_in[0] > 0.0 && omega_in[0] > 0.0 ? 0 : 1;
+    double nothing = 0.0*D_in[0] + 0.0*D_in[1] + 0.0*D_in[2] + 0.0*D_in[3] + 0.0*D_in[4] + 0.0*D_in[5];
+    nothing += 0.0*D_in[6] + 0.0*D_in[7] + 0.0*D_in[8] + 0.0*D_in[9] + 0.0*D_in[10] + 0.0*D_in[11];
+    nothing += 0.0*D_in[12] + 0.0*D_in[13] + 0.0*D_in[14] + 0.0*D_in[15] + 0.0*P_in[0] + 0.0*P_in[1];
+    nothing += 0.0*P_in[2] + 0.0*P_in[3] + 0.0*P_in[4] + 0.0*P_in[5] + 0.0*P_in[6] + 0.0*P_in[7];
+    nothing += 0.0*P_in[8] + 0.0*P_in[9] + 0.0*P_in[10] + 0.0*P_in[11] + 0.0*P_in[12] + 0.0*P_in[13];
+    nothing += 0.0*P_in[14] + 0.0*P_in[15] + 0.0*P_in[16] + 0.0*P_in[17] + 0.0*P_in[18] + 0.0*P_in[19];
+    nothing += 0.0*P_in[20] + 0.0*P_in[21] + 0.0*P_in[22] + 0.0*P_in[23] + 0.0*P_in[24] + 0.0*P_in[25];
+    nothing += 0.0*P_in[26] + 0.0*P_in[27] + 0.0*P_in[28] + 0.0*P_in[29] + 0.0*P_in[30] + 0.0*P_in[31];
+    nothing += 0.0*kp_in[0] + 0.0*kp_in[1] + 0.0*kp_in[2] + 0.0*kp_in[3] + 0.0*kp_in[4] + 0.0*kp_in[5];
+    nothing += 0.0*kp_in[6] + 0.0*kp_in[7] + 0.0*kd_in[0] + 0.0*kd_in[1] + 0.0*kd_in[2] + 0.0*kd_in[3];
+    nothing += 0.0*kd_in[4] + 0.0*kd_in[5] + 0.0*kd_in[6] + 0.0*kd_in[7] + 0.0*weight_in[0] + 0.0*omega_in[0];
+    nothing += 0.0*margin_out[0] + 0.0*S_out[0] + 0.0*S_out[1] + 0.0*S_out[2] + 0.0*S_out[3] + 0.0*S_out[4];
+    nothing += 0.0*S_out[5] + 0.0*S_out[6] + 0.0*S_out[7] + 0.0*S_out[8] + 0.0*S_out[9] + 0.0*S_out[10];
+    nothing += 0.0*S_out[11] + 0.0*S_out[12] + 0.0*S_out[13] + 0.0*S_out[14] + 0.0*S_out[15] + 0.0*S_out[16];
+    nothing += 0.0*S_out[17] + 0.0*S_out[18] + 0.0*S_out[19] + 0.0*S_out[20] + 0.0*S_out[21] + 0.0*S_out[22];
+    nothing += 0.0*S_out[23];
+    return weight_in[0] > 0.0 && omega_in[0] > 0.0 && nothing >= 0.0 ? 0 : 1;
 }

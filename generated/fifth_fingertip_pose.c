@@ -4,7 +4,9 @@
  * Source: eq. 5.2, 5.3, table 5.1.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   out  T[4][4] in 1, m
- * Cost: 28 add, 44 mul, 1 div, 3 neg, 1 sqrt, 5 sincos.
+ * Returns 0 where all inputs and outputs are finite and the four-bar of hmc closes; else 1, and
+ * outputs without a value are NaN.
+ * Cost: 31 add, 49 mul, 1 div, 3 neg, 1 sqrt, 5 sincos.
  * Inputs: sha256 28edf41a51f84ef24222facbdc6e1021f809ccdd8b122d41df2ba55b8d1b95d9.
  */
 #include "numerics.h"
@@ -12,7 +14,7 @@
 #include "sincos.h"
 #include "kernels.h"
 
-void awiwi_fifth_fingertip_pose(const double q_in[restrict 4], double T_out[restrict 16])
+int awiwi_fifth_fingertip_pose(const double q_in[restrict 4], double T_out[restrict 16])
 {
     T_out[12] = 0.0;
     T_out[13] = 0.0;
@@ -22,41 +24,47 @@ void awiwi_fifth_fingertip_pose(const double q_in[restrict 4], double T_out[rest
     const double t1 = q_in[2] + q_in[3];
     const double t2 = 0.7692307692307693*q_in[3] + t1;
     const awiwi_sincos4_result a0 = awiwi_sincos4(t2, t0, q_in[2], t1);
-    const double t3 = 0.01*a0.sin[1];
-    const double t4 = 0.00012*a0.cos[1] - 0.000122;
-    const double t5 = 0.01*a0.cos[1];
-    const double t6 = 1.0/t4;
-    const double t7 = 33.610469291294464*t6;
-    const double t8 = 57.5741330674062*t6;
-    const double t9 = t5 - 0.012;
-    const double t10 = t4 + 3.2375e-05;
-    const double t11 = sqrt(-0.0001125*t4 - t10*t10);
-    const double t12 = t9*t10 - t3*t11;
-    const double t13 = t3*t10 + t9*t11;
-    const double t14 = t7*t12 + t8*t13;
-    const double t15 = t7*t13 - t8*t12;
-    double s16 = 0.033*a0.sin[2] + 0.018*a0.sin[0] - 0.006;
-    double s17 = 0.033*a0.cos[2] + 0.018*a0.cos[0] + 0.006;
-    s16 += 0.022*a0.sin[3];
-    s17 += 0.022*a0.cos[3];
-    double s18 = t5 - s16*t15;
-    double s19 = t3 + s16*t14;
+    const double t3 = 0.00012*a0.cos[1] - 0.000122;
+    const double t4 = 0.01*a0.cos[1];
+    const double t5 = 1.0/t3;
+    const double t6 = 33.610469291294464*t5;
+    const double t7 = 57.5741330674062*t5;
+    const double t8 = t4 - 0.012;
+    const double t9 = t3 + 3.2375e-05;
+    const double t10 = sqrt(-0.0001125*t3 - t9*t9);
+    const double t11 = 0.01*a0.sin[1];
+    const double t12 = 0.0001*a0.sin[1]*a0.sin[1] + t8*t8;
+    const double t13 = t8*t9 - t11*t10;
+    const double t14 = t11*t9 + t8*t10;
+    const double t15 = t6*t13 + t7*t14;
+    const double t16 = t6*t14 - t7*t13;
+    double s17 = 0.033*a0.sin[2] + 0.018*a0.sin[0] - 0.006;
+    double s18 = 0.033*a0.cos[2] + 0.018*a0.cos[0] + 0.006;
+    s17 += 0.022*a0.sin[3];
+    s18 += 0.022*a0.cos[3];
+    double s19 = t4 - s17*t16;
+    double s20 = t11 + s17*t15;
     const awiwi_sincos_result a1 = awiwi_sincos(q_in[1]);
     T_out[6] = -a1.cos;
-    const double t20 = 0.0036*a1.sin - 0.004 - a1.cos*s17;
-    s18 -= t20*t14;
-    T_out[3] = s18;
-    T_out[7] = a1.sin*s17 + 0.0036*a1.cos;
-    s19 -= t20*t15;
-    T_out[11] = s19;
-    const double t21 = a1.cos*a0.cos[0];
-    T_out[0] = t21*t14 - a0.sin[0]*t15;
-    const double t22 = a1.cos*a0.sin[0];
-    T_out[1] = -(a0.cos[0]*t15) - t22*t14;
-    T_out[2] = a1.sin*t14;
+    const double t21 = 0.0036*a1.sin - 0.004 - a1.cos*s18;
+    s19 -= t21*t15;
+    T_out[3] = s19;
+    T_out[7] = a1.sin*s18 + 0.0036*a1.cos;
+    s20 -= t21*t16;
+    T_out[11] = s20;
+    const double t22 = a1.cos*a0.cos[0];
+    T_out[0] = t22*t15 - a0.sin[0]*t16;
+    const double t23 = a1.cos*a0.sin[0];
+    T_out[1] = -(a0.cos[0]*t16) - t23*t15;
+    T_out[2] = a1.sin*t15;
     T_out[4] = a1.sin*a0.cos[0];
     T_out[5] = -(a1.sin*a0.sin[0]);
-    T_out[8] = a0.sin[0]*t14 + t21*t15;
-    T_out[9] = a0.cos[0]*t14 - t22*t15;
-    T_out[10] = a1.sin*t15;
+    T_out[8] = a0.sin[0]*t15 + t22*t16;
+    T_out[9] = a0.cos[0]*t15 - t23*t16;
+    T_out[10] = a1.sin*t16;
+    double nothing = 0.0*q_in[0] + 0.0*q_in[1] + 0.0*q_in[2] + 0.0*q_in[3] + 0.0*T_out[0] + 0.0*T_out[1];
+    nothing += 0.0*T_out[2] + 0.0*T_out[3] + 0.0*T_out[4] + 0.0*T_out[5] + 0.0*T_out[6] + 0.0*T_out[7];
+    nothing += 0.0*T_out[8] + 0.0*T_out[9] + 0.0*T_out[10] + 0.0*T_out[11] + 0.0*T_out[12] + 0.0*T_out[13];
+    nothing += 0.0*T_out[14] + 0.0*T_out[15];
+    return -36730945.82185491*(t12 - 0.00034225)*(t12 - 1.225e-05) > 0.0 && nothing >= 0.0 ? 0 : 1;
 }

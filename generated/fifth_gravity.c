@@ -5,7 +5,9 @@
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  gravity[4] in N m
- * Cost: 41 add, 55 mul, 2 div, 1 sqrt, 5 sincos.
+ * Returns 0 where all inputs and outputs are finite and the four-bar of hmc closes; else 1, and
+ * outputs without a value are NaN.
+ * Cost: 44 add, 59 mul, 2 div, 1 sqrt, 5 sincos.
  * Inputs: sha256 510cc29c516f948798433eb3b40aa4ff4fd7af8989efae96a8696b05c3c6c657.
  */
 #include "numerics.h"
@@ -13,7 +15,7 @@
 #include "sincos.h"
 #include "kernels.h"
 
-void awiwi_fifth_gravity(const double q_in[restrict 4], const double g_in[restrict 3], double gravity_out[restrict 4])
+int awiwi_fifth_gravity(const double q_in[restrict 4], const double g_in[restrict 3], double gravity_out[restrict 4])
 {
     const double t0 = q_in[0] + 1.0471975511965979;
     const double t1 = q_in[2] - 1.5667559447406272;
@@ -36,22 +38,26 @@ void awiwi_fifth_gravity(const double q_in[restrict 4], const double g_in[restri
     const double t16 = a0.cos[0] - 1.2;
     const double t17 = a0.sin[0]*t14 + t16*t15;
     const double t18 = t16*t14 - a0.sin[0]*t15;
-    const double t19 = t13*(0.575741330674062*t17 + 0.33610469291294465*t18);
-    const double t20 = t10 - 8.79e-05;
-    const double t21 = t13*(0.33610469291294465*t17 - 0.575741330674062*t18);
-    double s22 = 0.000203*a0.sin[0] + t11*t19;
-    double s23 = 0.000203*a0.cos[0] - t11*t21;
+    const double t19 = t16*t16 + a0.sin[0]*a0.sin[0];
+    const double t20 = t13*(0.575741330674062*t17 + 0.33610469291294465*t18);
+    const double t21 = t10 - 8.79e-05;
+    const double t22 = t13*(0.33610469291294465*t17 - 0.575741330674062*t18);
+    double s23 = 0.000203*a0.sin[0] + t11*t20;
+    double s24 = 0.000203*a0.cos[0] - t11*t22;
     const awiwi_sincos_result a1 = awiwi_sincos(q_in[1]);
-    const double t24 = 1.46e-05*a1.sin + a1.cos*t20 - 7.12e-05;
-    s22 -= t24*t21;
-    s23 -= t24*t19;
-    double s25 = g_in[0]*s22 - g_in[2]*s23;
-    const double t26 = g_in[0]*t19 + g_in[2]*t21;
-    const double t27 = g_in[0]*t21 - g_in[2]*t19;
-    s25 += ((0.00012*a0.sin[0] - 5e-05*(t13*(a0.cos[0]*t17 - a0.sin[0]*t18)))/t15 - 1.0)*(t11*t26 - t24*t27);
-    gravity_out[0] = s25;
-    const double t28 = a1.cos*t26 + g_in[1]*a1.sin;
-    gravity_out[1] = t20*(g_in[1]*a1.cos - a1.sin*t26) + 1.46e-05*t28;
-    gravity_out[2] = t7*t28 - t10*t27;
-    gravity_out[3] = t6*t28 - t9*t27 - 0.7692307692307693*(t8*t27 - t5*t28);
+    const double t25 = 1.46e-05*a1.sin + a1.cos*t21 - 7.12e-05;
+    s23 -= t25*t22;
+    s24 -= t25*t20;
+    double s26 = g_in[0]*s23 - g_in[2]*s24;
+    const double t27 = g_in[0]*t20 + g_in[2]*t22;
+    const double t28 = g_in[0]*t22 - g_in[2]*t20;
+    s26 += ((0.00012*a0.sin[0] - 5e-05*(t13*(a0.cos[0]*t17 - a0.sin[0]*t18)))/t15 - 1.0)*(t11*t27 - t25*t28);
+    gravity_out[0] = s26;
+    const double t29 = a1.cos*t27 + g_in[1]*a1.sin;
+    gravity_out[1] = t21*(g_in[1]*a1.cos - a1.sin*t27) + 1.46e-05*t29;
+    gravity_out[2] = t7*t29 - t10*t28;
+    gravity_out[3] = t6*t29 - t9*t28 - 0.7692307692307693*(t8*t28 - t5*t29);
+    double nothing = 0.0*q_in[0] + 0.0*q_in[1] + 0.0*q_in[2] + 0.0*q_in[3] + 0.0*g_in[0] + 0.0*g_in[1];
+    nothing += 0.0*g_in[2] + 0.0*gravity_out[0] + 0.0*gravity_out[1] + 0.0*gravity_out[2] + 0.0*gravity_out[3];
+    return -0.3673094582185491*(t19 - 3.4225)*(t19 - 0.1225) > 0.0 && nothing >= 0.0 ? 0 : 1;
 }

@@ -9,7 +9,8 @@
  *   out  coupler_ratio[1] in 1
  *   out  rocker_ratio[1] in 1
  *   out  transmission[1] in 1
- * Returns 0 where the loop closes; else 1, and outputs without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and the loop closes; else 1, and outputs without a
+ * value are NaN.
  * Cost: 15 add, 25 mul, 2 div, 1 sqrt, 1 sincos, 2 calls.
  * Inputs: sha256 d021538d8900d42317b84036df325beebaa6feecad7df8e1e869f0ec5a1f0d9f.
  */
@@ -43,5 +44,6 @@ int awiwi_fifth_hmc_four_bar(const double q_in[restrict 1], double coupler_out[r
     coupler_out[0] = awiwi_atan2(t14, t13);
     rocker_out[0] = awiwi_atan2(t15, t10);
     transmission_out[0] = t14*t10 - t13*t15;
-    return -36730945.82185491*((t1 + 1.225e-05)*(t1 + 0.00034225)) > 0.0 ? 0 : 1;
+    double nothing = 0.0*q_in[0] + 0.0*coupler_out[0] + 0.0*rocker_out[0] + 0.0*coupler_ratio_out[0] + 0.0*rocker_ratio_out[0] + 0.0*transmission_out[0];
+    return -36730945.82185491*((t1 + 1.225e-05)*(t1 + 0.00034225)) > 0.0 && nothing >= 0.0 ? 0 : 1;
 }

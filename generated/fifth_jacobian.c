@@ -4,7 +4,9 @@
  * Source: eq. 5.3, differentiated.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   out  J[6][4] in m/rad, 1
- * Cost: 33 add, 59 mul, 2 div, 4 neg, 1 sqrt, 5 sincos.
+ * Returns 0 where all inputs and outputs are finite and the four-bar of hmc closes; else 1, and
+ * outputs without a value are NaN.
+ * Cost: 36 add, 64 mul, 2 div, 4 neg, 1 sqrt, 5 sincos.
  * Inputs: sha256 41e0b066350c1515c23653124cb3764011a2af2cb74c560413362bf44f18b5d9.
  */
 #include "numerics.h"
@@ -12,7 +14,7 @@
 #include "sincos.h"
 #include "kernels.h"
 
-void awiwi_fifth_jacobian(const double q_in[restrict 4], double J_out[restrict 24])
+int awiwi_fifth_jacobian(const double q_in[restrict 4], double J_out[restrict 24])
 {
     J_out[4] = 0.0;
     J_out[12] = 0.0;
@@ -31,42 +33,49 @@ void awiwi_fifth_jacobian(const double q_in[restrict 4], double J_out[restrict 2
     const double t9 = sqrt(-0.25*t8*t8 - 5.625e-05*t4);
     const double t10 = t6*(0.5*t7*t8 - t3*t9);
     const double t11 = t6*(0.005*a0.sin[0]*t8 + t7*t9);
-    const double t12 = (0.00012*a0.sin[0] + t3*t10 - t5*t11)/t9;
-    J_out[16] = -t12;
-    const double t13 = -0.022*a0.sin[2] + -0.018*a0.sin[3];
-    const double t14 = -0.033*a0.sin[1] + t13;
-    const double t15 = 0.022*a0.cos[2] + 0.018*a0.cos[3];
-    const double t16 = 0.033*a0.cos[1] + t15;
-    const double t17 = t13 - 0.013846153846153847*a0.sin[3];
-    const double t18 = 0.013846153846153847*a0.cos[3] + t15;
-    const double t19 = t14 + 0.006;
-    const double t20 = 115.1482661348124*t11 + 67.22093858258893*t10;
-    J_out[21] = t20;
-    const double t21 = 67.22093858258893*t11 - 115.1482661348124*t10;
-    J_out[13] = -t21;
-    const double t22 = t16 + 0.006;
+    const double t12 = t7*t7 + 0.0001*a0.sin[0]*a0.sin[0];
+    const double t13 = (0.00012*a0.sin[0] + t3*t10 - t5*t11)/t9;
+    J_out[16] = -t13;
+    const double t14 = -0.022*a0.sin[2] + -0.018*a0.sin[3];
+    const double t15 = -0.033*a0.sin[1] + t14;
+    const double t16 = 0.022*a0.cos[2] + 0.018*a0.cos[3];
+    const double t17 = 0.033*a0.cos[1] + t16;
+    const double t18 = t14 - 0.013846153846153847*a0.sin[3];
+    const double t19 = 0.013846153846153847*a0.cos[3] + t16;
+    const double t20 = t15 + 0.006;
+    const double t21 = 115.1482661348124*t11 + 67.22093858258893*t10;
+    J_out[21] = t21;
+    const double t22 = 67.22093858258893*t11 - 115.1482661348124*t10;
+    J_out[13] = -t22;
+    const double t23 = t17 + 0.006;
     const awiwi_sincos_result a1 = awiwi_sincos(q_in[1]);
     J_out[18] = -a1.cos;
-    const double t23 = 0.0036*a1.sin - a1.cos*t22;
-    J_out[5] = -t23;
-    const double t24 = t23 - 0.004;
-    J_out[0] = t12*(t19*t20 + t24*t21) - t3;
-    J_out[8] = t5 - t12*(t24*t20 - t19*t21);
-    const double t25 = a1.cos*t20;
-    const double t26 = a1.sin*t20;
-    J_out[14] = t26;
-    J_out[2] = t14*t25 - t16*t21;
-    J_out[3] = t17*t25 - t18*t21;
-    J_out[1] = -0.0036*t25 - t22*t26;
-    J_out[15] = 1.7692307692307692*t26;
-    J_out[6] = a1.sin*t14;
-    J_out[7] = a1.sin*t17;
+    const double t24 = 0.0036*a1.sin - a1.cos*t23;
+    J_out[5] = -t24;
+    const double t25 = t24 - 0.004;
+    J_out[0] = t13*(t20*t21 + t25*t22) - t3;
+    J_out[8] = t5 - t13*(t25*t21 - t20*t22);
+    const double t26 = a1.cos*t21;
     const double t27 = a1.sin*t21;
-    J_out[22] = t27;
-    const double t28 = a1.cos*t21;
-    J_out[9] = -0.0036*t28 - t22*t27;
-    J_out[10] = t16*t20 + t14*t28;
-    J_out[11] = t18*t20 + t17*t28;
+    J_out[14] = t27;
+    J_out[2] = t15*t26 - t17*t22;
+    J_out[3] = t18*t26 - t19*t22;
+    J_out[1] = -0.0036*t26 - t23*t27;
+    J_out[15] = 1.7692307692307692*t27;
+    J_out[6] = a1.sin*t15;
+    J_out[7] = a1.sin*t18;
+    const double t28 = a1.sin*t22;
+    J_out[22] = t28;
+    const double t29 = a1.cos*t22;
+    J_out[9] = -0.0036*t29 - t23*t28;
+    J_out[10] = t17*t21 + t15*t29;
+    J_out[11] = t19*t21 + t18*t29;
     J_out[19] = -1.7692307692307692*a1.cos;
-    J_out[23] = 1.7692307692307692*t27;
+    J_out[23] = 1.7692307692307692*t28;
+    double nothing = 0.0*q_in[0] + 0.0*q_in[1] + 0.0*q_in[2] + 0.0*q_in[3] + 0.0*J_out[0] + 0.0*J_out[1];
+    nothing += 0.0*J_out[2] + 0.0*J_out[3] + 0.0*J_out[4] + 0.0*J_out[5] + 0.0*J_out[6] + 0.0*J_out[7];
+    nothing += 0.0*J_out[8] + 0.0*J_out[9] + 0.0*J_out[10] + 0.0*J_out[11] + 0.0*J_out[12] + 0.0*J_out[13];
+    nothing += 0.0*J_out[14] + 0.0*J_out[15] + 0.0*J_out[16] + 0.0*J_out[17] + 0.0*J_out[18] + 0.0*J_out[19];
+    nothing += 0.0*J_out[20] + 0.0*J_out[21] + 0.0*J_out[22] + 0.0*J_out[23];
+    return -36730945.82185491*(t12 - 0.00034225)*(t12 - 1.225e-05) > 0.0 && nothing >= 0.0 ? 0 : 1;
 }

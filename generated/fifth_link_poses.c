@@ -4,7 +4,9 @@
  * Source: eq. 5.2.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   out  T[5][4][4] in 1, m
- * Cost: 38 add, 69 mul, 1 div, 13 neg, 1 sqrt, 5 sincos.
+ * Returns 0 where all inputs and outputs are finite and the four-bar of hmc closes; else 1, and
+ * outputs without a value are NaN.
+ * Cost: 41 add, 74 mul, 1 div, 13 neg, 1 sqrt, 5 sincos.
  * Inputs: sha256 32b023dd4bb7a4597b7c1aa31cf4af44bf374e70b19ab512ecc615d4be915382.
  */
 #include "numerics.h"
@@ -12,7 +14,7 @@
 #include "sincos.h"
 #include "kernels.h"
 
-void awiwi_fifth_link_poses(const double q_in[restrict 4], double T_out[restrict 80])
+int awiwi_fifth_link_poses(const double q_in[restrict 4], double T_out[restrict 80])
 {
     T_out[2] = 0.0;
     T_out[4] = 0.0;
@@ -55,84 +57,100 @@ void awiwi_fifth_link_poses(const double q_in[restrict 4], double T_out[restrict
     const double t8 = t4 - 0.012;
     const double t9 = 1.2e-06*a0.sin[0]*t6 + t8*t7;
     const double t10 = t6*t8 - 83.33333333333333*a0.sin[0]*t7;
-    const double t11 = 0.01*a0.sin[0];
-    T_out[11] = t11;
-    const double t12 = t5*(479784.442228385*t9 + 33.610469291294464*t10);
-    T_out[0] = t12;
-    T_out[9] = t12;
-    T_out[26] = t12;
-    const double t13 = t5*(280087.2440941205*t9 - 57.5741330674062*t10);
-    T_out[1] = -t13;
-    T_out[8] = t13;
-    T_out[18] = -t13;
-    const double t14 = t4 + 0.006*t13 + 0.004*t12;
-    T_out[19] = t14;
-    const double t15 = t11 + 0.004*t13 - 0.006*t12;
-    T_out[27] = t15;
+    const double t11 = t8*t8 + 0.0001*a0.sin[0]*a0.sin[0];
+    const double t12 = 0.01*a0.sin[0];
+    T_out[11] = t12;
+    const double t13 = t5*(479784.442228385*t9 + 33.610469291294464*t10);
+    T_out[0] = t13;
+    T_out[9] = t13;
+    T_out[26] = t13;
+    const double t14 = t5*(280087.2440941205*t9 - 57.5741330674062*t10);
+    T_out[1] = -t14;
+    T_out[8] = t14;
+    T_out[18] = -t14;
+    const double t15 = t4 + 0.006*t14 + 0.004*t13;
+    T_out[19] = t15;
+    const double t16 = t12 + 0.004*t14 - 0.006*t13;
+    T_out[27] = t16;
     const awiwi_sincos_result a1 = awiwi_sincos(q_in[1]);
     T_out[21] = a1.cos;
     T_out[38] = -a1.cos;
     T_out[54] = -a1.cos;
     T_out[70] = -a1.cos;
     T_out[20] = a1.sin;
-    const double t16 = a1.cos*t12;
-    T_out[16] = t16;
-    const double t17 = a0.cos[1]*t16 - a0.sin[1]*t13;
-    T_out[32] = t17;
-    T_out[33] = -(a0.cos[1]*t13) - a0.sin[1]*t16;
-    const double t18 = t14 + 0.006*t16;
-    T_out[35] = t18;
-    const double t19 = a0.cos[2]*t16 - a0.sin[2]*t13;
-    T_out[48] = t19;
-    T_out[49] = -(a0.cos[2]*t13) - a0.sin[2]*t16;
-    const double t20 = t18 - -0.033*t17;
-    T_out[51] = t20;
-    T_out[64] = a0.cos[3]*t16 - a0.sin[3]*t13;
-    T_out[65] = -(a0.cos[3]*t13) - a0.sin[3]*t16;
-    double s21 = t20 - -0.022*t19;
-    const double t22 = a1.sin*t12;
-    T_out[17] = -t22;
-    T_out[34] = t22;
-    T_out[50] = t22;
-    T_out[66] = t22;
-    const double t23 = a1.cos*t13;
-    T_out[24] = t23;
-    const double t24 = a0.sin[1]*t12 + a0.cos[1]*t23;
-    T_out[40] = t24;
-    const double t25 = a0.cos[1]*a1.sin;
-    T_out[36] = t25;
-    T_out[41] = a0.cos[1]*t12 - a0.sin[1]*t23;
+    const double t17 = a1.cos*t13;
+    T_out[16] = t17;
+    const double t18 = a0.cos[1]*t17 - a0.sin[1]*t14;
+    T_out[32] = t18;
+    T_out[33] = -(a0.cos[1]*t14) - a0.sin[1]*t17;
+    const double t19 = t15 + 0.006*t17;
+    T_out[35] = t19;
+    const double t20 = a0.cos[2]*t17 - a0.sin[2]*t14;
+    T_out[48] = t20;
+    T_out[49] = -(a0.cos[2]*t14) - a0.sin[2]*t17;
+    const double t21 = t19 - -0.033*t18;
+    T_out[51] = t21;
+    T_out[64] = a0.cos[3]*t17 - a0.sin[3]*t14;
+    T_out[65] = -(a0.cos[3]*t14) - a0.sin[3]*t17;
+    double s22 = t21 - -0.022*t20;
+    const double t23 = a1.sin*t13;
+    T_out[17] = -t23;
+    T_out[34] = t23;
+    T_out[50] = t23;
+    T_out[66] = t23;
+    const double t24 = a1.cos*t14;
+    T_out[24] = t24;
+    const double t25 = a0.sin[1]*t13 + a0.cos[1]*t24;
+    T_out[40] = t25;
+    const double t26 = a0.cos[1]*a1.sin;
+    T_out[36] = t26;
+    T_out[41] = a0.cos[1]*t13 - a0.sin[1]*t24;
     T_out[37] = -(a1.sin*a0.sin[1]);
-    const double t26 = t15 + 0.006*t23;
-    T_out[43] = t26;
-    const double t27 = a0.sin[2]*t12 + a0.cos[2]*t23;
-    T_out[56] = t27;
-    const double t28 = a1.sin*a0.cos[2];
-    T_out[52] = t28;
-    T_out[57] = a0.cos[2]*t12 - a0.sin[2]*t23;
+    const double t27 = t16 + 0.006*t24;
+    T_out[43] = t27;
+    const double t28 = a0.sin[2]*t13 + a0.cos[2]*t24;
+    T_out[56] = t28;
+    const double t29 = a1.sin*a0.cos[2];
+    T_out[52] = t29;
+    T_out[57] = a0.cos[2]*t13 - a0.sin[2]*t24;
     T_out[53] = -(a1.sin*a0.sin[2]);
-    const double t29 = t26 + 0.033*t24;
-    T_out[59] = t29;
-    double s30 = 0.003*a1.cos + 0.022*t28;
-    T_out[72] = a0.sin[3]*t12 + a0.cos[3]*t23;
+    const double t30 = t27 + 0.033*t25;
+    T_out[59] = t30;
+    double s31 = 0.003*a1.cos + 0.022*t29;
+    T_out[72] = a0.sin[3]*t13 + a0.cos[3]*t24;
     T_out[68] = a1.sin*a0.cos[3];
-    T_out[73] = a0.cos[3]*t12 - a0.sin[3]*t23;
+    T_out[73] = a0.cos[3]*t13 - a0.sin[3]*t24;
     T_out[69] = -(a1.sin*a0.sin[3]);
-    double s31 = 0.022*t27 + t29;
-    const double t32 = a1.sin*t13;
-    T_out[25] = -t32;
-    T_out[42] = t32;
-    T_out[58] = t32;
-    T_out[74] = t32;
-    const double t33 = 0.006*a1.sin;
-    T_out[39] = t33;
-    const double t34 = 0.033*t25 + t33;
-    T_out[55] = t34;
-    const double t35 = 0.003*a1.sin;
-    s21 -= t35*t12;
-    T_out[67] = s21;
-    s30 += t34;
-    T_out[71] = s30;
-    s31 -= t35*t13;
-    T_out[75] = s31;
+    double s32 = 0.022*t28 + t30;
+    const double t33 = a1.sin*t14;
+    T_out[25] = -t33;
+    T_out[42] = t33;
+    T_out[58] = t33;
+    T_out[74] = t33;
+    const double t34 = 0.006*a1.sin;
+    T_out[39] = t34;
+    const double t35 = 0.033*t26 + t34;
+    T_out[55] = t35;
+    const double t36 = 0.003*a1.sin;
+    s22 -= t36*t13;
+    T_out[67] = s22;
+    s31 += t35;
+    T_out[71] = s31;
+    s32 -= t36*t14;
+    T_out[75] = s32;
+    double nothing = 0.0*q_in[0] + 0.0*q_in[1] + 0.0*q_in[2] + 0.0*q_in[3] + 0.0*T_out[0] + 0.0*T_out[1];
+    nothing += 0.0*T_out[2] + 0.0*T_out[3] + 0.0*T_out[4] + 0.0*T_out[5] + 0.0*T_out[6] + 0.0*T_out[7];
+    nothing += 0.0*T_out[8] + 0.0*T_out[9] + 0.0*T_out[10] + 0.0*T_out[11] + 0.0*T_out[12] + 0.0*T_out[13];
+    nothing += 0.0*T_out[14] + 0.0*T_out[15] + 0.0*T_out[16] + 0.0*T_out[17] + 0.0*T_out[18] + 0.0*T_out[19];
+    nothing += 0.0*T_out[20] + 0.0*T_out[21] + 0.0*T_out[22] + 0.0*T_out[23] + 0.0*T_out[24] + 0.0*T_out[25];
+    nothing += 0.0*T_out[26] + 0.0*T_out[27] + 0.0*T_out[28] + 0.0*T_out[29] + 0.0*T_out[30] + 0.0*T_out[31];
+    nothing += 0.0*T_out[32] + 0.0*T_out[33] + 0.0*T_out[34] + 0.0*T_out[35] + 0.0*T_out[36] + 0.0*T_out[37];
+    nothing += 0.0*T_out[38] + 0.0*T_out[39] + 0.0*T_out[40] + 0.0*T_out[41] + 0.0*T_out[42] + 0.0*T_out[43];
+    nothing += 0.0*T_out[44] + 0.0*T_out[45] + 0.0*T_out[46] + 0.0*T_out[47] + 0.0*T_out[48] + 0.0*T_out[49];
+    nothing += 0.0*T_out[50] + 0.0*T_out[51] + 0.0*T_out[52] + 0.0*T_out[53] + 0.0*T_out[54] + 0.0*T_out[55];
+    nothing += 0.0*T_out[56] + 0.0*T_out[57] + 0.0*T_out[58] + 0.0*T_out[59] + 0.0*T_out[60] + 0.0*T_out[61];
+    nothing += 0.0*T_out[62] + 0.0*T_out[63] + 0.0*T_out[64] + 0.0*T_out[65] + 0.0*T_out[66] + 0.0*T_out[67];
+    nothing += 0.0*T_out[68] + 0.0*T_out[69] + 0.0*T_out[70] + 0.0*T_out[71] + 0.0*T_out[72] + 0.0*T_out[73];
+    nothing += 0.0*T_out[74] + 0.0*T_out[75] + 0.0*T_out[76] + 0.0*T_out[77] + 0.0*T_out[78] + 0.0*T_out[79];
+    return -36730945.82185491*(t11 - 0.00034225)*(t11 - 1.225e-05) > 0.0 && nothing >= 0.0 ? 0 : 1;
 }

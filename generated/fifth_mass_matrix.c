@@ -4,7 +4,9 @@
  * Source: eq. 2.17, 5.4.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   out  M[4][4] in kg m^2
- * Cost: 113 add, 126 mul, 2 div, 1 sqrt, 5 sincos.
+ * Returns 0 where all inputs and outputs are finite and the four-bar of hmc closes; else 1, and
+ * outputs without a value are NaN.
+ * Cost: 116 add, 130 mul, 2 div, 1 sqrt, 5 sincos.
  * Inputs: sha256 1718087ca49bffea2cbf8b94cea197715d11a5dc4952832196147295c859c88c.
  */
 #include "numerics.h"
@@ -12,7 +14,7 @@
 #include "sincos.h"
 #include "kernels.h"
 
-void awiwi_fifth_mass_matrix(const double q_in[restrict 4], double M_out[restrict 16])
+int awiwi_fifth_mass_matrix(const double q_in[restrict 4], double M_out[restrict 16])
 {
     const double t0 = q_in[0] + 1.0471975511965979;
     double s1 = 0.7692307692307693*q_in[3] - 1.5372089625888168;
@@ -27,86 +29,92 @@ void awiwi_fifth_mass_matrix(const double q_in[restrict 4], double M_out[restric
     const double t8 = a0.cos[0] - 1.2;
     const double t9 = t4*(a0.sin[0]*t6 + t8*t7);
     const double t10 = t4*(t8*t6 - a0.sin[0]*t7);
-    const double t11 = (a0.cos[0]*t9 - a0.sin[0]*(t10 + 0.00012))/t7 + 1.0;
-    const double t12 = 1.0 - t11;
-    const double t13 = 2.8807935083861587e-07*a0.cos[3] + 2.4754030786260505e-09*a0.sin[3];
-    const double t14 = 9.6e-09*a0.cos[2] + 1.3104e-06*a0.sin[2] + t13;
-    const double t15 = 1.68e-08*a0.cos[1] + 4.158e-06*a0.sin[1] + t14;
-    const double t16 = t15 - 1.2816e-06;
-    const double t17 = 5601.7448818824105*t9 - 9595.6888445677*t10;
-    const double t18 = 9595.6888445677*t9 + 5601.7448818824105*t10;
-    const double t19 = 2.4754030786260505e-09*a0.cos[3] - 2.8807935083861587e-07*a0.sin[3];
-    const double t20 = 1.3104e-06*a0.cos[2] + t19 - 9.6e-09*a0.sin[2];
-    const double t21 = 4.158e-06*a0.cos[1] + t20 - 1.68e-08*a0.sin[1];
-    const double t22 = t21 + 1.0548e-06;
-    const double t23 = 3.6666666666666665*a0.cos[2]*t19;
-    const double t24 = 1.011997e-05*a0.cos[1] - 2.62e-08*a0.sin[1];
-    const double t25 = 2.0599e-06*a0.cos[2] - 1.228e-08*a0.sin[2];
-    const double t26 = 2.6077491247001784e-07*a0.cos[3] + 1.03276050589926e-08*a0.sin[3];
-    const double t27 = a0.cos[1]*t24 + a0.cos[2]*t25 - a0.cos[3]*t26;
-    double s28 = a0.sin[1]*t24 + a0.sin[2]*t25 - a0.sin[3]*t26 - 5.027961974705037e-07;
-    const double t29 = 5.5*a0.cos[1]*t20;
-    const double t30 = t23 + t21 + t27 + t29 + 8.686874562350089e-07;
-    double s31 = t23 + 2.38584e-06;
-    double s32 = t29 + 1.020803e-05;
-    double s33 = t27 + t15 - 1.225648254376499e-05;
-    const double t34 = t15 - t21;
-    const double t35 = 3.6666666666666665*a0.sin[2]*t13;
-    s31 += t35;
-    s32 += s31;
-    s33 -= t35;
-    const double t36 = 5.5*a0.sin[1]*t14;
+    const double t11 = t8*t8 + a0.sin[0]*a0.sin[0];
+    const double t12 = (a0.cos[0]*t9 - a0.sin[0]*(t10 + 0.00012))/t7 + 1.0;
+    const double t13 = 1.0 - t12;
+    const double t14 = 2.8807935083861587e-07*a0.cos[3] + 2.4754030786260505e-09*a0.sin[3];
+    const double t15 = 9.6e-09*a0.cos[2] + 1.3104e-06*a0.sin[2] + t14;
+    const double t16 = 1.68e-08*a0.cos[1] + 4.158e-06*a0.sin[1] + t15;
+    const double t17 = t16 - 1.2816e-06;
+    const double t18 = 5601.7448818824105*t9 - 9595.6888445677*t10;
+    const double t19 = 9595.6888445677*t9 + 5601.7448818824105*t10;
+    const double t20 = 2.4754030786260505e-09*a0.cos[3] - 2.8807935083861587e-07*a0.sin[3];
+    const double t21 = 1.3104e-06*a0.cos[2] + t20 - 9.6e-09*a0.sin[2];
+    const double t22 = 4.158e-06*a0.cos[1] + t21 - 1.68e-08*a0.sin[1];
+    const double t23 = t22 + 1.0548e-06;
+    const double t24 = 3.6666666666666665*a0.cos[2]*t20;
+    const double t25 = 1.011997e-05*a0.cos[1] - 2.62e-08*a0.sin[1];
+    const double t26 = 2.0599e-06*a0.cos[2] - 1.228e-08*a0.sin[2];
+    const double t27 = 2.6077491247001784e-07*a0.cos[3] + 1.03276050589926e-08*a0.sin[3];
+    const double t28 = a0.cos[1]*t25 + a0.cos[2]*t26 - a0.cos[3]*t27;
+    double s29 = a0.sin[1]*t25 + a0.sin[2]*t26 - a0.sin[3]*t27 - 5.027961974705037e-07;
+    const double t30 = 5.5*a0.cos[1]*t21;
+    const double t31 = t24 + t22 + t28 + t30 + 8.686874562350089e-07;
+    double s32 = t24 + 2.38584e-06;
+    double s33 = t30 + 1.020803e-05;
+    double s34 = t28 + t16 - 1.225648254376499e-05;
+    const double t35 = t16 - t22;
+    const double t36 = 3.6666666666666665*a0.sin[2]*t14;
     s32 += t36;
-    M_out[10] = s32;
-    s33 -= t36;
-    const double t37 = t34 - s32 - 6.4814e-07;
-    const double t38 = 0.5*t34;
-    s28 += t38;
-    s33 -= t37;
-    M_out[5] = s33;
-    double s39 = t37 + t30;
-    s39 -= 1.0652e-06;
-    const double t40 = 2.4608e-07*a0.cos[2] - 2.22e-09*a0.sin[2] - 7.504232405782752e-08*a0.sin[3];
-    const double t41 = t40 + 4.517e-07*a0.cos[1] - 4.28e-09*a0.sin[1];
-    const double t42 = 2.22e-09*a0.cos[2] + 2.4608e-07*a0.sin[2] + 7.504232405782752e-08*a0.cos[3];
-    const double t43 = 5.772486465986733e-08*a0.cos[3] + t42;
-    M_out[7] = t43;
-    M_out[13] = t43;
-    const double t44 = t42 + 4.28e-09*a0.cos[1] + 4.517e-07*a0.sin[1];
-    M_out[6] = t44;
-    M_out[9] = t44;
-    const double t45 = 2.75*a0.cos[1];
-    const double t46 = 2.75*a0.sin[1];
-    s28 += t45*t14;
-    s28 += t46*t20;
-    const double t47 = t20 + 0.7692307692307693*t19;
-    const double t48 = t14 + 0.7692307692307693*t13;
-    double s49 = t45*t47 + s31 + t46*t48;
-    double s50 = s31 + 1.6871005917159763e-07;
-    s28 += 1.8333333333333333*(a0.cos[2]*t13 + a0.sin[2]*t19);
-    const double t51 = 1.4102564102564104*(a0.cos[2]*t19 + a0.sin[2]*t13) + 2.1932307692307691e-07;
-    s49 += t51;
-    M_out[11] = s49;
-    M_out[14] = s49;
-    s50 += 2.0*t51;
-    M_out[15] = s50;
+    s33 += s32;
+    s34 -= t36;
+    const double t37 = 5.5*a0.sin[1]*t15;
+    s33 += t37;
+    M_out[10] = s33;
+    s34 -= t37;
+    const double t38 = t35 - s33 - 6.4814e-07;
+    const double t39 = 0.5*t35;
+    s29 += t39;
+    s34 -= t38;
+    M_out[5] = s34;
+    double s40 = t38 + t31;
+    s40 -= 1.0652e-06;
+    const double t41 = 2.4608e-07*a0.cos[2] - 2.22e-09*a0.sin[2] - 7.504232405782752e-08*a0.sin[3];
+    const double t42 = t41 + 4.517e-07*a0.cos[1] - 4.28e-09*a0.sin[1];
+    const double t43 = 2.22e-09*a0.cos[2] + 2.4608e-07*a0.sin[2] + 7.504232405782752e-08*a0.cos[3];
+    const double t44 = 5.772486465986733e-08*a0.cos[3] + t43;
+    M_out[7] = t44;
+    M_out[13] = t44;
+    const double t45 = t43 + 4.28e-09*a0.cos[1] + 4.517e-07*a0.sin[1];
+    M_out[6] = t45;
+    M_out[9] = t45;
+    const double t46 = 2.75*a0.cos[1];
+    const double t47 = 2.75*a0.sin[1];
+    s29 += t46*t15;
+    s29 += t47*t21;
+    const double t48 = t21 + 0.7692307692307693*t20;
+    const double t49 = t15 + 0.7692307692307693*t14;
+    double s50 = t46*t48 + s32 + t47*t49;
+    double s51 = s32 + 1.6871005917159763e-07;
+    s29 += 1.8333333333333333*(a0.cos[2]*t14 + a0.sin[2]*t20);
+    const double t52 = 1.4102564102564104*(a0.cos[2]*t20 + a0.sin[2]*t14) + 2.1932307692307691e-07;
+    s50 += t52;
+    M_out[11] = s50;
+    M_out[14] = s50;
+    s51 += 2.0*t52;
+    M_out[15] = s51;
     const awiwi_sincos_result a1 = awiwi_sincos(q_in[1]);
-    s39 += a1.cos*(2.0*a1.sin*(t41 + 8.73e-08) - a1.cos*(t30 - 1.1684e-07));
-    const double t52 = a1.cos*t15;
-    const double t53 = a0.cos[0]*(t21*t18 - t52*t17) + a0.sin[0]*(t21*t17 + t52*t18) - (a1.sin*t41 - 0.3333333333333333*t21 - a1.cos*(s32 - t38))*t12;
-    M_out[2] = t53;
-    M_out[8] = t53;
-    double s54 = a1.sin*(5.772486465986733e-08*a0.sin[3] - t40) + 0.3333333333333333*t47;
-    const double t55 = a1.cos*t48;
-    s54 -= a1.cos*(0.5*(t48 - t47) - s49);
-    const double t56 = a0.cos[0]*(t47*t18 - t55*t17) + a0.sin[0]*(t47*t17 + t55*t18) + s54*t12;
-    M_out[3] = t56;
-    M_out[12] = t56;
-    const double t57 = 1.752e-07*a1.sin - a1.cos*t22;
-    const double t58 = t57 - 8.544e-07;
-    s39 += 0.6666666666666666*t57;
-    M_out[0] = 2.03e-06 - t12*(2.0*(a0.cos[0]*(t16*t17 + t58*t18) - a0.sin[0]*(t16*t18 - t58*t17))) - s39*(t11*(t11 - 2.0) + 1.0);
-    const double t59 = (a1.cos*(t44 - 8.78e-08) + a1.sin*s28)*t12 - (1.752e-07*a1.cos + a1.sin*t22)*(a0.cos[0]*t17 - a0.sin[0]*t18);
-    M_out[1] = t59;
-    M_out[4] = t59;
+    s40 += a1.cos*(2.0*a1.sin*(t42 + 8.73e-08) - a1.cos*(t31 - 1.1684e-07));
+    const double t53 = a1.cos*t16;
+    const double t54 = a0.cos[0]*(t22*t19 - t53*t18) + a0.sin[0]*(t22*t18 + t53*t19) - (a1.sin*t42 - 0.3333333333333333*t22 - a1.cos*(s33 - t39))*t13;
+    M_out[2] = t54;
+    M_out[8] = t54;
+    double s55 = a1.sin*(5.772486465986733e-08*a0.sin[3] - t41) + 0.3333333333333333*t48;
+    const double t56 = a1.cos*t49;
+    s55 -= a1.cos*(0.5*(t49 - t48) - s50);
+    const double t57 = a0.cos[0]*(t48*t19 - t56*t18) + a0.sin[0]*(t48*t18 + t56*t19) + s55*t13;
+    M_out[3] = t57;
+    M_out[12] = t57;
+    const double t58 = 1.752e-07*a1.sin - a1.cos*t23;
+    const double t59 = t58 - 8.544e-07;
+    s40 += 0.6666666666666666*t58;
+    M_out[0] = 2.03e-06 - t13*(2.0*(a0.cos[0]*(t17*t18 + t59*t19) - a0.sin[0]*(t17*t19 - t59*t18))) - s40*(t12*(t12 - 2.0) + 1.0);
+    const double t60 = (a1.cos*(t45 - 8.78e-08) + a1.sin*s29)*t13 - (1.752e-07*a1.cos + a1.sin*t23)*(a0.cos[0]*t18 - a0.sin[0]*t19);
+    M_out[1] = t60;
+    M_out[4] = t60;
+    double nothing = 0.0*q_in[0] + 0.0*q_in[1] + 0.0*q_in[2] + 0.0*q_in[3] + 0.0*M_out[0] + 0.0*M_out[1];
+    nothing += 0.0*M_out[2] + 0.0*M_out[3] + 0.0*M_out[4] + 0.0*M_out[5] + 0.0*M_out[6] + 0.0*M_out[7];
+    nothing += 0.0*M_out[8] + 0.0*M_out[9] + 0.0*M_out[10] + 0.0*M_out[11] + 0.0*M_out[12] + 0.0*M_out[13];
+    nothing += 0.0*M_out[14] + 0.0*M_out[15];
+    return -0.3673094582185491*(t11 - 3.4225)*(t11 - 0.1225) > 0.0 && nothing >= 0.0 ? 0 : 1;
 }

@@ -5,7 +5,9 @@
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   out  T[4][4] in 1, m
  *   out  J[6][4] in m/rad, 1
- * Cost: 41 add, 70 mul, 2 div, 8 neg, 1 sqrt, 5 sincos.
+ * Returns 0 where all inputs and outputs are finite and the four-bar of hmc closes; else 1, and
+ * outputs without a value are NaN.
+ * Cost: 44 add, 75 mul, 2 div, 8 neg, 1 sqrt, 5 sincos.
  * Inputs: sha256 28edf41a51f84ef24222facbdc6e1021f809ccdd8b122d41df2ba55b8d1b95d9.
  */
 #include "numerics.h"
@@ -13,7 +15,7 @@
 #include "sincos.h"
 #include "kernels.h"
 
-void awiwi_fifth_pose_and_jacobian(const double q_in[restrict 4], double T_out[restrict 16], double J_out[restrict 24])
+int awiwi_fifth_pose_and_jacobian(const double q_in[restrict 4], double T_out[restrict 16], double J_out[restrict 24])
 {
     T_out[12] = 0.0;
     T_out[13] = 0.0;
@@ -37,59 +39,69 @@ void awiwi_fifth_pose_and_jacobian(const double q_in[restrict 4], double T_out[r
     const double t10 = t5*t6 + t9*t7;
     const double t11 = t9*t6 - t5*t7;
     const double t12 = 1.0 - (0.00012*a0.sin[1] - 0.005*(t4*(a0.cos[1]*t10 - a0.sin[1]*t11)))/t7;
-    const double t13 = t4*(57.5741330674062*t10 + 33.610469291294464*t11);
-    J_out[21] = t13;
-    const double t14 = t4*(33.610469291294464*t10 - 57.5741330674062*t11);
-    J_out[13] = -t14;
-    const double t15 = -0.022*a0.sin[3] + -0.018*a0.sin[0];
-    const double t16 = -0.033*a0.sin[2] + t15;
-    const double t17 = 0.022*a0.cos[3] + 0.018*a0.cos[0];
-    const double t18 = 0.033*a0.cos[2] + t17;
-    const double t19 = -t16 - 0.006;
-    const double t20 = t18 + 0.006;
+    const double t13 = 0.0001*a0.sin[1]*a0.sin[1] + t9*t9;
+    const double t14 = t4*(57.5741330674062*t10 + 33.610469291294464*t11);
+    J_out[21] = t14;
+    const double t15 = t4*(33.610469291294464*t10 - 57.5741330674062*t11);
+    J_out[13] = -t15;
+    const double t16 = -0.022*a0.sin[3] + -0.018*a0.sin[0];
+    const double t17 = -0.033*a0.sin[2] + t16;
+    const double t18 = 0.022*a0.cos[3] + 0.018*a0.cos[0];
+    const double t19 = 0.033*a0.cos[2] + t18;
+    const double t20 = -t17 - 0.006;
+    const double t21 = t19 + 0.006;
     J_out[16] = t12 - 1.0;
     const awiwi_sincos_result a1 = awiwi_sincos(q_in[1]);
     T_out[6] = -a1.cos;
     J_out[18] = -a1.cos;
-    J_out[7] = a1.sin*(t15 - 0.013846153846153847*a0.sin[0]);
-    const double t21 = a1.cos*t13;
-    T_out[0] = a0.cos[0]*t21 - a0.sin[0]*t14;
-    const double t22 = a0.cos[0]*t14 + a0.sin[0]*t21;
-    T_out[1] = -t22;
-    J_out[2] = t16*t21 - t18*t14;
-    J_out[3] = t15*t21 + -0.013846153846153847*t22 - t17*t14;
-    const double t23 = a1.sin*t13;
-    T_out[2] = t23;
-    J_out[14] = t23;
-    const double t24 = 0.0036*a1.sin - a1.cos*t20;
-    J_out[5] = -t24;
-    const double t25 = t24 - 0.004;
-    const double t26 = t19*t14 + t25*t13;
-    const double t27 = t8 - t26;
-    T_out[3] = t27;
-    const double t28 = -0.0036*a1.cos - a1.sin*t20;
-    T_out[7] = -t28;
-    const double t29 = t19*t13 - t25*t14;
-    const double t30 = t5 + t29;
-    T_out[11] = t30;
-    J_out[0] = t29*t12 - t30;
-    J_out[8] = t27 + t26*t12;
+    J_out[7] = a1.sin*(t16 - 0.013846153846153847*a0.sin[0]);
+    const double t22 = a1.cos*t14;
+    T_out[0] = a0.cos[0]*t22 - a0.sin[0]*t15;
+    const double t23 = a0.cos[0]*t15 + a0.sin[0]*t22;
+    T_out[1] = -t23;
+    J_out[2] = t17*t22 - t19*t15;
+    J_out[3] = t16*t22 + -0.013846153846153847*t23 - t18*t15;
+    const double t24 = a1.sin*t14;
+    T_out[2] = t24;
+    J_out[14] = t24;
+    const double t25 = 0.0036*a1.sin - a1.cos*t21;
+    J_out[5] = -t25;
+    const double t26 = t25 - 0.004;
+    const double t27 = t20*t15 + t26*t14;
+    const double t28 = t8 - t27;
+    T_out[3] = t28;
+    const double t29 = -0.0036*a1.cos - a1.sin*t21;
+    T_out[7] = -t29;
+    const double t30 = t20*t14 - t26*t15;
+    const double t31 = t5 + t30;
+    T_out[11] = t31;
+    J_out[0] = t30*t12 - t31;
+    J_out[8] = t28 + t27*t12;
     T_out[4] = a1.sin*a0.cos[0];
     T_out[5] = -(a1.sin*a0.sin[0]);
-    const double t31 = a1.cos*t14;
-    T_out[8] = a0.sin[0]*t13 + a0.cos[0]*t31;
-    const double t32 = a0.cos[0]*t13 - a0.sin[0]*t31;
-    T_out[9] = t32;
-    J_out[10] = t18*t13 + t16*t31;
-    J_out[6] = a1.sin*t16;
-    J_out[11] = t17*t13 + 0.013846153846153847*t32 + t15*t31;
+    const double t32 = a1.cos*t15;
+    T_out[8] = a0.sin[0]*t14 + a0.cos[0]*t32;
+    const double t33 = a0.cos[0]*t14 - a0.sin[0]*t32;
+    T_out[9] = t33;
+    J_out[10] = t19*t14 + t17*t32;
+    J_out[6] = a1.sin*t17;
+    J_out[11] = t18*t14 + 0.013846153846153847*t33 + t16*t32;
     J_out[19] = -1.7692307692307692*a1.cos;
-    const double t33 = a1.sin*t14;
-    T_out[10] = t33;
-    J_out[22] = t33;
-    const double t34 = 1.7692307692307692*a1.sin;
-    J_out[1] = t28*t13;
-    J_out[9] = t28*t14;
-    J_out[15] = t34*t13;
-    J_out[23] = t34*t14;
+    const double t34 = a1.sin*t15;
+    T_out[10] = t34;
+    J_out[22] = t34;
+    const double t35 = 1.7692307692307692*a1.sin;
+    J_out[1] = t29*t14;
+    J_out[9] = t29*t15;
+    J_out[15] = t35*t14;
+    J_out[23] = t35*t15;
+    double nothing = 0.0*q_in[0] + 0.0*q_in[1] + 0.0*q_in[2] + 0.0*q_in[3] + 0.0*T_out[0] + 0.0*T_out[1];
+    nothing += 0.0*T_out[2] + 0.0*T_out[3] + 0.0*T_out[4] + 0.0*T_out[5] + 0.0*T_out[6] + 0.0*T_out[7];
+    nothing += 0.0*T_out[8] + 0.0*T_out[9] + 0.0*T_out[10] + 0.0*T_out[11] + 0.0*T_out[12] + 0.0*T_out[13];
+    nothing += 0.0*T_out[14] + 0.0*T_out[15] + 0.0*J_out[0] + 0.0*J_out[1] + 0.0*J_out[2] + 0.0*J_out[3];
+    nothing += 0.0*J_out[4] + 0.0*J_out[5] + 0.0*J_out[6] + 0.0*J_out[7] + 0.0*J_out[8] + 0.0*J_out[9];
+    nothing += 0.0*J_out[10] + 0.0*J_out[11] + 0.0*J_out[12] + 0.0*J_out[13] + 0.0*J_out[14] + 0.0*J_out[15];
+    nothing += 0.0*J_out[16] + 0.0*J_out[17] + 0.0*J_out[18] + 0.0*J_out[19] + 0.0*J_out[20] + 0.0*J_out[21];
+    nothing += 0.0*J_out[22] + 0.0*J_out[23];
+    return -36730945.82185491*(t13 - 0.00034225)*(t13 - 1.225e-05) > 0.0 && nothing >= 0.0 ? 0 : 1;
 }

@@ -14,8 +14,8 @@
  *   in   period[1] in s, 0.0001 to 0.01
  *   out  momentum_next[1] in N m s
  *   out  friction[1] in N m
- * Returns 0 where the motor's inertia is positive and the gain is positive and the period is positive;
- * else 1, and outputs without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and the motor's inertia is positive and the gain
+ * is positive and the period is positive; else 1, and outputs without a value are NaN.
  * Cost: 5 add, 5 mul, 1 div, 1 neg.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
@@ -29,5 +29,7 @@ int awiwi_friction_observer(const double momentum_in[restrict 1], const double u
     const double t2 = (B_in[0]*thd_in[0] - t0)/(t1 + 1.0);
     momentum_next_out[0] = t0 + t1*t2;
     friction_out[0] = -(gain_in[0]*t2);
-    return B_in[0] > 0.0 && gain_in[0] > 0.0 && period_in[0] > 0.0 ? 0 : 1;
+    double nothing = 0.0*momentum_in[0] + 0.0*u_in[0] + 0.0*tau_in[0] + 0.0*thd_in[0] + 0.0*B_in[0] + 0.0*gain_in[0];
+    nothing += 0.0*period_in[0] + 0.0*momentum_next_out[0] + 0.0*friction_out[0];
+    return B_in[0] > 0.0 && gain_in[0] > 0.0 && period_in[0] > 0.0 && nothing >= 0.0 ? 0 : 1;
 }

@@ -6,8 +6,9 @@
  *   in   q[19] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727, -0.3491, -0.1745, -0.08727, -0.08727, -0.3491, -0.1745, -0.08727, -0.08727, -0.3491, -0.1745, -0.08727, -0.5236, -0.3491, -0.1745, -0.08727] to [0.6109, 0.6109, 1.396, 1.396, 0.3491, 1.484, 1.571, 1.396, 0.3491, 1.484, 1.571, 1.396, 0.3491, 1.484, 1.571, 0.6981, 0.3491, 1.484, 1.571]
  *   in   wrist[2] in rad, from [0.1004, 0.6234] to [1.148, 1.322]
  *   out  h[38] in m
- * Returns 0 where q73 is between 0 and pi and the plane of the side bars has not passed A0 and bar AA0
- * closes the loop; else 1, and outputs without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and q73 is between 0 and pi and the plane of the
+ * side bars has not passed A0 and bar AA0 closes the loop; else 1, and outputs without a value are
+ * NaN.
  * Cost: 254 add, 180 mul, 2 div, 43 sqrt, 4 sincos.
  * Inputs: sha256 043c7fe4cf3ab8c45707fb92fe06f721b86c5746382be7b476392fac3d18624a.
  */
@@ -209,5 +210,15 @@ int awiwi_hand_tendon_lengths(const double q_in[restrict 19], const double wrist
     const double t123 = 0.005*q_in[18];
     h_out[36] = sqrt(0.066*t70 + s71 + 0.001285 - 0.022*t33 - 0.028*t76) + t123;
     h_out[37] = sqrt(0.07*t70 + s71 + 0.001481 - 0.02666666666666667*t33 - 0.032*t76) - t123;
-    return a0.sin[2] > 0.0 && 0.002592*a0.cos[3] > 0.0 && t54 > 0.0 ? 0 : 1;
+    double nothing = 0.0*q_in[0] + 0.0*q_in[1] + 0.0*q_in[2] + 0.0*q_in[3] + 0.0*q_in[4] + 0.0*q_in[5];
+    nothing += 0.0*q_in[6] + 0.0*q_in[7] + 0.0*q_in[8] + 0.0*q_in[9] + 0.0*q_in[10] + 0.0*q_in[11];
+    nothing += 0.0*q_in[12] + 0.0*q_in[13] + 0.0*q_in[14] + 0.0*q_in[15] + 0.0*q_in[16] + 0.0*q_in[17];
+    nothing += 0.0*q_in[18] + 0.0*wrist_in[0] + 0.0*wrist_in[1] + 0.0*h_out[0] + 0.0*h_out[1] + 0.0*h_out[2];
+    nothing += 0.0*h_out[3] + 0.0*h_out[4] + 0.0*h_out[5] + 0.0*h_out[6] + 0.0*h_out[7] + 0.0*h_out[8];
+    nothing += 0.0*h_out[9] + 0.0*h_out[10] + 0.0*h_out[11] + 0.0*h_out[12] + 0.0*h_out[13] + 0.0*h_out[14];
+    nothing += 0.0*h_out[15] + 0.0*h_out[16] + 0.0*h_out[17] + 0.0*h_out[18] + 0.0*h_out[19] + 0.0*h_out[20];
+    nothing += 0.0*h_out[21] + 0.0*h_out[22] + 0.0*h_out[23] + 0.0*h_out[24] + 0.0*h_out[25] + 0.0*h_out[26];
+    nothing += 0.0*h_out[27] + 0.0*h_out[28] + 0.0*h_out[29] + 0.0*h_out[30] + 0.0*h_out[31] + 0.0*h_out[32];
+    nothing += 0.0*h_out[33] + 0.0*h_out[34] + 0.0*h_out[35] + 0.0*h_out[36] + 0.0*h_out[37];
+    return a0.sin[2] > 0.0 && 0.002592*a0.cos[3] > 0.0 && t54 > 0.0 && nothing >= 0.0 ? 0 : 1;
 }

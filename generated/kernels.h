@@ -4,7 +4,14 @@
 #define AWIWI_KERNELS_H
 
 /* Port x of a kernel is the parameter x_in or x_out, an array of numbers row by row. The caller owns all arrays;
- * outputs overlap neither inputs nor each other (definitions are `restrict`). */
+ * outputs overlap neither inputs nor each other (definitions are `restrict`).
+ *
+ * Kernels that return an int return 0 for success, and never 0 if an input or an output is not finite. The other
+ * kernels have a result for all inputs in range and beyond; what depends on NaN is NaN.
+ *
+ * Link the mathematical library (-lm). Beside each other, these files and csrc call at most, of <math.h>:
+ *   fabs, fmax, frexp, ldexp, sqrt.
+ * and compilers may call memcpy, memmove and memset. */
 
 /* For toolchains that use only 31 characters of a name: define AWIWI_SHORT_NAMES in every file. */
 #ifdef AWIWI_SHORT_NAMES
@@ -51,8 +58,8 @@ extern const char awiwi_model_digest[65];
  *   out  k[8] in N/m
  *   out  slope[8] in 1/m
  *   out  curvature[8] in 1/(N m)
- * Returns 0 where every tension is on its spring's curve, with a margin of 0.4 %; else 1, and outputs
- * without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and every tension is on its spring's curve, with a
+ * margin of 0.4 %; else 1, and outputs without a value are NaN.
  * Cost: 198 add, 198 mul, 7 calls.
  */
 int awiwi_thumb_tendon_stiffness(const double tension_in[8], double k_out[8], double slope_out[8], double curvature_out[8]);
@@ -258,12 +265,14 @@ void awiwi_thumb_joint_torque_and_stiffness(const double q_in[4], const double f
 
 /*
  * Joint angles whose tendon lengths are nearest to the measured h (least squares); start is the last
- * estimate.
+ * estimate. Where the coupling is constant the estimate is linear, and not limited: lengths that no
+ * pose has give angles beyond the joint limits. Otherwise it is within them.
  * Source: eq. 5.14, 5.15, 5.24.
  *   in   h[8] in m, from [0, 0, 0, 0, -0.01117, -0.01117, -0.01955, -0.01955] to [0.1515, 0.1515, 0.1515, 0.1515, 0.01117, 0.01117, 0.01955, 0.01955]
  *   in   start[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   out  q[4] in rad
- * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
+ * Returns an awiwi_status, see awiwi_solvers.h, never 0 if an input is not finite; the outputs are
+ * always defined.
  * Cost: the solver's own work and calls, at most: 24 of thumb_tendon_lengths, 24 of thumb_coupling.
  */
 int awiwi_thumb_joint_estimate(const double h_in[8], const double start_in[4], double q_out[4]);
@@ -292,7 +301,8 @@ void awiwi_thumb_joint_estimate_error(const double q_in[4], const double noise_i
  *   in   f_min[1] in N, 3.87595 to 27.9443
  *   in   f_max[1] in N, 76.0811 to 100.149
  *   out  f[8] in N
- * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
+ * Returns an awiwi_status, see awiwi_solvers.h, never 0 if an input is not finite; the outputs are
+ * always defined.
  * Cost: the solver's own work and calls, at most: 1 of thumb_coupling, 357 of thumb_tendon_stiffness, 1 of thumb_coupling_derivative.
  */
 int awiwi_thumb_tendon_distribution(const double q_in[4], const double tau_in[4], const double K_in[16], const double f_min_in[1], const double f_max_in[1], double f_out[8]);
@@ -303,7 +313,8 @@ int awiwi_thumb_tendon_distribution(const double q_in[4], const double tau_in[4]
  *   in   h[4] in m, 0 to 0.15149
  *   in   start[2] in rad, -0.610865 to 0.610865
  *   out  q[2] in rad
- * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
+ * Returns an awiwi_status, see awiwi_solvers.h, never 0 if an input is not finite; the outputs are
+ * always defined.
  * Cost: the solver's own work and calls, at most: 51 of thumb_tendon_lengths, 51 of thumb_coupling.
  */
 int awiwi_thumb_base_estimate_by_gradient(const double h_in[4], const double start_in[2], double q_out[2]);
@@ -316,8 +327,8 @@ int awiwi_thumb_base_estimate_by_gradient(const double h_in[4], const double sta
  *   out  k[8] in N/m
  *   out  slope[8] in 1/m
  *   out  curvature[8] in 1/(N m)
- * Returns 0 where every tension is on its spring's curve, with a margin of 0.4 %; else 1, and outputs
- * without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and every tension is on its spring's curve, with a
+ * margin of 0.4 %; else 1, and outputs without a value are NaN.
  * Cost: 198 add, 198 mul, 7 calls.
  */
 int awiwi_index_tendon_stiffness(const double tension_in[8], double k_out[8], double slope_out[8], double curvature_out[8]);
@@ -523,7 +534,8 @@ void awiwi_index_joint_torque_and_stiffness(const double q_in[4], const double f
 
 /*
  * Joint angles whose tendon lengths are nearest to the measured h (least squares); start is the last
- * estimate.
+ * estimate. Where the coupling is constant the estimate is linear, and not limited: lengths that no
+ * pose has give angles beyond the joint limits. Otherwise it is within them.
  * Source: eq. 5.14, 5.15, 5.24.
  *   in   h[8] in m, from [-0.01278, -0.01278, -0.01278, -0.01278, -0.009425, -0.009425, -0.01571, -0.01571] to [0.01278, 0.01278, 0.01278, 0.01278, 0.009425, 0.009425, 0.01571, 0.01571]
  *   in   start[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
@@ -556,7 +568,8 @@ void awiwi_index_joint_estimate_error(const double q_in[4], const double noise_i
  *   in   f_min[1] in N, 3.87595 to 27.9443
  *   in   f_max[1] in N, 76.0811 to 100.149
  *   out  f[8] in N
- * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
+ * Returns an awiwi_status, see awiwi_solvers.h, never 0 if an input is not finite; the outputs are
+ * always defined.
  * Cost: the solver's own work and calls, at most: 1 of index_coupling, 66 of index_tendon_stiffness.
  */
 int awiwi_index_tendon_distribution(const double q_in[4], const double tau_in[4], const double K_in[16], const double f_min_in[1], const double f_max_in[1], double f_out[8]);
@@ -569,8 +582,8 @@ int awiwi_index_tendon_distribution(const double q_in[4], const double tau_in[4]
  *   out  k[8] in N/m
  *   out  slope[8] in 1/m
  *   out  curvature[8] in 1/(N m)
- * Returns 0 where every tension is on its spring's curve, with a margin of 0.4 %; else 1, and outputs
- * without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and every tension is on its spring's curve, with a
+ * margin of 0.4 %; else 1, and outputs without a value are NaN.
  * Cost: 198 add, 198 mul, 7 calls.
  */
 int awiwi_middle_tendon_stiffness(const double tension_in[8], double k_out[8], double slope_out[8], double curvature_out[8]);
@@ -776,7 +789,8 @@ void awiwi_middle_joint_torque_and_stiffness(const double q_in[4], const double 
 
 /*
  * Joint angles whose tendon lengths are nearest to the measured h (least squares); start is the last
- * estimate.
+ * estimate. Where the coupling is constant the estimate is linear, and not limited: lengths that no
+ * pose has give angles beyond the joint limits. Otherwise it is within them.
  * Source: eq. 5.14, 5.15, 5.24.
  *   in   h[8] in m, from [-0.01278, -0.01278, -0.01278, -0.01278, -0.009425, -0.009425, -0.01571, -0.01571] to [0.01278, 0.01278, 0.01278, 0.01278, 0.009425, 0.009425, 0.01571, 0.01571]
  *   in   start[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
@@ -809,7 +823,8 @@ void awiwi_middle_joint_estimate_error(const double q_in[4], const double noise_
  *   in   f_min[1] in N, 3.87595 to 27.9443
  *   in   f_max[1] in N, 76.0811 to 100.149
  *   out  f[8] in N
- * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
+ * Returns an awiwi_status, see awiwi_solvers.h, never 0 if an input is not finite; the outputs are
+ * always defined.
  * Cost: the solver's own work and calls, at most: 1 of middle_coupling, 66 of middle_tendon_stiffness.
  */
 int awiwi_middle_tendon_distribution(const double q_in[4], const double tau_in[4], const double K_in[16], const double f_min_in[1], const double f_max_in[1], double f_out[8]);
@@ -822,8 +837,8 @@ int awiwi_middle_tendon_distribution(const double q_in[4], const double tau_in[4
  *   out  k[6] in N/m
  *   out  slope[6] in 1/m
  *   out  curvature[6] in 1/(N m)
- * Returns 0 where every tension is on its spring's curve, with a margin of 0.4 %; else 1, and outputs
- * without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and every tension is on its spring's curve, with a
+ * margin of 0.4 %; else 1, and outputs without a value are NaN.
  * Cost: 148 add, 148 mul, 5 calls.
  */
 int awiwi_ring_tendon_stiffness(const double tension_in[6], double k_out[6], double slope_out[6], double curvature_out[6]);
@@ -1029,7 +1044,8 @@ void awiwi_ring_joint_torque_and_stiffness(const double q_in[3], const double f_
 
 /*
  * Joint angles whose tendon lengths are nearest to the measured h (least squares); start is the last
- * estimate.
+ * estimate. Where the coupling is constant the estimate is linear, and not limited: lengths that no
+ * pose has give angles beyond the joint limits. Otherwise it is within them.
  * Source: eq. 5.14, 5.15, 5.24.
  *   in   h[6] in m, from [-0.01278, -0.01278, -0.01278, -0.01278, -0.008639, -0.008639] to [0.01278, 0.01278, 0.01278, 0.01278, 0.008639, 0.008639]
  *   in   start[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
@@ -1062,7 +1078,8 @@ void awiwi_ring_joint_estimate_error(const double q_in[3], const double noise_in
  *   in   f_min[1] in N, 3.87595 to 27.9443
  *   in   f_max[1] in N, 76.0811 to 100.149
  *   out  f[6] in N
- * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
+ * Returns an awiwi_status, see awiwi_solvers.h, never 0 if an input is not finite; the outputs are
+ * always defined.
  * Cost: the solver's own work and calls, at most: 1 of ring_coupling, 66 of ring_tendon_stiffness.
  */
 int awiwi_ring_tendon_distribution(const double q_in[3], const double tau_in[3], const double K_in[9], const double f_min_in[1], const double f_max_in[1], double f_out[6]);
@@ -1075,8 +1092,8 @@ int awiwi_ring_tendon_distribution(const double q_in[3], const double tau_in[3],
  *   out  k[8] in N/m
  *   out  slope[8] in 1/m
  *   out  curvature[8] in 1/(N m)
- * Returns 0 where every tension is on its spring's curve, with a margin of 0.4 %; else 1, and outputs
- * without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and every tension is on its spring's curve, with a
+ * margin of 0.4 %; else 1, and outputs without a value are NaN.
  * Cost: 198 add, 198 mul, 7 calls.
  */
 int awiwi_fifth_tendon_stiffness(const double tension_in[8], double k_out[8], double slope_out[8], double curvature_out[8]);
@@ -1086,27 +1103,33 @@ int awiwi_fifth_tendon_stiffness(const double tension_in[8], double k_out[8], do
  * Source: eq. 5.2, 5.3, table 5.1.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   out  T[4][4] in 1, m
- * Cost: 28 add, 44 mul, 1 div, 3 neg, 1 sqrt, 5 sincos.
+ * Returns 0 where all inputs and outputs are finite and the four-bar of hmc closes; else 1, and
+ * outputs without a value are NaN.
+ * Cost: 31 add, 49 mul, 1 div, 3 neg, 1 sqrt, 5 sincos.
  */
-void awiwi_fifth_fingertip_pose(const double q_in[4], double T_out[16]);
+int awiwi_fifth_fingertip_pose(const double q_in[4], double T_out[16]);
 
 /*
  * Pose of every link frame (origin at its joint, fixed to the link) in the finger's base frame.
  * Source: eq. 5.2.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   out  T[5][4][4] in 1, m
- * Cost: 38 add, 69 mul, 1 div, 13 neg, 1 sqrt, 5 sincos.
+ * Returns 0 where all inputs and outputs are finite and the four-bar of hmc closes; else 1, and
+ * outputs without a value are NaN.
+ * Cost: 41 add, 74 mul, 1 div, 13 neg, 1 sqrt, 5 sincos.
  */
-void awiwi_fifth_link_poses(const double q_in[4], double T_out[80]);
+int awiwi_fifth_link_poses(const double q_in[4], double T_out[80]);
 
 /*
  * Fingertip Jacobian in base axes: velocity of the tip (rows 0-2) and angular velocity (rows 3-5).
  * Source: eq. 5.3, differentiated.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   out  J[6][4] in m/rad, 1
- * Cost: 33 add, 59 mul, 2 div, 4 neg, 1 sqrt, 5 sincos.
+ * Returns 0 where all inputs and outputs are finite and the four-bar of hmc closes; else 1, and
+ * outputs without a value are NaN.
+ * Cost: 36 add, 64 mul, 2 div, 4 neg, 1 sqrt, 5 sincos.
  */
-void awiwi_fifth_jacobian(const double q_in[4], double J_out[24]);
+int awiwi_fifth_jacobian(const double q_in[4], double J_out[24]);
 
 /*
  * Pose of the fingertip and its Jacobian, both in base axes, in one call with fewer operations.
@@ -1114,18 +1137,22 @@ void awiwi_fifth_jacobian(const double q_in[4], double J_out[24]);
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   out  T[4][4] in 1, m
  *   out  J[6][4] in m/rad, 1
- * Cost: 41 add, 70 mul, 2 div, 8 neg, 1 sqrt, 5 sincos.
+ * Returns 0 where all inputs and outputs are finite and the four-bar of hmc closes; else 1, and
+ * outputs without a value are NaN.
+ * Cost: 44 add, 75 mul, 2 div, 8 neg, 1 sqrt, 5 sincos.
  */
-void awiwi_fifth_pose_and_jacobian(const double q_in[4], double T_out[16], double J_out[24]);
+int awiwi_fifth_pose_and_jacobian(const double q_in[4], double T_out[16], double J_out[24]);
 
 /*
  * Mass matrix: the kinetic energy is half qd' M qd.
  * Source: eq. 2.17, 5.4.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   out  M[4][4] in kg m^2
- * Cost: 113 add, 126 mul, 2 div, 1 sqrt, 5 sincos.
+ * Returns 0 where all inputs and outputs are finite and the four-bar of hmc closes; else 1, and
+ * outputs without a value are NaN.
+ * Cost: 116 add, 130 mul, 2 div, 1 sqrt, 5 sincos.
  */
-void awiwi_fifth_mass_matrix(const double q_in[4], double M_out[16]);
+int awiwi_fifth_mass_matrix(const double q_in[4], double M_out[16]);
 
 /*
  * Coriolis matrix by Christoffel symbols, so that dM/dt - 2 C is skew-symmetric.
@@ -1133,9 +1160,11 @@ void awiwi_fifth_mass_matrix(const double q_in[4], double M_out[16]);
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   in   qd[4] in rad/s, -20 to 20
  *   out  C[4][4] in N m s/rad
- * Cost: 309 add, 359 mul, 2 div, 2 neg, 1 sqrt, 5 sincos.
+ * Returns 0 where all inputs and outputs are finite and the four-bar of hmc closes; else 1, and
+ * outputs without a value are NaN.
+ * Cost: 312 add, 364 mul, 2 div, 2 neg, 1 sqrt, 5 sincos.
  */
-void awiwi_fifth_coriolis_matrix(const double q_in[4], const double qd_in[4], double C_out[16]);
+int awiwi_fifth_coriolis_matrix(const double q_in[4], const double qd_in[4], double C_out[16]);
 
 /*
  * Joint torques that hold the finger at rest against gravity g (in base axes).
@@ -1143,9 +1172,11 @@ void awiwi_fifth_coriolis_matrix(const double q_in[4], const double qd_in[4], do
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  gravity[4] in N m
- * Cost: 41 add, 55 mul, 2 div, 1 sqrt, 5 sincos.
+ * Returns 0 where all inputs and outputs are finite and the four-bar of hmc closes; else 1, and
+ * outputs without a value are NaN.
+ * Cost: 44 add, 59 mul, 2 div, 1 sqrt, 5 sincos.
  */
-void awiwi_fifth_gravity(const double q_in[4], const double g_in[3], double gravity_out[4]);
+int awiwi_fifth_gravity(const double q_in[4], const double g_in[3], double gravity_out[4]);
 
 /*
  * Coriolis, centrifugal and gravity torques together: C qd + gravity.
@@ -1154,9 +1185,11 @@ void awiwi_fifth_gravity(const double q_in[4], const double g_in[3], double grav
  *   in   qd[4] in rad/s, -20 to 20
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  bias[4] in N m
- * Cost: 223 add, 250 mul, 2 div, 1 sqrt, 5 sincos.
+ * Returns 0 where all inputs and outputs are finite and the four-bar of hmc closes; else 1, and
+ * outputs without a value are NaN.
+ * Cost: 226 add, 255 mul, 2 div, 1 sqrt, 5 sincos.
  */
-void awiwi_fifth_bias(const double q_in[4], const double qd_in[4], const double g_in[3], double bias_out[4]);
+int awiwi_fifth_bias(const double q_in[4], const double qd_in[4], const double g_in[3], double bias_out[4]);
 
 /*
  * Joint torques that produce the accelerations qdd: M qdd + C qd + gravity.
@@ -1166,9 +1199,11 @@ void awiwi_fifth_bias(const double q_in[4], const double qd_in[4], const double 
  *   in   qdd[4] in rad/s^2, -2000 to 2000
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  tau[4] in N m
- * Cost: 238 add, 262 mul, 2 div, 1 sqrt, 5 sincos.
+ * Returns 0 where all inputs and outputs are finite and the four-bar of hmc closes; else 1, and
+ * outputs without a value are NaN.
+ * Cost: 241 add, 267 mul, 2 div, 1 sqrt, 5 sincos.
  */
-void awiwi_fifth_inverse_dynamics(const double q_in[4], const double qd_in[4], const double qdd_in[4], const double g_in[3], double tau_out[4]);
+int awiwi_fifth_inverse_dynamics(const double q_in[4], const double qd_in[4], const double qdd_in[4], const double g_in[3], double tau_out[4]);
 
 /*
  * Partial derivatives of the inverse dynamics with respect to the positions and the velocities.
@@ -1179,9 +1214,11 @@ void awiwi_fifth_inverse_dynamics(const double q_in[4], const double qd_in[4], c
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  dtau_dq[4][4] in N m/rad
  *   out  dtau_dqd[4][4] in N m s/rad
- * Cost: 957 add, 1075 mul, 2 div, 1 sqrt, 5 sincos.
+ * Returns 0 where all inputs and outputs are finite and the four-bar of hmc closes; else 1, and
+ * outputs without a value are NaN.
+ * Cost: 960 add, 1079 mul, 2 div, 1 sqrt, 5 sincos.
  */
-void awiwi_fifth_inverse_dynamics_derivatives(const double q_in[4], const double qd_in[4], const double qdd_in[4], const double g_in[3], double dtau_dq_out[16], double dtau_dqd_out[16]);
+int awiwi_fifth_inverse_dynamics_derivatives(const double q_in[4], const double qd_in[4], const double qdd_in[4], const double g_in[3], double dtau_dq_out[16], double dtau_dqd_out[16]);
 
 /*
  * Joint accelerations under the joint torques tau.
@@ -1191,9 +1228,11 @@ void awiwi_fifth_inverse_dynamics_derivatives(const double q_in[4], const double
  *   in   tau[4] in N m, -1 to 1
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  qdd[4] in rad/s^2
- * Cost: 329 add, 352 mul, 6 div, 1 neg, 1 sqrt, 5 sincos.
+ * Returns 0 where all inputs and outputs are finite and the four-bar of hmc closes; else 1, and
+ * outputs without a value are NaN.
+ * Cost: 332 add, 357 mul, 6 div, 1 neg, 1 sqrt, 5 sincos.
  */
-void awiwi_fifth_forward_dynamics(const double q_in[4], const double qd_in[4], const double tau_in[4], const double g_in[3], double qdd_out[4]);
+int awiwi_fifth_forward_dynamics(const double q_in[4], const double qd_in[4], const double tau_in[4], const double g_in[3], double qdd_out[4]);
 
 /*
  * Mass matrix, Coriolis matrix and gravity torques in one call with fewer operations.
@@ -1204,9 +1243,11 @@ void awiwi_fifth_forward_dynamics(const double q_in[4], const double qd_in[4], c
  *   out  M[4][4] in kg m^2
  *   out  C[4][4] in N m s/rad
  *   out  gravity[4] in N m
- * Cost: 339 add, 401 mul, 2 div, 2 neg, 1 sqrt, 5 sincos.
+ * Returns 0 where all inputs and outputs are finite and the four-bar of hmc closes; else 1, and
+ * outputs without a value are NaN.
+ * Cost: 342 add, 406 mul, 2 div, 2 neg, 1 sqrt, 5 sincos.
  */
-void awiwi_fifth_dynamics(const double q_in[4], const double qd_in[4], const double g_in[3], double M_out[16], double C_out[16], double gravity_out[4]);
+int awiwi_fifth_dynamics(const double q_in[4], const double qd_in[4], const double g_in[3], double M_out[16], double C_out[16], double gravity_out[4]);
 
 /*
  * Kinetic energy and potential energy in the gravity field g (zero at the base frame's origin).
@@ -1216,9 +1257,11 @@ void awiwi_fifth_dynamics(const double q_in[4], const double qd_in[4], const dou
  *   in   g[3] in m/s^2, -9.81 to 9.81
  *   out  kinetic[1] in J
  *   out  potential[1] in J
- * Cost: 133 add, 166 mul, 2 div, 1 sqrt, 5 sincos.
+ * Returns 0 where all inputs and outputs are finite and the four-bar of hmc closes; else 1, and
+ * outputs without a value are NaN.
+ * Cost: 136 add, 171 mul, 2 div, 1 sqrt, 5 sincos.
  */
-void awiwi_fifth_energy(const double q_in[4], const double qd_in[4], const double g_in[3], double kinetic_out[1], double potential_out[1]);
+int awiwi_fifth_energy(const double q_in[4], const double qd_in[4], const double g_in[3], double kinetic_out[1], double potential_out[1]);
 
 /*
  * Path length of every tendon in the finger, by its routing.
@@ -1282,7 +1325,8 @@ void awiwi_fifth_joint_torque_and_stiffness(const double q_in[4], const double f
 
 /*
  * Joint angles whose tendon lengths are nearest to the measured h (least squares); start is the last
- * estimate.
+ * estimate. Where the coupling is constant the estimate is linear, and not limited: lengths that no
+ * pose has give angles beyond the joint limits. Otherwise it is within them.
  * Source: eq. 5.14, 5.15, 5.24.
  *   in   h[8] in m, from [-0.005585, -0.005585, -0.01169, -0.01169, -0.01169, -0.01169, -0.007854, -0.007854] to [0.005585, 0.005585, 0.01169, 0.01169, 0.01169, 0.01169, 0.007854, 0.007854]
  *   in   start[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
@@ -1315,7 +1359,8 @@ void awiwi_fifth_joint_estimate_error(const double q_in[4], const double noise_i
  *   in   f_min[1] in N, 3.87595 to 27.9443
  *   in   f_max[1] in N, 76.0811 to 100.149
  *   out  f[8] in N
- * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
+ * Returns an awiwi_status, see awiwi_solvers.h, never 0 if an input is not finite; the outputs are
+ * always defined.
  * Cost: the solver's own work and calls, at most: 1 of fifth_coupling, 66 of fifth_tendon_stiffness.
  */
 int awiwi_fifth_tendon_distribution(const double q_in[4], const double tau_in[4], const double K_in[16], const double f_min_in[1], const double f_max_in[1], double f_out[8]);
@@ -1330,7 +1375,8 @@ int awiwi_fifth_tendon_distribution(const double q_in[4], const double tau_in[4]
  *   out  coupler_ratio[1] in 1
  *   out  rocker_ratio[1] in 1
  *   out  transmission[1] in 1
- * Returns 0 where the loop closes; else 1, and outputs without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and the loop closes; else 1, and outputs without a
+ * value are NaN.
  * Cost: 15 add, 25 mul, 2 div, 1 sqrt, 1 sincos, 2 calls.
  */
 int awiwi_fifth_hmc_four_bar(const double q_in[1], double coupler_out[1], double rocker_out[1], double coupler_ratio_out[1], double rocker_ratio_out[1], double transmission_out[1]);
@@ -1343,8 +1389,9 @@ int awiwi_fifth_hmc_four_bar(const double q_in[1], double coupler_out[1], double
  *   out  A[3] in m
  *   out  B[3] in m
  *   out  C[3] in m
- * Returns 0 where q73 is between 0 and pi and the plane of the side bars has not passed A0 and bar AA0
- * closes the loop; else 1, and outputs without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and q73 is between 0 and pi and the plane of the
+ * side bars has not passed A0 and bar AA0 closes the loop; else 1, and outputs without a value are
+ * NaN.
  * Cost: 20 add, 39 mul, 2 div, 1 neg, 1 sqrt, 2 sincos.
  */
 int awiwi_wrist_points(const double q71_in[1], const double q73_in[1], double A_out[3], double B_out[3], double C_out[3]);
@@ -1355,8 +1402,9 @@ int awiwi_wrist_points(const double q71_in[1], const double q73_in[1], double A_
  *   in   q71[1] in rad, 0.100424 to 1.14762
  *   in   q73[1] in rad, 0.6234 to 1.32153
  *   out  T[4][4] in 1, m
- * Returns 0 where q73 is between 0 and pi and the plane of the side bars has not passed A0 and bar AA0
- * closes the loop; else 1, and outputs without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and q73 is between 0 and pi and the plane of the
+ * side bars has not passed A0 and bar AA0 closes the loop; else 1, and outputs without a value are
+ * NaN.
  * Cost: 24 add, 48 mul, 2 div, 1 neg, 1 sqrt, 2 sincos.
  */
 int awiwi_wrist_palm_pose(const double q71_in[1], const double q73_in[1], double T_out[16]);
@@ -1367,8 +1415,9 @@ int awiwi_wrist_palm_pose(const double q71_in[1], const double q73_in[1], double
  *   in   q71[1] in rad, 0.100424 to 1.14762
  *   in   q73[1] in rad, 0.6234 to 1.32153
  *   out  h[38] in m
- * Returns 0 where q73 is between 0 and pi and the plane of the side bars has not passed A0 and bar AA0
- * closes the loop; else 1, and outputs without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and q73 is between 0 and pi and the plane of the
+ * side bars has not passed A0 and bar AA0 closes the loop; else 1, and outputs without a value are
+ * NaN.
  * Cost: 180 add, 143 mul, 2 div, 39 sqrt, 2 sincos.
  */
 int awiwi_wrist_tendon_lengths(const double q71_in[1], const double q73_in[1], double h_out[38]);
@@ -1379,8 +1428,9 @@ int awiwi_wrist_tendon_lengths(const double q71_in[1], const double q73_in[1], d
  *   in   q71[1] in rad, 0.100424 to 1.14762
  *   in   q73[1] in rad, 0.6234 to 1.32153
  *   out  dh[38][2] in m/rad
- * Returns 0 where q73 is between 0 and pi and the plane of the side bars has not passed A0 and bar AA0
- * closes the loop; else 1, and outputs without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and q73 is between 0 and pi and the plane of the
+ * side bars has not passed A0 and bar AA0 closes the loop; else 1, and outputs without a value are
+ * NaN.
  * Cost: 436 add, 478 mul, 41 div, 39 sqrt, 2 sincos.
  */
 int awiwi_wrist_coupling(const double q71_in[1], const double q73_in[1], double dh_out[76]);
@@ -1392,8 +1442,9 @@ int awiwi_wrist_coupling(const double q71_in[1], const double q73_in[1], double 
  *   in   q[19] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727, -0.3491, -0.1745, -0.08727, -0.08727, -0.3491, -0.1745, -0.08727, -0.08727, -0.3491, -0.1745, -0.08727, -0.5236, -0.3491, -0.1745, -0.08727] to [0.6109, 0.6109, 1.396, 1.396, 0.3491, 1.484, 1.571, 1.396, 0.3491, 1.484, 1.571, 1.396, 0.3491, 1.484, 1.571, 0.6981, 0.3491, 1.484, 1.571]
  *   in   wrist[2] in rad, from [0.1004, 0.6234] to [1.148, 1.322]
  *   out  h[38] in m
- * Returns 0 where q73 is between 0 and pi and the plane of the side bars has not passed A0 and bar AA0
- * closes the loop; else 1, and outputs without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and q73 is between 0 and pi and the plane of the
+ * side bars has not passed A0 and bar AA0 closes the loop; else 1, and outputs without a value are
+ * NaN.
  * Cost: 254 add, 180 mul, 2 div, 43 sqrt, 4 sincos.
  */
 int awiwi_hand_tendon_lengths(const double q_in[19], const double wrist_in[2], double h_out[38]);
@@ -1521,9 +1572,11 @@ void awiwi_motor_damping(const double thd_in[1], double damping_out[1]);
  * Source: eq. 3.4, 3.5.
  *   in   theta[1] in rad, -5 to 5
  *   out  tau[1] in N m
- * Cost: 11 add, 12 mul, 2 sincos.
+ * Returns 0 where all inputs and outputs are finite and theta is within the motor's travel, with a
+ * margin of 0.4 %; else 1, and outputs without a value are NaN.
+ * Cost: 13 add, 14 mul, 2 sincos.
  */
-void awiwi_motor_ripple(const double theta_in[1], double tau_out[1]);
+int awiwi_motor_ripple(const double theta_in[1], double tau_out[1]);
 
 /*
  * Motor torque to feed forward against friction and ripple: the share `compensation` of both.
@@ -1531,9 +1584,11 @@ void awiwi_motor_ripple(const double theta_in[1], double tau_out[1]);
  *   in   theta[1] in rad, -5 to 5
  *   in   thd[1] in rad/s, -20 to 20
  *   out  tau[1] in N m
- * Cost: 13 add, 15 mul, 2 sincos, 1 calls.
+ * Returns 0 where all inputs and outputs are finite and theta is within the motor's travel, with a
+ * margin of 0.4 %; else 1, and outputs without a value are NaN.
+ * Cost: 15 add, 17 mul, 2 sincos, 1 calls.
  */
-void awiwi_motor_compensation(const double theta_in[1], const double thd_in[1], double tau_out[1]);
+int awiwi_motor_compensation(const double theta_in[1], const double thd_in[1], double tau_out[1]);
 
 /*
  * Acceleration under the motor torque tau and the tendon force f: (tau - friction - ripple - r f) / B.
@@ -1543,9 +1598,11 @@ void awiwi_motor_compensation(const double theta_in[1], const double thd_in[1], 
  *   in   tau[1] in N m, -3 to 3
  *   in   f[1] in N, 0 to 100
  *   out  thdd[1] in rad/s^2
- * Cost: 15 add, 16 mul, 2 sincos, 1 calls.
+ * Returns 0 where all inputs and outputs are finite and theta is within the motor's travel, with a
+ * margin of 0.4 %; else 1, and outputs without a value are NaN.
+ * Cost: 17 add, 18 mul, 2 sincos, 1 calls.
  */
-void awiwi_motor_acceleration(const double theta_in[1], const double thd_in[1], const double tau_in[1], const double f_in[1], double thdd_out[1]);
+int awiwi_motor_acceleration(const double theta_in[1], const double thd_in[1], const double tau_in[1], const double f_in[1], double thdd_out[1]);
 
 /*
  * Motor torque of a motion under the tendon force f: B thdd + friction + ripple + r f.
@@ -1555,9 +1612,11 @@ void awiwi_motor_acceleration(const double theta_in[1], const double thd_in[1], 
  *   in   thdd[1] in rad/s^2, -1000 to 1000
  *   in   f[1] in N, 0 to 100
  *   out  tau[1] in N m
- * Cost: 15 add, 17 mul, 2 sincos, 1 calls.
+ * Returns 0 where all inputs and outputs are finite and theta is within the motor's travel, with a
+ * margin of 0.4 %; else 1, and outputs without a value are NaN.
+ * Cost: 17 add, 19 mul, 2 sincos, 1 calls.
  */
-void awiwi_motor_torque(const double theta_in[1], const double thd_in[1], const double thdd_in[1], const double f_in[1], double tau_out[1]);
+int awiwi_motor_torque(const double theta_in[1], const double thd_in[1], const double thdd_in[1], const double f_in[1], double tau_out[1]);
 
 /*
  * Length dL of tendon in the mechanism, force and stiffness of the tendon at the lever angle theta.
@@ -1566,9 +1625,9 @@ void awiwi_motor_torque(const double theta_in[1], const double thd_in[1], const 
  *   out  dL[1] in m
  *   out  force[1] in N
  *   out  stiffness[1] in N/m
- * Returns 0 where the roller is clear of the motor's pulley and the roller is clear of the fixed
- * pulley and the tendon pulls the lever towards its taut end and the spring is stretched; else 1, and
- * outputs without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and the roller is clear of the motor's pulley and
+ * the roller is clear of the fixed pulley and the tendon pulls the lever towards its taut end and the
+ * spring is stretched; else 1, and outputs without a value are NaN.
  * Cost: 38 add, 54 mul, 7 div, 3 sqrt, 1 sincos, 2 calls.
  */
 int awiwi_spring_lever(const double theta_in[1], double dL_out[1], double force_out[1], double stiffness_out[1]);
@@ -1580,8 +1639,8 @@ int awiwi_spring_lever(const double theta_in[1], double dL_out[1], double force_
  * Source: figure 4.7.
  *   in   x[1] in m, 0 to 0.0100745
  *   out  f[1] in N
- * Returns 0 where the argument is within the lever's travel, with a margin of 0.4 %; else 1, and
- * outputs without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and the argument is within the lever's travel,
+ * with a margin of 0.4 %; else 1, and outputs without a value are NaN.
  * Cost: 18 add, 18 mul.
  */
 int awiwi_spring_force(const double x_in[1], double f_out[1]);
@@ -1591,8 +1650,8 @@ int awiwi_spring_force(const double x_in[1], double f_out[1]);
  * Source: figure 4.7.
  *   in   x[1] in m, 0 to 0.0100745
  *   out  k[1] in N/m
- * Returns 0 where the argument is within the lever's travel, with a margin of 0.4 %; else 1, and
- * outputs without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and the argument is within the lever's travel,
+ * with a margin of 0.4 %; else 1, and outputs without a value are NaN.
  * Cost: 18 add, 18 mul.
  */
 int awiwi_spring_stiffness(const double x_in[1], double k_out[1]);
@@ -1602,8 +1661,8 @@ int awiwi_spring_stiffness(const double x_in[1], double k_out[1]);
  * Source: figure 4.7.
  *   in   f[1] in N, 3.87595 to 100.149
  *   out  x[1] in m
- * Returns 0 where the argument is within the lever's travel, with a margin of 0.4 %; else 1, and
- * outputs without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and the argument is within the lever's travel,
+ * with a margin of 0.4 %; else 1, and outputs without a value are NaN.
  * Cost: 18 add, 18 mul.
  */
 int awiwi_spring_elongation(const double f_in[1], double x_out[1]);
@@ -1616,8 +1675,8 @@ int awiwi_spring_elongation(const double f_in[1], double x_out[1]);
  *   out  dL[38] in m
  *   out  force[38] in N
  *   out  stiffness[38] in N/m
- * Returns 0 where the argument is within the lever's travel, with a margin of 0.4 %; else 1, and
- * outputs without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and the argument is within the lever's travel,
+ * with a margin of 0.4 %; else 1, and outputs without a value are NaN.
  * Cost: 1062 add, 1062 mul, 37 calls.
  */
 int awiwi_calibration_readings(const double readings_in[38], double dL_out[38], double force_out[38], double stiffness_out[38]);
@@ -1635,8 +1694,8 @@ int awiwi_calibration_readings(const double readings_in[38], double dL_out[38], 
  *   out  dL[1] in m
  *   out  force[1] in N
  *   out  stiffness[1] in N/m
- * Returns 0 where the argument is within the lever's travel, with a margin of 0.4 %; else 1, and
- * outputs without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and the argument is within the lever's travel,
+ * with a margin of 0.4 %; else 1, and outputs without a value are NaN.
  * Cost: 23 add, 19 mul, 1 div.
  */
 int awiwi_calibration_polynomials(const double counts_in[1], const double ends_in[2], const double length_powers_in[7], const double force_powers_in[7], const double stiffness_powers_in[7], double dL_out[1], double force_out[1], double stiffness_out[1]);
@@ -1675,13 +1734,13 @@ void awiwi_guiding_friction(const double f_in[1], const double bend_in[1], doubl
  * exceed K_eff in every direction, otherwise no positive definite K_imp exists. For K_mech = eps K_eff
  * (eq. 8.2), K_imp is eps / (eps - 1) K_eff.
  * Source: eq. 8.1, with the condition of section 8.2 mended.
- *   in   K_eff[4][4] in N m/rad, from [0.2, -0.05, -0.05, -0.05, -0.05, 0.2, -0.05, -0.05, -0.05, -0.05, 0.2, -0.05, -0.05, -0.05, -0.05, 0.2] to [2, 0.05, 0.05, 0.05, 0.05, 2, 0.05, 0.05, 0.05, 0.05, 2, 0.05, 0.05, 0.05, 0.05, 2]
- *   in   K_mech[4][4] in N m/rad, from [4, -0.5, -0.5, -0.5, -0.5, 4, -0.5, -0.5, -0.5, -0.5, 4, -0.5, -0.5, -0.5, -0.5, 4] to [20, 0.5, 0.5, 0.5, 0.5, 20, 0.5, 0.5, 0.5, 0.5, 20, 0.5, 0.5, 0.5, 0.5, 20]
+ *   in   K_eff[4][4] in N m/rad, from [0.011, -0.00275, -0.00275, -0.00275, -0.00275, 0.011, -0.00275, -0.00275, -0.00275, -0.00275, 0.011, -0.00275, -0.00275, -0.00275, -0.00275, 0.011] to [0.11, 0.00275, 0.00275, 0.00275, 0.00275, 0.11, 0.00275, 0.00275, 0.00275, 0.00275, 0.11, 0.00275, 0.00275, 0.00275, 0.00275, 0.11]
+ *   in   K_mech[4][4] in N m/rad, from [0.22, -0.0275, -0.0275, -0.0275, -0.0275, 0.22, -0.0275, -0.0275, -0.0275, -0.0275, 0.22, -0.0275, -0.0275, -0.0275, -0.0275, 0.22] to [7.6, 0.0275, 0.0275, 0.0275, 0.0275, 7.6, 0.0275, 0.0275, 0.0275, 0.0275, 7.6, 0.0275, 0.0275, 0.0275, 0.0275, 7.6]
  *   out  K_imp[4][4] in N m/rad
- * Returns 0 where pivot 0 of K_eff is positive and pivot 1 of K_eff is positive and pivot 2 of K_eff
- * is positive and pivot 3 of K_eff is positive and pivot 0 of K_mech - K_eff is positive and pivot 1
- * of K_mech - K_eff is positive and pivot 2 of K_mech - K_eff is positive and pivot 3 of K_mech -
- * K_eff is positive; else 1, and outputs without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and pivot 0 of K_eff is positive and pivot 1 of
+ * K_eff is positive and pivot 2 of K_eff is positive and pivot 3 of K_eff is positive and pivot 0 of
+ * K_mech - K_eff is positive and pivot 1 of K_mech - K_eff is positive and pivot 2 of K_mech - K_eff
+ * is positive and pivot 3 of K_mech - K_eff is positive; else 1, and outputs without a value are NaN.
  * Cost: 91 add, 111 mul, 7 div, 5 neg.
  */
 int awiwi_stiffness_correction(const double K_eff_in[16], const double K_mech_in[16], double K_imp_out[16]);
@@ -1690,12 +1749,12 @@ int awiwi_stiffness_correction(const double K_eff_in[16], const double K_mech_in
  * Controller stiffness k_imp of one joint, and its sensitivity dk_imp/dk_mech to errors of the
  * tendons' stiffness.
  * Source: eq. 8.1.
- *   in   k_eff[1] in N m/rad, 0.05 to 3
- *   in   k_mech[1] in N m/rad, 3.5 to 20
+ *   in   k_eff[1] in N m/rad, 0.00275 to 0.165
+ *   in   k_mech[1] in N m/rad, 0.1925 to 7.6
  *   out  k_imp[1] in N m/rad
  *   out  sensitivity[1] in 1
- * Returns 0 where k_eff is positive and k_mech - k_eff is positive; else 1, and outputs without a
- * value are NaN.
+ * Returns 0 where all inputs and outputs are finite and k_eff is positive and k_mech - k_eff is
+ * positive; else 1, and outputs without a value are NaN.
  * Cost: 1 add, 4 mul, 2 div, 3 neg.
  */
 int awiwi_stiffness_correction_scalar(const double k_eff_in[1], const double k_mech_in[1], double k_imp_out[1], double sensitivity_out[1]);
@@ -1715,8 +1774,8 @@ int awiwi_stiffness_correction_scalar(const double k_eff_in[1], const double k_m
  *   in   period[1] in s, 0.0001 to 0.01
  *   out  momentum_next[1] in N m s
  *   out  friction[1] in N m
- * Returns 0 where the motor's inertia is positive and the gain is positive and the period is positive;
- * else 1, and outputs without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and the motor's inertia is positive and the gain
+ * is positive and the period is positive; else 1, and outputs without a value are NaN.
  * Cost: 5 add, 5 mul, 1 div, 1 neg.
  */
 int awiwi_friction_observer(const double momentum_in[1], const double u_in[1], const double tau_in[1], const double thd_in[1], const double B_in[1], const double gain_in[1], const double period_in[1], double momentum_next_out[1], double friction_out[1]);
@@ -1755,8 +1814,9 @@ void awiwi_joint_impedance(const double M_in[16], const double C_in[16], const d
  *   in   motor_kp[1] in N m/rad, 0.01 to 100
  *   in   motor_kd[1] in N m s/rad, 0.001 to 1
  *   out  tau[1] in N m
- * Returns 0 where the pulley's radius is positive and the proportional gain is positive and the
- * derivative gain is positive; else 1, and outputs without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and the pulley's radius is positive and the
+ * proportional gain is positive and the derivative gain is positive; else 1, and outputs without a
+ * value are NaN.
  * Cost: 4 add, 3 mul.
  */
 int awiwi_motor_impedance(const double theta_in[1], const double thd_in[1], const double theta_des_in[1], const double f_des_in[1], const double friction_in[1], const double r_in[1], const double motor_kp_in[1], const double motor_kd_in[1], double tau_out[1]);
@@ -1781,9 +1841,9 @@ int awiwi_motor_impedance(const double theta_in[1], const double thd_in[1], cons
  *   in   force_kp[1] in 1/s^2, 100 to 1e+06
  *   in   force_kd[1] in 1/s, 10 to 10000
  *   out  tau[1] in N m
- * Returns 0 where the tendon's stiffness is positive and the pulley's radius is positive and the
- * motor's inertia is positive and the gain kp is positive and the gain kd is positive; else 1, and
- * outputs without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and the tendon's stiffness is positive and the
+ * pulley's radius is positive and the motor's inertia is positive and the gain kp is positive and the
+ * gain kd is positive; else 1, and outputs without a value are NaN.
  * Cost: 8 add, 8 mul, 2 div.
  */
 int awiwi_cascade(const double f_in[1], const double xd_in[1], const double stiffness_in[1], const double slope_in[1], const double hdd_in[1], const double f_des_in[1], const double fd_des_in[1], const double fdd_des_in[1], const double friction_in[1], const double r_in[1], const double B_in[1], const double force_kp_in[1], const double force_kd_in[1], double tau_out[1]);
@@ -1802,8 +1862,8 @@ int awiwi_cascade(const double f_in[1], const double xd_in[1], const double stif
  *   in   omega[1] in rad/s, 10 to 1000
  *   out  margin[1] in 1
  *   out  S[8][3] in m/N, m s/N, m s^2/N
- * Returns 0 where the weight is positive and the frequency omega is positive; else 1, and outputs
- * without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and the weight is positive and the frequency omega
+ * is positive; else 1, and outputs without a value are NaN.
  * Cost: 166 add, 210 mul, 23 div, 20 calls.
  */
 int awiwi_cascade_certificate(const double D_in[16], const double P_in[32], const double kp_in[8], const double kd_in[8], const double weight_in[1], const double omega_in[1], double margin_out[1], double S_out[24]);
@@ -1823,8 +1883,9 @@ int awiwi_cascade_certificate(const double D_in[16], const double P_in[32], cons
  *   in   kp[1] in m, 0.0001 to 1
  *   in   kd[1] in m s, 1e-06 to 0.1
  *   out  tau[1] in N m
- * Returns 0 where the pulley's radius is positive and the proportional gain is positive and the
- * derivative gain is positive; else 1, and outputs without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and the pulley's radius is positive and the
+ * proportional gain is positive and the derivative gain is positive; else 1, and outputs without a
+ * value are NaN.
  * Cost: 5 add, 3 mul.
  */
 int awiwi_tendon_force_pd(const double f_in[1], const double fd_in[1], const double f_des_in[1], const double fd_des_in[1], const double f_hat_in[1], const double friction_in[1], const double r_in[1], const double kp_in[1], const double kd_in[1], double tau_out[1]);
@@ -1848,9 +1909,10 @@ int awiwi_tendon_force_pd(const double f_in[1], const double fd_in[1], const dou
  *   in   xi0[1] in 1, 0.2 to 2
  *   out  tau[1] in N m
  *   out  gains[2] in m, m s
- * Returns 0 where the pulley's radius is positive and the motor's inertia is positive and the tendon's
- * stiffness is positive and the target's frequency is positive and the target's damping ratio is
- * positive and the proportional gain is positive; else 1, and outputs without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and the pulley's radius is positive and the
+ * motor's inertia is positive and the tendon's stiffness is positive and the target's frequency is
+ * positive and the target's damping ratio is positive and the proportional gain is positive; else 1,
+ * and outputs without a value are NaN.
  * Cost: 6 add, 15 mul, 1 div.
  */
 int awiwi_tendon_force_scheduled(const double f_in[1], const double fd_in[1], const double f_des_in[1], const double fd_des_in[1], const double f_hat_in[1], const double friction_in[1], const double r_in[1], const double b_in[1], const double stiffness_in[1], const double stiffness_rate_in[1], const double omega0_in[1], const double xi0_in[1], double tau_out[1], double gains_out[2]);
@@ -1864,8 +1926,9 @@ int awiwi_tendon_force_scheduled(const double f_in[1], const double fd_in[1], co
  *   in   omega0[1] in rad/s, 50 to 500
  *   in   xi0[1] in 1, 0.2 to 2
  *   out  K[2] in N m/rad, N m s/rad
- * Returns 0 where the motor's inertia is positive and the target's frequency is positive and the
- * target's damping ratio is positive; else 1, and outputs without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and the motor's inertia is positive and the
+ * target's frequency is positive and the target's damping ratio is positive; else 1, and outputs
+ * without a value are NaN.
  * Cost: 2 add, 4 mul.
  */
 int awiwi_pole_placement_motor(const double b_in[1], const double dtheta_in[1], const double k_in[1], const double omega0_in[1], const double xi0_in[1], double K_out[2]);
@@ -1884,8 +1947,9 @@ int awiwi_pole_placement_motor(const double b_in[1], const double dtheta_in[1], 
  *   in   R[1] in 1/(N^2 m^2), 1e-06 to 1
  *   out  K[2] in N m/rad, N m s/rad
  *   out  u[1] in N m
- * Returns 0 where the motor's inertia is positive and the torque's weight is positive and the angle's
- * weight is positive and the speed's weight is positive; else 1, and outputs without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and the motor's inertia is positive and the
+ * torque's weight is positive and the angle's weight is positive and the speed's weight is positive;
+ * else 1, and outputs without a value are NaN.
  * Cost: 12 add, 18 mul, 2 div, 2 neg, 2 sqrt.
  */
 int awiwi_sdre_tendon(const double theta_in[1], const double thd_in[1], const double theta_des_in[1], const double b_in[1], const double dtheta_in[1], const double spring_in[3], const double weights_in[2], const double R_in[1], double K_out[2], double u_out[1]);
@@ -1901,10 +1965,10 @@ int awiwi_sdre_tendon(const double theta_in[1], const double thd_in[1], const do
  *   in   omega[2] in rad/s, 5 to 500
  *   in   xi[2] in 1, 0.2 to 2
  *   out  K[4] in N m/rad, N m s/rad
- * Returns 0 where the link's inertia is positive and the motor's inertia is positive and the stiffness
- * is positive and the first frequency is positive and the second frequency is positive and the first
- * damping ratio is positive and the second damping ratio is positive; else 1, and outputs without a
- * value are NaN.
+ * Returns 0 where all inputs and outputs are finite and the link's inertia is positive and the motor's
+ * inertia is positive and the stiffness is positive and the first frequency is positive and the second
+ * frequency is positive and the first damping ratio is positive and the second damping ratio is
+ * positive; else 1, and outputs without a value are NaN.
  * Cost: 14 add, 26 mul, 2 div.
  */
 int awiwi_pole_placement(const double m_in[1], const double b_in[1], const double k_in[1], const double dq_in[1], const double dtheta_in[1], const double omega_in[2], const double xi_in[2], double K_out[4]);
@@ -1951,7 +2015,8 @@ void awiwi_secant_stiffness(const double spring_in[3], const double deflexion_in
  *   in   x_des[4] in rad, rad/s, from [-3, -50, -3, -50] to [3, 50, 3, 50]
  *   out  K[4] in N m/rad, N m s/rad
  *   out  u[1] in N m
- * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
+ * Returns an awiwi_status, see awiwi_solvers.h, never 0 if an input is not finite; the outputs are
+ * always defined.
  * Cost: the solver's own work and calls, at most: 1 of secant_stiffness, 1 of pole_placement_law.
  */
 int awiwi_sdre_joint(const double m_in[1], const double b_in[1], const double dq_in[1], const double dtheta_in[1], const double spring_in[3], const double weights_in[4], const double R_in[1], const double K_last_in[4], const double x_in[4], const double x_des_in[4], double K_out[4], double u_out[1]);
@@ -1969,7 +2034,8 @@ int awiwi_sdre_joint(const double m_in[1], const double b_in[1], const double dq
  *   out  K[4] in 1
  *   out  S[4][4] in 1
  *   out  residual[1] in 1
- * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
+ * Returns an awiwi_status, see awiwi_solvers.h, never 0 if an input is not finite; the outputs are
+ * always defined.
  * Cost: the solver's own work.
  */
 int awiwi_lqr(const double A_in[16], const double B_in[4], const double Q_in[16], const double R_in[1], double K_out[4], double S_out[16], double residual_out[1]);
@@ -1980,7 +2046,8 @@ int awiwi_lqr(const double A_in[16], const double B_in[4], const double Q_in[16]
  *   in   x[2] in 1, from [-3, -10] to [3, 10]
  *   in   k[2] in 1, 0.01 to 10
  *   out  u[1] in 1
- * Returns 0 where k1 is positive and k2 is positive; else 1, and outputs without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and k1 is positive and k2 is positive; else 1, and
+ * outputs without a value are NaN.
  * Cost: 6 add, 7 mul.
  */
 int awiwi_backstepping_academic(const double x_in[2], const double k_in[2], double u_out[1]);
@@ -2007,9 +2074,10 @@ void awiwi_backstepping_academic_lyapunov(const double x_in[2], const double k_i
  *   in   rates[4] in 1/s, 0.1 to 2000
  *   in   scales[3] in s^2, s^4, s^6, from [0.0001, 1e-08, 1e-12] to [10, 10, 10]
  *   out  tau_m[1] in N m
- * Returns 0 where the link's inertia is positive and the motor's inertia is positive and the stiffness
- * is positive and k1 is positive and k2 is positive and k3 is positive and k4 is positive and c2 is
- * positive and c3 is positive and c4 is positive; else 1, and outputs without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and the link's inertia is positive and the motor's
+ * inertia is positive and the stiffness is positive and k1 is positive and k2 is positive and k3 is
+ * positive and k4 is positive and c2 is positive and c3 is positive and c4 is positive; else 1, and
+ * outputs without a value are NaN.
  * Cost: 22 add, 16 mul, 4 div.
  */
 int awiwi_backstepping_position(const double motion_in[4], const double desired_in[5], const double plant_in[3], const double rates_in[4], const double scales_in[3], double tau_m_out[1]);
@@ -2044,9 +2112,10 @@ void awiwi_backstepping_position_lyapunov(const double motion_in[4], const doubl
  *   in   gains[4] in N m/rad, N m s/rad, 1/s, from [0.01, 0.0001, 0.1, 0.1] to [50, 1, 2000, 2000]
  *   in   weights[2] in rad/(N m), rad s^2/(N m), from [0.01, 1e-06] to [100, 100]
  *   out  tau_m[1] in N m
- * Returns 0 where the link's inertia is positive and the motor's inertia is positive and the stiffness
- * is positive and K_p is positive and K_d is positive and K_3 is positive and K_4 is positive and C_t
- * is positive and C_s is positive; else 1, and outputs without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and the link's inertia is positive and the motor's
+ * inertia is positive and the stiffness is positive and K_p is positive and K_d is positive and K_3 is
+ * positive and K_4 is positive and C_t is positive and C_s is positive; else 1, and outputs without a
+ * value are NaN.
  * Cost: 22 add, 16 mul, 4 div.
  */
 int awiwi_backstepping_impedance(const double state_in[4], const double desired_in[5], const double external_in[2], const double plant_in[3], const double gains_in[4], const double weights_in[2], double tau_m_out[1]);
@@ -2080,9 +2149,10 @@ void awiwi_backstepping_impedance_lyapunov(const double state_in[4], const doubl
  *   in   gains[4] in N m/rad, N m s/rad, 1/s, from [0.01, 0.0001, 0.1, 0.1] to [50, 1, 2000, 2000]
  *   in   weights[2] in rad/(N m), rad s^2/(N m), from [0.01, 1e-06] to [100, 100]
  *   out  tau_m[1] in N m
- * Returns 0 where the link's inertia is positive and the motor's inertia is positive and the spring's
- * slope is positive and K_p is positive and K_d is positive and K_3 is positive and K_4 is positive
- * and C_t is positive and C_s is positive; else 1, and outputs without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and the link's inertia is positive and the motor's
+ * inertia is positive and the spring's slope is positive and K_p is positive and K_d is positive and
+ * K_3 is positive and K_4 is positive and C_t is positive and C_s is positive; else 1, and outputs
+ * without a value are NaN.
  * Cost: 23 add, 20 mul, 4 div.
  */
 int awiwi_backstepping_nonlinear(const double state_in[4], const double desired_in[5], const double external_in[2], const double bodies_in[2], const double spring_in[2], const double gains_in[4], const double weights_in[2], double tau_m_out[1]);
@@ -2103,12 +2173,12 @@ int awiwi_backstepping_nonlinear(const double state_in[4], const double desired_
  *   in   impedance[2] in N m/rad, N m s/rad, from [0.01, 0.0001] to [50, 1]
  *   in   tunings[2][4] in 1/s, rad/(N m), rad s^2/(N m), from [0.1, 0.1, 0.01, 1e-06, 0.1, 0.1, 0.01, 1e-06] to [2000, 2000, 100, 100, 2000, 2000, 100, 100]
  *   out  tau_m[2] in N m
- * Returns 0 where the link's inertia is positive and motor 1's inertia is positive and motor 2's
- * inertia is positive and slope 1 is positive and slope 2 is positive and K_p is positive and K_d is
- * positive and K_3 of motor 1 is positive and K_4 of motor 1 is positive and C_t of motor 1 is
- * positive and C_s of motor 1 is positive and K_3 of motor 2 is positive and K_4 of motor 2 is
- * positive and C_t of motor 2 is positive and C_s of motor 2 is positive; else 1, and outputs without
- * a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and the link's inertia is positive and motor 1's
+ * inertia is positive and motor 2's inertia is positive and slope 1 is positive and slope 2 is
+ * positive and K_p is positive and K_d is positive and K_3 of motor 1 is positive and K_4 of motor 1
+ * is positive and C_t of motor 1 is positive and C_s of motor 1 is positive and K_3 of motor 2 is
+ * positive and K_4 of motor 2 is positive and C_t of motor 2 is positive and C_s of motor 2 is
+ * positive; else 1, and outputs without a value are NaN.
  * Cost: 42 add, 32 mul, 7 div.
  */
 int awiwi_backstepping_antagonistic(const double joint_in[2], const double torques_in[4], const double desired_in[5], const double pretension_in[3], const double external_in[2], const double inertias_in[3], const double springs_in[4], const double impedance_in[2], const double tunings_in[8], double tau_m_out[2]);
@@ -2147,12 +2217,12 @@ void awiwi_backstepping_antagonistic_lyapunov(const double joint_in[2], const do
  *   in   impedance[2] in N m/rad, N m s/rad, from [0.01, 0.0001] to [50, 1]
  *   in   tunings[2][4] in 1/s, rad/(N m), rad s^2/(N m), from [0.1, 0.1, 0.01, 1e-06, 0.1, 0.1, 0.01, 1e-06] to [2000, 2000, 100, 100, 2000, 2000, 100, 100]
  *   out  tau_m[2] in N m
- * Returns 0 where the link's inertia is positive and motor 1's inertia is positive and motor 2's
- * inertia is positive and slope 1 is positive and slope 2 is positive and K_p is positive and K_d is
- * positive and K_3 of motor 1 is positive and K_4 of motor 1 is positive and C_t of motor 1 is
- * positive and C_s of motor 1 is positive and K_3 of motor 2 is positive and K_4 of motor 2 is
- * positive and C_t of motor 2 is positive and C_s of motor 2 is positive; else 1, and outputs without
- * a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and the link's inertia is positive and motor 1's
+ * inertia is positive and motor 2's inertia is positive and slope 1 is positive and slope 2 is
+ * positive and K_p is positive and K_d is positive and K_3 of motor 1 is positive and K_4 of motor 1
+ * is positive and C_t of motor 1 is positive and C_s of motor 1 is positive and K_3 of motor 2 is
+ * positive and K_4 of motor 2 is positive and C_t of motor 2 is positive and C_s of motor 2 is
+ * positive; else 1, and outputs without a value are NaN.
  * Cost: 48 add, 40 mul, 7 div.
  */
 int awiwi_backstepping_antagonistic_decoupled(const double joint_in[2], const double torques_in[4], const double desired_in[5], const double pretension_in[3], const double external_in[2], const double inertias_in[3], const double springs_in[4], const double impedance_in[2], const double tunings_in[8], double tau_m_out[2]);
@@ -2191,10 +2261,10 @@ void awiwi_backstepping_state_gains_derivatives(const double plant_in[3], const 
  *   in   impedance[2] in N m/rad, N m s/rad, from [0.07, 0.0007] to [0.13, 0.0013]
  *   in   weights[2] in rad/(N m), rad s^2/(N m), from [7, 0.007] to [13, 0.013]
  *   out  rates[2] in 1/s
- * Returns 0 where the link's inertia is positive and the motor's inertia is positive and the stiffness
- * is positive and K_p is positive and K_d is positive and C_t is positive and C_s is positive and K_3
- * and K_4 are real and differ and their sum is positive and their product is positive; else 1, and
- * outputs without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and the link's inertia is positive and the motor's
+ * inertia is positive and the stiffness is positive and K_p is positive and K_d is positive and C_t is
+ * positive and C_s is positive and K_3 and K_4 are real and differ and their sum is positive and their
+ * product is positive; else 1, and outputs without a value are NaN.
  * Cost: 7 add, 8 mul, 5 div, 3 neg, 1 sqrt.
  */
 int awiwi_optimal_backstepping_rates(const double K_opt_in[4], const double plant_in[3], const double impedance_in[2], const double weights_in[2], double rates_out[2]);
@@ -2209,9 +2279,10 @@ int awiwi_optimal_backstepping_rates(const double K_opt_in[4], const double plan
  *   in   impedance[2] in N m/rad, N m s/rad, from [0.9, 0.000828] to [1.1, 0.001012]
  *   out  rates[2] in 1/s
  *   out  weights[2] in rad/(N m), rad s^2/(N m)
- * Returns 0 where the link's inertia is positive and the motor's inertia is positive and the stiffness
- * is positive and K_p is positive and K_d is positive and C_t is positive and K_3 is positive and K_4
- * is positive and C_s is positive; else 1, and outputs without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and the link's inertia is positive and the motor's
+ * inertia is positive and the stiffness is positive and K_p is positive and K_d is positive and C_t is
+ * positive and K_3 is positive and K_4 is positive and C_s is positive; else 1, and outputs without a
+ * value are NaN.
  * Cost: 8 add, 10 mul, 5 div, 3 neg.
  */
 int awiwi_optimal_backstepping_weights(const double K_opt_in[4], const double plant_in[3], const double impedance_in[2], double rates_out[2], double weights_out[2]);
@@ -2228,7 +2299,8 @@ int awiwi_optimal_backstepping_weights(const double K_opt_in[4], const double pl
  *   in   start[4] in N m/rad, N m s/rad, 1/s, from [0.001, 1e-09, 0.01, 0.01] to [1000, 1000, 1e+06, 1e+06]
  *   out  impedance[2] in N m/rad, N m s/rad
  *   out  rates[2] in 1/s
- * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
+ * Returns an awiwi_status, see awiwi_solvers.h, never 0 if an input is not finite; the outputs are
+ * always defined.
  * Cost: the solver's own work and calls, at most: 40 of backstepping_state_gains, 40 of backstepping_state_gains_derivatives.
  */
 int awiwi_optimal_backstepping(const double K_opt_in[4], const double plant_in[3], const double weights_in[2], const double start_in[4], double impedance_out[2], double rates_out[2]);
@@ -2244,8 +2316,8 @@ int awiwi_optimal_backstepping(const double K_opt_in[4], const double plant_in[3
  *   in   delay[1] in s, 0.005 to 0.1
  *   in   period[1] in s, 0.0001 to 0.01
  *   out  motion_next[5] in rad, rad/s, rad/s^2, rad/s^3, rad/s^4
- * Returns 0 where the delay is positive and the period is positive; else 1, and outputs without a
- * value are NaN.
+ * Returns 0 where all inputs and outputs are finite and the delay is positive and the period is
+ * positive; else 1, and outputs without a value are NaN.
  * Cost: 45 add, 50 mul, 5 div.
  */
 int awiwi_reference_filter(const double motion_in[5], const double desired_in[5], const double delay_in[1], const double period_in[1], double motion_next_out[5]);
@@ -2277,9 +2349,12 @@ int awiwi_reference_filter(const double motion_in[5], const double desired_in[5]
  *   out  load[1] in N m
  *   out  modelled[2] in N m
  *   out  resistance[2] in N m
+ * Returns 0 where all inputs and outputs are finite and the period is positive and the link's inertia
+ * is positive and motor 1's inertia is positive and motor 2's inertia is positive; else 1, and outputs
+ * without a value are NaN.
  * Cost: 119 add, 132 mul, 13 div, 4 neg, 12 calls.
  */
-void awiwi_antagonistic_observer(const double memory_in[13], const double thetas_in[2], const double stretches_in[2], const double measured_in[2], const double acted_in[2], const double acting_in[2], const double inertias_in[3], const double tendons_in[6], const double damping_in[1], const double friction_in[3], const double bandwidths_in[4], const double period_in[1], double memory_next_out[13], double joint_out[2], double motors_out[4], double torques_out[4], double springs_out[4], double load_out[1], double modelled_out[2], double resistance_out[2]);
+int awiwi_antagonistic_observer(const double memory_in[13], const double thetas_in[2], const double stretches_in[2], const double measured_in[2], const double acted_in[2], const double acting_in[2], const double inertias_in[3], const double tendons_in[6], const double damping_in[1], const double friction_in[3], const double bandwidths_in[4], const double period_in[1], double memory_next_out[13], double joint_out[2], double motors_out[4], double torques_out[4], double springs_out[4], double load_out[1], double modelled_out[2], double resistance_out[2]);
 
 /*
  * State and motor torques for a desired motion, with springs that are linear about their elongations.
@@ -2292,8 +2367,8 @@ void awiwi_antagonistic_observer(const double memory_in[13], const double thetas
  *   in   damping[1] in N m s/rad, 0 to 0.005
  *   out  x_des[6] in rad, rad/s, from [-3, -50, -3, -50, -3, -50] to [3, 50, 3, 50, 3, 50]
  *   out  u_des[2] in N m
- * Returns 0 where slope 1 is positive and slope 2 is positive; else 1, and outputs without a value are
- * NaN.
+ * Returns 0 where all inputs and outputs are finite and slope 1 is positive and slope 2 is positive;
+ * else 1, and outputs without a value are NaN.
  * Cost: 15 add, 15 mul, 2 div.
  */
 int awiwi_antagonistic_setpoint(const double desired_in[5], const double pretension_in[3], const double elongations_in[2], const double slopes_in[2], const double inertias_in[3], const double damping_in[1], double x_des_out[6], double u_des_out[2]);
@@ -2348,12 +2423,12 @@ void awiwi_antagonistic_sharing(const double torque_in[1], const double pretensi
  *   in   tunings[2][4] in 1/s, rad/(N m), rad s^2/(N m), from [0.1, 0.1, 0.01, 1e-06, 0.1, 0.1, 0.01, 1e-06] to [2000, 2000, 100, 100, 2000, 2000, 100, 100]
  *   in   resistance[2] in N m, -4 to 4
  *   out  tau_m[2] in N m
- * Returns 0 where the link's inertia is positive and motor 1's inertia is positive and motor 2's
- * inertia is positive and slope 1 is positive and slope 2 is positive and K_p is positive and K_d is
- * positive and K_3 of motor 1 is positive and K_4 of motor 1 is positive and C_t of motor 1 is
- * positive and C_s of motor 1 is positive and K_3 of motor 2 is positive and K_4 of motor 2 is
- * positive and C_t of motor 2 is positive and C_s of motor 2 is positive; else 1, and outputs without
- * a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and the link's inertia is positive and motor 1's
+ * inertia is positive and motor 2's inertia is positive and slope 1 is positive and slope 2 is
+ * positive and K_p is positive and K_d is positive and K_3 of motor 1 is positive and K_4 of motor 1
+ * is positive and C_t of motor 1 is positive and C_s of motor 1 is positive and K_3 of motor 2 is
+ * positive and K_4 of motor 2 is positive and C_t of motor 2 is positive and C_s of motor 2 is
+ * positive; else 1, and outputs without a value are NaN.
  * Cost: 49 add, 37 mul, 7 div.
  */
 int awiwi_backstepping_adaptive(const double joint_in[2], const double torques_in[4], const double desired_in[5], const double pretension_in[3], const double external_in[2], const double inertias_in[3], const double springs_in[4], const double damping_in[1], const double impedance_in[2], const double tunings_in[8], const double resistance_in[2], double tau_m_out[2]);

@@ -12,7 +12,8 @@
  *   out  K[4] in 1
  *   out  S[4][4] in 1
  *   out  residual[1] in 1
- * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
+ * Returns an awiwi_status, see awiwi_solvers.h, never 0 if an input is not finite; the outputs are
+ * always defined.
  * Cost: the solver's own work.
  */
 #include "numerics.h"

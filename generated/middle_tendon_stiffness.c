@@ -7,8 +7,8 @@
  *   out  k[8] in N/m
  *   out  slope[8] in 1/m
  *   out  curvature[8] in 1/(N m)
- * Returns 0 where every tension is on its spring's curve, with a margin of 0.4 %; else 1, and outputs
- * without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and every tension is on its spring's curve, with a
+ * margin of 0.4 %; else 1, and outputs without a value are NaN.
  * Cost: 198 add, 198 mul, 7 calls.
  * Inputs: sha256 b64c46b637f0a464ed4766b60f7050b3f882b2c8a66fc18598209e2c9ff07328.
  */
@@ -88,5 +88,11 @@ int awiwi_middle_tendon_stiffness(const double tension_in[restrict 8], double k_
     const double t43 = t33 + 0.5*(t42 + fabs(2.0*t33 - t42));
     const double t44 = t35 + 0.5*(t43 + fabs(2.0*t35 - t43));
     const double t45 = t37 + 0.5*(t44 + fabs(2.0*t37 - t44));
-    return 1.015625 - t39 - 0.5*(t45 + fabs(2.0*t39 - t45)) > 0.0 ? 0 : 1;
+    double nothing = 0.0*tension_in[0] + 0.0*tension_in[1] + 0.0*tension_in[2] + 0.0*tension_in[3] + 0.0*tension_in[4] + 0.0*tension_in[5];
+    nothing += 0.0*tension_in[6] + 0.0*tension_in[7] + 0.0*k_out[0] + 0.0*k_out[1] + 0.0*k_out[2] + 0.0*k_out[3];
+    nothing += 0.0*k_out[4] + 0.0*k_out[5] + 0.0*k_out[6] + 0.0*k_out[7] + 0.0*slope_out[0] + 0.0*slope_out[1];
+    nothing += 0.0*slope_out[2] + 0.0*slope_out[3] + 0.0*slope_out[4] + 0.0*slope_out[5] + 0.0*slope_out[6] + 0.0*slope_out[7];
+    nothing += 0.0*curvature_out[0] + 0.0*curvature_out[1] + 0.0*curvature_out[2] + 0.0*curvature_out[3] + 0.0*curvature_out[4] + 0.0*curvature_out[5];
+    nothing += 0.0*curvature_out[6] + 0.0*curvature_out[7];
+    return 1.015625 - t39 - 0.5*(t45 + fabs(2.0*t39 - t45)) > 0.0 && nothing >= 0.0 ? 0 : 1;
 }

@@ -5,15 +5,17 @@
  *   in   theta[1] in rad, -5 to 5
  *   in   thd[1] in rad/s, -20 to 20
  *   out  tau[1] in N m
- * Cost: 13 add, 15 mul, 2 sincos, 1 calls.
- * Inputs: sha256 4ac7c242f09df3b78e0f5c0776a7286d65f6e0b1d3d9afc8e4e505e87a15808c.
+ * Returns 0 where all inputs and outputs are finite and theta is within the motor's travel, with a
+ * margin of 0.4 %; else 1, and outputs without a value are NaN.
+ * Cost: 15 add, 17 mul, 2 sincos, 1 calls.
+ * Inputs: sha256 74985f4792d111b86d727cd910cbe8d2dc90033974f99210c38ef805bc1f64cc.
  */
 #include "numerics.h"
 #include "elementary.h"
 #include "sincos.h"
 #include "kernels.h"
 
-void awiwi_motor_compensation(const double theta_in[restrict 1], const double thd_in[restrict 1], double tau_out[restrict 1])
+int awiwi_motor_compensation(const double theta_in[restrict 1], const double thd_in[restrict 1], double tau_out[restrict 1])
 {
     const double t0 = 100.0*theta_in[0] - 0.8726646259971648;
     const awiwi_sincos2_result a0 = awiwi_sincos2(theta_in[0], t0);
@@ -21,9 +23,12 @@ void awiwi_motor_compensation(const double theta_in[restrict 1], const double th
     double s2 = 0.018706148721743875*t1 - 0.004688500797007119;
     double s3 = a0.sin[0]*(0.0108*t1 + 0.02658980933132962) - 0.009508910889165736;
     s3 += a0.cos[1]*(0.040783850416649246*a0.sin[1] + 0.019017821778331473*a0.cos[1] + 0.054);
+    const double t4 = 0.1992217898832685*theta_in[0];
     s2 += a0.sin[0]*(0.0108*a0.cos[0] + 0.018706148721743875*a0.sin[0]);
     s3 -= a0.cos[0]*s2;
     s3 += 0.03204*thd_in[0];
     s3 += 0.50274*awiwi_atan(10.0*thd_in[0]);
     tau_out[0] = s3;
+    double nothing = 0.0*theta_in[0] + 0.0*thd_in[0] + 0.0*tau_out[0];
+    return (1.0 - t4)*(t4 + 1.0) > 0.0 && nothing >= 0.0 ? 0 : 1;
 }

@@ -13,8 +13,9 @@
  *   in   motor_kp[1] in N m/rad, 0.01 to 100
  *   in   motor_kd[1] in N m s/rad, 0.001 to 1
  *   out  tau[1] in N m
- * Returns 0 where the pulley's radius is positive and the proportional gain is positive and the
- * derivative gain is positive; else 1, and outputs without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and the pulley's radius is positive and the
+ * proportional gain is positive and the derivative gain is positive; else 1, and outputs without a
+ * value are NaN.
  * Cost: 4 add, 3 mul.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
@@ -24,5 +25,7 @@
 int awiwi_motor_impedance(const double theta_in[restrict 1], const double thd_in[restrict 1], const double theta_des_in[restrict 1], const double f_des_in[restrict 1], const double friction_in[restrict 1], const double r_in[restrict 1], const double motor_kp_in[restrict 1], const double motor_kd_in[restrict 1], double tau_out[restrict 1])
 {
     tau_out[0] = friction_in[0] + f_des_in[0]*r_in[0] - motor_kp_in[0]*(theta_in[0] - theta_des_in[0]) - motor_kd_in[0]*thd_in[0];
-    return r_in[0] > 0.0 && motor_kp_in[0] > 0.0 && motor_kd_in[0] > 0.0 ? 0 : 1;
+    double nothing = 0.0*theta_in[0] + 0.0*thd_in[0] + 0.0*theta_des_in[0] + 0.0*f_des_in[0] + 0.0*friction_in[0] + 0.0*r_in[0];
+    nothing += 0.0*motor_kp_in[0] + 0.0*motor_kd_in[0] + 0.0*tau_out[0];
+    return r_in[0] > 0.0 && motor_kp_in[0] > 0.0 && motor_kd_in[0] > 0.0 && nothing >= 0.0 ? 0 : 1;
 }

@@ -11,7 +11,8 @@
  *   in   start[4] in N m/rad, N m s/rad, 1/s, from [0.001, 1e-09, 0.01, 0.01] to [1000, 1000, 1e+06, 1e+06]
  *   out  impedance[2] in N m/rad, N m s/rad
  *   out  rates[2] in 1/s
- * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
+ * Returns an awiwi_status, see awiwi_solvers.h, never 0 if an input is not finite; the outputs are
+ * always defined.
  * Cost: the solver's own work and calls, at most: 40 of backstepping_state_gains, 40 of backstepping_state_gains_derivatives.
  */
 #include "numerics.h"

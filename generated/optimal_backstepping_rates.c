@@ -7,10 +7,10 @@
  *   in   impedance[2] in N m/rad, N m s/rad, from [0.07, 0.0007] to [0.13, 0.0013]
  *   in   weights[2] in rad/(N m), rad s^2/(N m), from [7, 0.007] to [13, 0.013]
  *   out  rates[2] in 1/s
- * Returns 0 where the link's inertia is positive and the motor's inertia is positive and the stiffness
- * is positive and K_p is positive and K_d is positive and C_t is positive and C_s is positive and K_3
- * and K_4 are real and differ and their sum is positive and their product is positive; else 1, and
- * outputs without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and the link's inertia is positive and the motor's
+ * inertia is positive and the stiffness is positive and K_p is positive and K_d is positive and C_t is
+ * positive and C_s is positive and K_3 and K_4 are real and differ and their sum is positive and their
+ * product is positive; else 1, and outputs without a value are NaN.
  * Cost: 7 add, 8 mul, 5 div, 3 neg, 1 sqrt.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
@@ -28,5 +28,8 @@ int awiwi_optimal_backstepping_rates(const double K_opt_in[restrict 4], const do
     const double t5 = 0.5*t2 - sqrt(t4);
     rates_out[0] = -t5;
     rates_out[1] = t3/t5;
-    return plant_in[0] > 0.0 && plant_in[1] > 0.0 && plant_in[2] > 0.0 && impedance_in[0] > 0.0 && impedance_in[1] > 0.0 && weights_in[0] > 0.0 && weights_in[1] > 0.0 && t4 > 0.0 && -t2 > 0.0 && -t3 > 0.0 ? 0 : 1;
+    double nothing = 0.0*K_opt_in[0] + 0.0*K_opt_in[1] + 0.0*K_opt_in[2] + 0.0*K_opt_in[3] + 0.0*plant_in[0] + 0.0*plant_in[1];
+    nothing += 0.0*plant_in[2] + 0.0*impedance_in[0] + 0.0*impedance_in[1] + 0.0*weights_in[0] + 0.0*weights_in[1] + 0.0*rates_out[0];
+    nothing += 0.0*rates_out[1];
+    return plant_in[0] > 0.0 && plant_in[1] > 0.0 && plant_in[2] > 0.0 && impedance_in[0] > 0.0 && impedance_in[1] > 0.0 && weights_in[0] > 0.0 && weights_in[1] > 0.0 && t4 > 0.0 && -t2 > 0.0 && -t3 > 0.0 && nothing >= 0.0 ? 0 : 1;
 }

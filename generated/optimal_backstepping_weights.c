@@ -9,9 +9,10 @@
  *   in   impedance[2] in N m/rad, N m s/rad, from [0.9, 0.000828] to [1.1, 0.001012]
  *   out  rates[2] in 1/s
  *   out  weights[2] in rad/(N m), rad s^2/(N m)
- * Returns 0 where the link's inertia is positive and the motor's inertia is positive and the stiffness
- * is positive and K_p is positive and K_d is positive and C_t is positive and K_3 is positive and K_4
- * is positive and C_s is positive; else 1, and outputs without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and the link's inertia is positive and the motor's
+ * inertia is positive and the stiffness is positive and K_p is positive and K_d is positive and C_t is
+ * positive and K_3 is positive and K_4 is positive and C_s is positive; else 1, and outputs without a
+ * value are NaN.
  * Cost: 8 add, 10 mul, 5 div, 3 neg.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
@@ -34,5 +35,8 @@ int awiwi_optimal_backstepping_weights(const double K_opt_in[restrict 4], const 
     rates_out[0] = t7;
     const double t8 = t1 - t6*t7;
     weights_out[1] = -(t5/t8);
-    return plant_in[0] > 0.0 && plant_in[1] > 0.0 && plant_in[2] > 0.0 && impedance_in[0] > 0.0 && impedance_in[1] > 0.0 && -t4 > 0.0 && t7 > 0.0 && t6 > 0.0 && t8 > 0.0 ? 0 : 1;
+    double nothing = 0.0*K_opt_in[0] + 0.0*K_opt_in[1] + 0.0*K_opt_in[2] + 0.0*K_opt_in[3] + 0.0*plant_in[0] + 0.0*plant_in[1];
+    nothing += 0.0*plant_in[2] + 0.0*impedance_in[0] + 0.0*impedance_in[1] + 0.0*rates_out[0] + 0.0*rates_out[1] + 0.0*weights_out[0];
+    nothing += 0.0*weights_out[1];
+    return plant_in[0] > 0.0 && plant_in[1] > 0.0 && plant_in[2] > 0.0 && impedance_in[0] > 0.0 && impedance_in[1] > 0.0 && -t4 > 0.0 && t7 > 0.0 && t6 > 0.0 && t8 > 0.0 && nothing >= 0.0 ? 0 : 1;
 }

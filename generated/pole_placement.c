@@ -10,10 +10,10 @@
  *   in   omega[2] in rad/s, 5 to 500
  *   in   xi[2] in 1, 0.2 to 2
  *   out  K[4] in N m/rad, N m s/rad
- * Returns 0 where the link's inertia is positive and the motor's inertia is positive and the stiffness
- * is positive and the first frequency is positive and the second frequency is positive and the first
- * damping ratio is positive and the second damping ratio is positive; else 1, and outputs without a
- * value are NaN.
+ * Returns 0 where all inputs and outputs are finite and the link's inertia is positive and the motor's
+ * inertia is positive and the stiffness is positive and the first frequency is positive and the second
+ * frequency is positive and the first damping ratio is positive and the second damping ratio is
+ * positive; else 1, and outputs without a value are NaN.
  * Cost: 14 add, 26 mul, 2 div.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
@@ -35,5 +35,8 @@ int awiwi_pole_placement(const double m_in[restrict 1], const double b_in[restri
     K_out[2] = t7;
     K_out[0] = omega_in[0]*omega_in[1]*t0*t3 - t7;
     K_out[1] = t0*(2.0*(omega_in[0]*xi_in[1] + omega_in[1]*xi_in[0])*t3 - dq_in[0]*t7) - t5 - dq_in[0];
-    return m_in[0] > 0.0 && b_in[0] > 0.0 && k_in[0] > 0.0 && omega_in[0] > 0.0 && omega_in[1] > 0.0 && xi_in[0] > 0.0 && xi_in[1] > 0.0 ? 0 : 1;
+    double nothing = 0.0*m_in[0] + 0.0*b_in[0] + 0.0*k_in[0] + 0.0*dq_in[0] + 0.0*dtheta_in[0] + 0.0*omega_in[0];
+    nothing += 0.0*omega_in[1] + 0.0*xi_in[0] + 0.0*xi_in[1] + 0.0*K_out[0] + 0.0*K_out[1] + 0.0*K_out[2];
+    nothing += 0.0*K_out[3];
+    return m_in[0] > 0.0 && b_in[0] > 0.0 && k_in[0] > 0.0 && omega_in[0] > 0.0 && omega_in[1] > 0.0 && xi_in[0] > 0.0 && xi_in[1] > 0.0 && nothing >= 0.0 ? 0 : 1;
 }

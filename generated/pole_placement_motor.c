@@ -8,8 +8,9 @@
  *   in   omega0[1] in rad/s, 50 to 500
  *   in   xi0[1] in 1, 0.2 to 2
  *   out  K[2] in N m/rad, N m s/rad
- * Returns 0 where the motor's inertia is positive and the target's frequency is positive and the
- * target's damping ratio is positive; else 1, and outputs without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and the motor's inertia is positive and the
+ * target's frequency is positive and the target's damping ratio is positive; else 1, and outputs
+ * without a value are NaN.
  * Cost: 2 add, 4 mul.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
@@ -21,5 +22,7 @@ int awiwi_pole_placement_motor(const double b_in[restrict 1], const double dthet
     const double t0 = b_in[0]*omega0_in[0];
     K_out[0] = omega0_in[0]*t0 - k_in[0];
     K_out[1] = 2.0*xi0_in[0]*t0 - dtheta_in[0];
-    return b_in[0] > 0.0 && omega0_in[0] > 0.0 && xi0_in[0] > 0.0 ? 0 : 1;
+    double nothing = 0.0*b_in[0] + 0.0*dtheta_in[0] + 0.0*k_in[0] + 0.0*omega0_in[0] + 0.0*xi0_in[0] + 0.0*K_out[0];
+    nothing += 0.0*K_out[1];
+    return b_in[0] > 0.0 && omega0_in[0] > 0.0 && xi0_in[0] > 0.0 && nothing >= 0.0 ? 0 : 1;
 }

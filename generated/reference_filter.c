@@ -10,8 +10,8 @@
  *   in   delay[1] in s, 0.005 to 0.1
  *   in   period[1] in s, 0.0001 to 0.01
  *   out  motion_next[5] in rad, rad/s, rad/s^2, rad/s^3, rad/s^4
- * Returns 0 where the delay is positive and the period is positive; else 1, and outputs without a
- * value are NaN.
+ * Returns 0 where all inputs and outputs are finite and the delay is positive and the period is
+ * positive; else 1, and outputs without a value are NaN.
  * Cost: 45 add, 50 mul, 5 div.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
@@ -64,5 +64,8 @@ int awiwi_reference_filter(const double motion_in[restrict 5], const double desi
     s15 += t6*t26;
     motion_next_out[3] = s15;
     motion_next_out[4] = motion_in[4] + period_in[0]*t24 + t3*t25 + t5*t26 + t6*(t13*t23 + t10*t22 - t20*t24 - t18*t25 - t16*t26);
-    return delay_in[0] > 0.0 && period_in[0] > 0.0 ? 0 : 1;
+    double nothing = 0.0*motion_in[0] + 0.0*motion_in[1] + 0.0*motion_in[2] + 0.0*motion_in[3] + 0.0*motion_in[4] + 0.0*desired_in[0];
+    nothing += 0.0*desired_in[1] + 0.0*desired_in[2] + 0.0*desired_in[3] + 0.0*desired_in[4] + 0.0*delay_in[0] + 0.0*period_in[0];
+    nothing += 0.0*motion_next_out[0] + 0.0*motion_next_out[1] + 0.0*motion_next_out[2] + 0.0*motion_next_out[3] + 0.0*motion_next_out[4];
+    return delay_in[0] > 0.0 && period_in[0] > 0.0 && nothing >= 0.0 ? 0 : 1;
 }

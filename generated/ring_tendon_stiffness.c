@@ -7,8 +7,8 @@
  *   out  k[6] in N/m
  *   out  slope[6] in 1/m
  *   out  curvature[6] in 1/(N m)
- * Returns 0 where every tension is on its spring's curve, with a margin of 0.4 %; else 1, and outputs
- * without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and every tension is on its spring's curve, with a
+ * margin of 0.4 %; else 1, and outputs without a value are NaN.
  * Cost: 148 add, 148 mul, 5 calls.
  * Inputs: sha256 b64c46b637f0a464ed4766b60f7050b3f882b2c8a66fc18598209e2c9ff07328.
  */
@@ -70,5 +70,9 @@ int awiwi_ring_tendon_stiffness(const double tension_in[restrict 6], double k_ou
     const double t31 = t23 + 0.5*(t30 + fabs(2.0*t23 - t30));
     const double t32 = t25 + 0.5*(t31 + fabs(2.0*t25 - t31));
     const double t33 = t27 + 0.5*(t32 + fabs(2.0*t27 - t32));
-    return 1.015625 - t29 - 0.5*(t33 + fabs(2.0*t29 - t33)) > 0.0 ? 0 : 1;
+    double nothing = 0.0*tension_in[0] + 0.0*tension_in[1] + 0.0*tension_in[2] + 0.0*tension_in[3] + 0.0*tension_in[4] + 0.0*tension_in[5];
+    nothing += 0.0*k_out[0] + 0.0*k_out[1] + 0.0*k_out[2] + 0.0*k_out[3] + 0.0*k_out[4] + 0.0*k_out[5];
+    nothing += 0.0*slope_out[0] + 0.0*slope_out[1] + 0.0*slope_out[2] + 0.0*slope_out[3] + 0.0*slope_out[4] + 0.0*slope_out[5];
+    nothing += 0.0*curvature_out[0] + 0.0*curvature_out[1] + 0.0*curvature_out[2] + 0.0*curvature_out[3] + 0.0*curvature_out[4] + 0.0*curvature_out[5];
+    return 1.015625 - t29 - 0.5*(t33 + fabs(2.0*t29 - t33)) > 0.0 && nothing >= 0.0 ? 0 : 1;
 }

@@ -16,11 +16,13 @@
  *   in   x_des[4] in rad, rad/s, from [-3, -50, -3, -50] to [3, 50, 3, 50]
  *   out  K[4] in N m/rad, N m s/rad
  *   out  u[1] in N m
- * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
+ * Returns an awiwi_status, see awiwi_solvers.h, never 0 if an input is not finite; the outputs are
+ * always defined.
  * Cost: the solver's own work and calls, at most: 1 of secant_stiffness, 1 of pole_placement_law.
  */
 #include "numerics.h"
 #include "awiwi_regulators.h"
+#include "dense.h"
 #include "kernels.h"
 
 int awiwi_sdre_joint(const double m_in[restrict 1], const double b_in[restrict 1], const double dq_in[restrict 1], const double dtheta_in[restrict 1], const double spring_in[restrict 3], const double weights_in[restrict 4], const double R_in[restrict 1], const double K_last_in[restrict 4], const double x_in[restrict 4], const double x_des_in[restrict 4], double K_out[restrict 4], double u_out[restrict 1])
@@ -32,5 +34,5 @@ int awiwi_sdre_joint(const double m_in[restrict 1], const double b_in[restrict 1
     const awiwi_joint joint = {m_in[0], b_in[0], k[0], dq_in[0], dtheta_in[0]};
     const int status = awiwi_joint_gains(&joint, weights_in, R_in[0], K_last_in, 32, K_out);
     awiwi_pole_placement_law(K_out, x_in, x_des_in, hold, u_out);
-    return awiwi_refuse(status, u_out, 1);
+    return awiwi_refuse(status == AWIWI_OK && !(awiwi_all_finite(m_in, 1) && awiwi_all_finite(b_in, 1) && awiwi_all_finite(dq_in, 1) && awiwi_all_finite(dtheta_in, 1) && awiwi_all_finite(spring_in, 3) && awiwi_all_finite(weights_in, 4) && awiwi_all_finite(R_in, 1) && awiwi_all_finite(K_last_in, 4) && awiwi_all_finite(x_in, 4) && awiwi_all_finite(x_des_in, 4)) ? AWIWI_NOT_FINITE : status, u_out, 1);
 }

@@ -13,8 +13,9 @@
  *   in   R[1] in 1/(N^2 m^2), 1e-06 to 1
  *   out  K[2] in N m/rad, N m s/rad
  *   out  u[1] in N m
- * Returns 0 where the motor's inertia is positive and the torque's weight is positive and the angle's
- * weight is positive and the speed's weight is positive; else 1, and outputs without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and the motor's inertia is positive and the
+ * torque's weight is positive and the angle's weight is positive and the speed's weight is positive;
+ * else 1, and outputs without a value are NaN.
  * Cost: 12 add, 18 mul, 2 div, 2 neg, 2 sqrt.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
@@ -38,5 +39,8 @@ int awiwi_sdre_tendon(const double theta_in[restrict 1], const double thd_in[res
     const double t9 = b_in[0]*(t2 - sqrt(s3));
     K_out[1] = -t9;
     u_out[0] = theta_des_in[0]*t5 + (theta_in[0] - theta_des_in[0])*t8 + thd_in[0]*t9;
-    return b_in[0] > 0.0 && R_in[0] > 0.0 && weights_in[0] > 0.0 && weights_in[1] > 0.0 ? 0 : 1;
+    double nothing = 0.0*theta_in[0] + 0.0*thd_in[0] + 0.0*theta_des_in[0] + 0.0*b_in[0] + 0.0*dtheta_in[0] + 0.0*spring_in[0];
+    nothing += 0.0*spring_in[1] + 0.0*spring_in[2] + 0.0*weights_in[0] + 0.0*weights_in[1] + 0.0*R_in[0] + 0.0*K_out[0];
+    nothing += 0.0*K_out[1] + 0.0*u_out[0];
+    return b_in[0] > 0.0 && R_in[0] > 0.0 && weights_in[0] > 0.0 && weights_in[1] > 0.0 && nothing >= 0.0 ? 0 : 1;
 }

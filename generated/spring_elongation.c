@@ -4,8 +4,8 @@
  * Source: figure 4.7.
  *   in   f[1] in N, 3.87595 to 100.149
  *   out  x[1] in m
- * Returns 0 where the argument is within the lever's travel, with a margin of 0.4 %; else 1, and
- * outputs without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and the argument is within the lever's travel,
+ * with a margin of 0.4 %; else 1, and outputs without a value are NaN.
  * Cost: 18 add, 18 mul.
  * Inputs: sha256 6a5695bb7e492700563a99433621bd21f8005fce81d41ed26a0365bf35bb62e3.
  */
@@ -20,5 +20,6 @@ int awiwi_spring_elongation(const double f_in[restrict 1], double x_out[restrict
     const double t3 = t1*(t1*(t1*(t2 - 16.062277840141032) + 0.11186973130937451) + 2.0601325128426753) - 0.8197646619220418;
     const double t4 = t1*(t1*(t1*(t1*t3 + 0.05873713362489698) + 0.1356808122624448) - 0.08794811908496997) + 0.015500658797482721;
     x_out[0] = t1*(t1*(t1*(t1*t4 + 0.017805274432857756) - 0.02169179583600335) + 0.015187073187799235) + 0.006922140392958584;
-    return 1.015625 - 0.00043156509109859516*t0*t0 > 0.0 ? 0 : 1;
+    double nothing = 0.0*f_in[0] + 0.0*x_out[0];
+    return 1.015625 - 0.00043156509109859516*t0*t0 > 0.0 && nothing >= 0.0 ? 0 : 1;
 }

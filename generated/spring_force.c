@@ -6,8 +6,8 @@
  * Source: figure 4.7.
  *   in   x[1] in m, 0 to 0.0100745
  *   out  f[1] in N
- * Returns 0 where the argument is within the lever's travel, with a margin of 0.4 %; else 1, and
- * outputs without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and the argument is within the lever's travel,
+ * with a margin of 0.4 %; else 1, and outputs without a value are NaN.
  * Cost: 18 add, 18 mul.
  * Inputs: sha256 6a5695bb7e492700563a99433621bd21f8005fce81d41ed26a0365bf35bb62e3.
  */
@@ -22,5 +22,6 @@ int awiwi_spring_force(const double x_in[restrict 1], double f_out[restrict 1])
     const double t3 = t1*(t1*(t1*(t1*t2 + 0.023597175380135116) + 0.02157867738956194) + 0.07748390265669301) + 0.17045358422894816;
     const double t4 = t1*(t1*(t1*(t1*t3 + 0.33611894046710494) + 0.6995668466139973) + 1.4975984167644067) + 3.2551960219637897;
     f_out[0] = t1*(t1*(t1*(t1*t4 + 6.802992144829689) + 11.202442186961518) + 37.491138243912154) + 35.47509519087468;
-    return 1.015625 - 39410.4352743336*t0*t0 > 0.0 ? 0 : 1;
+    double nothing = 0.0*x_in[0] + 0.0*f_out[0];
+    return 1.015625 - 39410.4352743336*t0*t0 > 0.0 && nothing >= 0.0 ? 0 : 1;
 }

@@ -6,9 +6,9 @@
  *   out  dL[1] in m
  *   out  force[1] in N
  *   out  stiffness[1] in N/m
- * Returns 0 where the roller is clear of the motor's pulley and the roller is clear of the fixed
- * pulley and the tendon pulls the lever towards its taut end and the spring is stretched; else 1, and
- * outputs without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and the roller is clear of the motor's pulley and
+ * the roller is clear of the fixed pulley and the tendon pulls the lever towards its taut end and the
+ * spring is stretched; else 1, and outputs without a value are NaN.
  * Cost: 38 add, 54 mul, 7 div, 3 sqrt, 1 sincos, 2 calls.
  * Inputs: sha256 6a5695bb7e492700563a99433621bd21f8005fce81d41ed26a0365bf35bb62e3.
  */
@@ -64,5 +64,6 @@ int awiwi_spring_lever(const double theta_in[restrict 1], double dL_out[restrict
     force_out[0] = t34;
     const double t35 = t6*t25 - t0*t26;
     stiffness_out[0] = (7000.0*(t15*(t12*t31 - t14*s4)) + (t32*(t32/t18 - 1.0) + t35*(1.0 + t35/t21))*t34)/(t33*t33);
-    return t20 > 0.0 && t17 > 0.0 && 0.37*t33 > 0.0 && t14 > 0.0 ? 0 : 1;
+    double nothing = 0.0*theta_in[0] + 0.0*dL_out[0] + 0.0*force_out[0] + 0.0*stiffness_out[0];
+    return t20 > 0.0 && t17 > 0.0 && 0.37*t33 > 0.0 && t14 > 0.0 && nothing >= 0.0 ? 0 : 1;
 }

@@ -4,8 +4,8 @@
  * Source: figure 4.7.
  *   in   x[1] in m, 0 to 0.0100745
  *   out  k[1] in N/m
- * Returns 0 where the argument is within the lever's travel, with a margin of 0.4 %; else 1, and
- * outputs without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and the argument is within the lever's travel,
+ * with a margin of 0.4 %; else 1, and outputs without a value are NaN.
  * Cost: 18 add, 18 mul.
  * Inputs: sha256 6a5695bb7e492700563a99433621bd21f8005fce81d41ed26a0365bf35bb62e3.
  */
@@ -19,5 +19,6 @@ int awiwi_spring_stiffness(const double x_in[restrict 1], double k_out[restrict 
     const double t2 = t0*(t0*(t0*(t0*(t1 + 6.3290557196299035) + 0.5917984133640911) + 19.630910187519355) + 49.25209831455856);
     const double t3 = t0*(t0*(t0*(t0*(t2 + 92.89407597904768) + 193.1327897043863) + 405.51481495765694) + 838.2681317499836);
     k_out[0] = t0*(t0*(t0*(t3 + 1692.8589059297435) + 3083.0718504037786) + 3932.3423118480105) + 7645.052374541885;
-    return 1.015625 - 0.7021340433490548*t0*t0 > 0.0 ? 0 : 1;
+    double nothing = 0.0*x_in[0] + 0.0*k_out[0];
+    return 1.015625 - 0.7021340433490548*t0*t0 > 0.0 && nothing >= 0.0 ? 0 : 1;
 }

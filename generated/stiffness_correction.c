@@ -5,13 +5,13 @@
  * exceed K_eff in every direction, otherwise no positive definite K_imp exists. For K_mech = eps K_eff
  * (eq. 8.2), K_imp is eps / (eps - 1) K_eff.
  * Source: eq. 8.1, with the condition of section 8.2 mended.
- *   in   K_eff[4][4] in N m/rad, from [0.2, -0.05, -0.05, -0.05, -0.05, 0.2, -0.05, -0.05, -0.05, -0.05, 0.2, -0.05, -0.05, -0.05, -0.05, 0.2] to [2, 0.05, 0.05, 0.05, 0.05, 2, 0.05, 0.05, 0.05, 0.05, 2, 0.05, 0.05, 0.05, 0.05, 2]
- *   in   K_mech[4][4] in N m/rad, from [4, -0.5, -0.5, -0.5, -0.5, 4, -0.5, -0.5, -0.5, -0.5, 4, -0.5, -0.5, -0.5, -0.5, 4] to [20, 0.5, 0.5, 0.5, 0.5, 20, 0.5, 0.5, 0.5, 0.5, 20, 0.5, 0.5, 0.5, 0.5, 20]
+ *   in   K_eff[4][4] in N m/rad, from [0.011, -0.00275, -0.00275, -0.00275, -0.00275, 0.011, -0.00275, -0.00275, -0.00275, -0.00275, 0.011, -0.00275, -0.00275, -0.00275, -0.00275, 0.011] to [0.11, 0.00275, 0.00275, 0.00275, 0.00275, 0.11, 0.00275, 0.00275, 0.00275, 0.00275, 0.11, 0.00275, 0.00275, 0.00275, 0.00275, 0.11]
+ *   in   K_mech[4][4] in N m/rad, from [0.22, -0.0275, -0.0275, -0.0275, -0.0275, 0.22, -0.0275, -0.0275, -0.0275, -0.0275, 0.22, -0.0275, -0.0275, -0.0275, -0.0275, 0.22] to [7.6, 0.0275, 0.0275, 0.0275, 0.0275, 7.6, 0.0275, 0.0275, 0.0275, 0.0275, 7.6, 0.0275, 0.0275, 0.0275, 0.0275, 7.6]
  *   out  K_imp[4][4] in N m/rad
- * Returns 0 where pivot 0 of K_eff is positive and pivot 1 of K_eff is positive and pivot 2 of K_eff
- * is positive and pivot 3 of K_eff is positive and pivot 0 of K_mech - K_eff is positive and pivot 1
- * of K_mech - K_eff is positive and pivot 2 of K_mech - K_eff is positive and pivot 3 of K_mech -
- * K_eff is positive; else 1, and outputs without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and pivot 0 of K_eff is positive and pivot 1 of
+ * K_eff is positive and pivot 2 of K_eff is positive and pivot 3 of K_eff is positive and pivot 0 of
+ * K_mech - K_eff is positive and pivot 1 of K_mech - K_eff is positive and pivot 2 of K_mech - K_eff
+ * is positive and pivot 3 of K_mech - K_eff is positive; else 1, and outputs without a value are NaN.
  * Cost: 91 add, 111 mul, 7 div, 5 neg.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
@@ -112,5 +112,13 @@ int awiwi_stiffness_correction(const double K_eff_in[restrict 16], const double 
     s55 -= t62*t65;
     s57 -= t64*t65;
     s59 -= s57*s57*(1.0/s55);
-    return K_eff_in[0] > 0.0 && t61 > 0.0 && s55 > 0.0 && s59 > 0.0 && -t1 > 0.0 && -t8 > 0.0 && -t17 > 0.0 && -t21 > 0.0 ? 0 : 1;
+    double nothing = 0.0*K_eff_in[0] + 0.0*K_eff_in[1] + 0.0*K_eff_in[2] + 0.0*K_eff_in[3] + 0.0*K_eff_in[4] + 0.0*K_eff_in[5];
+    nothing += 0.0*K_eff_in[6] + 0.0*K_eff_in[7] + 0.0*K_eff_in[8] + 0.0*K_eff_in[9] + 0.0*K_eff_in[10] + 0.0*K_eff_in[11];
+    nothing += 0.0*K_eff_in[12] + 0.0*K_eff_in[13] + 0.0*K_eff_in[14] + 0.0*K_eff_in[15] + 0.0*K_mech_in[0] + 0.0*K_mech_in[1];
+    nothing += 0.0*K_mech_in[2] + 0.0*K_mech_in[3] + 0.0*K_mech_in[4] + 0.0*K_mech_in[5] + 0.0*K_mech_in[6] + 0.0*K_mech_in[7];
+    nothing += 0.0*K_mech_in[8] + 0.0*K_mech_in[9] + 0.0*K_mech_in[10] + 0.0*K_mech_in[11] + 0.0*K_mech_in[12] + 0.0*K_mech_in[13];
+    nothing += 0.0*K_mech_in[14] + 0.0*K_mech_in[15] + 0.0*K_imp_out[0] + 0.0*K_imp_out[1] + 0.0*K_imp_out[2] + 0.0*K_imp_out[3];
+    nothing += 0.0*K_imp_out[4] + 0.0*K_imp_out[5] + 0.0*K_imp_out[6] + 0.0*K_imp_out[7] + 0.0*K_imp_out[8] + 0.0*K_imp_out[9];
+    nothing += 0.0*K_imp_out[10] + 0.0*K_imp_out[11] + 0.0*K_imp_out[12] + 0.0*K_imp_out[13] + 0.0*K_imp_out[14] + 0.0*K_imp_out[15];
+    return K_eff_in[0] > 0.0 && t61 > 0.0 && s55 > 0.0 && s59 > 0.0 && -t1 > 0.0 && -t8 > 0.0 && -t17 > 0.0 && -t21 > 0.0 && nothing >= 0.0 ? 0 : 1;
 }

@@ -3,12 +3,12 @@
  * Controller stiffness k_imp of one joint, and its sensitivity dk_imp/dk_mech to errors of the
  * tendons' stiffness.
  * Source: eq. 8.1.
- *   in   k_eff[1] in N m/rad, 0.05 to 3
- *   in   k_mech[1] in N m/rad, 3.5 to 20
+ *   in   k_eff[1] in N m/rad, 0.00275 to 0.165
+ *   in   k_mech[1] in N m/rad, 0.1925 to 7.6
  *   out  k_imp[1] in N m/rad
  *   out  sensitivity[1] in 1
- * Returns 0 where k_eff is positive and k_mech - k_eff is positive; else 1, and outputs without a
- * value are NaN.
+ * Returns 0 where all inputs and outputs are finite and k_eff is positive and k_mech - k_eff is
+ * positive; else 1, and outputs without a value are NaN.
  * Cost: 1 add, 4 mul, 2 div, 3 neg.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
@@ -20,5 +20,6 @@ int awiwi_stiffness_correction_scalar(const double k_eff_in[restrict 1], const d
     const double t0 = k_eff_in[0] - k_mech_in[0];
     k_imp_out[0] = -(k_eff_in[0]*k_mech_in[0]*(1.0/t0));
     sensitivity_out[0] = -(k_eff_in[0]*k_eff_in[0]/(t0*t0));
-    return k_eff_in[0] > 0.0 && -t0 > 0.0 ? 0 : 1;
+    double nothing = 0.0*k_eff_in[0] + 0.0*k_mech_in[0] + 0.0*k_imp_out[0] + 0.0*sensitivity_out[0];
+    return k_eff_in[0] > 0.0 && -t0 > 0.0 && nothing >= 0.0 ? 0 : 1;
 }

@@ -14,8 +14,9 @@
  *   in   kp[1] in m, 0.0001 to 1
  *   in   kd[1] in m s, 1e-06 to 0.1
  *   out  tau[1] in N m
- * Returns 0 where the pulley's radius is positive and the proportional gain is positive and the
- * derivative gain is positive; else 1, and outputs without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and the pulley's radius is positive and the
+ * proportional gain is positive and the derivative gain is positive; else 1, and outputs without a
+ * value are NaN.
  * Cost: 5 add, 3 mul.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
@@ -27,5 +28,7 @@ int awiwi_tendon_force_pd(const double f_in[restrict 1], const double fd_in[rest
     double s0 = friction_in[0] + f_hat_in[0]*r_in[0] - kd_in[0]*(fd_in[0] - fd_des_in[0]);
     s0 -= kp_in[0]*(f_in[0] - f_des_in[0]);
     tau_out[0] = s0;
-    return r_in[0] > 0.0 && kp_in[0] > 0.0 && kd_in[0] > 0.0 ? 0 : 1;
+    double nothing = 0.0*f_in[0] + 0.0*fd_in[0] + 0.0*f_des_in[0] + 0.0*fd_des_in[0] + 0.0*f_hat_in[0] + 0.0*friction_in[0];
+    nothing += 0.0*r_in[0] + 0.0*kp_in[0] + 0.0*kd_in[0] + 0.0*tau_out[0];
+    return r_in[0] > 0.0 && kp_in[0] > 0.0 && kd_in[0] > 0.0 && nothing >= 0.0 ? 0 : 1;
 }

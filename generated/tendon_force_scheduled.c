@@ -18,9 +18,10 @@
  *   in   xi0[1] in 1, 0.2 to 2
  *   out  tau[1] in N m
  *   out  gains[2] in m, m s
- * Returns 0 where the pulley's radius is positive and the motor's inertia is positive and the tendon's
- * stiffness is positive and the target's frequency is positive and the target's damping ratio is
- * positive and the proportional gain is positive; else 1, and outputs without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and the pulley's radius is positive and the
+ * motor's inertia is positive and the tendon's stiffness is positive and the target's frequency is
+ * positive and the target's damping ratio is positive and the proportional gain is positive; else 1,
+ * and outputs without a value are NaN.
  * Cost: 6 add, 15 mul, 1 div.
  * Inputs: sha256 44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a.
  */
@@ -38,5 +39,8 @@ int awiwi_tendon_force_scheduled(const double f_in[restrict 1], const double fd_
     gains_out[0] = t5;
     tau_out[0] = r_in[0]*(f_hat_in[0] - (fd_in[0] - fd_des_in[0])*t1*t3) + friction_in[0] - (f_in[0] - f_des_in[0])*t5;
     gains_out[1] = t1*t4;
-    return r_in[0] > 0.0 && b_in[0] > 0.0 && stiffness_in[0] > 0.0 && omega0_in[0] > 0.0 && xi0_in[0] > 0.0 && t2 > 0.0 ? 0 : 1;
+    double nothing = 0.0*f_in[0] + 0.0*fd_in[0] + 0.0*f_des_in[0] + 0.0*fd_des_in[0] + 0.0*f_hat_in[0] + 0.0*friction_in[0];
+    nothing += 0.0*r_in[0] + 0.0*b_in[0] + 0.0*stiffness_in[0] + 0.0*stiffness_rate_in[0] + 0.0*omega0_in[0] + 0.0*xi0_in[0];
+    nothing += 0.0*tau_out[0] + 0.0*gains_out[0] + 0.0*gains_out[1];
+    return r_in[0] > 0.0 && b_in[0] > 0.0 && stiffness_in[0] > 0.0 && omega0_in[0] > 0.0 && xi0_in[0] > 0.0 && t2 > 0.0 && nothing >= 0.0 ? 0 : 1;
 }

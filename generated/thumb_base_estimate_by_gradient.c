@@ -5,7 +5,8 @@
  *   in   h[4] in m, 0 to 0.15149
  *   in   start[2] in rad, -0.610865 to 0.610865
  *   out  q[2] in rad
- * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
+ * Returns an awiwi_status, see awiwi_solvers.h, never 0 if an input is not finite; the outputs are
+ * always defined.
  * Cost: the solver's own work and calls, at most: 51 of thumb_tendon_lengths, 51 of thumb_coupling.
  */
 #include "numerics.h"

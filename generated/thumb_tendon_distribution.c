@@ -11,11 +11,13 @@
  *   in   f_min[1] in N, 3.87595 to 27.9443
  *   in   f_max[1] in N, 76.0811 to 100.149
  *   out  f[8] in N
- * Returns an awiwi_status, see awiwi_solvers.h; the outputs are always defined.
+ * Returns an awiwi_status, see awiwi_solvers.h, never 0 if an input is not finite; the outputs are
+ * always defined.
  * Cost: the solver's own work and calls, at most: 1 of thumb_coupling, 357 of thumb_tendon_stiffness, 1 of thumb_coupling_derivative.
  */
 #include "numerics.h"
 #include "awiwi_distribution.h"
+#include "dense.h"
 #include "kernels.h"
 
 static int curve(const void *context, const awiwi_real *f, awiwi_real *k, awiwi_real *slope, awiwi_real *curvature)
@@ -39,5 +41,6 @@ int awiwi_thumb_tendon_distribution(const double q_in[restrict 4], const double 
 
     awiwi_thumb_coupling(q_in, P);
     awiwi_thumb_coupling_derivative(q_in, dP);
-    return awiwi_distribute(&tendons, tau_in, K_in, tolerance, f_out);
+    const int status = awiwi_distribute(&tendons, tau_in, K_in, tolerance, f_out);
+    return status == AWIWI_OK && !(awiwi_all_finite(q_in, 4) && awiwi_all_finite(tau_in, 4) && awiwi_all_finite(K_in, 16) && awiwi_all_finite(f_min_in, 1) && awiwi_all_finite(f_max_in, 1)) ? AWIWI_NOT_FINITE : status;
 }

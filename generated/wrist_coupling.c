@@ -5,8 +5,9 @@
  *   in   q71[1] in rad, 0.100424 to 1.14762
  *   in   q73[1] in rad, 0.6234 to 1.32153
  *   out  dh[38][2] in m/rad
- * Returns 0 where q73 is between 0 and pi and the plane of the side bars has not passed A0 and bar AA0
- * closes the loop; else 1, and outputs without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and q73 is between 0 and pi and the plane of the
+ * side bars has not passed A0 and bar AA0 closes the loop; else 1, and outputs without a value are
+ * NaN.
  * Cost: 436 add, 478 mul, 41 div, 39 sqrt, 2 sincos.
  * Inputs: sha256 c9e8bcef7946e105e81ceb55d9a65cfc81331bce477c734136b5eb268c572442.
  */
@@ -341,5 +342,18 @@ int awiwi_wrist_coupling(const double q71_in[restrict 1], const double q73_in[re
     dh_out[74] = (s69 + 0.38095238095238093*t70 - 0.035*t45)*t213;
     dh_out[73] = t212*(0.011*t85 + 0.033*t102 + s105 + 0.3333333333333333*t110);
     dh_out[75] = t213*(0.013333333333333334*t85 + 0.035*t102 + s105 + 0.38095238095238093*t110);
-    return a0.sin[0] > 0.0 && 0.002592*a0.cos[1] > 0.0 && t21 > 0.0 ? 0 : 1;
+    double nothing = 0.0*q71_in[0] + 0.0*q73_in[0] + 0.0*dh_out[0] + 0.0*dh_out[1] + 0.0*dh_out[2] + 0.0*dh_out[3];
+    nothing += 0.0*dh_out[4] + 0.0*dh_out[5] + 0.0*dh_out[6] + 0.0*dh_out[7] + 0.0*dh_out[8] + 0.0*dh_out[9];
+    nothing += 0.0*dh_out[10] + 0.0*dh_out[11] + 0.0*dh_out[12] + 0.0*dh_out[13] + 0.0*dh_out[14] + 0.0*dh_out[15];
+    nothing += 0.0*dh_out[16] + 0.0*dh_out[17] + 0.0*dh_out[18] + 0.0*dh_out[19] + 0.0*dh_out[20] + 0.0*dh_out[21];
+    nothing += 0.0*dh_out[22] + 0.0*dh_out[23] + 0.0*dh_out[24] + 0.0*dh_out[25] + 0.0*dh_out[26] + 0.0*dh_out[27];
+    nothing += 0.0*dh_out[28] + 0.0*dh_out[29] + 0.0*dh_out[30] + 0.0*dh_out[31] + 0.0*dh_out[32] + 0.0*dh_out[33];
+    nothing += 0.0*dh_out[34] + 0.0*dh_out[35] + 0.0*dh_out[36] + 0.0*dh_out[37] + 0.0*dh_out[38] + 0.0*dh_out[39];
+    nothing += 0.0*dh_out[40] + 0.0*dh_out[41] + 0.0*dh_out[42] + 0.0*dh_out[43] + 0.0*dh_out[44] + 0.0*dh_out[45];
+    nothing += 0.0*dh_out[46] + 0.0*dh_out[47] + 0.0*dh_out[48] + 0.0*dh_out[49] + 0.0*dh_out[50] + 0.0*dh_out[51];
+    nothing += 0.0*dh_out[52] + 0.0*dh_out[53] + 0.0*dh_out[54] + 0.0*dh_out[55] + 0.0*dh_out[56] + 0.0*dh_out[57];
+    nothing += 0.0*dh_out[58] + 0.0*dh_out[59] + 0.0*dh_out[60] + 0.0*dh_out[61] + 0.0*dh_out[62] + 0.0*dh_out[63];
+    nothing += 0.0*dh_out[64] + 0.0*dh_out[65] + 0.0*dh_out[66] + 0.0*dh_out[67] + 0.0*dh_out[68] + 0.0*dh_out[69];
+    nothing += 0.0*dh_out[70] + 0.0*dh_out[71] + 0.0*dh_out[72] + 0.0*dh_out[73] + 0.0*dh_out[74] + 0.0*dh_out[75];
+    return a0.sin[0] > 0.0 && 0.002592*a0.cos[1] > 0.0 && t21 > 0.0 && nothing >= 0.0 ? 0 : 1;
 }

@@ -5,8 +5,9 @@
  *   in   q71[1] in rad, 0.100424 to 1.14762
  *   in   q73[1] in rad, 0.6234 to 1.32153
  *   out  T[4][4] in 1, m
- * Returns 0 where q73 is between 0 and pi and the plane of the side bars has not passed A0 and bar AA0
- * closes the loop; else 1, and outputs without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and q73 is between 0 and pi and the plane of the
+ * side bars has not passed A0 and bar AA0 closes the loop; else 1, and outputs without a value are
+ * NaN.
  * Cost: 24 add, 48 mul, 2 div, 1 neg, 1 sqrt, 2 sincos.
  * Inputs: sha256 f3c3c5f8b9f1a1e1c692bd3c2cc78649d46a5699c6bfe9fac97394eae1cedb18.
  */
@@ -64,5 +65,8 @@ int awiwi_wrist_palm_pose(const double q71_in[restrict 1], const double q73_in[r
     T_out[7] = 0.5*t7 - t10*t26;
     T_out[9] = a0.sin[0]*t13;
     T_out[11] = 0.018*t23 + a0.sin[0]*t27;
-    return a0.sin[1] > 0.0 && 0.002592*a0.cos[0] > 0.0 && t18 > 0.0 ? 0 : 1;
+    double nothing = 0.0*q71_in[0] + 0.0*q73_in[0] + 0.0*T_out[0] + 0.0*T_out[1] + 0.0*T_out[2] + 0.0*T_out[3];
+    nothing += 0.0*T_out[4] + 0.0*T_out[5] + 0.0*T_out[6] + 0.0*T_out[7] + 0.0*T_out[8] + 0.0*T_out[9];
+    nothing += 0.0*T_out[10] + 0.0*T_out[11] + 0.0*T_out[12] + 0.0*T_out[13] + 0.0*T_out[14] + 0.0*T_out[15];
+    return a0.sin[1] > 0.0 && 0.002592*a0.cos[0] > 0.0 && t18 > 0.0 && nothing >= 0.0 ? 0 : 1;
 }

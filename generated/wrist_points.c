@@ -7,8 +7,9 @@
  *   out  A[3] in m
  *   out  B[3] in m
  *   out  C[3] in m
- * Returns 0 where q73 is between 0 and pi and the plane of the side bars has not passed A0 and bar AA0
- * closes the loop; else 1, and outputs without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and q73 is between 0 and pi and the plane of the
+ * side bars has not passed A0 and bar AA0 closes the loop; else 1, and outputs without a value are
+ * NaN.
  * Cost: 20 add, 39 mul, 2 div, 1 neg, 1 sqrt, 2 sincos.
  * Inputs: sha256 db74b2a34f56c6ccad41684846d922ba049b7832368c63b234f7fba0d2100dce.
  */
@@ -54,5 +55,7 @@ int awiwi_wrist_points(const double q71_in[restrict 1], const double q73_in[rest
     B_out[2] = a0.sin[0]*t3;
     C_out[0] = a0.cos[0]*t7;
     C_out[2] = a0.sin[0]*t7;
-    return a0.sin[1] > 0.0 && 0.002592*a0.cos[0] > 0.0 && t18 > 0.0 ? 0 : 1;
+    double nothing = 0.0*q71_in[0] + 0.0*q73_in[0] + 0.0*A_out[0] + 0.0*A_out[1] + 0.0*A_out[2] + 0.0*B_out[0];
+    nothing += 0.0*B_out[1] + 0.0*B_out[2] + 0.0*C_out[0] + 0.0*C_out[1] + 0.0*C_out[2];
+    return a0.sin[1] > 0.0 && 0.002592*a0.cos[0] > 0.0 && t18 > 0.0 && nothing >= 0.0 ? 0 : 1;
 }

@@ -5,8 +5,9 @@
  *   in   q71[1] in rad, 0.100424 to 1.14762
  *   in   q73[1] in rad, 0.6234 to 1.32153
  *   out  h[38] in m
- * Returns 0 where q73 is between 0 and pi and the plane of the side bars has not passed A0 and bar AA0
- * closes the loop; else 1, and outputs without a value are NaN.
+ * Returns 0 where all inputs and outputs are finite and q73 is between 0 and pi and the plane of the
+ * side bars has not passed A0 and bar AA0 closes the loop; else 1, and outputs without a value are
+ * NaN.
  * Cost: 180 add, 143 mul, 2 div, 39 sqrt, 2 sincos.
  * Inputs: sha256 c9e8bcef7946e105e81ceb55d9a65cfc81331bce477c734136b5eb268c572442.
  */
@@ -169,5 +170,12 @@ int awiwi_wrist_tendon_lengths(const double q71_in[restrict 1], const double q73
     h_out[27] = sqrt(0.038*t47 + s48 + 0.000361);
     h_out[36] = sqrt(0.066*t47 + s48 + 0.001285 - 0.022*t5 - 0.028*t54);
     h_out[37] = sqrt(0.07*t47 + s48 + 0.001481 - 0.02666666666666667*t5 - 0.032*t54);
-    return a0.sin[0] > 0.0 && 0.002592*a0.cos[1] > 0.0 && t29 > 0.0 ? 0 : 1;
+    double nothing = 0.0*q71_in[0] + 0.0*q73_in[0] + 0.0*h_out[0] + 0.0*h_out[1] + 0.0*h_out[2] + 0.0*h_out[3];
+    nothing += 0.0*h_out[4] + 0.0*h_out[5] + 0.0*h_out[6] + 0.0*h_out[7] + 0.0*h_out[8] + 0.0*h_out[9];
+    nothing += 0.0*h_out[10] + 0.0*h_out[11] + 0.0*h_out[12] + 0.0*h_out[13] + 0.0*h_out[14] + 0.0*h_out[15];
+    nothing += 0.0*h_out[16] + 0.0*h_out[17] + 0.0*h_out[18] + 0.0*h_out[19] + 0.0*h_out[20] + 0.0*h_out[21];
+    nothing += 0.0*h_out[22] + 0.0*h_out[23] + 0.0*h_out[24] + 0.0*h_out[25] + 0.0*h_out[26] + 0.0*h_out[27];
+    nothing += 0.0*h_out[28] + 0.0*h_out[29] + 0.0*h_out[30] + 0.0*h_out[31] + 0.0*h_out[32] + 0.0*h_out[33];
+    nothing += 0.0*h_out[34] + 0.0*h_out[35] + 0.0*h_out[36] + 0.0*h_out[37];
+    return a0.sin[0] > 0.0 && 0.002592*a0.cos[1] > 0.0 && t29 > 0.0 && nothing >= 0.0 ? 0 : 1;
 }

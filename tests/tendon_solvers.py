@@ -14,7 +14,6 @@ from awiwi_gen.emit.files import scalar_files
 from awiwi_gen.emit.options import Options
 from awiwi_gen.resources import CSRC
 
-REAL = scalar_files(Options())["real.h"]
 NUMBERS = ctypes.POINTER(ctypes.c_double)
 CURVE = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, NUMBERS, NUMBERS, NUMBERS, NUMBERS)
 OK, OUT_OF_DOMAIN, NOT_CONVERGED, NOT_FINITE, INFEASIBLE = range(5)
@@ -33,9 +32,15 @@ class Tendons(ctypes.Structure):
     )  # fmt: skip
 
 
+def write_headers(directory: Path, options: Options | None = None) -> None:
+    """Write the generated headers that csrc includes."""
+    for name, text in scalar_files(options or Options()).items():
+        (directory / name).write_text(text)
+
+
 def compiled(directory: Path) -> ctypes.CDLL:
     """The solvers in double precision as a library."""
-    (directory / "real.h").write_text(REAL)
+    write_headers(directory)
     target = directory / "distribution.so"
     sources = [str(CSRC / f"{name}.c") for name in ("tendon_pairs", "tendon_search", "tendon_gradient", "dense")]
     compiler().run(*FLAGS, f"-I{directory}", f"-I{CSRC}", "-shared", *sources, "-o", str(target))

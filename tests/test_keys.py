@@ -98,7 +98,7 @@ def test_all_that_runs_in_a_derivation_is_in_its_key(kernels, name):
     kernel = kernels[name]
     for route, where in kernel.routes.items():
         known = frozenset().union(
-            *map(sources.closure, ("awiwi_gen.derive", where.module, type(kernel.part).__module__))
+            *map(sources.closure, ("awiwi_gen.derive", *where.modules, type(kernel.part).__module__))
         )
         ran = traced(lambda route=route: check_dimensions(kernel, Deriver(kernel.part).derive(kernel, route)))
 

@@ -15,7 +15,8 @@ from awiwi_gen.kernels import catalog
 
 PACKAGE = Path(__file__).resolve().parent.parent / "awiwi_gen"
 PHYSICS = [
-    ["errors", "units", "resources", "exits"],
+    ["errors", "units", "resources"],
+    ["extras", "exits"],
     ["hand", "kernel", "structure"],
     ["definitions", "witnesses"],
     ["kernels"],
@@ -31,8 +32,8 @@ COMPILER = [
 ]
 ROOMS = ("reproduce", "compare", "tune")
 TOP = [
-    ["derive", "records", "budget"],
-    ["judge"],
+    ["derive", "records", "budget", "parameters"],
+    ["judge", "golden"],
     ["parallel", "tasks"],
     ["pipeline"],
     ["report", "explain", "terminal", "simulate", "results", "amalgamate"],

@@ -30,21 +30,21 @@ def single():
 def test_kernels_and_libraries_survive_pickling_and_copying(single, duplicate):
     single.threads = 3
     q = np.array([0.1, 0.2])
-    again, kernel = duplicate(single), duplicate(single.jaw_mass_matrix)
+    again, kernel = duplicate(single), duplicate(single.jaw_coupling)
 
     assert again.threads == 3
     assert again.digest == single.digest
     assert list(again) == list(single)
-    assert np.array_equal(again.jaw_mass_matrix(q), single.jaw_mass_matrix(q))
-    assert np.array_equal(kernel(q), single.jaw_mass_matrix(q))
+    assert np.array_equal(again.jaw_coupling(q), single.jaw_coupling(q))
+    assert np.array_equal(kernel(q), single.jaw_coupling(q))
 
 
 def test_a_kernel_runs_in_a_process_pool(single):
     q = RANDOM.uniform(0, 0.2, (6, 2))
     with multiprocessing.get_context("spawn").Pool(1) as pool:
-        found = pool.map(single.jaw_mass_matrix, q)
+        found = pool.map(single.jaw_coupling, q)
 
-    assert np.array_equal(found, single.jaw_mass_matrix(q))
+    assert np.array_equal(found, single.jaw_coupling(q))
 
 
 # ------------------------------------------------------------------------------------------------- building
@@ -103,10 +103,10 @@ def test_the_precision_of_other_libraries_is_left_as_it_was(tmp_path):
 
 def test_a_single_precision_library_computes_in_single_precision(single):
     q = np.array([0.1, 0.2])
-    M = single.jaw_mass_matrix(q)
+    M = single.jaw_coupling(q)
 
     assert M.dtype == np.float32
-    assert np.array_equal(M, single.jaw_mass_matrix(q.astype(np.float32)))
+    assert np.array_equal(M, single.jaw_coupling(q.astype(np.float32)))
     assert single.jaw_energy(q, q, np.zeros(3)).kinetic.dtype == np.float32
 
 

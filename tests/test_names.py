@@ -17,15 +17,18 @@ from awiwi_gen.cache import Cache
 from awiwi_gen.emit.batch import batch_files
 from awiwi_gen.emit.c import CFunction, c_function
 from awiwi_gen.emit.files import kernel_file, shared_files
-from awiwi_gen.emit.names import C99_SIGNIFICANT, csrc_names, require_names, short_name
+from awiwi_gen.emit.names import C99_SIGNIFICANT, TAKEN_KERNELS, csrc_names, require_names, short_name
 from awiwi_gen.emit.options import Options
+from awiwi_gen.emit.params import Numbers, struct_fields
 from awiwi_gen.emit.tree import sealed
 from awiwi_gen.errors import InputError
+from awiwi_gen.hand.ranges import ranges
 from awiwi_gen.ir.builder import Builder
 from awiwi_gen.ir.cost import cost
 from awiwi_gen.ir.graph import Graph, Output
 from awiwi_gen.kernel import Kernel, Port
 from awiwi_gen.kernels import catalog
+from awiwi_gen.library import Library
 from awiwi_gen.resources import CSRC, TEMPLATES
 from awiwi_gen.units import one
 
@@ -112,7 +115,7 @@ def entry(one_kernel: Kernel) -> dict[str, object]:
 def write_tree(directory: Path, prefix: str, kernels: list[Kernel]) -> None:
     functions = [printed(one_kernel, prefix) for one_kernel in kernels]
     entries = [entry(one_kernel) for one_kernel in kernels]
-    files = shared_files(prefix, functions, "0" * 64, {}, Options()) | batch_files(entries, prefix, Options())
+    files = shared_files(prefix, functions, "0" * 64, Options()) | batch_files(entries, prefix, Options())
     files |= {f"{function.name}.c": kernel_file(function, "0" * 64) for function in functions}
     files["manifest.json"] = sealed({"hand": "", "prefix": prefix, "c_type": "double", "kernels": entries})
     for name, text in files.items():
@@ -204,11 +207,21 @@ def test_keywords_macros_and_our_own_identifiers_are_kernels_that_compile_or_are
         ("own", "dense", "dense.c would collide with csrc/dense.c"),
         ("own", "model", "model.c would collide with model.c"),
         ("own", "a b", "not a usable name"),
+        ("own", "threads", "kernel 'threads': Python or the Python interface has this name"),
+        ("own", "lambda", "kernel 'lambda': Python or the Python interface has this name"),
     ],
 )
 def test_a_kernel_whose_name_is_taken_is_refused_with_the_owner(prefix, name, reason):
     with pytest.raises(InputError, match=re.escape(reason)):
         require_names(prefix, [kernel(name, ["x"], ["y"])])
+
+
+def test_the_names_that_kernels_may_not_have_are_the_members_of_a_library(own):
+    lib, kernels, _ = own
+    members = {name for name in (*dir(Library), *vars(lib)) if re.fullmatch(r"[a-z](_?[a-z0-9])*", name)}
+
+    assert members == TAKEN_KERNELS - {*keyword.kwlist}
+    assert all(getattr(lib, each.name) is lib[each.name] for each in kernels)
 
 
 def test_kernels_that_agree_in_63_characters_or_but_for_case_are_refused():
@@ -262,7 +275,9 @@ def test_words_as_prefix_finger_and_joint_compile_or_are_refused_with_their_line
         if isinstance(hand, str):
             faults[word] = hand
             continue
-        shared = shared_files(hand.prefix, [], "0" * 64, hand.quantities(), Options(params="runtime"))
+        options = Options(params="runtime")
+        numbers = Numbers(hand.quantities(), ranges(hand), {}, [], "0" * 64)
+        shared = shared_files(hand.prefix, [], "0" * 64, options, struct_fields(numbers, options))
         (tmp_path / f"{word}_kernels.h").write_text(shared["kernels.h"])
     headers = sorted(path.name for path in tmp_path.glob("*_kernels.h"))
     (tmp_path / "all.c").write_text("".join(f'#include "{name}"\n' for name in headers) + "int main(void);\n")

@@ -7,9 +7,14 @@ import os
 import shutil
 import subprocess
 import sys
+import sysconfig
 from pathlib import Path
 
 import pytest
+
+from awiwi_gen.build import load
+from awiwi_gen.cache import Cache
+from awiwi_gen.errors import BuildError
 
 ONE_FINGER = str(Path(__file__).with_name("one_finger.toml"))
 OPTIONS = ("--hand", ONE_FINGER, "--only", "jaw_tendon_lengths")
@@ -102,6 +107,12 @@ def test_a_compiler_that_refuses_the_code_is_quoted(generated, tmp_path, empty_c
 
     assert done.returncode == 1
     assert "jaw_tendon_lengths.c:1:1: error:" in done.stderr
+
+
+def test_without_the_headers_of_python_they_are_asked_for(generated, tmp_path, monkeypatch):
+    monkeypatch.setattr(sysconfig, "get_paths", lambda: {"include": str(tmp_path)})
+    with pytest.raises(BuildError, match=rf"{tmp_path} has no Python.h; install .* apt-get install python3-dev"):
+        load(generated, Cache(tmp_path / "cache"))
 
 
 @pytest.mark.parametrize("command", [["check"], ["list", "--assumed"], ["--help"]])

@@ -194,3 +194,23 @@ def test_the_public_header_leaves_the_arithmetic_of_the_user_alone(tree, tmp_pat
 
     assert fused(tmp_path / "user.c", ["-mfma", "-ffp-contract=fast"], tree) == 1
     assert compile_with(["-ffast-math"], tmp_path / "user.c", tree, CSRC)[0] == 0
+
+
+def test_the_header_names_every_function_of_the_c_library_that_objects_need(tree, tmp_path):
+    """Without built-in functions of the compiler every call is one."""
+    text = (tree / "kernels.h").read_text()
+    library = re.findall(
+        r"\w+", text[text.index("of <math.h>:") + len("of <math.h>:") : text.index("and compilers may")]
+    )
+    silent = {"memcpy", "memmove", "memset"}
+    flags = ["-std=c99", "-O0", "-fno-builtin", f"-I{tree}", f"-I{CSRC}", "-c"]
+    files = [str(path.resolve()) for directory in (tree, CSRC) for path in sorted(directory.glob("*.c"))]
+    subprocess.run([*compiler().command, *flags, *files], cwd=tmp_path, check=True)
+    objects = sorted(map(str, tmp_path.glob("*.o")))
+    listed = subprocess.run(["nm", *objects], capture_output=True, text=True, check=True).stdout
+    defined = set(re.findall(r" [A-Z] (?<! U )(\w+)", listed))
+    needed = set(re.findall(r" U (\w+)", listed)) - defined - {"_GLOBAL_OFFSET_TABLE_"}
+
+    assert needed - silent == set(library)
+    assert "-lm" in text
+    assert "overlap neither inputs nor each other" in text

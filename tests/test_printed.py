@@ -21,7 +21,7 @@ from awiwi_gen.loops.pair import TABLE_PAIR, at_rest, pair_loop
 from awiwi_gen.loops.regulator import cancelling, regulator
 from awiwi_gen.loops.sampled import is_implementable
 from awiwi_gen.reproduce.figures import linear
-from awiwi_gen.reproduce.figures.backstepping import OUTER, STEP, rise, step_response
+from awiwi_gen.reproduce.figures.backstepping import OUTER, STEP, rise
 from awiwi_gen.reproduce.gain_search import PRINTED_BOX, draw, nearest
 from awiwi_gen.reproduce.printed import all_numbers
 from awiwi_gen.reproduce.printed.backstepping import FIGURE_15_16
@@ -132,12 +132,12 @@ def test_figures_15_7_and_15_8_are_of_the_impedance_law(lib):
     times = np.linspace(0, 10, 1001)
 
     def rises(build):
-        return [rise(times, step_response(build(lib, TABLE_15_1, (5.0, K2, *OUTER)), times)) for K2 in (1.0, 5.0)]
+        return [rise(times, build(lib, TABLE_15_1, (5.0, K2, *OUTER)).step(STEP, times)) for K2 in (1.0, 5.0)]
 
     faster, slower = rises(position_loop), rises(normalised_loop)
     assert faster[1] < faster[0] / 2
     assert slower[1] > 2 * slower[0]
-    assert step_response(normalised_loop(lib, TABLE_15_1, (50.0, 1.0, *OUTER)), times).max() > 1.5 * STEP
+    assert normalised_loop(lib, TABLE_15_1, (50.0, 1.0, *OUTER)).step(STEP, times).max() > 1.5 * STEP
 
 
 def test_the_rate_of_the_load_cannot_be_neglected_with_the_printed_gains(lib):
@@ -153,7 +153,7 @@ def test_the_printed_damping_does_not_run_on_the_clock(lib):
     printed = impedance_loop(lib, TABLE_15_1, FIGURE_15_16)
     softer = impedance_loop(lib, TABLE_16_1, (0.5, 0.0012, 100.0, 100.0))
 
-    assert printed.stable
+    assert printed.poles().real.max() < 0
     assert printed.sampled_radius() > 3
     assert printed.delay_margin() < 25e-6
     assert softer.sampled_radius() < 1

@@ -15,7 +15,6 @@ from awiwi_gen import reproduce
 from awiwi_gen.__main__ import app
 from awiwi_gen.build import load
 from awiwi_gen.emit.tree import read_manifest
-from awiwi_gen.errors import InputError
 from awiwi_gen.hand import Hand
 from awiwi_gen.pipeline import Job, Proof, cached_tree, verify
 from awiwi_gen.reproduce import page
@@ -152,13 +151,6 @@ def test_the_command_writes_the_page_and_prints_each_verdict(tmp_path, monkeypat
     assert [figure["number"] for figure in written["figures"]] == [figure.number for figure in results.figures]
     assert [number["verdict"] for number in written["numbers"]] == ["agrees", "misprint"]
     assert "figure 5.7: the claim does not hold" in told.stdout
-
-
-def test_without_the_drawing_libraries_the_command_says_what_to_install(tmp_path, monkeypatch, hand):
-    monkeypatch.setattr(page.importlib.util, "find_spec", lambda name: None)
-
-    with pytest.raises(InputError, match="pip install 'awiwi_gen\\[studies\\]'"):
-        page.publish(Job(hand), tmp_path / "index.html", None)
 
 
 def test_a_claw_without_an_index_has_the_figures_of_straight_tendons(root):

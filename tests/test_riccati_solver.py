@@ -3,43 +3,53 @@
 from __future__ import annotations
 
 import ctypes
+import platform
+import shutil
+import subprocess
+from functools import partial
 
 import numpy as np
 import pytest
-from tendon_solvers import REAL
+from tendon_solvers import write_headers
 from test_riccati import random_plants
 
 from awiwi_gen.build import FLAGS, compiler
-from awiwi_gen.emit.files import scalar_files
 from awiwi_gen.emit.options import Options
 from awiwi_gen.resources import CSRC
-from awiwi_gen.verify.problems_riccati import optimum
+from awiwi_gen.verify.problems_riccati import joint, optimum
 
 OK, OUT_OF_DOMAIN, NOT_CONVERGED, NOT_FINITE = range(4)
-SINGLE = scalar_files(Options("f32"))["real.h"]
 ROUNDING = {np.float64: 2.0**-53, np.float32: 2.0**-24}
+
+
+FUSED = ["-O2", "-march=haswell", "-DAWIWI_ALLOW_CONTRACTION", "-ffp-contract=fast"]
+
+
+def compiled(directory, dtype, command, flags):
+    """The solver as a C function, in a precision."""
+    write_headers(directory, Options("f64" if dtype is np.float64 else "f32"))
+    target = directory / f"{dtype.__name__}.so"
+    sources = [str(CSRC / f"{name}.c") for name in ("riccati", "poles", "dense")]
+    words = [*command, *flags, f"-I{directory}", f"-I{CSRC}", "-shared", *sources, "-lm", "-o", str(target)]
+    subprocess.run(words, check=True)
+    return ctypes.CDLL(str(target)).awiwi_riccati
 
 
 @pytest.fixture(scope="module")
 def solve(tmp_path_factory):
     """Status, K, S and residual in a precision, for plants that are taken as exact."""
-    libraries = {}
-    for dtype, real in ((np.float64, REAL), (np.float32, SINGLE)):
-        directory = tmp_path_factory.mktemp("riccati")
-        (directory / "real.h").write_text(real)
-        sources = [str(CSRC / f"{name}.c") for name in ("riccati", "poles", "dense")]
-        target = directory / "riccati.so"
-        compiler().run(*FLAGS, f"-I{directory}", f"-I{CSRC}", "-shared", *sources, "-lm", "-o", str(target))
-        libraries[dtype] = ctypes.CDLL(str(target)).awiwi_riccati
+    directory = tmp_path_factory.mktemp("riccati")
+    libraries = {dtype: compiled(directory, dtype, compiler().command, FLAGS) for dtype in (np.float64, np.float32)}
+    return partial(call, libraries)
 
-    def solve(dtype, A, b, Q, r, doublings=32):
-        A, b, Q = (np.ascontiguousarray(part, dtype) for part in (A, b, Q))
-        K, S, residual = np.full(len(b), np.nan, dtype), np.full(A.shape, np.nan, dtype), np.full(1, np.nan, dtype)
-        scalar = ctypes.c_double if dtype is np.float64 else ctypes.c_float
-        A, b, Q, *out = (part.ctypes.data_as(ctypes.c_void_p) for part in (A, b, Q, K, S, residual))
-        return libraries[dtype](len(K), A, b, Q, scalar(r), doublings, *out), K, S, float(residual[0])
 
-    return solve
+def call(libraries, dtype, A, b, Q, r, doublings=32):
+    """Status, K, S and residual of a plant that is taken as exact."""
+    A, b, Q = (np.ascontiguousarray(part, dtype) for part in (A, b, Q))
+    K, S, residual = np.full(len(b), np.nan, dtype), np.full(A.shape, np.nan, dtype), np.full(1, np.nan, dtype)
+    scalar = ctypes.c_double if dtype is np.float64 else ctypes.c_float
+    A, b, Q, *out = (part.ctypes.data_as(ctypes.c_void_p) for part in (A, b, Q, K, S, residual))
+    return libraries[dtype](len(K), A, b, Q, scalar(r), doublings, *out), K, S, float(residual[0])
 
 
 def rounded(dtype, plant):
@@ -104,3 +114,21 @@ def test_without_doublings_the_best_known_is_returned_with_its_residual(solve):
     assert status in (OK, NOT_CONVERGED)
     assert np.isfinite(K).all()
     assert (residual < 1e-10) == (status == OK)
+
+
+@pytest.mark.skipif(platform.machine() != "x86_64", reason="the flags are those of x86")
+@pytest.mark.parametrize("program", ["gcc", "clang"])
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+def test_fused_operations_change_no_gain_and_lose_no_plant(solve, dtype, program, tmp_path):
+    if not shutil.which(program):
+        pytest.skip(f"there is no {program} here")
+    fused = {dtype: compiled(tmp_path, dtype, [program], [*FLAGS, *FUSED, "-w"])}
+    random = np.random.default_rng(5)
+    for _ in range(500):
+        m, b, k = 10 ** random.uniform([-6, -4, -1.3], [-3, -2, 1.7])
+        plant = joint(m, b, k, random.uniform(0, 5e-3), random.uniform(0, 0.1))
+        plant = *plant, np.diag(10 ** random.uniform(-2, 2, 4)), 10 ** random.uniform(-4, 2)
+        status, gains, _, _ = call(fused, dtype, *plant)
+
+        assert status == OK
+        assert gains.tolist() == solve(dtype, *plant)[1].tolist()

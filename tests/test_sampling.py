@@ -7,7 +7,8 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import solve_continuous_are
 
-from awiwi_gen.loops.sampled import PERIOD, delay_margin, is_implementable, report, sampled, slowed
+from awiwi_gen.loops.sampled import delay_margin, is_implementable, report, sampled, slowed
+from awiwi_gen.simulate import PERIOD
 from awiwi_gen.verify.problems_riccati import joint
 
 TABLE_13_1 = joint(4e-7, 2e-3, 0.605, 0.0012, 0.0012)

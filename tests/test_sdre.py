@@ -6,7 +6,7 @@ import ctypes
 
 import numpy as np
 import pytest
-from tendon_solvers import REAL, numbers
+from tendon_solvers import numbers, write_headers
 
 from awiwi_gen.build import FLAGS, compiler
 from awiwi_gen.resources import CSRC
@@ -132,7 +132,7 @@ class Joint(ctypes.Structure):
 def solver(tmp_path_factory):
     """Status and gains for a plant (m, b, k, dq, dtheta) and weights (4 and R), from last gains in so many steps."""
     directory = tmp_path_factory.mktemp("gains")
-    (directory / "real.h").write_text(REAL)
+    write_headers(directory)
     target, sources = directory / "gains.so", [str(CSRC / "joint_gains.c"), str(CSRC / "dense.c")]
     compiler().run(*FLAGS, f"-I{directory}", f"-I{CSRC}", "-shared", *sources, "-lm", "-o", str(target))
     call = ctypes.CDLL(str(target)).awiwi_joint_gains

@@ -90,6 +90,17 @@ def test_springs_that_no_spring_is_like_end_within_the_bounds(library, kind):
             assert np.abs(finger.P.T @ f + tau).max() < 1e-13
 
 
+@pytest.mark.parametrize("share", [0.0, 0.2, 0.4, 0.6, 1.0])
+def test_alike_tendons_share_a_force_unequally_where_only_that_is_stiff_enough(library, share):
+    finger = solvers.Finger(library, [[0.009], [-0.009], [-0.009]], quadratic)
+    wanted = np.array([100, 5 + 90 * share, 95 - 90 * share])  # the first is at its limit
+
+    status, f = finger.distribute(-finger.P.T @ wanted, finger.stiffness(wanted))
+
+    assert status == OK
+    assert np.abs(np.sort(f) - np.sort(wanted)).max() < 1e-7
+
+
 def test_tendons_that_pull_at_nothing_give_no_torque_and_forces_within_limits(library):
     for finger in fingers(library, np.random.default_rng(20)):
         finger.P *= 0

@@ -7,7 +7,7 @@ torque, and damps nothing. Gains must be stable in both cases.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -54,10 +54,7 @@ class Clocked:
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
-        return {
-            "law": self.law, "gains": dict(self.gains), "radius": self.radius, "margin": self.margin,
-            "noise": self.noise, "runs": self.runs,
-        }  # fmt: skip
+        return asdict(self) | {"runs": self.runs}
 
 
 def clocked(library: Any, law: Law, gains: Mapping[str, float], joint: Joint, force: float) -> Clocked:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from awiwi_gen.compare.clock import Clocked, clocked
@@ -36,9 +36,8 @@ class Row:
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
-        return {
-            "law": self.law, "force": self.force, "plant": self.plant, **self.score.as_dict(), "goal": self.score.good,
-        }  # fmt: skip
+        head = {"law": self.law, "force": self.force, "plant": self.plant}
+        return head | asdict(self.score) | {"goal": self.score.good}
 
     def cells(self) -> tuple[str, ...]:
         """The row as text; a run that did not end has no numbers."""
@@ -114,17 +113,14 @@ def step_of_all_laws(rows: Iterable[Row]) -> Figure:
     )
     lines = {name: ((row.step.time - BEFORE * PERIOD) * 1e3, row.step["x"][:, 0]) for name, row in shown.items()}
     return Figure(
-        number="15.24 (all laws)",
-        title="One step under all laws, on a joint of the hand",
-        claim="The antagonistic law settles faster than the cascade, and overshoots less.",
-        found=(
-            f"The exact law settles in {exact.settling * 1e3:.0f} ms, the cascade in {cascade.settling * 1e3:.0f} ms "
-            f"with {cascade.overshoot:.0%} of overshoot; with springs and friction estimated by an observer, the law "
-            f"settles in {adaptive.settling * 1e3:.0f} ms."
-        ),
-        holds=exact.settling < cascade.settling and exact.overshoot < cascade.overshoot,
-        draw=curves(None, lines, "t [ms]", "q [rad]", xlim=(-5, 150)),
-    )
+        "15.24 (all laws)", "One step under all laws, on a joint of the hand",
+        "The antagonistic law settles faster than the cascade, and overshoots less.",
+        f"The exact law settles in {exact.settling * 1e3:.0f} ms, the cascade in {cascade.settling * 1e3:.0f} ms "
+        f"with {cascade.overshoot:.0%} of overshoot; with springs and friction estimated by an observer, the law "
+        f"settles in {adaptive.settling * 1e3:.0f} ms.",
+        exact.settling < cascade.settling and exact.overshoot < cascade.overshoot,
+        curves(None, lines, "t [ms]", "q [rad]", xlim=(-5, 150)),
+    )  # fmt: skip
 
 
 def _clock_cells(force: float, found: Clocked) -> tuple[str, ...]:

@@ -68,8 +68,7 @@ OBSERVED = (
 )
 STATE = ("joint", "motors")
 SETPOINT = Block(
-    "antagonistic_setpoint",
-    {"desired": "motion", "inertias": "known_inertias", "damping": "known_damping"},
+    "antagonistic_setpoint", {"desired": "motion", "inertias": "known_inertias", "damping": "known_damping"}
 )
 FEEDBACK = Block("antagonistic_feedback", {"x": STATE, "resistance": "modelled", "tau_m": "wanted"})
 COMPENSATED = Block(  # adds friction compensation to a law without it
@@ -84,12 +83,8 @@ PAIR: Wires = {"desired": "motion", "external": ("load_seen", "nothing"), "inert
 
 def rest(believed: Joint, force: float) -> Values:
     """Known elongations and stiffness of the springs at rest."""
-    torque = force * believed.arm
-    return {
-        "elongations": believed.elongations(torque),
-        "slopes": believed.slopes(torque),
-        "no_feedback": np.zeros((2, 6)),
-    }
+    p, k = (of(force * believed.arm) for of in (believed.elongations, believed.slopes))
+    return {"elongations": p, "slopes": k, "no_feedback": np.zeros((2, 6))}
 
 
 def of_modes(link: Array, pull: Array) -> Array:
@@ -149,36 +144,22 @@ def regulated(library: Any, believed: Joint, force: float, gains: Mapping[str, f
 
 def scheduled(_: Any, believed: Joint, force: float, gains: Mapping[str, float]) -> Values:
     """Impedance of the link over force loops of both tendons; three of the law's four joints stand still."""
-    others = np.eye(4)
-    others[0, 0] = 0
 
     def first(value: float) -> Array:
-        matrix: Array = others.copy()
-        matrix[0, 0] = value
-        return matrix
+        return np.diag([value, 1.0, 1.0, 1.0])
 
     return rest(believed, force) | {
-        "mass": first(float(believed.inertias[0])),
-        "coriolis": np.diag([believed.damping, 0, 0, 0]),
-        "three": np.zeros(3),
-        "four": np.zeros(4),
-        "stiff": first(gains["K_p"]),
-        "damp": first(gains["K_d"]),
-        "omega0": gains["omega"],
-        "xi0": gains["xi"],
-        "force_gains": np.zeros(4),
-        "wound": np.zeros(2),
-    }
+        "mass": first(float(believed.inertias[0])), "coriolis": np.diag([believed.damping, 0, 0, 0]),
+        "three": np.zeros(3), "four": np.zeros(4), "stiff": first(gains["K_p"]), "damp": first(gains["K_d"]),
+        "omega0": gains["omega"], "xi0": gains["xi"], "force_gains": np.zeros(4), "wound": np.zeros(2),
+    }  # fmt: skip
 
 
 def backstepped(_: Any, believed: Joint, force: float, gains: Mapping[str, float]) -> Values:
     """Gains of all backstepping laws of a pair."""
     tuning = [gains[name] for name in ("K_3", "K_4", "C_t", "C_s")]
-    return rest(believed, force) | {
-        "impedance": [gains["K_p"], gains["K_d"]],
-        "tunings": [tuning, tuning],
-        "torques_wanted": np.zeros(2),
-    }
+    impedance = [gains["K_p"], gains["K_d"]]
+    return rest(believed, force) | {"impedance": impedance, "tunings": [tuning] * 2, "torques_wanted": np.zeros(2)}
 
 
 def state_dependent(_: Any, believed: Joint, force: float, gains: Mapping[str, float]) -> Values:
@@ -188,27 +169,19 @@ def state_dependent(_: Any, believed: Joint, force: float, gains: Mapping[str, f
     slope = believed.slopes(force * believed.arm).mean()
     weight = gains["error"] ** 2
     return rest(believed, force) | {
-        "both": 2 * believed.inertias[1],
-        "no_drag": 0.0,
+        "both": 2 * believed.inertias[1], "no_drag": 0.0,
         "difference": [2 * slope, 0.0, 2 * k3],  # phi(p + d) - phi(p - d)
-        "spring": believed.tendons.mean(axis=0),
-        "weights": [weight, 1e-6, 1e-6, gains["speed"] ** 2],
-        "pull_weights": [weight, gains["speed"] ** 2],
-        "R": 1.0,
-        "K_kept": np.zeros(4),
-        "K_pull": np.zeros(2),
-        "sum_wanted": force * believed.arm,
-        "together_wanted": [p.mean(), 0.0],
-    }
+        "spring": believed.tendons.mean(axis=0), "R": 1.0, "K_kept": np.zeros(4), "K_pull": np.zeros(2),
+        "weights": [weight, 1e-6, 1e-6, gains["speed"] ** 2], "pull_weights": [weight, gains["speed"] ** 2],
+        "sum_wanted": force * believed.arm, "together_wanted": [p.mean(), 0.0],
+    }  # fmt: skip
 
 
 STIFFNESS = {"K_p": Gain(0.5, "N m/rad", 2), "K_d": Gain(0.003, "N m s/rad", 1)}
 STEPS = {
-    "K_3": Gain(150.0, "1/s"),
-    "K_4": Gain(150.0, "1/s"),
-    "C_t": Gain(100.0, "rad/(N m)", 0),
+    "K_3": Gain(150.0, "1/s"), "K_4": Gain(150.0, "1/s"), "C_t": Gain(100.0, "rad/(N m)", 0),
     "C_s": Gain(0.01, "rad s^2/(N m)", -2),
-}
+}  # fmt: skip
 
 
 def pair_law(name: str, kernel: str, source: str, says: str) -> Law:
@@ -312,10 +285,7 @@ LAWS = {
         Law(
             "backstepping_adaptive", "eq. 15.82 to 15.106, mended and extended",
             "the same with damping, springs that are learnt, and whatever the motors must overcome", STIFFNESS | STEPS,
-            (
-                *OBSERVED,
-                Block("backstepping_adaptive", PAIR | {"damping": "known_damping", "tau_m": "wanted"}),
-            ),
+            (*OBSERVED, Block("backstepping_adaptive", PAIR | {"damping": "known_damping", "tau_m": "wanted"})),
             backstepped,
         ),
     )

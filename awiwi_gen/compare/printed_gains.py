@@ -13,7 +13,8 @@ from typing import Any
 from awiwi_gen.loops.joint import TABLE_15_1, TABLE_16_1, Loop, impedance_loop, position_loop
 from awiwi_gen.loops.nearest import Nearest, nearest
 from awiwi_gen.loops.pair import TABLE_PAIR, TUNING, pair_loop
-from awiwi_gen.loops.sampled import PERIOD, Report, report
+from awiwi_gen.loops.sampled import Report, report
+from awiwi_gen.simulate import PERIOD
 
 COLUMNS = ("law", "gains of", "plant", "spectral radius", "delay margin", "nearest that run", "verdict")
 PLANTS = {"table 15.1": TABLE_15_1, "table 16.1": TABLE_16_1}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -73,10 +73,6 @@ class Score:
     chatter: float
     failed: bool
 
-    def as_dict(self) -> dict[str, Any]:
-        """Plain data for JSON."""
-        return asdict(self)
-
     @property
     def good(self) -> bool:
         """Whether the goal is reached: 40 ms, 2 % of overshoot, 3 % of stiffness error, no slack."""
@@ -104,7 +100,7 @@ def score(traces: Mapping[str, Trace], K_p: float) -> Score:
     step, load, sine = (traces[name] for name in ("step", "load", "sine"))
     failed = any(trace.status or trace.refused or trace.done < TICKS for trace in traces.values())
     if any(trace.done < TICKS for trace in traces.values()):
-        return Score(*(float("inf"),) * 4, float("inf"), float("inf"), float("inf"), float("inf"), failed=True)
+        return Score(*(float("inf"),) * 8, failed=True)
     q = step["x"][:, 0]
     off = np.flatnonzero(np.abs(q - STEP) > BAND * STEP)
     deflexion = float(load["x"][-LAST:, 0].mean())

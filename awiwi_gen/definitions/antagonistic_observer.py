@@ -84,7 +84,8 @@ def antagonistic_observer(
     modelled = Matrix([resistance(friction, moving[1]) for moving in later])
     unmodelled = Matrix([-inertias[i + 1] * moving[2] for i, moving in enumerate(later)])
     moved_motors = Matrix([*later[0][:2], *later[1][:2]])
-    return known, joint[:2, :], moved_motors, Matrix(pulls), Matrix(springs), load, modelled, modelled + unmodelled
+    outputs = known, joint[:2, :], moved_motors, Matrix(pulls), Matrix(springs), load, modelled, modelled + unmodelled
+    return *outputs, [T, *inertias]
 
 
 def _ahead(motion: Matrix, known: Expr, T: Expr) -> Matrix:

@@ -12,7 +12,6 @@ from collections.abc import Iterable, Mapping
 from math import prod
 from typing import Any
 
-from awiwi_gen.emit.files import banner, render
 from awiwi_gen.emit.names import function_name, input_name, output_name
 from awiwi_gen.emit.options import GCC_FLAGS, VECTOR_FLAGS, Options
 from awiwi_gen.ir.cost import SINCOS
@@ -34,6 +33,8 @@ Entry = Mapping[str, Any]  # a kernel in the manifest
 
 def batch_files(entries: Iterable[Entry], prefix: str, options: Options) -> dict[str, str]:
     """C files with kernels over many samples, by their paths in the generated directory."""
+    from awiwi_gen.emit.files import banner, render  # here, because a library is loaded without Jinja
+
     chosen = [entry for entry in entries if has_batch(entry)]
     files = {f"{entry['name']}.c": batch_file(entry, prefix, options.c_type) for entry in chosen}
     files["batches.h"] = render(
@@ -59,6 +60,8 @@ def prototype(entry: Entry, prefix: str, c_type: str) -> str:
 
 def batch_file(entry: Entry, prefix: str, c_type: str) -> str:
     """The C of one kernel over many samples."""
+    from awiwi_gen.emit.files import banner, render
+
     name, status = entry["name"], bool(entry["status"])
     ports, params = _ports(entry, c_type), _params(entry, prefix)
     given = ["params"] * len(params)

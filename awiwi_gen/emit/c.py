@@ -17,10 +17,12 @@ from awiwi_gen.emit.options import Options
 from awiwi_gen.ir.cost import Cost, cost
 from awiwi_gen.ir.elementary import OWN
 from awiwi_gen.ir.graph import LEAVES, Graph, Node, Ref, node_of, operands
+from awiwi_gen.ir.passes.lift import DERIVED
 from awiwi_gen.ir.passes.sincos_groups import angle_groups
 from awiwi_gen.kernel import GUARDS
 
 SPARSE = 64  # an output with at least so many zeros is cleared by memset
+TERMS = 6  # of a sum of inputs in one line
 LINE = 100  # a longer expression gets a local variable
 ATOM, PRODUCT, SUM = 3, 2, 1  # how tightly a printed expression binds
 
@@ -56,16 +58,14 @@ def c_function(
     part: str = "",
 ) -> CFunction:
     """Print a graph. ``inputs`` maps port names to shapes; ``part`` is the path of its part in the hand file."""
-    printer = Printer(graph, options, f"params->{identifier(part)}_" if part else "params->")
+    printer = Printer(graph, options, part, inputs)
     outputs = {o.name: o.shape for o in graph.outputs if o.name != GUARDS}
     result = "int" if len(outputs) < len(graph.outputs) else "void"
     head = f"{result} {function_name(prefix, name)}"
     prototype, definition = signature(head, inputs, outputs, options, graph.params and prefix)
     read = {node[1] for node in graph.nodes if node[0] == "input"}
-    functions = {node[0] for node in graph.nodes} - LEAVES - {"add", "mul", "div", "inv"}
-    own = functions & OWN.keys() if options.math == "own" else set()
-    headers = {'"sincos.h"' if function in ("sin", "cos") else '"elementary.h"' for function in own}
-    unused = tuple(f"(void){input_name(port)};" for port in inputs if port not in read)
+    unread = inputs if result == "void" else {}  # a status reads all inputs
+    unused = tuple(f"(void){input_name(port)};" for port in unread if port not in read)
     statements = printer.statements()
     clears = any(line.startswith("memset") for line in statements)
     return CFunction(
@@ -75,8 +75,16 @@ def c_function(
         comment=comment,
         statements=(*unused, *statements),
         cost=cost(graph),
-        includes=("<math.h>",) * bool(functions - own) + ("<string.h>",) * clears + tuple(sorted(headers)),
+        includes=headers_of(graph, options, clears),
     )
+
+
+def headers_of(graph: Graph, options: Options, clears: bool = False) -> tuple[str, ...]:
+    """The headers of the functions that a graph calls, and of memset if it ``clears`` an output."""
+    functions = {node[0] for node in graph.nodes} - LEAVES - {"add", "mul", "div", "inv"}
+    own = functions & OWN.keys() if options.math == "own" else set()
+    headers = {'"sincos.h"' if function in ("sin", "cos") else '"elementary.h"' for function in own}
+    return ("<math.h>",) * bool(functions - own) + ("<string.h>",) * clears + tuple(sorted(headers))
 
 
 def signature(
@@ -100,10 +108,11 @@ def is_continued(graph: Graph, node: Node) -> bool:
 
 
 class Printer:
-    """Turns the nodes of one graph into C text."""
+    """Turns the nodes of one graph into C text. ``part`` is the path of its part in the hand file."""
 
-    def __init__(self, graph: Graph, options: Options, params: str) -> None:
-        self.graph, self.options, self.params = graph, options, params
+    def __init__(self, graph: Graph, options: Options, part: str, inputs: Mapping[str, Shape] | None = None) -> None:
+        self.graph, self.options, self.part = graph, options, part
+        self.inputs = inputs or {}  # whose finiteness a status tells
         self.sincos_of: dict[Ref, str] = {}  # a format for the text of an angle's sine and cosine
         self.groups = angle_groups(graph) if options.math == "own" else {}
         self.texts: list[Text] = []
@@ -129,8 +138,22 @@ class Printer:
         for output in self.graph.outputs:
             if output.name == GUARDS:
                 positive = [f"{self.operand(ref, SUM)} > {zero}" for ref in output.elements]
+                if self.inputs:
+                    self.lines += self.nothing()
+                    positive.append(f"nothing >= {zero}")
                 self.lines.append(f"return {' && '.join(positive)} ? 0 : 1;")
         return self.lines
+
+    def nothing(self) -> list[str]:
+        """A sum that is zero if all inputs and outputs are finite, and not a number otherwise."""
+        zero, lines = self.options.literal(Fraction(0)), []
+        elements = [self.input_element(port, i) for port, shape in self.inputs.items() for i in range(prod(shape))]
+        outputs = [output for output in self.graph.outputs if output.name != GUARDS]
+        elements += [self.output_element(o.name, i) for o in outputs for i in range(len(o.elements))]
+        for first in range(0, len(elements), TERMS):
+            terms = " + ".join(f"{zero}*{element}" for element in elements[first : first + TERMS])
+            lines.append(f"{'nothing +=' if first else f'{self.options.c_type} nothing ='} {terms};")
+        return lines
 
     def stored(self) -> dict[int, list[tuple[str, Ref]]]:
         """The output elements that each node is stored in, and with which sign."""
@@ -210,8 +233,9 @@ class Printer:
         return f"{name}({', '.join(self.operand(r, SUM) for r in refs)})", ATOM
 
     def parameter(self, path: str) -> str:
-        """The field of the parameter struct that holds a number of the hand."""
-        return self.params + identifier(path)
+        """The field of the parameter struct that holds a number of the hand, or one derived from such."""
+        struct = "params->" if path.startswith(DERIVED) else "params->numbers."
+        return struct + identifier(f"{self.part}.{path}")
 
     def input_element(self, port: str, element: int) -> str:
         """The C of an element of an input."""

@@ -2,7 +2,7 @@
 
 Ports cannot collide with anything: port ``x`` is the C parameter ``x_in`` or ``x_out``, and no keyword, standard macro,
 type of ours or local variable of generated code ends like that. Kernels keep their names behind the hand's prefix;
-`require_names` checks those against the table.
+`require_names` checks those against the table. Kernels are also attributes of a Python library, beside its own.
 """
 
 from __future__ import annotations
@@ -41,6 +41,11 @@ WORD = re.compile(r"[A-Za-z_]\w*")
 COMMENT = re.compile(r'/\*.*?\*/|"[^"\n]*"', re.DOTALL)
 # Ports are also arguments and result fields of Python functions, beside these of our own.
 TAKEN_PORTS = {*keyword.kwlist, "self", "out", "status", GUARDS}
+# Kernels are attributes of `library.Library`, beside these, and name the types of their results.
+TAKEN_KERNELS = {
+    *keyword.kwlist, "c", "digest", "dtype", "ffi", "get", "items", "keys", "manifest", "origin", "params", "pointer",
+    "threads", "values", "vectorise_after", "vectorised", "with_numbers",
+}  # fmt: skip
 
 
 def input_name(port: str) -> str:
@@ -75,13 +80,17 @@ def csrc_names() -> dict[str, str]:
 
 def taken_names(prefix: str) -> dict[str, str]:
     """The table: every external name that a kernel may not have, and who has it."""
-    own = {f"{prefix}_{name}": "kernels.h" for name in ("params", "default_params", "model_digest")}
+    ours = ("params", "numbers", "default_numbers", "params_derive", "params_load", "model_digest")
+    own = {f"{prefix}_{name}": "kernels.h or params.h" for name in ours}
     return dict.fromkeys(STANDARD, "the C or C++ standard") | csrc_names() | own
 
 
 def taken_files() -> dict[str, str]:
     """File names (without suffix) that a kernel may not have: their files or objects would overwrite each other."""
-    return {path.stem: f"csrc/{path.name}" for path in sorted(CSRC.glob("*.c"))} | {"model": "model.c"}
+    return {path.stem: f"csrc/{path.name}" for path in sorted(CSRC.glob("*.c"))} | {
+        "model": "model.c",
+        "params": "params.c",
+    }
 
 
 def require_names(prefix: str, kernels: Iterable[Kernel]) -> None:
@@ -101,6 +110,8 @@ def require_names(prefix: str, kernels: Iterable[Kernel]) -> None:
             continue
         if owner := taken.get(name):
             faults.append(f"{who}: its C name {name} is taken by {owner}; choose another kernel name or prefix")
+        if kernel.name in TAKEN_KERNELS:
+            faults.append(f"{who}: Python or the Python interface has this name; choose another")
         if owner := files.get(kernel.name):
             faults.append(f"{who}: its file {kernel.name}.c would collide with {owner}; choose another name")
         for external in (name, f"{name}_batch"):

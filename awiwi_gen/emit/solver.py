@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from fractions import Fraction
 
-from awiwi_gen.emit.c import CFunction, signature
+from awiwi_gen.emit.c import CFunction, identifier, signature
 from awiwi_gen.emit.files import banner, describe, render
-from awiwi_gen.emit.names import function_name
+from awiwi_gen.emit.names import function_name, input_name
 from awiwi_gen.emit.options import Options
 from awiwi_gen.ir.cost import Cost
 from awiwi_gen.kernel import Kernel, Solver
@@ -39,7 +39,6 @@ def solver_function(
         banner=banner(*comment),
         definition=definition,
         kernels={family: function_name(prefix, function.name) for family, function in used.items()},
-        context=f"(const {prefix}_params *)context, " if runtime else "",
         contexts={
             family: f"(const {prefix}_params *)context, " if "_params *" in function.prototype else ""
             for family, function in used.items()
@@ -49,7 +48,11 @@ def solver_function(
         m=len(solver.equations),
         equations=", ".join(map(str, solver.equations)),
         unknowns=", ".join(map(str, solver.unknowns)),
-        arrays=[_array(name, values, options) for name, values in solver.arrays.items()],
+        checked=_checked(kernel),
+        arrays=[
+            _array(name, values, options, kernel.path, solver.limits.get(name, ()) if runtime else ())
+            for name, values in solver.arrays.items()
+        ],
         tolerance=options.literal(Fraction(STOP[options.scalar])),
         **solver.strings,
     )
@@ -58,6 +61,16 @@ def solver_function(
     return function, text
 
 
-def _array(name: str, values: tuple[float, ...], options: Options) -> str:
-    numbers = ", ".join(options.literal(Fraction(value)) for value in values)
-    return f"static const awiwi_real {name}[{len(values)}] = {{{numbers}}};"
+def _checked(kernel: Kernel) -> str:
+    """The status, unless it is AWIWI_OK although an input is not finite."""
+    finite = [f"awiwi_all_finite({input_name(name)}, {port.size})" for name, port in kernel.inputs.items()]
+    return f"status == AWIWI_OK && !({' && '.join(finite)}) ? AWIWI_NOT_FINITE : status"
+
+
+def _array(name: str, values: tuple[float, ...], options: Options, part: str, paths: tuple[str, ...]) -> str:
+    """Constants, or the numbers of the hand at these paths."""
+    numbers = ", ".join(
+        f"params->numbers.{identifier(f'{part}.{path}')}" if path else options.literal(Fraction(value))
+        for value, path in zip(values, paths or ("",) * len(values), strict=True)
+    )
+    return f"{'' if paths else 'static '}const awiwi_real {name}[{len(values)}] = {{{numbers}}};"

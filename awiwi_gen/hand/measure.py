@@ -35,7 +35,8 @@ class Measure:
         return parse_quantity(self.example).unit
 
     @cached_property
-    def _ends(self) -> tuple[Fraction, Fraction]:
+    def ends(self) -> tuple[Fraction, Fraction]:
+        """Both ends of the range, in SI units."""
         return parse_quantity(self.low).value, parse_quantity(self.high).value
 
     @property
@@ -59,7 +60,7 @@ class Measure:
         # Units compare without the radian, but here it counts: an angle must say rad or deg.
         if (quantity.unit, quantity.unit.radians) != (self.unit, self.unit.radians):
             raise ValueError(f"is {name_of(quantity.unit)}; expected {self.expected}")
-        low, high = self._ends
+        low, high = self.ends
         if low > 0 and quantity.value <= 0:
             raise ValueError(f"must be above zero; expected {self.expected}")
         if not low <= quantity.value <= high:
@@ -75,7 +76,7 @@ class Measure:
         if self.unit.label != "rad" or not text.endswith("rad"):
             return ""
         degrees = text.removesuffix("rad") + "deg"
-        return f'; did you mean "{degrees}"?' if abs(parse_quantity(degrees).value) <= self._ends[1] else ""
+        return f'; did you mean "{degrees}"?' if abs(parse_quantity(degrees).value) <= self.ends[1] else ""
 
     def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
         text = core_schema.str_schema(metadata={"pydantic_js_updates": {"examples": [self.example]}})

@@ -160,12 +160,12 @@ def _leaves(node: object) -> Iterator[tuple[str, Quantity, str]]:
             items = node.items() if isinstance(node, dict) else ((f"[{i}]", item) for i, item in enumerate(node))
             for key, item in items:
                 for path, quantity, source in _leaves(item):
-                    yield _join(key, path), quantity, source
+                    yield join(key, path), quantity, source
         case Part():
             own = getattr(node, "source", {})
             for key, _, item in node.entries():
                 for below, quantity, source in _leaves(item):
-                    path = _join(key, below)
+                    path = join(key, below)
                     yield path, quantity, source or _source_of(own, path)
 
 
@@ -189,14 +189,15 @@ def _replaced(node: object, path: str, leaf: Callable[[str, Quantity], object]) 
         case tuple():
             return tuple(_replaced(item, f"{path}[{index}]", leaf) for index, item in enumerate(node))
         case dict():
-            return {key: _replaced(item, _join(path, key), leaf) for key, item in node.items()}
+            return {key: _replaced(item, join(path, key), leaf) for key, item in node.items()}
         case Part():
-            new = {name: _replaced(item, _join(path, key), leaf) for key, name, item in node.entries()}
+            new = {name: _replaced(item, join(path, key), leaf) for key, name, item in node.entries()}
             return node.model_copy(update=new)
     return node
 
 
-def _join(path: str, below: str) -> str:
+def join(path: str, below: str) -> str:
+    """The path of what lies below another path."""
     return f"{path}{below}" if below.startswith("[") or not below or not path else f"{path}.{below}"
 
 

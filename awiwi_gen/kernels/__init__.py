@@ -47,5 +47,5 @@ def declared(hand: Hand) -> list[Kernel]:
         *(spring_kernels(hand, hand.spring) if hand.spring else []),
         *(fibre_kernels(hand, hand.tendon) if hand.tendon else []),
     ]
-    laws = [*joint_laws(), *linear_laws(), *backstepping_laws(), *optimal_laws(), *antagonistic_laws()]
+    laws = [*joint_laws(hand), *linear_laws(), *backstepping_laws(), *optimal_laws(), *antagonistic_laws()]
     return fingers + wrist + hand_kernels(hand) + measured_kernels(hand) + actuators + laws + plant_kernels()

@@ -13,7 +13,7 @@ from typing import Any
 from awiwi_gen.hand import Finger, Hand
 from awiwi_gen.kernel import Kernel, Port, Solver
 from awiwi_gen.kernels.declare import Family
-from awiwi_gen.kernels.fingers import Size, input_ports, joint_limits
+from awiwi_gen.kernels.fingers import Size, input_ports, joint_limits, limit_paths
 from awiwi_gen.units import rad
 
 TRIALS = 50  # as in algorithm 1; figure 5.17 shows that 15 are enough for noisy lengths
@@ -75,6 +75,7 @@ def gradient_search(finger: Finger) -> Solver:
         },
         iterations=TRIALS + 1,
         tolerance={"f64": 1e-6, "f32": 1e-4},
+        limits={end: tuple(paths[j] for j in base.joints) for end, paths in limit_paths(finger).items()},
     )
 
 

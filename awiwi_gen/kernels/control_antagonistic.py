@@ -80,6 +80,7 @@ def reference_filter(_: Any, motion: Any, desired: Any, delay: Any, period: Any)
     },
     "eq. 15.82, observed",
     subject="antagonistic_observer",
+    guards=positive("the period", *PAIR[:3]),
 )
 def antagonistic_observer(
     _: Any, memory: Any, thetas: Any, stretches: Any, measured: Any, acted: Any, acting: Any,

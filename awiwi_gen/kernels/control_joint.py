@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from awiwi_gen.hand import Hand
+from awiwi_gen.hand.lever import Lever
 from awiwi_gen.kernel import Kernel, Port
 from awiwi_gen.kernels.declare import Family, Parameterless
 from awiwi_gen.units import N, Unit, kg, m, one, rad, s
@@ -19,9 +21,39 @@ TORQUE, MOMENTUM = N * m, N * m * s
 STIFFNESS, DAMPING, INERTIA = N * m / rad, N * m * s / rad, kg * m**2
 
 
-def joint_laws() -> list[Kernel]:
+def joint_laws(hand: Hand) -> list[Kernel]:
     """All kernels of joint control."""
-    return laws.kernels("", Parameterless(), "control", {}, PORTS, None)
+    ports = PORTS | stiffness_ports(*joint_stiffness(hand))
+    return laws.kernels("", Parameterless(), "control", {}, ports, None)
+
+
+def joint_stiffness(hand: Hand) -> tuple[float, float]:
+    """Least and largest stiffness [N m/rad] that the tendons on a joint's pulley give it, to two digits."""
+    low, high = float(hand.limits.tendon_stiffness_low), float(hand.limits.tendon_stiffness_high)
+    if hand.spring:
+        levers = [Lever(spring) for spring in (hand.spring, *hand.spring.calibrated.values())]
+        low = min(lever.at(lever.slack).stiffness for lever in levers)
+        high = max(lever.at(lever.taut).stiffness for lever in levers)
+    squares = [
+        float(pulley.radius) ** 2 * sum(over[1:] == pulley.joint for tendon in finger.tendons for over in tendon.over)
+        for finger in hand.fingers.values()
+        for pulley in finger.pulleys
+    ]
+    found = [square for square in squares if square > 0] or [1.0]
+    return float(f"{low * min(found):.2g}"), float(f"{high * max(found):.2g}")
+
+
+def stiffness_ports(low: float, high: float) -> dict[str, Port]:
+    """Stiffnesses of joints between low and high, and softer ones that a controller makes of them.
+
+    All matrices in these ranges are diagonally dominant, and so is the difference of two.
+    """
+    return {
+        "K_eff": matrix(STIFFNESS, low / 20, low / 2, low / 80),
+        "K_mech": matrix(STIFFNESS, low, high, low / 8),
+        "k_eff": Port((), STIFFNESS, low / 80, low * 3 / 4),
+        "k_mech": Port((), STIFFNESS, low * 7 / 8, high),
+    }
 
 
 def matrix(unit: Unit, low: float, high: float, beside: float) -> Port:
@@ -39,11 +71,6 @@ def vector(unit: Unit, limit: float) -> Port:
 
 
 PORTS = {
-    # every stiffness matrix in these ranges is diagonally dominant, and so is their difference
-    "K_eff": matrix(STIFFNESS, 0.2, 2.0, 0.05),
-    "K_mech": matrix(STIFFNESS, 4.0, 20.0, 0.5),
-    "k_eff": Port((), STIFFNESS, 0.05, 3.0),
-    "k_mech": Port((), STIFFNESS, 3.5, 20.0),
     # one motor and its tendon
     "momentum": Port((), MOMENTUM, -0.05, 0.05),
     "u": Port((), TORQUE, -3.0, 3.0),

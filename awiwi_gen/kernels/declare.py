@@ -10,7 +10,7 @@ from __future__ import annotations
 import inspect
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Generic, TypeVar
 
 from awiwi_gen.kernel import WINGS, Kernel, Port, Route, Solver
@@ -93,6 +93,15 @@ class Family(Generic[Size]):
     ) -> list[Kernel]:
         """All kernels of one part, in the order of their declaration."""
         return [template.kernel(prefix, part, path, structure, ports, size) for template in self.templates]
+
+
+def within(kernel: Kernel, subject: str, function: str, guards: tuple[str, ...]) -> Kernel:
+    """A kernel that returns a status: its domain is the function ``function`` of the module ``subject`` in both wings."""
+    routes = {
+        library: replace(route, domain=Route(f"{WINGS[library]}.{subject}", function))
+        for library, route in kernel.routes.items()
+    }
+    return replace(kernel, routes=routes, guards=guards)
 
 
 class Parameterless:

@@ -9,7 +9,7 @@ from awiwi_gen.hand import Hand
 from awiwi_gen.hand.lever import Lever
 from awiwi_gen.hand.parts import Finger, Tendon
 from awiwi_gen.kernel import Kernel, Port, Solver
-from awiwi_gen.kernels.declare import Family
+from awiwi_gen.kernels.declare import Family, within
 from awiwi_gen.units import J, N, Unit, kg, m, one, rad, s
 
 
@@ -31,7 +31,14 @@ def finger_kernels(hand: Hand, name: str, finger: Finger) -> list[Kernel]:
     """All kernels of one finger."""
     size = Size(len(finger.joints), len(finger.tendons), len(finger.links))
     ports = input_ports(hand, finger, size)
-    return per_finger.kernels(name, finger, f"fingers.{name}", finger.structure(), ports, size)
+    kernels = per_finger.kernels(name, finger, f"fingers.{name}", finger.structure(), ports, size)
+    loops = tuple(f"the four-bar of {link.joint} closes" for link in finger.links if link.four_bar)
+    return [within(k, "domain", "loops_close", loops) if loops and moves_the_chain(k) else k for k in kernels]
+
+
+def moves_the_chain(kernel: Kernel) -> bool:
+    """Whether a kernel depends on where the links are; tendons only depend on angles."""
+    return any(route.module.endswith((".kinematics", ".dynamics")) for route in kernel.routes.values())
 
 
 def input_ports(hand: Hand, finger: Finger, size: Size) -> dict[str, Port]:
@@ -74,6 +81,12 @@ def joint_limits(finger: Finger) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Lower and upper limits of the independent joints [rad]."""
     free = [link for link in finger.links if link.joint in finger.joints]
     return tuple(float(k.low or 0) for k in free), tuple(float(k.high or 0) for k in free)
+
+
+def limit_paths(finger: Finger) -> dict[str, tuple[str, ...]]:
+    """Paths of the lower and upper limits of the independent joints; empty where a joint has none."""
+    free = [(i, link) for i, link in enumerate(finger.links) if link.joint in finger.joints]
+    return {end: tuple(f"links[{i}].{end}" if getattr(k, end) else "" for i, k in free) for end in ("low", "high")}
 
 
 def length_range(finger: Finger, tendon: Tendon) -> tuple[float, float]:
@@ -259,6 +272,7 @@ def nonlinear_estimate(finger: Finger, iterations: int = 24) -> Solver | None:
         strings={"search": f"awiwi_least_squares(&problem, h_in, start_in, {iterations}, tolerance, q_out)"},
         iterations=iterations,
         tolerance={"f64": 1e-12, "f32": 1e-5},
+        limits=limit_paths(finger),
     )
 
 
@@ -269,7 +283,11 @@ def nonlinear_estimate(finger: Finger, iterations: int = 24) -> Solver | None:
     solver=nonlinear_estimate,
 )
 def joint_estimate(finger: Any, h: Any, start: Any) -> Any:
-    """Joint angles whose tendon lengths are nearest to the measured h (least squares); start is the last estimate."""
+    """Joint angles whose tendon lengths are nearest to the measured h (least squares); start is the last estimate.
+
+    Where the coupling is constant the estimate is linear, and not limited: lengths that no pose has give angles beyond the
+    joint limits. Otherwise it is within them.
+    """
 
 
 @per_finger(

@@ -6,15 +6,18 @@ from typing import Any
 
 from awiwi_gen.hand import Hand, Motor
 from awiwi_gen.kernel import Kernel, Port
-from awiwi_gen.kernels.declare import Family
+from awiwi_gen.kernels.declare import Family, within
 from awiwi_gen.units import J, N, Unit, m, rad, s
 
 of_motor: Family[None] = Family("motor")
 
+TRAVEL = ("theta is within the motor's travel, with a margin of 0.4 %",)  # beyond it, sines of the rotor's angle end
+
 
 def motor_kernels(hand: Hand, motor: Motor) -> list[Kernel]:
     """All kernels of the motor."""
-    return of_motor.kernels("motor", motor, "motor", {"motor": motor.structure()}, motor_ports(hand, motor), None)
+    kernels = of_motor.kernels("motor", motor, "motor", {"motor": motor.structure()}, motor_ports(hand, motor), None)
+    return [within(k, "domain", "within_travel", TRAVEL) if "theta" in k.inputs else k for k in kernels]
 
 
 def motor_ports(hand: Hand, motor: Motor) -> dict[str, Port]:

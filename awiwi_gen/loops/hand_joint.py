@@ -78,21 +78,16 @@ def joint_of(library: Any, hand: Hand, finger: str = FINGER, joint: str = JOINT)
     finger = finger if finger in hand.fingers else next(iter(hand.fingers))
     names = hand.fingers[finger].joints
     index = names.index(joint) if joint in names else 0
-    straight = np.zeros(len(names))
-    arms = np.abs(library[f"{finger}_coupling"](straight))
-    pulls = [arm[index] for arm, place in zip(arms, joints_of(arms), strict=True) if place == index]
-    arm = float(max(pulls))
-    ratio = arm / float(hand.motor.pulley)
-    b = 2 * float(library.motor_energy(1.0)) * ratio**2
-    link = float(library[f"{finger}_mass_matrix"](straight)[index, index])
-    friction = hand.motor.friction
+    pulley, friction = float(hand.motor.pulley), hand.motor.friction
+    driven = [each for each in drives(library, finger, pulley) if each.joint == index]
+    arm, link, b = max((each.arm, each.link, each.motor) for each in driven)
+    ratio = arm / pulley
+    known = np.array([friction.steepness, friction.level, friction.viscosity], float)
     return Joint(
         inertias=np.array([link, b, b]),
         tendons=np.array([_cubic(library) * arm ** np.array([2, 3, 4])] * 2),
         damping=DAMPING,
-        friction=np.array(
-            [float(friction.steepness) * ratio, float(friction.level) * ratio, float(friction.viscosity) * ratio**2]
-        ),
+        friction=known * ratio ** np.array([1, 1, 2]),
         known=float(hand.motor.compensation),
         arm=arm,
         limit=float(hand.motor.torque) * ratio,
@@ -100,12 +95,30 @@ def joint_of(library: Any, hand: Hand, finger: str = FINGER, joint: str = JOINT)
     )
 
 
-def joints_of(arms: Array) -> list[int]:
-    """The joint of each tendon, from lever arms (m, n): equally many for each joint, with the largest sum of arms."""
-    tendons, joints = arms.shape
-    share = -(-tendons // joints)
+@dataclass(frozen=True)
+class Drive:
+    """A tendon's joint and lever arm [m]; inertias [kg m^2] of the link and of the motor in joint coordinates."""
+
+    joint: int
+    arm: float
+    link: float
+    motor: float
+
+
+def drives(library: Any, finger: str, pulley: float) -> list[Drive]:
+    """Every tendon of a finger, which is straight, with motors on pulleys of a radius [m]; other joints are held.
+
+    Equally many tendons belong to each joint, with the largest sum of lever arms.
+    """
+    coupling = library[f"{finger}_coupling"]
+    straight = np.zeros(coupling.inputs[0]["shape"])
+    arms = np.abs(coupling(straight))
+    masses = np.diagonal(library[f"{finger}_mass_matrix"](straight))
+    inertia, share = 2 * float(library.motor_energy(1.0)), -(-len(arms) // len(straight))
     _, places = linear_sum_assignment(np.repeat(arms, share, axis=1), maximize=True)
-    return [int(place) // share for place in places]
+    joints = [int(place) // share for place in places]
+    pulls = [(joint, float(arm[joint])) for joint, arm in zip(joints, arms, strict=True)]
+    return [Drive(joint, arm, float(masses[joint]), inertia * (arm / pulley) ** 2) for joint, arm in pulls]
 
 
 def _cubic(library: Any) -> Array:
@@ -143,23 +156,10 @@ def values_of(joint: Joint, believed: Joint, force: float) -> dict[str, Any]:
     torque = force * joint.arm
     theta = joint.elongations(torque)
     return {
-        "x": [0, 0, theta[0], 0, theta[1], 0],
-        "u": [torque, torque],
-        "wanted": [torque, torque],
-        "load": 0.0,
-        "inertias": joint.inertias,
-        "tendons": joint.tendons,
-        "damping": joint.damping,
-        "friction": joint.friction,
+        "x": [0, 0, theta[0], 0, theta[1], 0], "u": [torque, torque], "wanted": [torque, torque], "load": 0.0,
+        "inertias": joint.inertias, "tendons": joint.tendons, "damping": joint.damping, "friction": joint.friction,
         "memory": [0, 0, 0, theta[0], 0, 0, theta[1], 0, 0, torque, torque, 1, 1],
-        "motion": np.zeros(5),
-        "goal": np.zeros(5),
-        "period": PERIOD,
-        "known_inertias": believed.inertias,
-        "known_tendons": believed.tendons,
-        "known_damping": believed.damping,
-        "known_friction": believed.friction,
-        "pretension": [torque, 0, 0],
-        "nothing": 0.0,
-        "acted": [torque, torque],
-    }
+        "motion": np.zeros(5), "goal": np.zeros(5), "period": PERIOD,
+        "known_inertias": believed.inertias, "known_tendons": believed.tendons, "known_damping": believed.damping,
+        "known_friction": believed.friction, "pretension": [torque, 0, 0], "nothing": 0.0, "acted": [torque, torque],
+    }  # fmt: skip

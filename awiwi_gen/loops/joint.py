@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 from scipy.linalg import expm
 
-from awiwi_gen.loops.sampled import PERIOD, delay_margin, sampled
-
-Array = np.ndarray[Any, Any]
+from awiwi_gen.loops.sampled import delay_margin, sampled
+from awiwi_gen.simulate import Array
 
 UNIT_WEIGHTS = (1.0, 1.0)
 
@@ -102,11 +101,6 @@ class Loop:
         poles: Array = np.linalg.eigvals(self.closed)
         return poles
 
-    @property
-    def stable(self) -> bool:
-        """Whether all poles lie in the left half plane."""
-        return bool(self.poles().real.max() < 0)
-
     def response(self, start: Any, times: Array, w: Any = 0.0) -> Array:
         """States (times, n) from ``start`` under a constant w; the times are evenly spaced and begin at the start."""
         n = len(self.A)
@@ -115,6 +109,20 @@ class Loop:
         for _ in times[1:]:
             states.append(step @ states[-1])
         return np.array(states)[:, :n]
+
+    def step(self, height: float, times: Array) -> Array:
+        """Position (times,) of the link after a step of the desired one, from rest at 0."""
+        position: Array = height + self.response([-height, *np.zeros(len(self.A) - 1)], times)[:, 0]
+        return position
+
+    def loaded(self, start: Array, times: Array, torque: float) -> Array:
+        """States (times, n) from ``start`` after a step of the outer torque [N m], whose rate is an impulse."""
+        return self.response(start + (self.E + self.B @ self.H) @ [0.0, torque], times, [torque, 0.0])
+
+    @property
+    def stiffness(self) -> float:
+        """Of the link at rest [N m/rad]: outer torque per deflexion."""
+        return float(1 / self.at_rest([1.0, 0.0])[0])
 
     def at_rest(self, w: Any) -> Array:
         """The state at rest under a constant w."""
@@ -126,7 +134,7 @@ class Loop:
 
     def sampled_radius(self, delay: int = 1) -> float:
         """Spectral radius when the law runs on the hand's clock and acts ``delay`` ticks later."""
-        return float(np.abs(np.linalg.eigvals(sampled(self.A, self.B, self.K, PERIOD, delay))).max())
+        return float(np.abs(np.linalg.eigvals(sampled(self.A, self.B, self.K, delay=delay))).max())
 
     def delay_margin(self) -> float:
         """The shortest delay [s] that moves a pole to the imaginary axis; infinite if none does."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from awiwi_gen.loops.nearest import least
 from awiwi_gen.loops.sampled import hold
 from awiwi_gen.simulate import Array, Machine, slopes
 
@@ -54,11 +55,5 @@ class SampledLoop:
 
     def margin(self) -> float:
         """The shortest additional delay [s] at which a pole reaches the unit circle; infinite if none does."""
-        for step in range(1, LONGEST * FINE + 1):
-            if self.radius(step / FINE) >= STABLE:
-                good, bad = (step - 1) / FINE, step / FINE
-                for _ in range(HALVINGS):
-                    middle = (good + bad) / 2
-                    good, bad = (good, middle) if self.radius(middle) >= STABLE else (middle, bad)
-                return good * self.period
-        return float("inf")
+        found = least(lambda share: self.radius(share * LONGEST) >= STABLE, LONGEST * FINE, HALVINGS)
+        return found[0] * LONGEST * self.period if found else float("inf")

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from awiwi_gen.loops.joint import TABLE_16_1, Array, Loop, Plant, slopes
+from awiwi_gen.loops.joint import TABLE_16_1, Loop, slopes
+from awiwi_gen.simulate import Array
 
 SIDES = np.array([1.0, -1.0])
 TUNING = (100.0, 100.0, 1.0, 1.0)  # K_3, K_4, C_t, C_s of either motor
@@ -21,16 +22,6 @@ class Pair:
     m: float
     b: tuple[float, float]
     k: tuple[float, float]
-
-    @classmethod
-    def like(cls, plant: Plant) -> Pair:
-        """A pair with the link, motors and springs of a single joint."""
-        return cls(plant.m, (plant.b,) * 2, (plant.k,) * 2)
-
-    @property
-    def given(self) -> dict[str, Any]:
-        """The plant by the names of the laws' ports."""
-        return {"inertias": (self.m, *self.b), "springs": [(k, 0.0) for k in self.k]}
 
     def open_loop(self) -> tuple[Array, Array, Array]:
         """A (6, 6), B (6, 2) and E (6, 2) of the plant (eq. 15.83, corrected)."""
@@ -46,7 +37,7 @@ class Pair:
         return A, B, E
 
 
-TABLE_PAIR = Pair.like(TABLE_16_1)
+TABLE_PAIR = Pair(TABLE_16_1.m, (TABLE_16_1.b,) * 2, (TABLE_16_1.k,) * 2)
 
 
 def pair_loop(
@@ -54,26 +45,20 @@ def pair_loop(
 ) -> tuple[Loop, Array]:
     """A law for pairs as feedback about q_d = 0, and the constant torques (2,) that it adds for a pretension."""
     zero = {"joint": np.zeros(2), "torques": np.zeros((2, 2)), "external": np.zeros(2)}
-    given = pair.given | {
-        "desired": np.zeros(5),
-        "pretension": (pretension, 0.0, 0.0),
-        "impedance": impedance,
-        "tunings": np.broadcast_to(tuning, (2, 4)),
-    }
+    given = {
+        "inertias": (pair.m, *pair.b), "springs": [(k, 0.0) for k in pair.k], "desired": np.zeros(5),
+        "pretension": (pretension, 0.0, 0.0), "impedance": impedance, "tunings": np.broadcast_to(tuning, (2, 4)),
+    }  # fmt: skip
     constant = law(**zero, **given).tau_m
 
     def by(port: str, size: int) -> Array:
         others = {name: value for name, value in zero.items() if name != port}
         return slopes(law, port, size, **others, **given)
 
-    torques = np.stack(
-        [(law(**(zero | {"torques": unit}), **given).tau_m - constant) for unit in _UNIT_TORQUES], axis=1
-    )
+    units = np.eye(4).reshape(4, 2, 2)
+    torques = np.stack([law(**(zero | {"torques": unit}), **given).tau_m - constant for unit in units], axis=1)
     K = -np.hstack([by("joint", 2), torques])
     return Loop(*pair.open_loop(), K, by("external", 2)), constant
-
-
-_UNIT_TORQUES = np.eye(4).reshape(4, 2, 2)
 
 
 def at_rest(loop: Loop, constant: Array) -> Array:

@@ -16,7 +16,8 @@ import numpy as np
 from scipy.linalg import solve_continuous_are
 
 from awiwi_gen.errors import InputError
-from awiwi_gen.loops.joint import Array, Loop, Plant, joint_loop
+from awiwi_gen.loops.joint import Loop, Plant, joint_loop
+from awiwi_gen.simulate import Array
 
 Quadratic = tuple[float, float]
 

@@ -11,17 +11,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf, pi
-from typing import Any
 
 import numpy as np
 from scipy.linalg import eig, eigvals, expm, matrix_balance
 
-Array = np.ndarray[Any, Any]
+from awiwi_gen.loops.nearest import least
+from awiwi_gen.simulate import PERIOD, Array
+
 Design = Callable[[float], Array]
 
-PERIOD = 1 / 3000  # [s] of the hand's clock
 SLOWEST = 1e-3  # smallest bandwidth that is tried, as a share of the law's own
-STEPS = 30  # of the search from the law's bandwidth down to that
+STEPS = 29  # of the search from the law's bandwidth down to that
 HALVINGS = 40
 
 
@@ -102,20 +102,15 @@ def is_implementable(
         return Answer(found, 1.0, K, found)
     family = design or slowed(A, B, K)
 
-    def works(bandwidth: float) -> bool:
-        gains = family(bandwidth)
+    def works(exponent: float) -> bool:
+        gains = family(SLOWEST**exponent)
         return all(report(A, B, gains, period, late).implementable for late in (delay, delay + 1))
 
-    shares = np.geomspace(1, SLOWEST, STEPS)
-    first = next((i for i in range(1, STEPS) if works(shares[i])), None)
-    if first is None:
+    bracket = least(works, STEPS, HALVINGS)
+    if bracket is None:
         return Answer(found, 0.0, None, None)
-    fails, best = shares[first - 1], shares[first]
-    for _ in range(HALVINGS):
-        middle = np.sqrt(fails * best)
-        fails, best = (fails, middle) if works(middle) else (middle, best)
-    gains = family(best)
-    return Answer(found, float(best), gains, report(A, B, gains, period, delay))
+    bandwidth = SLOWEST ** bracket[1]
+    return Answer(found, bandwidth, family(bandwidth), report(A, B, family(bandwidth), period, delay))
 
 
 def slowed(A: Array, B: Array, K: Array) -> Design:

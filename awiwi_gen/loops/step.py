@@ -1,12 +1,23 @@
-"""Overshoot and settling time of step responses."""
+"""One run of a plant under a law on a clock; overshoot and settling time of step responses."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from math import inf
 from typing import Any
 
 import numpy as np
 
-Array = np.ndarray[Any, Any]
+from awiwi_gen.simulate import PERIOD, Actuator, Array, Element, Loop, Scenario, Trace, simulate
+
+
+def run(
+    library: Any, plant: Sequence[Element], law: Sequence[Element], scenario: Scenario, watch: Sequence[str] = ("x",),
+    period: float = PERIOD, limit: float = inf, late: bool = False,
+) -> Trace:  # fmt: skip
+    """Run a plant of state ``x`` and rate ``xd`` under a law whose ``command`` acts as ``u``, within a limit."""
+    loop = Loop(plant, law, {"x": "xd"}, actuators=[Actuator("command", "u", limit, late)], period=period)
+    return simulate(library, loop, [scenario], watch)[0]
 
 
 def overshoot(values: Array, goal: Array | float, start: Array | float) -> Array:

@@ -13,8 +13,7 @@ import numpy as np
 from awiwi_gen.hand import Hand
 from awiwi_gen.kernels.base_estimate import base_of
 from awiwi_gen.kernels.fingers import joint_limits
-
-Array = np.ndarray[Any, Any]
+from awiwi_gen.simulate import Array
 
 
 @dataclass(frozen=True)

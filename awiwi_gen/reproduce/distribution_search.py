@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-Array = np.ndarray[Any, Any]
+from awiwi_gen.simulate import Array
 
 LIMITS = 6.0, 90.0  # N
 ROUNDS = 200

@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from awiwi_gen.loops.joint import UNIT_WEIGHTS, Array, Plant
+from awiwi_gen.loops.joint import UNIT_WEIGHTS, Plant
+from awiwi_gen.simulate import Array
 
 Box = tuple[tuple[float, float, float, float], tuple[float, float, float, float]]
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import io
 import re
 from collections import Counter
@@ -13,7 +12,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from awiwi_gen.emit.files import render
-from awiwi_gen.errors import InputError
 from awiwi_gen.hand import Hand
 from awiwi_gen.report import COLUMNS, proof_rows
 from awiwi_gen.reproduce.figures import all_figures, in_order
@@ -26,15 +24,9 @@ if TYPE_CHECKING:
 
 SIZE = (6.4, 3.9)  # inches
 STYLE = {
-    "svg.fonttype": "path",
-    "font.size": 9.0,
-    "axes.grid": True,
-    "grid.alpha": 0.3,
-    "grid.linewidth": 0.5,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "legend.frameon": False,
-}
+    "svg.fonttype": "path", "font.size": 9.0, "axes.grid": True, "grid.alpha": 0.3, "grid.linewidth": 0.5,
+    "axes.spines.top": False, "axes.spines.right": False, "legend.frameon": False,
+}  # fmt: skip
 FIRST_OF_PART_II = 7  # chapter
 COUNTED: dict[Verdict, str] = {
     "agrees": "agree",
@@ -72,14 +64,11 @@ Comparison = Callable[[Any, Hand], tuple[list[Figure], list[Table]]]
 def publish(job: Job, path: Path, comparison: Comparison) -> Results:
     """Compute figures and numbers of a hand, verify its kernels, write the page.
 
-    ``comparison`` gives the figures and tables of compared laws. Raises InputError where libraries are missing.
+    ``comparison`` gives the figures and tables of compared laws.
     """
     from awiwi_gen.build import load
     from awiwi_gen.pipeline import cached_tree, verify
 
-    missing = [name for name in ("matplotlib", "scipy") if importlib.util.find_spec(name) is None]
-    if missing:
-        raise InputError(f"{' and '.join(missing)} needed for figures; install them: pip install 'awiwi_gen[studies]'")
     directory = cached_tree(job)
     library = load(directory, job.store)
     compared_figures, tables = comparison(library, job.hand)

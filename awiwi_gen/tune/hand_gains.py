@@ -18,18 +18,11 @@ from awiwi_gen.hand import Hand
 from awiwi_gen.loops.joint import Plant
 from awiwi_gen.loops.nearest import nearest
 from awiwi_gen.loops.pair import Pair, pair_loop
-from awiwi_gen.loops.sampled import PERIOD
+from awiwi_gen.simulate import PERIOD
 from awiwi_gen.tune.tendons import GAINS, plants
 
 PRETENSIONS = (10.0, 20.0)  # N
-POWERS = {
-    "K_p": 2,
-    "K_d": 1,
-    "K_3": 1,
-    "K_4": 1,
-    "C_t": 0,
-    "C_s": -2,
-}  # of the bandwidth that a gain is proportional to
+POWERS = {"K_p": 2, "K_d": 1, "K_3": 1, "K_4": 1, "C_t": 0, "C_s": -2}  # of the bandwidth, that gains grow with
 
 
 def require_running_gains(hand: Hand, store: Cache) -> None:

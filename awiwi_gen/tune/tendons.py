@@ -29,10 +29,11 @@ from awiwi_gen.hand import Finger, Hand
 from awiwi_gen.hand.file import HandFile
 from awiwi_gen.hand.gains import TendonGains
 from awiwi_gen.hand.parts import Measure, Part
-from awiwi_gen.loops.hand_joint import joints_of
-from awiwi_gen.loops.joint import Array, Loop, Plant
+from awiwi_gen.loops.hand_joint import drives
+from awiwi_gen.loops.joint import Loop, Plant
+from awiwi_gen.loops.nearest import least
 from awiwi_gen.loops.regulator import Gains, cancelling, exact_gains, loop_of, pretension_loop, regulator
-from awiwi_gen.loops.sampled import PERIOD
+from awiwi_gen.simulate import PERIOD, Array
 from awiwi_gen.units import Quantity
 
 Rows = tuple[tuple[float, ...], ...]
@@ -42,7 +43,8 @@ GAINS = {
     for note in field.metadata
     if isinstance(note, Measure)
 }
-DEAREST = 1e12  # largest factor on R that is tried
+DECADES = 12  # of the largest factor on R that is tried
+HALVINGS = 8  # of a decade: to 1 %
 
 
 def _cost_matrix(value: object) -> Rows:
@@ -166,20 +168,14 @@ def plants(library: Any, hand: Hand, name: str, finger: Finger, force: float) ->
     """
     if hand.motor is None or hand.spring is None:
         raise InputError("gains need a hand with the sections [motor] and [spring]")
-    inertia = 2 * float(library.motor_energy(1.0))
     elongation = library.spring_elongation(force)
     if elongation.status:
         raise InputError(f"pretension = {force:g} N is beyond what the hand's springs can hold")
-    stiffness = float(library.spring_stiffness(elongation.x).k)
-    straight = np.zeros(len(finger.joints))
-    arms = np.abs(library[f"{name}_coupling"](straight))
-    masses = np.diagonal(library[f"{name}_mass_matrix"](straight))
-    found = []
-    for arm, joint in zip(arms, joints_of(arms), strict=True):
-        ratio = float(arm[joint]) / float(hand.motor.pulley)
-        pair = Plant(float(masses[joint]), 2 * inertia * ratio**2, 2 * stiffness * float(arm[joint]) ** 2)
-        found.append((finger.joints[joint], pair))
-    return found
+    k = float(library.spring_stiffness(elongation.x).k)
+    return [
+        (finger.joints[each.joint], Plant(each.link, 2 * each.motor, 2 * k * each.arm**2))
+        for each in drives(library, name, float(hand.motor.pulley))
+    ]
 
 
 def tune_tendon(library: Any, tendon: int, joint: str, plant: Plant, Q: Array, R: float) -> Tuned:
@@ -204,20 +200,15 @@ def _regulated(library: Any, plant: Plant, Q: Array, R: float) -> tuple[Gains, t
 def _way_out(library: Any, plant: Plant, Q: Array, R: float) -> str:
     """The least stable R, found by bisection, in words."""
 
-    def works(factor: float) -> bool:
-        _, loops = _regulated(library, plant, Q, factor * R)
+    def works(share: float) -> bool:
+        _, loops = _regulated(library, plant, Q, 10 ** (DECADES * share) * R)
         return all(loop.sampled_radius() < 1 for loop in loops)
 
-    low, high = 1.0, 10.0
-    while not works(high):
-        low, high = high, 10 * high
-        if high > DEAREST:
-            ringing = np.sqrt(plant.k * (1 / plant.m + 1 / plant.b)) / (2 * np.pi)
-            return f"no R helps, for link and spring ring at {ringing:.0f} Hz"
-    while high / low > 1.01:
-        middle = float(np.sqrt(low * high))
-        low, high = (low, middle) if works(middle) else (middle, high)
-    return f"R = {high * R:.3g} is the least that works"
+    bracket = least(works, DECADES, HALVINGS)
+    if bracket is None:
+        ringing = np.sqrt(plant.k * (1 / plant.m + 1 / plant.b)) / (2 * np.pi)
+        return f"no R helps, for link and spring ring at {ringing:.0f} Hz"
+    return f"R = {10 ** (DECADES * bracket[1]) * R:.3g} is the least that works"
 
 
 def write_gains(path: Path, tuned: list[Tuned]) -> None:

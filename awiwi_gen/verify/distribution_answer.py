@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from flint import arb
+from flint import arb, arb_mat
 
 Array = np.ndarray[Any, Any]
 
@@ -32,10 +32,12 @@ class System:
     ) -> None:
         n = len(tau)
         self.free, self.n = np.flatnonzero(held == 0).tolist(), n
-        self.P = [P[i * n : i * n + n] for i in range(len(f))]
-        self.dP = [dP[i * n * n : (i + 1) * n * n] for i in range(len(f))]
+        self.P = arb_mat(len(f), n, P)
+        self.dP = arb_mat(len(f), n * n, dP)
+        self.pairs = arb_mat([[a * b for a in row for b in row] for row in self.P.tolist()])
         self.tau = [arb(float(x)) for x in tau]
-        self.K = [arb(float(x)) for x in (K.astype(np.float64) + K.T.astype(np.float64)).flat]
+        symmetric = K.astype(np.float64) + K.T.astype(np.float64)
+        self.K = arb_mat(n * n, 1, [arb(float(x)) / 2 for x in symmetric.flat])
         coupling, derivative = floats
         self.rows = _independent(coupling[self.free])
         k, slope, curvature = curve
@@ -49,43 +51,40 @@ class System:
         matrix[:count, :count] = hessian[np.ix_(self.free, self.free)]
         matrix[:count, count:] = coupling[np.ix_(self.free, self.rows)]
         matrix[count:, :count] = matrix[:count, count:].T
-        self.inverse = _inverse(matrix)
+        self.inverse = arb_mat(count + rank, count + rank, [arb(float(x)) for x in _inverse(matrix).flat])
         self.multipliers = [arb(0)] * rank
 
     def torque(self, f: list[arb]) -> list[arb]:
         """The joint torque (n) of forces f (m)."""
-        return [-sum((p[j] * force for p, force in zip(self.P, f, strict=True)), arb(0)) for j in range(self.n)]
+        found: list[arb] = (-(self.P.transpose() * _column(f))).entries()
+        return found
 
     def stiffness(self, f: list[arb], k: list[arb]) -> list[arb]:
         """The joint stiffness (n n), row by row, of forces f (m) that give the tendons the stiffness k (m)."""
-        n, m = range(self.n), range(len(f))
-        return [
-            sum((k[i] * self.P[i][a] * self.P[i][b] + f[i] * self.dP[i][a * self.n + b] for i in m), arb(0))
-            for a in n
-            for b in n
-        ]
+        found: list[arb] = (self.pairs.transpose() * _column(k) + self.dP.transpose() * _column(f)).entries()
+        return found
 
     def improved(self, f: list[arb], k: list[arb], slope: list[arb]) -> list[arb]:
         """Forces after one Newton step."""
-        n = range(self.n)
-        excess = [found - twice / 2 for found, twice in zip(self.stiffness(f, k), self.K, strict=True)]
-        torque = self.torque(f)
-        misses = [
-            sum((excess[a * self.n + b] * (slope[i] * self.P[i][a] * self.P[i][b] + self.dP[i][a * self.n + b])
-                 for a in n for b in n), arb(0))
-            + sum((self.P[i][j] * multiplier for j, multiplier in zip(self.rows, self.multipliers, strict=True)), arb(0))
-            for i in self.free
-        ]  # fmt: skip
+        excess, torque = _column(self.stiffness(f, k)) - self.K, self.torque(f)
+        by_pair, by_slope = (self.pairs * excess).entries(), (self.dP * excess).entries()
+        prices = [arb(0)] * self.n
+        for j, multiplier in zip(self.rows, self.multipliers, strict=True):
+            prices[j] = multiplier
+        priced = (self.P * _column(prices)).entries()
+        misses = [slope[i] * by_pair[i] + by_slope[i] + priced[i] for i in self.free]
         misses += [self.tau[j] - torque[j] for j in self.rows]
-        steps = [
-            sum((arb(float(x)) * miss for x, miss in zip(row, misses, strict=True)), arb(0)) for row in self.inverse
-        ]
+        steps = (self.inverse * _column(misses)).entries()
         self.multipliers = [
             (multiplier - step).mid()
             for multiplier, step in zip(self.multipliers, steps[len(self.free) :], strict=True)
         ]
         change = dict(zip(self.free, steps, strict=False))
         return [(force - change[i]).mid() if i in change else force for i, force in enumerate(f)]
+
+
+def _column(entries: list[arb]) -> arb_mat:
+    return arb_mat(len(entries), 1, entries)
 
 
 def _independent(P: Array) -> list[int]:

@@ -121,8 +121,8 @@ class GradientSearch(LeastSquares):
     """The same problem by the corrected algorithm 1, whose arithmetic is repeated here operation by operation.
 
     It makes a fixed number of trials, so it reaches the minimum only where the spans determine the joints well. On
-    other fingers it must still match its mirror in every bit, and end no farther from the measured lengths than it
-    started.
+    other fingers the algorithm stops up to a radian away. There its result must still match its mirror in every bit,
+    which fixes it completely, and end no farther from the measured lengths than it started.
     """
 
     def solve(self, inputs: Mapping[str, Array]) -> Reference:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from awiwi_gen.ir.algebras import Balls, Floats
 from awiwi_gen.ir.graph import Graph, prune
 from awiwi_gen.ir.interpret import evaluate
 from awiwi_gen.verify.distribution_answer import System
+from awiwi_gen.verify.nearest_forces import Demands, minima
 from awiwi_gen.verify.problem import Problem
 from awiwi_gen.verify.reference import Reference, reference
 
@@ -25,7 +26,11 @@ LEAST_AUTHORITY = 0.05  # smallest singular value of the free tendons' coupling,
 UNREACHABLE = 0.05  # distance of a stiffness from what the tendons can do, relative to its largest entry
 UNREACHABLE_TORQUE = 0.2  # [N m]
 HALVINGS = 12  # of the distance to an unreachable stiffness, until its answer is unique
-RAYS, POINTS = 48, 24  # of the search for other forces that come as near: rays, and points on each
+MARGIN = 1e-3  # other stiffnesses must be farther by this share of the distance; else the demand is not well posed
+ROUNDING = 1e-7  # distance relative to the stiffness that counts as zero, after a search in floats
+LEAST_GAIN = 1e-6  # a shorter distance by this share is another minimum, or the answer is none
+SAME_STIFFNESS = 0.1  # of the distance: stiffnesses that differ by less are those of one minimum
+SAME_FORCES = 1e-2  # of the upper limit: forces that differ by less are those of one minimum
 DETERMINED = 1e-4  # smallest effect of a pattern of forces, relative to the largest, that still determines forces
 ROUNDS = 8  # of Newton's method with a derivative in floats, at most: each gains ten digits at least
 LAST_STEP = 1e-40  # largest step [N] after which the next would change nothing that two doubles show
@@ -74,7 +79,7 @@ class Distribution(Problem):
 
     The sample's number modulo 4 decides the kind: 0: forces inside the limits that give exactly the demand; 1: the same
     with some forces at limits; 2: a stiffness out of reach, in a direction that no change of the forces reduces; 3: a
-    torque out of reach. A search along rays confirms that no other forces come as near.
+    torque out of reach. A search from many starts confirms that no other forces come as near.
 
     Some fingers have no unique answer: two equal pairs over one joint, or three tendons over one joint, can change
     their forces without a change of torque or stiffness. There torque and stiffness are compared, not the forces.
@@ -96,30 +101,42 @@ class Distribution(Problem):
         """One answer for every sample; cached, since the demand and its solution both need it."""
         given = b"".join(each.tobytes() for each in (q, low, high))
         if given not in self._cached:
-            random = np.random.default_rng(len(q))
-            P, dP = self.tendons(q)
-            drafts = [_draft(s % 4, P[s], random) for s in range(len(q))]
-            limits = [(float(low[s]), float(high[s])) for s in range(len(q))]
-            first = [_forces(draft.share, draft.held, each) for draft, each in zip(drafts, limits, strict=True)]
-            k, slope = self.curve(np.array(first).T, "k", "slope")
-            states = [_state(first[s], k[:, s], slope[:, s], P[s], dP[s]) for s in range(len(q))]
-            self._cached[given] = [self._answer(drafts[s], states[s], P[s], dP[s], limits[s]) for s in range(len(q))]
+            self._cached[given] = self._answers(q, low, high)
         return self._cached[given]
 
-    def _answer(self, draft: _Draft, state: _State, P: Array, dP: Array, limits: Limits) -> Answer:
-        """Forces, and a demand for which they are optimal.
+    def _answers(self, q: Array, low: Array, high: Array) -> list[Answer]:
+        """Forces, and demands for which they are optimal.
 
         The distance of the stiffness is not convex in the forces: if the demand is too far out of reach, other forces
-        come nearer. So it is halved until none does; at distance zero none can.
+        come nearer, or as near. So it is halved until none do; at distance zero none can.
         """
-        infeasible = bool(draft.torque_excess.any())
-        for part in (*0.5 ** np.arange(HALVINGS), 0.0) if draft.kind > 1 else (0.0,):
-            reached, at, excess = self._out_of_reach(draft, state, P, dP, limits, part)
-            tau = draft.torque_excess - P.T @ reached.f
-            answer = Answer(reached.f, at, tau, reached.K - excess, not infeasible, _is_unique(P, reached.growth))
-            if self._is_nearest(answer, P, dP, limits):
-                return answer
-        return answer
+        samples = len(q)
+        random = np.random.default_rng(samples)
+        P, dP = self.tendons(q)
+        drafts = [_draft(s % 4, P[s], random) for s in range(samples)]
+        limits = [(float(low[s]), float(high[s])) for s in range(samples)]
+        first = [_forces(draft.share, draft.held, each) for draft, each in zip(drafts, limits, strict=True)]
+        k, slope = self.curve(np.array(first).T, "k", "slope")
+        states = [_state(first[s], k[:, s], slope[:, s], P[s], dP[s]) for s in range(samples)]
+        answers: dict[int, Answer] = {}
+        for part in (*0.5 ** np.arange(HALVINGS), 0.0):
+            pending = np.array([s for s in range(samples) if s not in answers], int)
+            if len(pending) == 0:
+                break
+            tried = [
+                self._answer(drafts[s], states[s], P[s], dP[s], limits[s], part * (drafts[s].kind > 1)) for s in pending
+            ]
+            nearest, alone = self._compared(tried, P[pending], dP[pending], low[pending], high[pending])
+            for i, s in enumerate(pending):
+                if nearest[i] or part == 0:
+                    answers[int(s)] = replace(tried[i], unique=tried[i].unique and bool(alone[i]))
+        return [answers[s] for s in range(samples)]
+
+    def _answer(self, draft: _Draft, state: _State, P: Array, dP: Array, limits: Limits, part: float) -> Answer:
+        """Forces, and a demand out of reach by a part of the draft's miss for which they are stationary."""
+        reached, at, excess = self._out_of_reach(draft, state, P, dP, limits, part)
+        tau, feasible = draft.torque_excess - P.T @ reached.f, not draft.torque_excess.any()
+        return Answer(reached.f, at, tau, reached.K - excess, feasible, _is_unique(P, reached.growth))
 
     def _out_of_reach(
         self, draft: _Draft, state: _State, P: Array, dP: Array, limits: Limits, part: float
@@ -137,34 +154,30 @@ class Distribution(Problem):
             state = _state(f, k, slope, P, dP)
         return state, held, excess * 0
 
-    def _is_nearest(self, answer: Answer, P: Array, dP: Array, limits: Limits) -> bool:
-        """Whether no other forces with the same torque come as near, on rays from the answer.
+    def _compared(self, answers: list[Answer], P: Array, dP: Array, low: Array, high: Array) -> tuple[Array, Array]:
+        """Whether each answer's stiffness is the nearest by a margin, and whether no other forces give a stiffness as near.
 
-        Pairs need no search: their stiffness is linear in sums that grow with the forces. Where the answer is not
-        unique, other forces come as near, but none may come nearer.
+        Pairs need no search: their stiffness is linear in sums that grow with the forces.
         """
         group = [int(i) for i in self.solver.strings["searched"].split(",") if i]
         if not group:
-            return True
-        rays = _rays(P[group])
-        room = np.where(rays > 0, limits[1] - answer.f[group], limits[0] - answer.f[group])
-        with np.errstate(divide="ignore", invalid="ignore"):
-            length = np.where(np.abs(rays) > 1e-12, room / rays, np.inf).min(axis=1)
-        away = np.outer(length, np.arange(1, POINTS + 1) / POINTS)[..., None] * rays[:, None]
-        f = np.broadcast_to(answer.f, (*away.shape[:2], len(P))).copy()
-        f[..., group] = np.clip(f[..., group] + away, *limits)
-        distance = ((self._stiffness(f, P, dP) - answer.K) ** 2).sum(axis=(-2, -1))
-        moved = np.abs(f - answer.f).max(axis=-1) > 1e-6 * limits[1]
-        here = ((self._stiffness(answer.f, P, dP) - answer.K) ** 2).sum()
-        if answer.unique:
-            return not np.any(distance[moved] <= here)
-        rounding = (1e-12 * np.abs(answer.K).max()) ** 2
-        return not np.any(distance[moved] < here * (1 - 1e-9) - rounding)
+            return np.ones(len(answers), bool), np.ones(len(answers), bool)
+        f, K = (np.array([getattr(answer, name) for answer in answers]) for name in ("f", "K"))
+        torque_limits = np.array([(answer.held != 0) & (not answer.feasible) for answer in answers])
+        demands = Demands(f, K, P, dP, low, high, torque_limits, group)
+        others = minima(demands, self.curve)
+        here, there = (demands.stiffness(each, self._stiffnesses(each)) for each in (f[:, None], others))
+        nearest, distances = (np.linalg.norm(each - K[:, None], axis=(2, 3)) for each in (here, there))
+        as_near = distances < nearest * (1 + MARGIN) + ROUNDING * np.linalg.norm(K, axis=(1, 2))[:, None]
+        differ = np.linalg.norm(there - here, axis=(2, 3)) > SAME_STIFFNESS * nearest
+        differ |= distances < nearest * (1 - LEAST_GAIN)
+        away = np.abs(others - f[:, None]).max(axis=2) > SAME_FORCES * high[:, None]
+        exact = nearest[:, 0] <= ROUNDING * np.linalg.norm(K, axis=(1, 2))
+        return exact | ~(as_near & differ).any(axis=1), ~(as_near & away).any(axis=1)
 
-    def _stiffness(self, f: Array, P: Array, dP: Array) -> Array:
-        """Joint stiffness (..., n, n) of forces (..., m)."""
-        k = self.curve(f.reshape(-1, len(P)).T, "k")[0].T.reshape(f.shape)
-        return np.asarray(np.einsum("...i,ia,ib->...ab", k, P, P) + np.tensordot(f, dP, 1))
+    def _stiffnesses(self, f: Array) -> Array:
+        """Stiffnesses of the tendons (..., m) at forces (..., m)."""
+        return np.asarray(self.curve(f.reshape(-1, f.shape[-1]).T, "k")[0].T.reshape(f.shape))
 
     def tendons(self, q: Array) -> tuple[Array, Array]:
         """Coupling (samples, m, n) and its derivatives (samples, m, n, n) in floats."""
@@ -299,18 +312,6 @@ def _null_space(P: Array) -> Array:
     """Orthonormal changes of the forces (tendons, ...) that give no torque."""
     u, sizes, _ = np.linalg.svd(P)
     return u[:, int(np.sum(sizes > 1e-9 * sizes[0])) :] if len(P) else np.zeros((0, 0))
-
-
-def _rays(P: Array) -> Array:
-    """Directions (rays, tendons) in which forces change and the torque does not."""
-    moves = _null_space(P)
-    if moves.shape[1] == 1:
-        return np.concatenate([moves.T, -moves.T])
-    around = np.random.default_rng(RAYS).normal(size=(RAYS, moves.shape[1]))
-    if moves.shape[1] == 2:
-        angle = 2 * np.pi * np.arange(RAYS) / RAYS
-        around = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    return np.asarray(around @ moves.T)
 
 
 def _out_of_reach(P: Array, growth: Array, held: Array, miss: Array) -> Array:

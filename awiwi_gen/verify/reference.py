@@ -15,6 +15,7 @@ from awiwi_gen.ir.algebras import NUMPY_NAMES, Balls
 from awiwi_gen.ir.graph import Graph, Node, Output, Ref
 from awiwi_gen.ir.interpret import evaluate
 from awiwi_gen.ir.passes.schedule import depth_first
+from awiwi_gen.kernel import GUARDS
 
 Array = np.ndarray[Any, Any]
 BallArrays = dict[str, list[list[arb]]]
@@ -94,6 +95,13 @@ def reference(values: BallArrays) -> Reference:
         rest = [[float(x - h) for x, h in zip(c, f, strict=True)] for c, f in zip(centres, first, strict=True)]
         high[name], low[name] = np.array(first).T, np.array(rest).T
     return Reference(high, low)
+
+
+def domain(values: BallArrays) -> list[int]:
+    """The samples at which all values are numbers, and all guards positive."""
+    columns = [(name == GUARDS, column) for name, elements in values.items() for column in elements]
+    samples = range(len(columns[0][1]))
+    return [i for i in samples if all(x[i].is_finite() and (not guard or x[i] > 0) for guard, x in columns)]
 
 
 ZERO = arb(0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Mapping
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,26 @@ from awiwi_gen.kernel import Port
 SAMPLES = 320
 SEED = 20120301  # printed with every report; the samples of a part depend on it and on the part's name only
 
+VARIATION = Fraction(1, 1000)  # of numbers that are read at run time; a thousandth keeps loops closed at joint limits
+
 Array = np.ndarray[Any, Any]
+
+
+def varied(values: Mapping[str, Fraction], part: str = "") -> dict[str, Fraction]:
+    """Other numbers of a part, by paths relative to it, each within a thousandth of its own; zeros stay."""
+    return {
+        path: value
+        * (
+            1
+            + VARIATION * Fraction(zlib.crc32(f"{SEED} {part}.{path}".replace(" .", " ").encode()) - (1 << 31), 1 << 31)
+        )
+        for path, value in values.items()
+    }
+
+
+def _share(path: str) -> Fraction:
+    """A number from -1 to 1 that only a path decides."""
+    return Fraction(zlib.crc32(f"{SEED} {path}".encode()) - (1 << 31), 1 << 31)
 
 
 def draw(ports: Mapping[str, Port], part: str, dtype: type = np.float64, samples: int = SAMPLES) -> dict[str, Array]:

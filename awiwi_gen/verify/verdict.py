@@ -49,23 +49,52 @@ class Verdict:
         """Plain data for JSON."""
         return asdict(self)
 
+    def joined(self, other: Verdict, when: str) -> Verdict:
+        """The worse of two examinations; ``when`` says what was different in the other one."""
+        return replace(
+            self,
+            passed=self.passed and other.passed,
+            bit_exact=self.bit_exact and other.bit_exact,
+            worst_ulp=max(self.worst_ulp, other.worst_ulp),
+            worst_scaled_error=max(self.worst_scaled_error, other.worst_scaled_error),
+            bound_use=max(self.bound_use, other.bound_use),
+            reasons=(*self.reasons, *(f"{when}, {reason}" for reason in other.reasons)),
+        )
+
     def refused(self, reason: str) -> Verdict:
         """The same verdict with one more reason for failure."""
         return replace(self, passed=False, reasons=(*self.reasons, reason))
 
 
-def float_values(graph: Graph, inputs: Mapping[str, Array], params: Mapping[str, Any], algebra: Any) -> dict[str, Any]:
-    """Values of a graph in an algebra on arrays: per output a list of columns (samples,), or of pairs of columns."""
+def float_values(
+    graph: Graph,
+    inputs: Mapping[str, Array],
+    params: Mapping[str, Any],
+    algebra: Any,
+    derivation: Graph | None = None,
+) -> dict[str, Any]:
+    """Values of a graph in an algebra on arrays: per output a list of columns (samples,), or of pairs of columns.
+
+    ``derivation`` is the graph of derived numbers, which depend on ``params`` alone.
+    """
     samples = len(next(iter(inputs.values())))
+    derived = derived_values(derivation, params, algebra) if derivation else {}
 
     def leaf(node: Node) -> Any:
         if node[0] == "param":
-            return algebra.const(params[node[1]])
+            return derived[node[1]] if node[1] in derived else algebra.const(params[node[1]])
         column = inputs[node[1]][:, node[2]]
         return (column.astype(np.float64), np.zeros(samples)) if isinstance(algebra, Bounded) else column
 
     with np.errstate(all="ignore"):
         return evaluate(graph, algebra, leaf)
+
+
+def derived_values(derivation: Graph, params: Mapping[str, Any], algebra: Any) -> dict[str, Any]:
+    """Derived numbers in an algebra, by path, in the order of operations of the C."""
+    with np.errstate(all="ignore"):
+        found = evaluate(derivation, algebra, lambda node: algebra.const(params[node[1]]))
+    return {path: elements[0] for path, elements in found.items()}
 
 
 def stack(columns: list[Any], samples: int) -> Array:
@@ -134,8 +163,12 @@ def judge(
     seed: int,
     dtype: type,
     own: bool,
+    derivation: Graph | None = None,
 ) -> Verdict:
-    """Levels 1 and 3 for one compiled kernel, with the results of levels 2 and 4 for its graphs."""
+    """Levels 1 and 3 for one compiled kernel, with the results of levels 2 and 4 for its graphs.
+
+    ``derivation`` is the graph of the derived numbers that the kernel reads.
+    """
     samples = len(next(iter(inputs.values())))
     arrays = {port: a.reshape(samples, *shapes[port]) for port, a in inputs.items()}
     raw = call(**arrays)
@@ -143,8 +176,8 @@ def judge(
     guarded = len(outputs) < len(graph.outputs)
     computed = dict(zip(outputs, raw if len(outputs) + guarded > 1 else (raw,), strict=False))
     computed = {port: np.asarray(a).reshape(samples, -1) for port, a in computed.items()}
-    mirrored = float_values(graph, inputs, params, Floats(dtype, own))
-    bounds = float_values(graph, inputs, params, Bounded(dtype, own))
+    mirrored = float_values(graph, inputs, params, Floats(dtype, own), derivation)
+    bounds = float_values(graph, inputs, params, Bounded(dtype, own), derivation)
     exact = True
     worst_ulp = worst_scaled = bound_use = 0.0
     reasons = []

@@ -16,8 +16,8 @@ LENGTHENED = ca.DM([[-1, 1, 0], [1, 0, 1]])  # elongations by (q, theta1, theta2
 def antagonistic_observer(
     _: Any, memory: SX, thetas: SX, stretches: SX, measured: SX, acted: SX, acting: SX,
     inertias: SX, tendons: SX, damping: SX, friction: SX, bandwidths: SX, period: SX,
-) -> tuple[SX, ...]:  # fmt: skip
-    """One sample: the memory (13) and the law's inputs. Matrices of motions have a column for the link and each motor."""
+) -> tuple[Any, ...]:  # fmt: skip
+    """The memory (13) and the law's inputs, a sample later; guards. Matrices of motions have a column for each body."""
     bodies = (inertias, damping, friction, period)
     poles = ca.exp(-bandwidths * period)
     before, last, scales = ca.reshape(memory[:9], 3, 3), memory[9:11], memory[11:]
@@ -51,6 +51,7 @@ def antagonistic_observer(
         unexplained[0],
         modelled,
         modelled - unexplained[1:],
+        [period, *ca.vertsplit(inertias)],
     )
 
 

@@ -6,29 +6,31 @@
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_fifth_bias(const double q_in[4], const double qd_in[4], const double g_in[3], double bias_out[4]);
+INLINED int awiwi_fifth_bias(const double q_in[4], const double qd_in[4], const double g_in[3], double bias_out[4]);
 #include "../fifth_bias.c"
 
-VECTORS void block(const double *restrict q_in_at, ptrdiff_t q_in_row, const double *restrict qd_in_at, ptrdiff_t qd_in_row, const double *restrict g_in_at, ptrdiff_t g_in_row, double *restrict bias_out_at, ptrdiff_t bias_out_row)
+VECTORS void block(const double *restrict q_in_at, ptrdiff_t q_in_row, const double *restrict qd_in_at, ptrdiff_t qd_in_row, const double *restrict g_in_at, ptrdiff_t g_in_row, double *restrict bias_out_at, ptrdiff_t bias_out_row, int *restrict status)
 {
     EACH_SAMPLE {
         double q_in_one[4], qd_in_one[4], g_in_one[3], bias_out_one[4];
         TAKE(q_in, 4)
         TAKE(qd_in, 4)
         TAKE(g_in, 3)
-        awiwi_fifth_bias(q_in_one, qd_in_one, g_in_one, bias_out_one);
+        status[i_] = awiwi_fifth_bias(q_in_one, qd_in_one, g_in_one, bias_out_one);
         GIVE(bias_out, 4)
     }
 }
 
-void awiwi_fifth_bias_batch(ptrdiff_t samples, const double *q_in, ptrdiff_t q_in_sample, ptrdiff_t q_in_element, const double *qd_in, ptrdiff_t qd_in_sample, ptrdiff_t qd_in_element, const double *g_in, ptrdiff_t g_in_sample, ptrdiff_t g_in_element, double *bias_out, ptrdiff_t bias_out_sample, ptrdiff_t bias_out_element)
+void awiwi_fifth_bias_batch(ptrdiff_t samples, const double *q_in, ptrdiff_t q_in_sample, ptrdiff_t q_in_element, const double *qd_in, ptrdiff_t qd_in_sample, ptrdiff_t qd_in_element, const double *g_in, ptrdiff_t g_in_sample, ptrdiff_t g_in_element, double *bias_out, ptrdiff_t bias_out_sample, ptrdiff_t bias_out_element, int *status)
 {
     double q_in_rows[4*BLOCK], qd_in_rows[4*BLOCK], g_in_rows[3*BLOCK], bias_out_rows[4*BLOCK];
+    int status_rows[BLOCK];
     EACH_BLOCK {
         GATHER(q_in, 4)
         GATHER(qd_in, 4)
         GATHER(g_in, 3)
-        block(AT(q_in), AT(qd_in), AT(g_in), AT(bias_out));
+        block(AT(q_in), AT(qd_in), AT(g_in), AT(bias_out), status_rows);
         SCATTER(bias_out, 4)
+        memcpy(status + first_, status_rows, (size_t)COUNT * sizeof *status);
     }
 }

@@ -6,28 +6,30 @@
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_fifth_coriolis_matrix(const double q_in[4], const double qd_in[4], double C_out[16]);
+INLINED int awiwi_fifth_coriolis_matrix(const double q_in[4], const double qd_in[4], double C_out[16]);
 #include "../fifth_coriolis_matrix.c"
 
-VECTORS void block(const double *restrict q_in_at, ptrdiff_t q_in_row, const double *restrict qd_in_at, ptrdiff_t qd_in_row, double *restrict C_out_at, ptrdiff_t C_out_row)
+VECTORS void block(const double *restrict q_in_at, ptrdiff_t q_in_row, const double *restrict qd_in_at, ptrdiff_t qd_in_row, double *restrict C_out_at, ptrdiff_t C_out_row, int *restrict status)
 {
     EACH_SAMPLE {
         double q_in_one[4], qd_in_one[4], C_out_one[16];
         TAKE(q_in, 4)
         TAKE(qd_in, 4)
-        awiwi_fifth_coriolis_matrix(q_in_one, qd_in_one, C_out_one);
+        status[i_] = awiwi_fifth_coriolis_matrix(q_in_one, qd_in_one, C_out_one);
         GIVE(C_out, 16)
     }
 }
 
-void awiwi_fifth_coriolis_matrix_batch(ptrdiff_t samples, const double *q_in, ptrdiff_t q_in_sample, ptrdiff_t q_in_element, const double *qd_in, ptrdiff_t qd_in_sample, ptrdiff_t qd_in_element, double *C_out, ptrdiff_t C_out_sample, ptrdiff_t C_out_element)
+void awiwi_fifth_coriolis_matrix_batch(ptrdiff_t samples, const double *q_in, ptrdiff_t q_in_sample, ptrdiff_t q_in_element, const double *qd_in, ptrdiff_t qd_in_sample, ptrdiff_t qd_in_element, double *C_out, ptrdiff_t C_out_sample, ptrdiff_t C_out_element, int *status)
 {
     double q_in_rows[4*BLOCK], qd_in_rows[4*BLOCK], C_out_rows[16*BLOCK];
+    int status_rows[BLOCK];
     EACH_BLOCK {
         GATHER(q_in, 4)
         GATHER(qd_in, 4)
         PREFETCH_ROWS(C_out, 16)
-        block(AT(q_in), AT(qd_in), AT(C_out));
+        block(AT(q_in), AT(qd_in), AT(C_out), status_rows);
         SCATTER(C_out, 16)
+        memcpy(status + first_, status_rows, (size_t)COUNT * sizeof *status);
     }
 }

@@ -6,35 +6,37 @@
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_fifth_dynamics(const double q_in[4], const double qd_in[4], const double g_in[3], double M_out[16], double C_out[16], double gravity_out[4]);
+INLINED int awiwi_fifth_dynamics(const double q_in[4], const double qd_in[4], const double g_in[3], double M_out[16], double C_out[16], double gravity_out[4]);
 #include "../fifth_dynamics.c"
 
-VECTORS void block(const double *restrict q_in_at, ptrdiff_t q_in_row, const double *restrict qd_in_at, ptrdiff_t qd_in_row, const double *restrict g_in_at, ptrdiff_t g_in_row, double *restrict M_out_at, ptrdiff_t M_out_row, double *restrict C_out_at, ptrdiff_t C_out_row, double *restrict gravity_out_at, ptrdiff_t gravity_out_row)
+VECTORS void block(const double *restrict q_in_at, ptrdiff_t q_in_row, const double *restrict qd_in_at, ptrdiff_t qd_in_row, const double *restrict g_in_at, ptrdiff_t g_in_row, double *restrict M_out_at, ptrdiff_t M_out_row, double *restrict C_out_at, ptrdiff_t C_out_row, double *restrict gravity_out_at, ptrdiff_t gravity_out_row, int *restrict status)
 {
     EACH_SAMPLE {
         double q_in_one[4], qd_in_one[4], g_in_one[3], M_out_one[16], C_out_one[16], gravity_out_one[4];
         TAKE(q_in, 4)
         TAKE(qd_in, 4)
         TAKE(g_in, 3)
-        awiwi_fifth_dynamics(q_in_one, qd_in_one, g_in_one, M_out_one, C_out_one, gravity_out_one);
+        status[i_] = awiwi_fifth_dynamics(q_in_one, qd_in_one, g_in_one, M_out_one, C_out_one, gravity_out_one);
         GIVE(M_out, 16)
         GIVE(C_out, 16)
         GIVE(gravity_out, 4)
     }
 }
 
-void awiwi_fifth_dynamics_batch(ptrdiff_t samples, const double *q_in, ptrdiff_t q_in_sample, ptrdiff_t q_in_element, const double *qd_in, ptrdiff_t qd_in_sample, ptrdiff_t qd_in_element, const double *g_in, ptrdiff_t g_in_sample, ptrdiff_t g_in_element, double *M_out, ptrdiff_t M_out_sample, ptrdiff_t M_out_element, double *C_out, ptrdiff_t C_out_sample, ptrdiff_t C_out_element, double *gravity_out, ptrdiff_t gravity_out_sample, ptrdiff_t gravity_out_element)
+void awiwi_fifth_dynamics_batch(ptrdiff_t samples, const double *q_in, ptrdiff_t q_in_sample, ptrdiff_t q_in_element, const double *qd_in, ptrdiff_t qd_in_sample, ptrdiff_t qd_in_element, const double *g_in, ptrdiff_t g_in_sample, ptrdiff_t g_in_element, double *M_out, ptrdiff_t M_out_sample, ptrdiff_t M_out_element, double *C_out, ptrdiff_t C_out_sample, ptrdiff_t C_out_element, double *gravity_out, ptrdiff_t gravity_out_sample, ptrdiff_t gravity_out_element, int *status)
 {
     double q_in_rows[4*BLOCK], qd_in_rows[4*BLOCK], g_in_rows[3*BLOCK], M_out_rows[16*BLOCK], C_out_rows[16*BLOCK], gravity_out_rows[4*BLOCK];
+    int status_rows[BLOCK];
     EACH_BLOCK {
         GATHER(q_in, 4)
         GATHER(qd_in, 4)
         GATHER(g_in, 3)
         PREFETCH_ROWS(M_out, 16)
         PREFETCH_ROWS(C_out, 16)
-        block(AT(q_in), AT(qd_in), AT(g_in), AT(M_out), AT(C_out), AT(gravity_out));
+        block(AT(q_in), AT(qd_in), AT(g_in), AT(M_out), AT(C_out), AT(gravity_out), status_rows);
         SCATTER(M_out, 16)
         SCATTER(C_out, 16)
         SCATTER(gravity_out, 4)
+        memcpy(status + first_, status_rows, (size_t)COUNT * sizeof *status);
     }
 }

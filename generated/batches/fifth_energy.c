@@ -6,31 +6,33 @@
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_fifth_energy(const double q_in[4], const double qd_in[4], const double g_in[3], double kinetic_out[1], double potential_out[1]);
+INLINED int awiwi_fifth_energy(const double q_in[4], const double qd_in[4], const double g_in[3], double kinetic_out[1], double potential_out[1]);
 #include "../fifth_energy.c"
 
-VECTORS void block(const double *restrict q_in_at, ptrdiff_t q_in_row, const double *restrict qd_in_at, ptrdiff_t qd_in_row, const double *restrict g_in_at, ptrdiff_t g_in_row, double *restrict kinetic_out_at, ptrdiff_t kinetic_out_row, double *restrict potential_out_at, ptrdiff_t potential_out_row)
+VECTORS void block(const double *restrict q_in_at, ptrdiff_t q_in_row, const double *restrict qd_in_at, ptrdiff_t qd_in_row, const double *restrict g_in_at, ptrdiff_t g_in_row, double *restrict kinetic_out_at, ptrdiff_t kinetic_out_row, double *restrict potential_out_at, ptrdiff_t potential_out_row, int *restrict status)
 {
     EACH_SAMPLE {
         double q_in_one[4], qd_in_one[4], g_in_one[3], kinetic_out_one[1], potential_out_one[1];
         TAKE(q_in, 4)
         TAKE(qd_in, 4)
         TAKE(g_in, 3)
-        awiwi_fifth_energy(q_in_one, qd_in_one, g_in_one, kinetic_out_one, potential_out_one);
+        status[i_] = awiwi_fifth_energy(q_in_one, qd_in_one, g_in_one, kinetic_out_one, potential_out_one);
         GIVE(kinetic_out, 1)
         GIVE(potential_out, 1)
     }
 }
 
-void awiwi_fifth_energy_batch(ptrdiff_t samples, const double *q_in, ptrdiff_t q_in_sample, ptrdiff_t q_in_element, const double *qd_in, ptrdiff_t qd_in_sample, ptrdiff_t qd_in_element, const double *g_in, ptrdiff_t g_in_sample, ptrdiff_t g_in_element, double *kinetic_out, ptrdiff_t kinetic_out_sample, ptrdiff_t kinetic_out_element, double *potential_out, ptrdiff_t potential_out_sample, ptrdiff_t potential_out_element)
+void awiwi_fifth_energy_batch(ptrdiff_t samples, const double *q_in, ptrdiff_t q_in_sample, ptrdiff_t q_in_element, const double *qd_in, ptrdiff_t qd_in_sample, ptrdiff_t qd_in_element, const double *g_in, ptrdiff_t g_in_sample, ptrdiff_t g_in_element, double *kinetic_out, ptrdiff_t kinetic_out_sample, ptrdiff_t kinetic_out_element, double *potential_out, ptrdiff_t potential_out_sample, ptrdiff_t potential_out_element, int *status)
 {
     double q_in_rows[4*BLOCK], qd_in_rows[4*BLOCK], g_in_rows[3*BLOCK], kinetic_out_rows[1*BLOCK], potential_out_rows[1*BLOCK];
+    int status_rows[BLOCK];
     EACH_BLOCK {
         GATHER(q_in, 4)
         GATHER(qd_in, 4)
         GATHER(g_in, 3)
-        block(AT(q_in), AT(qd_in), AT(g_in), AT(kinetic_out), AT(potential_out));
+        block(AT(q_in), AT(qd_in), AT(g_in), AT(kinetic_out), AT(potential_out), status_rows);
         SCATTER(kinetic_out, 1)
         SCATTER(potential_out, 1)
+        memcpy(status + first_, status_rows, (size_t)COUNT * sizeof *status);
     }
 }

@@ -6,26 +6,28 @@
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_fifth_fingertip_pose(const double q_in[4], double T_out[16]);
+INLINED int awiwi_fifth_fingertip_pose(const double q_in[4], double T_out[16]);
 #include "../fifth_fingertip_pose.c"
 
-VECTORS void block(const double *restrict q_in_at, ptrdiff_t q_in_row, double *restrict T_out_at, ptrdiff_t T_out_row)
+VECTORS void block(const double *restrict q_in_at, ptrdiff_t q_in_row, double *restrict T_out_at, ptrdiff_t T_out_row, int *restrict status)
 {
     EACH_SAMPLE {
         double q_in_one[4], T_out_one[16];
         TAKE(q_in, 4)
-        awiwi_fifth_fingertip_pose(q_in_one, T_out_one);
+        status[i_] = awiwi_fifth_fingertip_pose(q_in_one, T_out_one);
         GIVE(T_out, 16)
     }
 }
 
-void awiwi_fifth_fingertip_pose_batch(ptrdiff_t samples, const double *q_in, ptrdiff_t q_in_sample, ptrdiff_t q_in_element, double *T_out, ptrdiff_t T_out_sample, ptrdiff_t T_out_element)
+void awiwi_fifth_fingertip_pose_batch(ptrdiff_t samples, const double *q_in, ptrdiff_t q_in_sample, ptrdiff_t q_in_element, double *T_out, ptrdiff_t T_out_sample, ptrdiff_t T_out_element, int *status)
 {
     double q_in_rows[4*BLOCK], T_out_rows[16*BLOCK];
+    int status_rows[BLOCK];
     EACH_BLOCK {
         GATHER(q_in, 4)
         PREFETCH_ROWS(T_out, 16)
-        block(AT(q_in), AT(T_out));
+        block(AT(q_in), AT(T_out), status_rows);
         SCATTER(T_out, 16)
+        memcpy(status + first_, status_rows, (size_t)COUNT * sizeof *status);
     }
 }

@@ -6,10 +6,10 @@
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_fifth_forward_dynamics(const double q_in[4], const double qd_in[4], const double tau_in[4], const double g_in[3], double qdd_out[4]);
+INLINED int awiwi_fifth_forward_dynamics(const double q_in[4], const double qd_in[4], const double tau_in[4], const double g_in[3], double qdd_out[4]);
 #include "../fifth_forward_dynamics.c"
 
-VECTORS void block(const double *restrict q_in_at, ptrdiff_t q_in_row, const double *restrict qd_in_at, ptrdiff_t qd_in_row, const double *restrict tau_in_at, ptrdiff_t tau_in_row, const double *restrict g_in_at, ptrdiff_t g_in_row, double *restrict qdd_out_at, ptrdiff_t qdd_out_row)
+VECTORS void block(const double *restrict q_in_at, ptrdiff_t q_in_row, const double *restrict qd_in_at, ptrdiff_t qd_in_row, const double *restrict tau_in_at, ptrdiff_t tau_in_row, const double *restrict g_in_at, ptrdiff_t g_in_row, double *restrict qdd_out_at, ptrdiff_t qdd_out_row, int *restrict status)
 {
     EACH_SAMPLE {
         double q_in_one[4], qd_in_one[4], tau_in_one[4], g_in_one[3], qdd_out_one[4];
@@ -17,20 +17,22 @@ VECTORS void block(const double *restrict q_in_at, ptrdiff_t q_in_row, const dou
         TAKE(qd_in, 4)
         TAKE(tau_in, 4)
         TAKE(g_in, 3)
-        awiwi_fifth_forward_dynamics(q_in_one, qd_in_one, tau_in_one, g_in_one, qdd_out_one);
+        status[i_] = awiwi_fifth_forward_dynamics(q_in_one, qd_in_one, tau_in_one, g_in_one, qdd_out_one);
         GIVE(qdd_out, 4)
     }
 }
 
-void awiwi_fifth_forward_dynamics_batch(ptrdiff_t samples, const double *q_in, ptrdiff_t q_in_sample, ptrdiff_t q_in_element, const double *qd_in, ptrdiff_t qd_in_sample, ptrdiff_t qd_in_element, const double *tau_in, ptrdiff_t tau_in_sample, ptrdiff_t tau_in_element, const double *g_in, ptrdiff_t g_in_sample, ptrdiff_t g_in_element, double *qdd_out, ptrdiff_t qdd_out_sample, ptrdiff_t qdd_out_element)
+void awiwi_fifth_forward_dynamics_batch(ptrdiff_t samples, const double *q_in, ptrdiff_t q_in_sample, ptrdiff_t q_in_element, const double *qd_in, ptrdiff_t qd_in_sample, ptrdiff_t qd_in_element, const double *tau_in, ptrdiff_t tau_in_sample, ptrdiff_t tau_in_element, const double *g_in, ptrdiff_t g_in_sample, ptrdiff_t g_in_element, double *qdd_out, ptrdiff_t qdd_out_sample, ptrdiff_t qdd_out_element, int *status)
 {
     double q_in_rows[4*BLOCK], qd_in_rows[4*BLOCK], tau_in_rows[4*BLOCK], g_in_rows[3*BLOCK], qdd_out_rows[4*BLOCK];
+    int status_rows[BLOCK];
     EACH_BLOCK {
         GATHER(q_in, 4)
         GATHER(qd_in, 4)
         GATHER(tau_in, 4)
         GATHER(g_in, 3)
-        block(AT(q_in), AT(qd_in), AT(tau_in), AT(g_in), AT(qdd_out));
+        block(AT(q_in), AT(qd_in), AT(tau_in), AT(g_in), AT(qdd_out), status_rows);
         SCATTER(qdd_out, 4)
+        memcpy(status + first_, status_rows, (size_t)COUNT * sizeof *status);
     }
 }

@@ -6,27 +6,29 @@
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_fifth_gravity(const double q_in[4], const double g_in[3], double gravity_out[4]);
+INLINED int awiwi_fifth_gravity(const double q_in[4], const double g_in[3], double gravity_out[4]);
 #include "../fifth_gravity.c"
 
-VECTORS void block(const double *restrict q_in_at, ptrdiff_t q_in_row, const double *restrict g_in_at, ptrdiff_t g_in_row, double *restrict gravity_out_at, ptrdiff_t gravity_out_row)
+VECTORS void block(const double *restrict q_in_at, ptrdiff_t q_in_row, const double *restrict g_in_at, ptrdiff_t g_in_row, double *restrict gravity_out_at, ptrdiff_t gravity_out_row, int *restrict status)
 {
     EACH_SAMPLE {
         double q_in_one[4], g_in_one[3], gravity_out_one[4];
         TAKE(q_in, 4)
         TAKE(g_in, 3)
-        awiwi_fifth_gravity(q_in_one, g_in_one, gravity_out_one);
+        status[i_] = awiwi_fifth_gravity(q_in_one, g_in_one, gravity_out_one);
         GIVE(gravity_out, 4)
     }
 }
 
-void awiwi_fifth_gravity_batch(ptrdiff_t samples, const double *q_in, ptrdiff_t q_in_sample, ptrdiff_t q_in_element, const double *g_in, ptrdiff_t g_in_sample, ptrdiff_t g_in_element, double *gravity_out, ptrdiff_t gravity_out_sample, ptrdiff_t gravity_out_element)
+void awiwi_fifth_gravity_batch(ptrdiff_t samples, const double *q_in, ptrdiff_t q_in_sample, ptrdiff_t q_in_element, const double *g_in, ptrdiff_t g_in_sample, ptrdiff_t g_in_element, double *gravity_out, ptrdiff_t gravity_out_sample, ptrdiff_t gravity_out_element, int *status)
 {
     double q_in_rows[4*BLOCK], g_in_rows[3*BLOCK], gravity_out_rows[4*BLOCK];
+    int status_rows[BLOCK];
     EACH_BLOCK {
         GATHER(q_in, 4)
         GATHER(g_in, 3)
-        block(AT(q_in), AT(g_in), AT(gravity_out));
+        block(AT(q_in), AT(g_in), AT(gravity_out), status_rows);
         SCATTER(gravity_out, 4)
+        memcpy(status + first_, status_rows, (size_t)COUNT * sizeof *status);
     }
 }

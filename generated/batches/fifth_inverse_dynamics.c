@@ -6,10 +6,10 @@
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_fifth_inverse_dynamics(const double q_in[4], const double qd_in[4], const double qdd_in[4], const double g_in[3], double tau_out[4]);
+INLINED int awiwi_fifth_inverse_dynamics(const double q_in[4], const double qd_in[4], const double qdd_in[4], const double g_in[3], double tau_out[4]);
 #include "../fifth_inverse_dynamics.c"
 
-VECTORS void block(const double *restrict q_in_at, ptrdiff_t q_in_row, const double *restrict qd_in_at, ptrdiff_t qd_in_row, const double *restrict qdd_in_at, ptrdiff_t qdd_in_row, const double *restrict g_in_at, ptrdiff_t g_in_row, double *restrict tau_out_at, ptrdiff_t tau_out_row)
+VECTORS void block(const double *restrict q_in_at, ptrdiff_t q_in_row, const double *restrict qd_in_at, ptrdiff_t qd_in_row, const double *restrict qdd_in_at, ptrdiff_t qdd_in_row, const double *restrict g_in_at, ptrdiff_t g_in_row, double *restrict tau_out_at, ptrdiff_t tau_out_row, int *restrict status)
 {
     EACH_SAMPLE {
         double q_in_one[4], qd_in_one[4], qdd_in_one[4], g_in_one[3], tau_out_one[4];
@@ -17,20 +17,22 @@ VECTORS void block(const double *restrict q_in_at, ptrdiff_t q_in_row, const dou
         TAKE(qd_in, 4)
         TAKE(qdd_in, 4)
         TAKE(g_in, 3)
-        awiwi_fifth_inverse_dynamics(q_in_one, qd_in_one, qdd_in_one, g_in_one, tau_out_one);
+        status[i_] = awiwi_fifth_inverse_dynamics(q_in_one, qd_in_one, qdd_in_one, g_in_one, tau_out_one);
         GIVE(tau_out, 4)
     }
 }
 
-void awiwi_fifth_inverse_dynamics_batch(ptrdiff_t samples, const double *q_in, ptrdiff_t q_in_sample, ptrdiff_t q_in_element, const double *qd_in, ptrdiff_t qd_in_sample, ptrdiff_t qd_in_element, const double *qdd_in, ptrdiff_t qdd_in_sample, ptrdiff_t qdd_in_element, const double *g_in, ptrdiff_t g_in_sample, ptrdiff_t g_in_element, double *tau_out, ptrdiff_t tau_out_sample, ptrdiff_t tau_out_element)
+void awiwi_fifth_inverse_dynamics_batch(ptrdiff_t samples, const double *q_in, ptrdiff_t q_in_sample, ptrdiff_t q_in_element, const double *qd_in, ptrdiff_t qd_in_sample, ptrdiff_t qd_in_element, const double *qdd_in, ptrdiff_t qdd_in_sample, ptrdiff_t qdd_in_element, const double *g_in, ptrdiff_t g_in_sample, ptrdiff_t g_in_element, double *tau_out, ptrdiff_t tau_out_sample, ptrdiff_t tau_out_element, int *status)
 {
     double q_in_rows[4*BLOCK], qd_in_rows[4*BLOCK], qdd_in_rows[4*BLOCK], g_in_rows[3*BLOCK], tau_out_rows[4*BLOCK];
+    int status_rows[BLOCK];
     EACH_BLOCK {
         GATHER(q_in, 4)
         GATHER(qd_in, 4)
         GATHER(qdd_in, 4)
         GATHER(g_in, 3)
-        block(AT(q_in), AT(qd_in), AT(qdd_in), AT(g_in), AT(tau_out));
+        block(AT(q_in), AT(qd_in), AT(qdd_in), AT(g_in), AT(tau_out), status_rows);
         SCATTER(tau_out, 4)
+        memcpy(status + first_, status_rows, (size_t)COUNT * sizeof *status);
     }
 }

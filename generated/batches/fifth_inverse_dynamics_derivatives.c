@@ -6,10 +6,10 @@
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_fifth_inverse_dynamics_derivatives(const double q_in[4], const double qd_in[4], const double qdd_in[4], const double g_in[3], double dtau_dq_out[16], double dtau_dqd_out[16]);
+INLINED int awiwi_fifth_inverse_dynamics_derivatives(const double q_in[4], const double qd_in[4], const double qdd_in[4], const double g_in[3], double dtau_dq_out[16], double dtau_dqd_out[16]);
 #include "../fifth_inverse_dynamics_derivatives.c"
 
-VECTORS void block(const double *restrict q_in_at, ptrdiff_t q_in_row, const double *restrict qd_in_at, ptrdiff_t qd_in_row, const double *restrict qdd_in_at, ptrdiff_t qdd_in_row, const double *restrict g_in_at, ptrdiff_t g_in_row, double *restrict dtau_dq_out_at, ptrdiff_t dtau_dq_out_row, double *restrict dtau_dqd_out_at, ptrdiff_t dtau_dqd_out_row)
+VECTORS void block(const double *restrict q_in_at, ptrdiff_t q_in_row, const double *restrict qd_in_at, ptrdiff_t qd_in_row, const double *restrict qdd_in_at, ptrdiff_t qdd_in_row, const double *restrict g_in_at, ptrdiff_t g_in_row, double *restrict dtau_dq_out_at, ptrdiff_t dtau_dq_out_row, double *restrict dtau_dqd_out_at, ptrdiff_t dtau_dqd_out_row, int *restrict status)
 {
     EACH_SAMPLE {
         double q_in_one[4], qd_in_one[4], qdd_in_one[4], g_in_one[3], dtau_dq_out_one[16], dtau_dqd_out_one[16];
@@ -17,15 +17,16 @@ VECTORS void block(const double *restrict q_in_at, ptrdiff_t q_in_row, const dou
         TAKE(qd_in, 4)
         TAKE(qdd_in, 4)
         TAKE(g_in, 3)
-        awiwi_fifth_inverse_dynamics_derivatives(q_in_one, qd_in_one, qdd_in_one, g_in_one, dtau_dq_out_one, dtau_dqd_out_one);
+        status[i_] = awiwi_fifth_inverse_dynamics_derivatives(q_in_one, qd_in_one, qdd_in_one, g_in_one, dtau_dq_out_one, dtau_dqd_out_one);
         GIVE(dtau_dq_out, 16)
         GIVE(dtau_dqd_out, 16)
     }
 }
 
-void awiwi_fifth_inverse_dynamics_derivatives_batch(ptrdiff_t samples, const double *q_in, ptrdiff_t q_in_sample, ptrdiff_t q_in_element, const double *qd_in, ptrdiff_t qd_in_sample, ptrdiff_t qd_in_element, const double *qdd_in, ptrdiff_t qdd_in_sample, ptrdiff_t qdd_in_element, const double *g_in, ptrdiff_t g_in_sample, ptrdiff_t g_in_element, double *dtau_dq_out, ptrdiff_t dtau_dq_out_sample, ptrdiff_t dtau_dq_out_element, double *dtau_dqd_out, ptrdiff_t dtau_dqd_out_sample, ptrdiff_t dtau_dqd_out_element)
+void awiwi_fifth_inverse_dynamics_derivatives_batch(ptrdiff_t samples, const double *q_in, ptrdiff_t q_in_sample, ptrdiff_t q_in_element, const double *qd_in, ptrdiff_t qd_in_sample, ptrdiff_t qd_in_element, const double *qdd_in, ptrdiff_t qdd_in_sample, ptrdiff_t qdd_in_element, const double *g_in, ptrdiff_t g_in_sample, ptrdiff_t g_in_element, double *dtau_dq_out, ptrdiff_t dtau_dq_out_sample, ptrdiff_t dtau_dq_out_element, double *dtau_dqd_out, ptrdiff_t dtau_dqd_out_sample, ptrdiff_t dtau_dqd_out_element, int *status)
 {
     double q_in_rows[4*BLOCK], qd_in_rows[4*BLOCK], qdd_in_rows[4*BLOCK], g_in_rows[3*BLOCK], dtau_dq_out_rows[16*BLOCK], dtau_dqd_out_rows[16*BLOCK];
+    int status_rows[BLOCK];
     EACH_BLOCK {
         GATHER(q_in, 4)
         GATHER(qd_in, 4)
@@ -33,8 +34,9 @@ void awiwi_fifth_inverse_dynamics_derivatives_batch(ptrdiff_t samples, const dou
         GATHER(g_in, 3)
         PREFETCH_ROWS(dtau_dq_out, 16)
         PREFETCH_ROWS(dtau_dqd_out, 16)
-        block(AT(q_in), AT(qd_in), AT(qdd_in), AT(g_in), AT(dtau_dq_out), AT(dtau_dqd_out));
+        block(AT(q_in), AT(qd_in), AT(qdd_in), AT(g_in), AT(dtau_dq_out), AT(dtau_dqd_out), status_rows);
         SCATTER(dtau_dq_out, 16)
         SCATTER(dtau_dqd_out, 16)
+        memcpy(status + first_, status_rows, (size_t)COUNT * sizeof *status);
     }
 }

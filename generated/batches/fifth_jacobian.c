@@ -6,26 +6,28 @@
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_fifth_jacobian(const double q_in[4], double J_out[24]);
+INLINED int awiwi_fifth_jacobian(const double q_in[4], double J_out[24]);
 #include "../fifth_jacobian.c"
 
-VECTORS void block(const double *restrict q_in_at, ptrdiff_t q_in_row, double *restrict J_out_at, ptrdiff_t J_out_row)
+VECTORS void block(const double *restrict q_in_at, ptrdiff_t q_in_row, double *restrict J_out_at, ptrdiff_t J_out_row, int *restrict status)
 {
     EACH_SAMPLE {
         double q_in_one[4], J_out_one[24];
         TAKE(q_in, 4)
-        awiwi_fifth_jacobian(q_in_one, J_out_one);
+        status[i_] = awiwi_fifth_jacobian(q_in_one, J_out_one);
         GIVE(J_out, 24)
     }
 }
 
-void awiwi_fifth_jacobian_batch(ptrdiff_t samples, const double *q_in, ptrdiff_t q_in_sample, ptrdiff_t q_in_element, double *J_out, ptrdiff_t J_out_sample, ptrdiff_t J_out_element)
+void awiwi_fifth_jacobian_batch(ptrdiff_t samples, const double *q_in, ptrdiff_t q_in_sample, ptrdiff_t q_in_element, double *J_out, ptrdiff_t J_out_sample, ptrdiff_t J_out_element, int *status)
 {
     double q_in_rows[4*BLOCK], J_out_rows[24*BLOCK];
+    int status_rows[BLOCK];
     EACH_BLOCK {
         GATHER(q_in, 4)
         PREFETCH_ROWS(J_out, 24)
-        block(AT(q_in), AT(J_out));
+        block(AT(q_in), AT(J_out), status_rows);
         SCATTER(J_out, 24)
+        memcpy(status + first_, status_rows, (size_t)COUNT * sizeof *status);
     }
 }

@@ -6,26 +6,28 @@
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_fifth_mass_matrix(const double q_in[4], double M_out[16]);
+INLINED int awiwi_fifth_mass_matrix(const double q_in[4], double M_out[16]);
 #include "../fifth_mass_matrix.c"
 
-VECTORS void block(const double *restrict q_in_at, ptrdiff_t q_in_row, double *restrict M_out_at, ptrdiff_t M_out_row)
+VECTORS void block(const double *restrict q_in_at, ptrdiff_t q_in_row, double *restrict M_out_at, ptrdiff_t M_out_row, int *restrict status)
 {
     EACH_SAMPLE {
         double q_in_one[4], M_out_one[16];
         TAKE(q_in, 4)
-        awiwi_fifth_mass_matrix(q_in_one, M_out_one);
+        status[i_] = awiwi_fifth_mass_matrix(q_in_one, M_out_one);
         GIVE(M_out, 16)
     }
 }
 
-void awiwi_fifth_mass_matrix_batch(ptrdiff_t samples, const double *q_in, ptrdiff_t q_in_sample, ptrdiff_t q_in_element, double *M_out, ptrdiff_t M_out_sample, ptrdiff_t M_out_element)
+void awiwi_fifth_mass_matrix_batch(ptrdiff_t samples, const double *q_in, ptrdiff_t q_in_sample, ptrdiff_t q_in_element, double *M_out, ptrdiff_t M_out_sample, ptrdiff_t M_out_element, int *status)
 {
     double q_in_rows[4*BLOCK], M_out_rows[16*BLOCK];
+    int status_rows[BLOCK];
     EACH_BLOCK {
         GATHER(q_in, 4)
         PREFETCH_ROWS(M_out, 16)
-        block(AT(q_in), AT(M_out));
+        block(AT(q_in), AT(M_out), status_rows);
         SCATTER(M_out, 16)
+        memcpy(status + first_, status_rows, (size_t)COUNT * sizeof *status);
     }
 }

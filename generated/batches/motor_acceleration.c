@@ -6,10 +6,10 @@
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_motor_acceleration(const double theta_in[1], const double thd_in[1], const double tau_in[1], const double f_in[1], double thdd_out[1]);
+INLINED int awiwi_motor_acceleration(const double theta_in[1], const double thd_in[1], const double tau_in[1], const double f_in[1], double thdd_out[1]);
 #include "../motor_acceleration.c"
 
-VECTORS void block(const double *restrict theta_in_at, ptrdiff_t theta_in_row, const double *restrict thd_in_at, ptrdiff_t thd_in_row, const double *restrict tau_in_at, ptrdiff_t tau_in_row, const double *restrict f_in_at, ptrdiff_t f_in_row, double *restrict thdd_out_at, ptrdiff_t thdd_out_row)
+VECTORS void block(const double *restrict theta_in_at, ptrdiff_t theta_in_row, const double *restrict thd_in_at, ptrdiff_t thd_in_row, const double *restrict tau_in_at, ptrdiff_t tau_in_row, const double *restrict f_in_at, ptrdiff_t f_in_row, double *restrict thdd_out_at, ptrdiff_t thdd_out_row, int *restrict status)
 {
     EACH_SAMPLE {
         double theta_in_one[1], thd_in_one[1], tau_in_one[1], f_in_one[1], thdd_out_one[1];
@@ -17,20 +17,22 @@ VECTORS void block(const double *restrict theta_in_at, ptrdiff_t theta_in_row, c
         TAKE(thd_in, 1)
         TAKE(tau_in, 1)
         TAKE(f_in, 1)
-        awiwi_motor_acceleration(theta_in_one, thd_in_one, tau_in_one, f_in_one, thdd_out_one);
+        status[i_] = awiwi_motor_acceleration(theta_in_one, thd_in_one, tau_in_one, f_in_one, thdd_out_one);
         GIVE(thdd_out, 1)
     }
 }
 
-void awiwi_motor_acceleration_batch(ptrdiff_t samples, const double *theta_in, ptrdiff_t theta_in_sample, ptrdiff_t theta_in_element, const double *thd_in, ptrdiff_t thd_in_sample, ptrdiff_t thd_in_element, const double *tau_in, ptrdiff_t tau_in_sample, ptrdiff_t tau_in_element, const double *f_in, ptrdiff_t f_in_sample, ptrdiff_t f_in_element, double *thdd_out, ptrdiff_t thdd_out_sample, ptrdiff_t thdd_out_element)
+void awiwi_motor_acceleration_batch(ptrdiff_t samples, const double *theta_in, ptrdiff_t theta_in_sample, ptrdiff_t theta_in_element, const double *thd_in, ptrdiff_t thd_in_sample, ptrdiff_t thd_in_element, const double *tau_in, ptrdiff_t tau_in_sample, ptrdiff_t tau_in_element, const double *f_in, ptrdiff_t f_in_sample, ptrdiff_t f_in_element, double *thdd_out, ptrdiff_t thdd_out_sample, ptrdiff_t thdd_out_element, int *status)
 {
     double theta_in_rows[1*BLOCK], thd_in_rows[1*BLOCK], tau_in_rows[1*BLOCK], f_in_rows[1*BLOCK], thdd_out_rows[1*BLOCK];
+    int status_rows[BLOCK];
     EACH_BLOCK {
         GATHER(theta_in, 1)
         GATHER(thd_in, 1)
         GATHER(tau_in, 1)
         GATHER(f_in, 1)
-        block(AT(theta_in), AT(thd_in), AT(tau_in), AT(f_in), AT(thdd_out));
+        block(AT(theta_in), AT(thd_in), AT(tau_in), AT(f_in), AT(thdd_out), status_rows);
         SCATTER(thdd_out, 1)
+        memcpy(status + first_, status_rows, (size_t)COUNT * sizeof *status);
     }
 }

@@ -6,27 +6,29 @@
 #include "batches.h"
 #include "samples.h"
 
-INLINED void awiwi_motor_compensation(const double theta_in[1], const double thd_in[1], double tau_out[1]);
+INLINED int awiwi_motor_compensation(const double theta_in[1], const double thd_in[1], double tau_out[1]);
 #include "../motor_compensation.c"
 
-VECTORS void block(const double *restrict theta_in_at, ptrdiff_t theta_in_row, const double *restrict thd_in_at, ptrdiff_t thd_in_row, double *restrict tau_out_at, ptrdiff_t tau_out_row)
+VECTORS void block(const double *restrict theta_in_at, ptrdiff_t theta_in_row, const double *restrict thd_in_at, ptrdiff_t thd_in_row, double *restrict tau_out_at, ptrdiff_t tau_out_row, int *restrict status)
 {
     EACH_SAMPLE {
         double theta_in_one[1], thd_in_one[1], tau_out_one[1];
         TAKE(theta_in, 1)
         TAKE(thd_in, 1)
-        awiwi_motor_compensation(theta_in_one, thd_in_one, tau_out_one);
+        status[i_] = awiwi_motor_compensation(theta_in_one, thd_in_one, tau_out_one);
         GIVE(tau_out, 1)
     }
 }
 
-void awiwi_motor_compensation_batch(ptrdiff_t samples, const double *theta_in, ptrdiff_t theta_in_sample, ptrdiff_t theta_in_element, const double *thd_in, ptrdiff_t thd_in_sample, ptrdiff_t thd_in_element, double *tau_out, ptrdiff_t tau_out_sample, ptrdiff_t tau_out_element)
+void awiwi_motor_compensation_batch(ptrdiff_t samples, const double *theta_in, ptrdiff_t theta_in_sample, ptrdiff_t theta_in_element, const double *thd_in, ptrdiff_t thd_in_sample, ptrdiff_t thd_in_element, double *tau_out, ptrdiff_t tau_out_sample, ptrdiff_t tau_out_element, int *status)
 {
     double theta_in_rows[1*BLOCK], thd_in_rows[1*BLOCK], tau_out_rows[1*BLOCK];
+    int status_rows[BLOCK];
     EACH_BLOCK {
         GATHER(theta_in, 1)
         GATHER(thd_in, 1)
-        block(AT(theta_in), AT(thd_in), AT(tau_out));
+        block(AT(theta_in), AT(thd_in), AT(tau_out), status_rows);
         SCATTER(tau_out, 1)
+        memcpy(status + first_, status_rows, (size_t)COUNT * sizeof *status);
     }
 }

@@ -18,6 +18,7 @@ from awiwi_gen.ir.builder import Builder, copy_node, rebuild, shorten
 from awiwi_gen.ir.cost import cost
 from awiwi_gen.ir.graph import Graph, Node, Ref
 from awiwi_gen.ir.passes.angles import Angle, Form, Pair, Part, Reader, Square
+from awiwi_gen.ir.traced import computed, hypotenuse
 
 BITS = 400
 EXACT = Fraction(1, 1 << 300)  # a coefficient smaller than this part of its form is a rounded zero
@@ -72,7 +73,11 @@ def _direction(form: Form) -> Form:
     with ctx.workprec(BITS):
         a, b = (arb(fmpq(x.numerator, x.denominator)) for x in form)
         length = (a * a + b * b).sqrt()
-        return _fraction(a / length), _fraction(-b / length)
+        cosine, sine = _fraction(a / length), _fraction(-b / length)
+    return (
+        computed(cosine, form, lambda numbers, a, b: numbers.div(a, hypotenuse(numbers, a, b))),
+        computed(sine, form, lambda numbers, a, b: ~numbers.div(b, hypotenuse(numbers, a, b))),
+    )
 
 
 def _fraction(x: arb) -> Fraction:
@@ -126,7 +131,8 @@ def _with_phase(graph: Graph, angle: Angle, phase: Form) -> Graph:
     shared: dict[tuple[int, int], Form] = {}
     with ctx.workprec(BITS):
         c, s = (arb(fmpq(x.numerator, x.denominator)) for x in phase)
-        shift = _fraction(arb.atan2(s, c))
+        value = _fraction(arb.atan2(s, c))
+    shift = computed(value, phase, lambda numbers, c, s: numbers.call("atan2", s, c))
 
     def form(builder: Builder, leaves: Leaves, one: Form) -> list[Ref]:
         one = shared.setdefault(_key(one), one)

@@ -19,6 +19,7 @@ from flint import arb, ctx, fmpq
 from awiwi_gen.ir.builder import ONE, Builder, copy_node, rebuild
 from awiwi_gen.ir.cost import cost
 from awiwi_gen.ir.graph import LEAVES, Graph, Node, Ref, node_of, operands
+from awiwi_gen.ir.traced import Traced
 
 BITS = 400
 LARGEST = 1e9  # no value is scaled by more, for single precision has a small range
@@ -202,13 +203,18 @@ def _log(value: Fraction) -> float:
 
 
 def _value(powers: Powers, constants: list[Fraction]) -> Fraction:
-    """The product of constants to their exponents: exact if these are integers, else at 400 bits."""
+    """The product of constants to their exponents: exact if these are integers, else at 400 bits.
+
+    Zero, which no factor can be, for a root of a number that is read at run time, for it may be negative.
+    """
     result = ONE
     with ctx.workprec(BITS):
         for number, e in powers.items():
             k = constants[number]
             if e.denominator == 1:
                 result *= k**e.numerator
+            elif isinstance(k, Traced):
+                return ONE * 0
             else:
                 x = (arb(fmpq(k.numerator, k.denominator)).log() * arb(fmpq(e.numerator, e.denominator))).exp()
                 mantissa, exponent = x.mid().man_exp()

@@ -6,6 +6,7 @@ motion, a position controller drives it 3000 times a second, and its sensors are
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,7 +14,7 @@ import numpy as np
 
 from awiwi_gen.hand import Hand, Motor
 from awiwi_gen.identify import fit_friction
-from awiwi_gen.results import Figure, curves
+from awiwi_gen.results import Draw, Figure, curves
 from awiwi_gen.simulate import PERIOD, Actuator, Array, Block, Element, Loop, Scenario, Sensor, Sum, Wire, simulate
 
 BANDWIDTH = 450.0  # rad/s, of the position loop: well above the ripple it has to show in its torque
@@ -36,9 +37,6 @@ def figures(library: Any, hand: Hand) -> list[Figure]:
     return found
 
 
-# -- figure 3.3 -------------------------------------------------------------------------------------------
-
-
 def friction(library: Any, motor: Motor) -> Figure:
     """Figure 3.3: mean torques at constant speeds give the friction curve, in spite of ripple."""
     generator = np.random.default_rng(33)
@@ -59,16 +57,11 @@ def friction(library: Any, motor: Motor) -> Figure:
         axes.legend()
 
     return Figure(
-        number="3.3",
-        title="Friction found from the mean motor torque at constant speeds",
-        claim="The mean torques at constant speeds follow atan(g1 w) g2 + g3 w.",
-        found=f"The fit finds the friction of the simulated motor within {error:.2%} of its largest value.",
-        holds=error < 0.02,
-        draw=draw,
-    )
-
-
-# -- figures 3.4 to 3.6: one simulation of several motors -------------------------------------------------
+        "3.3", "Friction found from the mean motor torque at constant speeds",
+        "The mean torques at constant speeds follow atan(g1 w) g2 + g3 w.",
+        f"The fit finds the friction of the simulated motor within {error:.2%} of its largest value.", error < 0.02,
+        draw,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -114,6 +107,19 @@ class Recordings:
         amplitude = 2 * np.abs(np.fft.rfft(torque - torque.mean())) / len(torque)
         return np.fft.rfftfreq(len(torque), (self.theta[1] - self.theta[0]) / (2 * np.pi)), amplitude
 
+    def strongest(self, torque: Array) -> float:
+        """The largest line of the rotor in a recording, in periods per turn of the output."""
+        lines, amplitude = self.spectrum(torque)
+        return float(lines[np.argmax(np.where(lines > self.line / 2, amplitude, 0.0))])
+
+    def drawing(self, shown: Mapping[str, tuple[float, Array]]) -> Draw:
+        """The spectra of labelled recordings, each with its speed [rad/s]."""
+        spectra = {label: (speed, *self.spectrum(torque)) for label, (speed, torque) in shown.items()}
+        lines = {
+            label: (speed * lines / (2 * np.pi), amplitude) for label, (speed, lines, amplitude) in spectra.items()
+        }
+        return curves(None, lines, "frequency [Hz]", "torque amplitude [N m]", xlim=(0, self.highest))
+
     def peak(self, torque: Array) -> float:
         """Amplitude of the rotor's strongest ripple in a recording [N m]."""
         lines, amplitude = self.spectrum(torque)
@@ -141,11 +147,8 @@ def drive(library: Any, speeds: Array, fed: Array, start: float, duration: float
         [Actuator("command", "u", late=False)],
     )  # fmt: skip
     times = np.arange(round(duration / PERIOD)) * PERIOD
-    values = {
-        "zeros": np.zeros(2),
-        "K": (inertia * BANDWIDTH**2, 2 * DAMPING * inertia * BANDWIDTH, 0.0, 0.0),
-        "u": 0.0,
-    }
+    K = (inertia * BANDWIDTH**2, 2 * DAMPING * inertia * BANDWIDTH, 0.0, 0.0)
+    values = {"zeros": np.zeros(2), "K": K, "u": 0.0}
     scenarios = []
     for seed, (speed, share) in enumerate(zip(speeds, fed, strict=True)):
         goal = np.stack([start + speed * times, np.full_like(times, speed)], axis=1)
@@ -159,34 +162,28 @@ def repeatability(recordings: Recordings) -> Figure:
     mean = recordings.repeated.mean(axis=0)
     spread = float(np.std(recordings.repeated - mean))
     share = spread / float(np.std(mean))
-
     return Figure(
-        number="3.4",
-        title=f"Commanded torque of {RUNS} motions at {recordings.speed:g} rad/s from the same angle",
-        claim="The disturbance repeats: it depends on the position.",
-        found=f"Runs differ by {share:.0%} of what they have in common.",
-        holds=share < 0.2,
-        draw=curves(recordings.theta, recordings.repeated.T, "output angle [rad]", "commanded torque [N m]"),
-    )
+        "3.4", f"Commanded torque of {RUNS} motions at {recordings.speed:g} rad/s from the same angle",
+        "The disturbance repeats: it depends on the position.",
+        f"Runs differ by {share:.0%} of what they have in common.", share < 0.2,
+        curves(recordings.theta, recordings.repeated.T, "output angle [rad]", "commanded torque [N m]"),
+    )  # fmt: skip
 
 
 def frequencies(recordings: Recordings) -> Figure:
     """Figure 3.5: at twice the speed the main line is at twice the frequency, and as high."""
     fast, slow = recordings.repeated[0], recordings.slow
-    spectra = [(recordings.speed, *recordings.spectrum(fast)), (recordings.speed / 2, *recordings.spectrum(slow))]
-    rotor = [lines > recordings.line / 2 for _, lines, _ in spectra]
-    main = [speed * lines[ours][np.argmax(a[ours])] for (speed, lines, a), ours in zip(spectra, rotor, strict=True)]
+    speeds = {recordings.speed: fast, recordings.speed / 2: slow}
+    main = [speed * recordings.strongest(torque) for speed, torque in speeds.items()]
     shift, heights = main[0] / main[1], recordings.peak(fast) / recordings.peak(slow)
 
-    shown = {f"{speed:g} rad/s": (speed * lines / (2 * np.pi), amplitude) for speed, lines, amplitude in spectra}
+    shown = {f"{speed:g} rad/s": (speed, torque) for speed, torque in speeds.items()}
     return Figure(
-        number="3.5",
-        title="Frequencies of the disturbance at two speeds",
-        claim="The main line moves with the rotor's speed, so the disturbance depends on the position.",
-        found=f"At twice the speed it is at {shift:.3g} times the frequency, {heights:.2f} times as high.",
-        holds=abs(shift - 2) < 1e-6 and abs(heights - 1) < 0.1,
-        draw=curves(None, shown, "frequency [Hz]", "torque amplitude [N m]", xlim=(0, recordings.highest)),
-    )
+        "3.5", "Frequencies of the disturbance at two speeds",
+        "The main line moves with the rotor's speed, so the disturbance depends on the position.",
+        f"At twice the speed it is at {shift:.3g} times the frequency, {heights:.2f} times as high.",
+        abs(shift - 2) < 1e-6 and abs(heights - 1) < 0.1, recordings.drawing(shown),
+    )  # fmt: skip
 
 
 def compensation(recordings: Recordings) -> Figure:
@@ -194,21 +191,12 @@ def compensation(recordings: Recordings) -> Figure:
     without, fed = recordings.repeated[0], recordings.compensated
     left = recordings.peak(fed) / recordings.peak(without)
 
-    shown = {}
-    for torque, label in ((without, "without compensation"), (fed, "with compensation")):
-        lines, amplitude = recordings.spectrum(torque)
-        shown[label] = lines * recordings.speed / (2 * np.pi), amplitude
+    shown = {"without compensation": (recordings.speed, without), "with compensation": (recordings.speed, fed)}
     return Figure(
-        number="3.6",
-        title="Frequencies of the controller's torque with and without compensation",
-        claim="Feeding the disturbance forward attenuates the rotor's main line.",
-        found=f"Of its amplitude {left:.0%} is left.",
-        holds=left < 0.25,
-        draw=curves(None, shown, "frequency [Hz]", "torque amplitude [N m]", xlim=(0, recordings.highest)),
-    )
-
-
-# -- figure 4.7 -------------------------------------------------------------------------------------------
+        "3.6", "Frequencies of the controller's torque with and without compensation",
+        "Feeding the disturbance forward attenuates the rotor's main line.", f"Of its amplitude {left:.0%} is left.",
+        left < 0.25, recordings.drawing(shown),
+    )  # fmt: skip
 
 
 def characteristic(library: Any) -> Figure:
@@ -232,13 +220,8 @@ def characteristic(library: Any) -> Figure:
         other.set_ylabel("tendon stiffness (dashed) [N/mm]", color="tab:red")
 
     return Figure(
-        number="4.7",
-        title="Force and stiffness of the tendon's mechanism",
-        claim="The stiffness rises with the force, and a polynomial is enough for either.",
-        found=(
-            f"It rises from {stiff.min() / 1e3:.1f} to {stiff.max() / 1e3:.1f} N/mm up to {pulled.max():.0f} N; "
-            f"polynomials give the force within {error:.0e} of its largest value."
-        ),
-        holds=progressive and error < 1e-6,
-        draw=draw,
-    )
+        "4.7", "Force and stiffness of the tendon's mechanism",
+        "The stiffness rises with the force, and a polynomial is enough for either.",
+        f"It rises from {stiff.min() / 1e3:.1f} to {stiff.max() / 1e3:.1f} N/mm up to {pulled.max():.0f} N; "
+        f"polynomials give the force within {error:.0e} of its largest value.", progressive and error < 1e-6, draw,
+    )  # fmt: skip

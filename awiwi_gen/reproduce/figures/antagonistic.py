@@ -68,21 +68,17 @@ def deflexion(library: Any) -> Figure:
     """Figure 15.23, continuous: a step, then a torque on the link."""
     loop, _ = pair_loop(library.backstepping_antagonistic, TABLE_PAIR, IMPEDANCE)
     times, torque, goal = np.linspace(0, 1.5, 1501), 0.1, np.pi / 4
-    start = np.array([-goal, 0, 0, 0, 0, 0])
-    moved = loop.response(start, times)
-    jump = (loop.E + loop.B @ loop.H) @ [0.0, torque]
-    loaded = loop.response(moved[-1] + jump, times, [torque, 0.0])
+    moved = loop.response([-goal, 0, 0, 0, 0, 0], times)
+    loaded = loop.loaded(moved[-1], times, torque)
     q = goal + np.concatenate([moved[:, 0], loaded[:, 0]])
     end = goal + torque / IMPEDANCE[0]
-
     return Figure(
-        number="15.23",
-        title="A step and a torque on the link, exact law",
-        claim="The link arrives, then yields to the torque as its impedance says.",
-        found=f"It ends at {q[-1]:.6f} rad; the step and torque over stiffness make {end:.6f}.",
-        holds=bool(abs(q[-1] - end) < 1e-3 and (np.diff(q) > -1e-9).all()),
-        draw=curves(np.concatenate([times, times[-1] + times]), q, "t [s]", "q [rad]"),
-    )
+        "15.23", "A step and a torque on the link, exact law",
+        "The link arrives, then yields to the torque as its impedance says.",
+        f"It ends at {q[-1]:.6f} rad; the step and torque over stiffness make {end:.6f}.",
+        bool(abs(q[-1] - end) < 1e-3 and (np.diff(q) > -1e-9).all()),
+        curves(np.concatenate([times, times[-1] + times]), q, "t [s]", "q [rad]"),
+    )  # fmt: skip
 
 
 def pretension(library: Any) -> Figure:
@@ -95,18 +91,13 @@ def pretension(library: Any) -> Figure:
         rest = at_rest(loop, constant)
         runs[name] = (rest + loop.response(start - rest, times))[:, 2::2].mean(axis=1)
     left = {name: float(run[-1]) for name, run in runs.items()}
-
     return Figure(
-        number="15.23 (pretension)",
-        title="The pretension under the printed decoupling",
-        claim="Motors can be treated as not aware of one another, and the pretension be added.",
-        found=(
-            f"Of {PRETENSION:g} N m the printed decoupling leaves {left['decoupled']:.2g}, the law of the whole system of "
-            f"order six {left['exact']:.4g}."
-        ),
-        holds=left["decoupled"] > 0.9 * PRETENSION,
-        draw=curves(times, runs, "t [s]", "common torque [N m]"),
-    )
+        "15.23 (pretension)", "The pretension under the printed decoupling",
+        "Motors can be treated as not aware of one another, and the pretension be added.",
+        f"Of {PRETENSION:g} N m the printed decoupling leaves {left['decoupled']:.2g}, the law of the whole system of "
+        f"order six {left['exact']:.4g}.", left["decoupled"] > 0.9 * PRETENSION,
+        curves(times, runs, "t [s]", "common torque [N m]"),
+    )  # fmt: skip
 
 
 def step(library: Any) -> Figure:
@@ -121,16 +112,12 @@ def step(library: Any) -> Figure:
     falls = bool((np.diff(V[at + 3 :]) <= 1e-9 * V[at + 3 :].max()).all())
     lines = {"q [rad]": q, "V, scaled": V / V.max()}
     return Figure(
-        number="15.24 (simulated)",
-        title=f"A step of {STEP:g} rad at 3 kHz",
-        claim="The backstepping law is fast and accurate.",
-        found=(
-            f"Settled after {settled * 1e3:.0f} ms with {over:.1%} overshoot; V falls after the step; the slacker tendon "
-            f"keeps {least:.2g} N m."
-        ),
-        holds=falls and settled < 0.04 and over < 0.02 and least > 0,
-        draw=curves(trace.time, lines, "t [s]", "angle [rad], energy by its largest value"),
-    )
+        "15.24 (simulated)", f"A step of {STEP:g} rad at 3 kHz",
+        "The backstepping law is fast and accurate.",
+        f"Settled after {settled * 1e3:.0f} ms with {over:.1%} overshoot; V falls after the step; the slacker tendon "
+        f"keeps {least:.2g} N m.", falls and settled < 0.04 and over < 0.02 and least > 0,
+        curves(trace.time, lines, "t [s]", "angle [rad], energy by its largest value"),
+    )  # fmt: skip
 
 
 def sines(library: Any) -> list[Figure]:
@@ -150,50 +137,37 @@ def sines(library: Any) -> list[Figure]:
     follow, gain = (dict(zip(labels, rows, strict=True)) for rows in (q[0], gains.T))
     return [
         Figure(
-            number="15.25 (simulated)",
-            title=f"A sine of {FREQUENCIES[0]:g} Hz at 3 kHz",
-            claim="The law follows a sine.",
-            found=f"Within {error:.1e} rad of {amplitude:g} rad once the sine's derivatives are fed.",
-            holds=error < 0.01 * amplitude,
-            draw=curves(times, follow, "t [s]", "q [rad]"),
+            "15.25 (simulated)", f"A sine of {FREQUENCIES[0]:g} Hz at 3 kHz",
+            "The law follows a sine.",
+            f"Within {error:.1e} rad of {amplitude:g} rad once the sine's derivatives are fed.",
+            error < 0.01 * amplitude, curves(times, follow, "t [s]", "q [rad]"),
         ),
         Figure(
-            number="15.26 (simulated)",
-            title="Gain over frequency at 3 kHz",
-            claim="The gain stays near one over a wide range of frequencies.",
-            found=(
-                f"At {FREQUENCIES[-1]:g} Hz it is {gains[-1, 0]:.3f} with the derivatives fed, and {gains[-1, 1]:.2f} "
-                "with the position alone."
-            ),
-            holds=bool(np.abs(gains[:, 0] - 1).max() < 0.05),
-            draw=curves(FREQUENCIES, gain, "frequency [Hz]", "gain", "o-", "o-"),
+            "15.26 (simulated)", "Gain over frequency at 3 kHz",
+            "The gain stays near one over a wide range of frequencies.",
+            f"At {FREQUENCIES[-1]:g} Hz it is {gains[-1, 0]:.3f} with the derivatives fed, and {gains[-1, 1]:.2f} "
+            "with the position alone.", bool(np.abs(gains[:, 0] - 1).max() < 0.05),
+            curves(FREQUENCIES, gain, "frequency [Hz]", "gain", "o-", "o-"),
         ),
-    ]
+    ]  # fmt: skip
 
 
 def rendered(library: Any) -> Figure:
-    """Figure 15.27: the torque at a deflexion, for three stiffnesses."""
-    imposed = np.linspace(0, 0.4, 5)
-    torques = {K_p: static_torques(library, K_p, imposed) for K_p in STIFFNESSES}
+    """Figure 15.27: the torque at a deflexion, for three stiffnesses.
+
+    A fixture holds the link and is felt by the law; its torque is the load under which the link would stand there.
+    """
+    imposed, torques = np.linspace(0, 0.4, 5), {}
+    for K_p in STIFFNESSES:
+        loop, _ = pair_loop(library.backstepping_antagonistic, TABLE_PAIR, (K_p, 0.05))
+        unit = loop.at_rest([1.0, 0.0])
+        torques[K_p] = imposed / unit[0] * (unit[4] - unit[2])
     worst = max(float(np.abs(t - K_p * imposed).max()) for K_p, t in torques.items())
 
     lines = {f"K_p = {K_p:g} N m/rad": torque for K_p, torque in torques.items()}
     return Figure(
-        number="15.27 (simulated)",
-        title="Torque at an imposed deflexion",
-        claim="The torque of the tendons at an imposed deflexion is that of the desired stiffness.",
-        found=f"It is, within {worst:.0e} N m.",
-        holds=worst < 1e-9,
-        draw=curves(imposed, lines, "imposed deflexion [rad]", "torque of the tendons [N m]", *["o-"] * 3),
-    )
-
-
-def static_torques(library: Any, K_p: float, imposed: Array) -> Array:
-    """Torque [N m] of the tendons against a fixture that holds the link at deflexions [rad] and is felt by the law.
-
-    The fixture's torque is the load under which the link would stand there by itself.
-    """
-    loop, _ = pair_loop(library.backstepping_antagonistic, TABLE_PAIR, (K_p, 0.05))
-    unit = loop.at_rest([1.0, 0.0])
-    torques: Array = imposed / unit[0] * (unit[4] - unit[2])
-    return torques
+        "15.27 (simulated)", "Torque at an imposed deflexion",
+        "The torque of the tendons at an imposed deflexion is that of the desired stiffness.",
+        f"It is, within {worst:.0e} N m.", worst < 1e-9,
+        curves(imposed, lines, "imposed deflexion [rad]", "torque of the tendons [N m]", *["o-"] * 3),
+    )  # fmt: skip

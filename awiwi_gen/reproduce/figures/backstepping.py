@@ -6,24 +6,14 @@ for the impedance law of section 15.3, with a link of unit inertia, they hold.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from itertools import pairwise
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from awiwi_gen.hand import Hand
-from awiwi_gen.loops.joint import (
-    TABLE_15_1,
-    TABLE_16_1,
-    Plant,
-    normalised_loop,
-    position_loop,
-    state_gains,
-)
-from awiwi_gen.loops.joint import (
-    Loop as LinearLoop,
-)
+from awiwi_gen.loops.joint import TABLE_15_1, TABLE_16_1, Plant, normalised_loop, position_loop, state_gains
+from awiwi_gen.loops.joint import Loop as LinearLoop
 from awiwi_gen.results import Figure, curves
 from awiwi_gen.simulate import Actuator, Array, Block, Element, Loop, Scenario, Sum, Trace, simulate
 
@@ -36,12 +26,10 @@ SATURATION = 0.0005  # N m
 DELAYS = (0.0, 1e-4, 2e-4, 5e-4, 1e-3)
 SERVO = 333e-6  # s, of a complete round trip
 
-Builder = Callable[..., LinearLoop]
-
 
 def figures(library: Any, hand: Hand) -> list[Figure]:
     """All of them; they need nothing of the hand."""
-    laws: dict[str, Builder] = {"position law": position_loop, "impedance law": normalised_loop}
+    laws = {"position law": position_loop, "impedance law": normalised_loop}
     return [
         convergence(library),
         *(phases(library, number, gains) for number, gains in PHASES.items()),
@@ -51,13 +39,11 @@ def figures(library: Any, hand: Hand) -> list[Figure]:
     ]
 
 
-# -- section 15.1 ------------------------------------------------------------------------------------------
+def run_example(library: Any, starts: Array, gains: Array) -> tuple[Array, bool, float]:
+    """The example of section 15.1 under the compiled law for 60 s; runs differ in start and gains.
 
-
-def run_example(library: Any, starts: Array, gains: Array, until: float, ticks: int) -> tuple[Array, Array]:
-    """States (ticks + 1, runs, 2) of the example under the compiled law, and its energy V; runs differ in start and gains.
-
-    The example's polynomial x1^2 - x1^3 is the torque of a cubic spring.
+    States (ticks, runs, 2), whether the energy V falls all the way, and the largest x1 at the end. The example's
+    polynomial x1^2 - x1^3 is the torque of a cubic spring.
     """
     drift = {"deflexion": "x[0]", "deflexion_des": "x[0]", "torque": "drift", "k": "unused"}
     plant: list[Element] = [
@@ -66,37 +52,33 @@ def run_example(library: Any, starts: Array, gains: Array, until: float, ticks: 
         Block("backstepping_academic", {"k": "gains", "u": "xd[1]"}),
     ]
     scenarios = [
-        Scenario({"x": x, "gains": k, "spring": (0.0, 1.0, -1.0)}, ticks + 1)
+        Scenario({"x": x, "gains": k, "spring": (0.0, 1.0, -1.0)}, 3001)
         for x, k in zip(*np.broadcast_arrays(starts, gains), strict=True)
     ]
-    traces = simulate(library, Loop(plant, [], {"x": "xd"}, period=until / ticks), scenarios, ["x"])
+    traces = simulate(library, Loop(plant, [], {"x": "xd"}, period=0.02), scenarios, ["x"])
     states = np.stack([trace["x"] for trace in traces], axis=1)
-    return states, library.backstepping_academic_lyapunov(x=states, k=gains).V
+    V = library.backstepping_academic_lyapunov(x=states, k=gains).V
+    return states, bool((np.diff(V, axis=0) <= 1e-12).all()), float(np.abs(states[-1, :, 0]).max())
 
 
 def convergence(library: Any) -> Figure:
     """Figure 15.1."""
     first, second = FIGURE_15_1
     k = np.stack(np.meshgrid(first, second, indexing="ij"), axis=-1).reshape(-1, 2)
-    trace, V = run_example(library, np.ones_like(k), k, 60.0, 3000)
-    falling, left = bool((np.diff(V, axis=0) <= 1e-12).all()), np.abs(trace[-1, ..., 0]).max()
-
+    trace, falling, left = run_example(library, np.ones_like(k), k)
     return Figure(
-        number="15.1",
-        title="The example for 50 pairs of gains",
-        claim="Every pair of positive gains brings the state to the origin.",
-        found=f"All runs end within {left:.0e} after 60 s, and V falls all the way (eq. 15.10, corrected).",
-        holds=falling and bool(left < 0.1),
-        draw=curves(np.linspace(0, 10, 501), trace[:501, :, 0], "t", "x1"),
-    )
+        "15.1", "The example for 50 pairs of gains",
+        "Every pair of positive gains brings the state to the origin.",
+        f"All runs end within {left:.0e} after 60 s, and V falls all the way (eq. 15.10, corrected).",
+        falling and left < 0.1, curves(np.linspace(0, 10, 501), trace[:501, :, 0], "t", "x1"),
+    )  # fmt: skip
 
 
 def phases(library: Any, number: str, gains: tuple[float, float]) -> Figure:
     """Figures 15.2 to 15.4: one pair of gains from a ring of initial states."""
     angles = np.linspace(0, 2 * np.pi, 16, endpoint=False)
     start = 2 * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
-    trace, V = run_example(library, start, np.array(gains), 60.0, 3000)
-    falling, left = bool((np.diff(V, axis=0) <= 1e-12).all()), np.abs(trace[-1, :, 0]).max()
+    trace, falling, left = run_example(library, start, np.array(gains))
 
     def draw(axes: Any) -> None:
         for states, style in ((trace, "-"), (start[None], "x")):
@@ -104,55 +86,34 @@ def phases(library: Any, number: str, gains: tuple[float, float]) -> Figure:
         axes.set(xlabel="x1", ylabel="x1'")
 
     return Figure(
-        number=number,
-        title=f"The example's phases for k1 = {gains[0]:g}, k2 = {gains[1]:g}",
-        claim="Every initial state comes to the origin.",
-        found=f"All runs end within {left:.0e} after 60 s, and V falls all the way.",
-        holds=falling and bool(left < 0.1),
-        draw=draw,
-    )
+        number, f"The example's phases for k1 = {gains[0]:g}, k2 = {gains[1]:g}",
+        "Every initial state comes to the origin.",
+        f"All runs end within {left:.0e} after 60 s, and V falls all the way.", falling and left < 0.1, draw,
+    )  # fmt: skip
 
 
-# -- section 15.2 ------------------------------------------------------------------------------------------
-
-
-def sweep(library: Any, which: int, name: str, build: Builder) -> Figure:
+def sweep(library: Any, which: int, name: str, build: Callable[..., LinearLoop]) -> Figure:
     """Figures 15.7 (K1 swept, K2 = 1) and 15.8 (K2 swept, K1 = 5)."""
     times = np.linspace(0, 30, 3001)
     runs = {}
     for value in SWEEP:
         gains = (value, 1.0, *OUTER) if which == 1 else (5.0, value, *OUTER)
-        runs[value] = step_response(build(library, TABLE_15_1, gains), times)
+        runs[value] = build(library, TABLE_15_1, gains).step(STEP, times)
     rises = [rise(times, run) for run in runs.values()]
     overshoots = [max(float(run.max() / STEP - 1), 0.0) for run in runs.values()]
     shown = ", ".join(f"{v:g}: {r:.3g} s, {o:.0%}" for v, r, o in zip(SWEEP, rises, overshoots, strict=True))
     if which == 1:
         effect = "K1 is a stiffness: more of it is faster, and too much oscillates"
-        holds = monotone(rises[::-1]) and overshoots[-1] > max(0.1, overshoots[0])
+        holds = bool((np.diff(rises) < 0).all()) and overshoots[-1] > max(0.1, overshoots[0])
     else:
         effect = "K2 is a damping: more of it slows the link down"
-        holds = monotone(rises)
-
+        holds = bool((np.diff(rises) > 0).all())
     lines = {f"K{which} = {value:g}": run for value, run in runs.items()}
     return Figure(
-        number=f"15.{6 + which} ({name})",
-        title=f"Influence of K{which} on a step of {STEP:g} rad, {name}",
-        claim=f"{effect}.",
-        found=f"Rise time and overshoot at K{which} = {shown}.",
-        holds=holds,
-        draw=curves(times, lines, "t [s]", "q [rad]", xlim=(0, 10)),
-    )
-
-
-def monotone(values: Sequence[float]) -> bool:
-    """Whether values grow all the way."""
-    return all(a < b for a, b in pairwise(values))
-
-
-def step_response(loop: LinearLoop, times: Array) -> Array:
-    """Position [rad] of the link after a step of the desired one."""
-    response: Array = STEP + loop.response([-STEP, 0, 0, 0], times)[:, 0]
-    return response
+        f"15.{6 + which} ({name})", f"Influence of K{which} on a step of {STEP:g} rad, {name}",
+        f"{effect}.", f"Rise time and overshoot at K{which} = {shown}.", holds,
+        curves(times, lines, "t [s]", "q [rad]", xlim=(0, 10)),
+    )  # fmt: skip
 
 
 def rise(times: Array, run: Array) -> float:
@@ -196,25 +157,18 @@ def saturation(library: Any) -> list[Figure]:
     )
     return [
         Figure(
-            number="15.10",
-            title="A step with saturated torque: link, plant of table 16.1",
-            claim="The law stays stable in spite of the limit.",
-            found=f"Both runs end within {left:.1%} of the step.",
-            holds=left < 0.02,
-            draw=curves(None, angles, "t [s]", "q [rad]"),
+            "15.10", "A step with saturated torque: link, plant of table 16.1",
+            "The law stays stable in spite of the limit.", f"Both runs end within {left:.1%} of the step.", left < 0.02,
+            curves(None, angles, "t [s]", "q [rad]"),
         ),
         Figure(
-            number="15.11",
-            title="A step with saturated torque: command, plant of table 16.1",
-            claim="The limit of 0.0005 N m cuts the command strongly.",
-            found=(
-                f"With table 15.1, as captioned, the command stays below {peaks[0]:.1e} N m all by itself; with table "
-                f"16.1, shown here, it would reach {peaks[1]:.1e} N m."
-            ),
-            holds=peaks[0] > SATURATION,
-            draw=curves(None, torques, "t [s]", "torque [N m]", xlim=(0, 0.3)),
+            "15.11", "A step with saturated torque: command, plant of table 16.1",
+            "The limit of 0.0005 N m cuts the command strongly.",
+            f"With table 15.1, as captioned, the command stays below {peaks[0]:.1e} N m all by itself; with table "
+            f"16.1, shown here, it would reach {peaks[1]:.1e} N m.", peaks[0] > SATURATION,
+            curves(None, torques, "t [s]", "torque [N m]", xlim=(0, 0.3)),
         ),
-    ]
+    ]  # fmt: skip
 
 
 def delay(library: Any) -> Figure:
@@ -225,10 +179,8 @@ def delay(library: Any) -> Figure:
     margin = position_loop(library, TABLE_15_1, gains).delay_margin()
     lines = {f"{late * 1e3:g} ms": (runs[late].time[::10], runs[late]["x"][::10, 0]) for late in DELAYS}
     return Figure(
-        number="15.13",
-        title="A step behind delays",
-        claim="At the 333 us of a round trip nothing oscillates, even with these large gains.",
-        found=f"With table 15.1 it then overshoots by {overshoot:.0%}; the delay margin is {margin * 1e3:.2f} ms.",
-        holds=overshoot < 0.02,
-        draw=curves(None, lines, "t [s]", "q [rad]", ylim=(-0.2, 2.0)),
-    )
+        "15.13", "A step behind delays",
+        "At the 333 us of a round trip nothing oscillates, even with these large gains.",
+        f"With table 15.1 it then overshoots by {overshoot:.0%}; the delay margin is {margin * 1e3:.2f} ms.",
+        overshoot < 0.02, curves(None, lines, "t [s]", "q [rad]", ylim=(-0.2, 2.0)),
+    )  # fmt: skip

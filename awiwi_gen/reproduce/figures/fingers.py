@@ -11,8 +11,8 @@ from awiwi_gen.hand import Hand, Spring
 from awiwi_gen.hand.lever import Lever
 from awiwi_gen.kernels.base_estimate import base_of
 from awiwi_gen.reproduce.base_search import BaseSearch
-from awiwi_gen.results import Figure
-from awiwi_gen.simulate import Array, Block, Loop, Scenario, Sum, simulate
+from awiwi_gen.results import Figure, curves
+from awiwi_gen.simulate import Array, Block, Element, Loop, Scenario, Sum, simulate
 
 RELEASE, JOINT = 0.1, 1  # rad, at the joint for flexion
 PRETENSION = 20.0  # N in every tendon
@@ -29,9 +29,6 @@ def figures(library: Any, hand: Hand) -> list[Figure]:
     found = [coriolis(library, hand, hand.spring)] if "index" in hand.fingers and hand.spring else []
     based = [name for name, finger in hand.fingers.items() if base_of(finger).spans]
     return found + [figure for name in based[:1] for figure in estimates(library, hand, name)]
-
-
-# -- figure 5.7 -------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -66,25 +63,18 @@ def coriolis(library: Any, hand: Hand, spring: Spring) -> Figure:
         for reading, a, b in zip(release.readings, early, worst, strict=True)
     )
 
-    def draw(axes: Any) -> None:
-        axes.plot(release.times, change[0] * 1e3, linewidth=0.8, label=hand.fingers["index"].joints)
-        axes.axhline(seen * 1e3, color="black", linestyle=":", linewidth=0.8, label="resolution of the sensors")
-        axes.set(xlabel="time [s]", ylabel="change of the joint angles [mrad]", title=release.readings[0])
-        axes.legend()
-
+    lines = dict(zip(hand.fingers["index"].joints, change[0].T * 1e3, strict=True))
+    lines |= {"resolution of the sensors": np.full(STEPS, seen * 1e3)}
+    styles, labels = ["-"] * (len(lines) - 1) + [":"], ("time [s]", "change of the joint angles [mrad]")
     return Figure(
-        number="5.7",
-        title="What Coriolis and centrifugal terms change in the motion of the index finger",
-        claim="Without these terms the finger moves the same, within the resolution of its sensors.",
-        found=(
-            f"A count of the sensors is {seen * 1e3:.2g} mrad, an error of 0.5 mm in the lengths {coarse * 1e3:.0f} "
-            f"mrad. Damping read as {listed}. The difference is a drift of phase, growing with time, less with damping. "
-            f"Less than a count of the sensors it remains with {unseen or 'none of these'}. Abduction is moved too, by "
-            f"{np.abs(release.full[0, :, 0]).max() * 1e3:.2g} mrad, for the links are not symmetric."
-        ),
-        holds=bool(worst[0] < seen),
-        draw=draw,
-    )
+        "5.7", "What Coriolis and centrifugal terms change in the motion of the index finger",
+        "Without these terms the finger moves the same, within the resolution of its sensors.",
+        f"A count of the sensors is {seen * 1e3:.2g} mrad, an error of 0.5 mm in the lengths {coarse * 1e3:.0f} "
+        f"mrad. Damping read as {listed}. The difference is a drift of phase, growing with time, less with damping. "
+        f"Less than a count of the sensors it remains with {unseen or 'none of these'}. Abduction is moved too, by "
+        f"{np.abs(release.full[0, :, 0]).max() * 1e3:.2g} mrad, for the links are not symmetric.",
+        bool(worst[0] < seen), curves(release.times, lines, *labels, *styles, title=release.readings[0]),
+    )  # fmt: skip
 
 
 def released(library: Any, hand: Hand) -> Release:
@@ -95,38 +85,27 @@ def released(library: Any, hand: Hand) -> Release:
     dampings = damping_readings(library, straight)
     springs = [Block("spring_force", {"x": f"elongations[{i}]", "f": f"forces[{i}]"}) for i in range(m)]
     damping = [(f"damping[{i * n}:{i * n + n}]", f"qd[{i}]") for i in range(n)]  # row by row: the matrix is symmetric
-    paths = {
-        name: simulate(
-            library,
-            Loop(
-                [
-                    Sum("speeds", (1.0, "qd")),
-                    Block("index_tendon_lengths", {"h": "lengths"}),
-                    Sum("elongations", (1.0, "lengths"), (-1.0, "slack_lengths")),
-                    *springs,
-                    Block("index_joint_torque", {"f": "forces", "tau": "pull"}),
-                    Sum("tau", (1.0, "pull"), *damping),
-                    Block("index_forward_dynamics", {"qd": seen}),
-                ],
-                [], {"q": "speeds", "qd": "qdd"}, period=DURATION / (STEPS - 1),
-            ),
-            [
-                Scenario(
-                    {
-                        "q": start, "qd": straight, "at_rest": straight, "damping": -D, "forces": np.zeros(m),
-                        "slack_lengths": library.index_tendon_lengths(straight) - library.spring_elongation(PRETENSION).x,
-                        "g": np.zeros(3),
-                    },
-                    STEPS,
-                )
-                for D in dampings.values()
-            ],
-            ["q"],
-        )
-        for name, seen in (("full", "qd"), ("reduced", "at_rest"))
+    values = {
+        "q": start, "qd": straight, "at_rest": straight, "forces": np.zeros(m), "g": np.zeros(3),
+        "slack_lengths": library.index_tendon_lengths(straight) - library.spring_elongation(PRETENSION).x,
     }  # fmt: skip
-    full, reduced = (np.stack([trace["q"] for trace in traces]) for traces in paths.values())
-    return Release(tuple(dampings), np.linspace(0.0, DURATION, STEPS), full, reduced)
+    scenarios = [Scenario(values | {"damping": -D}, STEPS) for D in dampings.values()]
+
+    def motion(seen: str) -> Array:
+        plant: list[Element] = [
+            Sum("speeds", (1.0, "qd")),
+            Block("index_tendon_lengths", {"h": "lengths"}),
+            Sum("elongations", (1.0, "lengths"), (-1.0, "slack_lengths")),
+            *springs,
+            Block("index_joint_torque", {"f": "forces", "tau": "pull"}),
+            Sum("tau", (1.0, "pull"), *damping),
+            Block("index_forward_dynamics", {"qd": seen}),
+        ]
+        loop = Loop(plant, [], {"q": "speeds", "qd": "qdd"}, period=DURATION / (STEPS - 1))
+        return np.stack([trace["q"] for trace in simulate(library, loop, scenarios, ["q"])])
+
+    times = np.linspace(0.0, DURATION, STEPS)
+    return Release(tuple(dampings), times, full=motion("qd"), reduced=motion("at_rest"))
 
 
 def damping_readings(library: Any, q: Array) -> dict[str, Array]:
@@ -141,9 +120,6 @@ def damping_readings(library: Any, q: Array) -> dict[str, Array]:
     critical = (2 * turned * np.sqrt(squares)) @ turned.T
     modal = {f"{share:g} % of each mode": share / 100 * critical for share in (0.1, 1, 10)}
     return modal | {"1e-3 N m s/rad in each joint": 1e-3 * np.eye(len(q))}
-
-
-# -- figures 5.16 and 5.17 --------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -187,27 +163,18 @@ def estimates(library: Any, hand: Hand, finger: str) -> list[Figure]:
 
     return [
         Figure(
-            number="5.16",
-            title=f"Base joints of the {finger} by the gradient search, 30 iterations from (0, 0)",
-            claim="30 iterations find the joints, but for the corners.",
-            found=(
-                f"The corrected search finds the corners too. From exact lengths its largest errors are {clean} iterations; "
-                f"the figure shows {visible:.1e} rad."
-            ),
-            holds=bool(result.error(0.0, 30) < visible),
-            draw=draw_one,
+            "5.16", f"Base joints of the {finger} by the gradient search, 30 iterations from (0, 0)",
+            "30 iterations find the joints, but for the corners.",
+            f"The corrected search finds the corners too. From exact lengths its largest errors are {clean} iterations; "
+            f"the figure shows {visible:.1e} rad.", bool(result.error(0.0, 30) < visible), draw_one,
         ),
         Figure(
-            number="5.17",
-            title=f"The same for {COUNTS[0]}, {COUNTS[1]} and {COUNTS[2]} iterations, from lengths with errors",
-            claim="Few iterations are enough, for errors of the lengths soon decide.",
-            found=(
-                f"Largest errors after {', '.join(map(str, COUNTS))} iterations, for lengths wrong by up to {noisy}."
-            ),
-            holds=enough,
-            draw=draw_all,
+            "5.17", f"The same for {COUNTS[0]}, {COUNTS[1]} and {COUNTS[2]} iterations, from lengths with errors",
+            "Few iterations are enough, for errors of the lengths soon decide.",
+            f"Largest errors after {', '.join(map(str, COUNTS))} iterations, for lengths wrong by up to {noisy}.",
+            enough, draw_all,
         ),
-    ]
+    ]  # fmt: skip
 
 
 def estimated(search: BaseSearch) -> Estimates:
@@ -228,9 +195,6 @@ def scatter(axes: Any, poses: Array, found: Array) -> None:
     """Circles where the joints are, crosses where they are found."""
     axes.plot(*poses.T, "o", color="tab:red", fillstyle="none", markersize=4)
     axes.plot(*found.T, "x", color="tab:blue", markersize=4)
-
-
-# -- resolution of the sensors ----------------------------------------------------------------------------
 
 
 def resolution(library: Any, spring: Spring, finger: str) -> float:

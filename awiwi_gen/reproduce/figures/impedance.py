@@ -11,10 +11,11 @@ from typing import Any
 import numpy as np
 
 from awiwi_gen.hand import Hand
-from awiwi_gen.loops.joint import TABLE_15_1, TABLE_16_1, UNIT_WEIGHTS, Array, Plant, impedance_loop
-from awiwi_gen.loops.step import overshoot, settling
-from awiwi_gen.results import Figure, curves
-from awiwi_gen.simulate import Actuator, Block, Loop, Scenario, Trace, simulate
+from awiwi_gen.loops.joint import TABLE_15_1, TABLE_16_1, UNIT_WEIGHTS, impedance_loop
+from awiwi_gen.loops.joint import Loop as LinearLoop
+from awiwi_gen.loops.step import overshoot, run, settling
+from awiwi_gen.results import Figure, curves, listed
+from awiwi_gen.simulate import Array, Block, Scenario, Trace
 
 STEP = np.pi / 4
 LOAD = 0.2  # N m, as captioned
@@ -37,65 +38,50 @@ def figures(library: Any, hand: Hand) -> list[Figure]:
     return [*stiffness(library), damping(library), neglected_rate(library), *nonlinear(library)]
 
 
-# -- linear spring -----------------------------------------------------------------------------------------
-
-
-def load_and_step(library: Any, plant: Plant, gains: Any, times: Array) -> Array:
+def load_and_step(loop: LinearLoop, times: Array) -> Array:
     """Position [rad] of the link: a step of the desired position, then a load, both fed to the law."""
-    loop = impedance_loop(library, plant, gains)
     first, second = (int(np.searchsorted(times, at)) for at in (STEP_AT, LOAD_AT))
     moved = loop.response([-STEP, 0, 0, 0], times[first:] - times[first])
-    jump = (loop.E + loop.B @ loop.H) @ [0.0, LOAD]  # the impulse of the load's rate
-    loaded = loop.response(moved[second - first] + jump, times[second:] - times[second], [LOAD, 0.0])
+    loaded = loop.loaded(moved[second - first], times[second:] - times[second], LOAD)
     return np.concatenate([np.zeros(first), STEP + moved[: second - first, 0], STEP + loaded[:, 0]])
 
 
 def stiffness(library: Any) -> list[Figure]:
     """Figure 15.16: what holds of its deflexions, and what does not of its rise times."""
     times = np.linspace(0, END, 2501)
-    gains = [(K_p, 0.05, *OUTER) for K_p in STIFFNESSES]
-    runs = [load_and_step(library, TABLE_15_1, each, times) for each in gains]
-    rests = [impedance_loop(library, TABLE_15_1, each).at_rest([LOAD, 0.0])[0] for each in gains]
-    slow = [-1 / impedance_loop(library, TABLE_15_1, each).poles().real.max() for each in gains]
-
-    draw = curves(
-        times, {f"K_p = {K:g} N m/rad": run for K, run in zip(STIFFNESSES, runs, strict=True)}, "t [s]", "q [rad]"
-    )
+    loops = {K_p: impedance_loop(library, TABLE_15_1, (K_p, 0.05, *OUTER)) for K_p in STIFFNESSES}
+    rests = [LOAD / loop.stiffness for loop in loops.values()]
+    slow = [-1 / loop.poles().real.max() for loop in loops.values()]
+    lines = {f"K_p = {K_p:g} N m/rad": load_and_step(loop, times) for K_p, loop in loops.items()}
+    draw = curves(times, lines, "t [s]", "q [rad]")
     return [
         Figure(
-            number="15.16 (deflexion)",
-            title="A step and a load at three stiffnesses",
-            claim=f"The stiffness decides the deflexion under {LOAD:g} N m.",
-            found=f"{', '.join(f'{rest:.3g}' for rest in rests)} rad, load over stiffness, once the load is fed to the law.",
-            holds=bool(np.allclose(np.array(rests) * STIFFNESSES, LOAD, rtol=1e-6)),
-            draw=draw,
+            "15.16 (deflexion)", "A step and a load at three stiffnesses",
+            f"The stiffness decides the deflexion under {LOAD:g} N m.",
+            f"{listed(rests, '.3g')} rad, load over stiffness, once the load is fed to the law.",
+            bool(np.allclose(np.array(rests) * STIFFNESSES, LOAD, rtol=1e-6)), draw,
         ),
         Figure(
-            number="15.16 (rise)",
-            title="The rise at three stiffnesses",
-            claim="The rise times are identical, for the motor imposes them.",
-            found=f"The slowest time constants are {', '.join(f'{t:.2g}' for t in slow)} s: K_d / K_p.",
-            holds=max(slow) < 1.1 * min(slow),
-            draw=draw,
+            "15.16 (rise)", "The rise at three stiffnesses",
+            "The rise times are identical, for the motor imposes them.",
+            f"The slowest time constants are {listed(slow, '.2g')} s: K_d / K_p.", max(slow) < 1.1 * min(slow), draw,
         ),
-    ]
+    ]  # fmt: skip
 
 
 def damping(library: Any) -> Figure:
     """Figure 15.17."""
     times = np.linspace(0, END, 2501)
-    runs = [load_and_step(library, TABLE_15_1, (1.0, K_d, *OUTER), times) for K_d in DAMPINGS]
+    loops = [impedance_loop(library, TABLE_15_1, (1.0, K_d, *OUTER)) for K_d in DAMPINGS]
+    runs = [load_and_step(loop, times) for loop in loops]
     moving = (times >= STEP_AT) & (times < LOAD_AT)
     arrivals = [float(settling(times[moving] - STEP_AT, run[moving], STEP, 0.0)) for run in runs]
     lines = {f"K_d = {K_d:g} N m s/rad": run for K_d, run in zip(DAMPINGS, runs, strict=True)}
     return Figure(
-        number="15.17",
-        title="A step and a load at three dampings",
-        claim="More damping settles later.",
-        found=f"The step is within 2 % after {', '.join(f'{t:.3g}' for t in arrivals)} s.",
-        holds=arrivals == sorted(arrivals) and arrivals[0] < arrivals[-1],
-        draw=curves(times, lines, "t [s]", "q [rad]"),
-    )
+        "15.17", "A step and a load at three dampings",
+        "More damping settles later.", f"The step is within 2 % after {listed(arrivals, '.3g')} s.",
+        arrivals == sorted(arrivals) and arrivals[0] < arrivals[-1], curves(times, lines, "t [s]", "q [rad]"),
+    )  # fmt: skip
 
 
 def neglected_rate(library: Any) -> Figure:
@@ -107,18 +93,12 @@ def neglected_rate(library: Any) -> Figure:
         times = np.linspace(0, 8 * gains[1] / gains[0], 2001)
         runs[name] = times * gains[0] / gains[1], loop.response(np.zeros(4), times, [LOAD, 0.0])[:, 0] / LOAD * gains[0]
         peaks.append(float(runs[name][1].max()))
-
     return Figure(
-        number="15.16 (rate of the load)",
-        title="A load step whose rate is not fed to the law",
-        claim="It is practically sufficient to neglect the rate of the outer torque.",
-        found=f"The link goes to {' and '.join(f'{peak:.3g}' for peak in peaks)} times its deflexion.",
-        holds=max(peaks) < 1.1,
-        draw=curves(None, runs, "t K_p / K_d", "deflexion in parts of the static one"),
-    )
-
-
-# -- nonlinear spring --------------------------------------------------------------------------------------
+        "15.16 (rate of the load)", "A load step whose rate is not fed to the law",
+        "It is practically sufficient to neglect the rate of the outer torque.",
+        f"The link goes to {listed(peaks, '.3g', ' and ')} times its deflexion.", max(peaks) < 1.1,
+        curves(None, runs, "t K_p / K_d", "deflexion in parts of the static one"),
+    )  # fmt: skip
 
 
 def run_nonlinear(library: Any, limit: float) -> dict[str, Trace]:
@@ -133,15 +113,11 @@ def run_nonlinear(library: Any, limit: float) -> dict[str, Trace]:
     desired = np.zeros((ticks, 5))
     desired[:, 0] = STEP * (times >= NONLINEAR_STEP_AT)
     values = SPRING_JOINT | {"x": np.zeros(4), "nominal": (CURVE[0], 0.0), "gains": GAINS}
-    traces: dict[str, Trace] = {}
+    scenario = Scenario(values, ticks, {"desired": desired, "external": external})
+    plant, traces = [Block("plant_joint_nonlinear", {"load": "external[0]"})], {}
     for name, spring in (("nonlinear law", "spring"), ("linear law", "nominal")):
-        loop = Loop(
-            [Block("plant_joint_nonlinear", {"load": "external[0]"})],
-            [Block("backstepping_nonlinear", {"state": ("x[0:2]", "tau"), "spring": spring, "tau_m": "command"})],
-            {"x": "xd"}, actuators=[Actuator("command", "u", limit, late=False)], period=TICK,
-        )  # fmt: skip
-        scenario = Scenario(values, ticks, {"desired": desired, "external": external})
-        traces |= {name: simulate(library, loop, [scenario], ["x", "spring"])[0]}
+        law = Block("backstepping_nonlinear", {"state": ("x[0:2]", "tau"), "spring": spring, "tau_m": "command"})
+        traces[name] = run(library, plant, [law], scenario, ["x", "spring"], TICK, limit)
     return traces
 
 
@@ -163,38 +139,29 @@ def nonlinear(library: Any) -> list[Figure]:
     changes = [float(change[part].max()) for part in (moving, loaded)]
     return [
         Figure(
-            number="15.19",
-            title="Linear and nonlinear law behind a nonlinear spring",
-            claim="In free motion both laws do the same; under load the nonlinear one settles sooner, overshoots more.",
-            found=(
-                f"In free motion they differ by {apart:.1e} rad at most; under load the nonlinear and the linear law "
-                f"settle after {settled[0][0]:.1f} and {settled[0][1]:.1f} ms and overshoot by "
-                f"{over[0][0]:.0%} and {over[0][1]:.0%}."
-            ),
-            holds=bool(apart < 0.02 * STEP and settled[0][0] < settled[0][1] and over[0][0] > over[0][1]),
-            draw=curves(times, angles[0], "t [s]", "q [rad]"),
+            "15.19", "Linear and nonlinear law behind a nonlinear spring",
+            "In free motion both laws do the same; under load the nonlinear one settles sooner, overshoots more.",
+            f"In free motion they differ by {apart:.1e} rad at most; under load the nonlinear and the linear law "
+            f"settle after {settled[0][0]:.1f} and {settled[0][1]:.1f} ms and overshoot by "
+            f"{over[0][0]:.0%} and {over[0][1]:.0%}.",
+            bool(apart < 0.02 * STEP and settled[0][0] < settled[0][1] and over[0][0] > over[0][1]),
+            curves(times, angles[0], "t [s]", "q [rad]"),
         ),
         Figure(
-            number="15.20",
-            title="Stiffness of the spring during figure 15.19",
-            claim="Accelerating the link changes the stiffness little, loading it much.",
-            found=f"By {changes[0]:.0%} and by {changes[1]:.0%}.",
-            holds=changes[0] < 0.1 * changes[1],
-            draw=curves(times, stiffness, "t [s]", "k [N m/rad]"),
+            "15.20", "Stiffness of the spring during figure 15.19",
+            "Accelerating the link changes the stiffness little, loading it much.",
+            f"By {changes[0]:.0%} and by {changes[1]:.0%}.", changes[0] < 0.1 * changes[1],
+            curves(times, stiffness, "t [s]", "k [N m/rad]"),
         ),
         Figure(
-            number="15.21",
-            title=f"The same with torques cut at {SATURATION:g} N m",
-            claim="Saturation makes the laws more alike; the nonlinear one still settles sooner.",
-            found=(
-                "The nonlinear and the linear law overshoot by "
-                f"{over[1][0]:.0%} and {over[1][1]:.0%} and settle after {settled[1][0]:.0f} and "
-                f"{settled[1][1]:.0f} ms, {settled[0][0]:.0f} and {settled[0][1]:.0f} ms without saturation."
-            ),
-            holds=bool(
+            "15.21", f"The same with torques cut at {SATURATION:g} N m",
+            "Saturation makes the laws more alike; the nonlinear one still settles sooner.",
+            "The nonlinear and the linear law overshoot by "
+            f"{over[1][0]:.0%} and {over[1][1]:.0%} and settle after {settled[1][0]:.0f} and "
+            f"{settled[1][1]:.0f} ms, {settled[0][0]:.0f} and {settled[0][1]:.0f} ms without saturation.",
+            bool(
                 abs(settled[1][0] - settled[1][1]) < abs(settled[0][0] - settled[0][1])
                 and settled[1][0] < settled[1][1]
-            ),
-            draw=curves(times, angles[1], "t [s]", "q [rad]"),
+            ), curves(times, angles[1], "t [s]", "q [rad]"),
         ),
-    ]
+    ]  # fmt: skip

@@ -15,11 +15,11 @@ import numpy as np
 from awiwi_gen.hand import Hand
 from awiwi_gen.kernels.fingers_control import antagonists, groups, senses
 from awiwi_gen.loops.hand_joint import STRETCH, Joint, joint_of, loop_around, values_of
-from awiwi_gen.loops.step import overshoot, settling
+from awiwi_gen.loops.step import overshoot, run, settling
 from awiwi_gen.reproduce.distribution_search import Demands, closed_form_of
 from awiwi_gen.reproduce.printed.joint import VISIBLE, paired
-from awiwi_gen.results import Figure, curves
-from awiwi_gen.simulate import PERIOD, Actuator, Array, Block, Element, Loop, Scenario, Sum, Trace, simulate
+from awiwi_gen.results import Figure, curves, listed
+from awiwi_gen.simulate import PERIOD, Array, Block, Element, Scenario, Sum, Trace, simulate
 
 FELT = (1.0, 0.7)  # N m/rad, of figure 8.3
 EPSILON = 1.5
@@ -32,10 +32,8 @@ DAMPING = 1e-3  # N m s/rad, of the link
 SOFT, STIFF, RESONANT = 0.3, 0.8, 1.3  # N m/rad, of the impedance; the tendons make about 1
 CHOSEN = "The source prints no gains; these were chosen such that the joint oscillates."
 TENSIONS = np.array([40.0, 60.0, 80.0])  # N, of figure 11.4
-SWEEP, SWEPT = (
-    (2.0, 4.0, 8.0, 12.0, 14.0, 16.0, 17.0, 18.0, 19.0, 20.0, 21.0, 22.0, 24.0, 26.0, 28.0, 32.0, 64.0),
-    1.0,
-)  # Hz, s
+SWEEP = (2.0, 4.0, 8.0, 12.0, 14.0, 16.0, 17.0, 18.0, 19.0, 20.0, 21.0, 22.0, 24.0, 26.0, 28.0, 32.0, 64.0)  # Hz
+SWEPT = 1.0  # s
 LOW_TENSION, HIGH_TENSION = 30.0, 60.0  # N
 SLOW, AMPLITUDE, DRY_FRICTION, OBSERVER = 0.5, 0.5, 0.03, 300.0  # Hz, rad, N m, 1/s: figure 9.3
 
@@ -64,9 +62,6 @@ def joint_with_own_pair(hand: Hand) -> tuple[str, str] | None:
     return max(found)[1:] if found else None
 
 
-# -- chapter 7 ----------------------------------------------------------------------------------------------
-
-
 def algorithm_2(library: Any, finger: str) -> Figure:
     """Violated limits and missed stiffness by the penalty's weight, beside the closed form."""
     demands = Demands.feasible(library, finger, DEMANDS)
@@ -77,21 +72,13 @@ def algorithm_2(library: Any, finger: str) -> Figure:
     lines = {"limits violated by [N]": violated, "stiffness missed by [N m/rad]": missed}
     log: dict[str, Any] = {"xscale": "log", "yscale": "log"}
     return Figure(
-        number="7 (algorithm 2)",
-        title="Algorithm 2, corrected, on feasible demands",
-        claim="The force limits are in practice achieved, since their weight can be large.",
-        found=(
-            "One case in ten "
-            f"violates them by {violated.max():.2g} N or more at a light weight and misses the stiffness by "
-            f"{missed.max():.2g} N m/rad or more at a heavy one; the closed form violates nothing and misses "
-            f"{demands.miss(ours).max():.0e}."
-        ),
-        holds=bool(np.any((violated < VISIBLE) & (missed < 0.01))),
-        draw=curves(WEIGHTS, lines, "weight of the penalty", "90th percentile", "o-", "s-", **log),
-    )
-
-
-# -- chapter 8 ----------------------------------------------------------------------------------------------
+        "7 (algorithm 2)", "Algorithm 2, corrected, on feasible demands",
+        "The force limits are in practice achieved, since their weight can be large.", "One case in ten "
+        f"violates them by {violated.max():.2g} N or more at a light weight and misses the stiffness by "
+        f"{missed.max():.2g} N m/rad or more at a heavy one; the closed form violates nothing and misses "
+        f"{demands.miss(ours).max():.0e}.", bool(np.any((violated < VISIBLE) & (missed < 0.01))),
+        curves(WEIGHTS, lines, "weight of the penalty", "90th percentile", "o-", "s-", **log),
+    )  # fmt: skip
 
 
 def correction(library: Any, joint: Joint) -> Figure:
@@ -122,19 +109,12 @@ def correction(library: Any, joint: Joint) -> Figure:
         axes.set_ylim(top=1.15 * axes.get_ylim()[1])
 
     return Figure(
-        number="8.3",
-        title="Stiffness correction under a disturbance",
-        claim=(
-            f"The felt stiffness stays around {' and '.join(f'{felt:g}' for felt in FELT)} N m/rad although the "
-            "disturbance changes that of the tendons."
-        ),
-        found=f"It stays within {worst:.1%}, while the stiffness of the tendons changes by {changes:.0%}.",
-        holds=bool(worst < 0.1 and not any(np.any(curve[4]) for curve in shown)),
-        draw=draw,
-    )
-
-
-# -- chapter 9 ----------------------------------------------------------------------------------------------
+        "8.3", "Stiffness correction under a disturbance",
+        f"The felt stiffness stays around {listed(FELT, 'g', ' and ')} N m/rad although the "
+        "disturbance changes that of the tendons.",
+        f"It stays within {worst:.1%}, while the stiffness of the tendons changes by {changes:.0%}.",
+        bool(worst < 0.1 and not any(np.any(curve[4]) for curve in shown)), draw,
+    )  # fmt: skip
 
 
 def observer(library: Any) -> Figure:
@@ -145,16 +125,12 @@ def observer(library: Any) -> Figure:
     lines = {"desired": runs[True][0], "without compensation": runs[False][1], "with compensation": runs[True][1]}
     times = np.arange(len(runs[True][0])) * PERIOD
     return Figure(
-        number="9.3",
-        title="A slow sine with and without friction compensation",
-        claim="Compensating the observed friction clearly improves the tracking.",
-        found=(
-            f"The error falls from {errors[False] * 1e3:.0f} to {errors[True] * 1e3:.1f} mrad (r.m.s.), and the torque "
-            f"travels {busy[True] / busy[False]:.1f} times as far; the text has it react violently."
-        ),
-        holds=errors[True] < errors[False] / 3,
-        draw=curves(times, lines, "t [s]", "joint angle [rad]", ":"),
-    )
+        "9.3", "A slow sine with and without friction compensation",
+        "Compensating the observed friction clearly improves the tracking.",
+        f"The error falls from {errors[False] * 1e3:.0f} to {errors[True] * 1e3:.1f} mrad (r.m.s.), and the torque "
+        f"travels {busy[True] / busy[False]:.1f} times as far; the text has it react violently.",
+        errors[True] < errors[False] / 3, curves(times, lines, "t [s]", "joint angle [rad]", ":"),
+    )  # fmt: skip
 
 
 def tracked(library: Any, compensate: bool) -> tuple[Array, Array, Array]:
@@ -172,18 +148,14 @@ def tracked(library: Any, compensate: bool) -> tuple[Array, Array, Array]:
             {"x": ("x", "zeros"), "x_des": ("goal", "zeros"), "u_des": "compensation", "u": "command"},
         ),
     ]
-    loop = Loop([Block("plant_tendon")], law, {"x": "xd"}, actuators=[Actuator("command", "u", late=False)])
     values = {
         "x": np.zeros(2), "path": 0.0, "motor": (inertia, 1.0), "line": np.zeros(3), "zeros": np.zeros(2),
         "friction": (10 * np.pi, 2 / np.pi * DRY_FRICTION, 0.0), "K": (0.3, 0.004, 0.0, 0.0), "momentum": 0.0,
         "B": inertia, "gain": OBSERVER, "period": PERIOD,
     }  # fmt: skip
-    (trace,) = simulate(library, loop, [Scenario(values, ticks, {"goal": goal})], ["x", "u"])
+    trace = run(library, [Block("plant_tendon")], law, Scenario(values, ticks, {"goal": goal}), ["x", "u"])
     after = slice(round(1 / SLOW / PERIOD), None)
     return goal[after, 0], trace["x"][after, 0], trace["u"][after, 0]
-
-
-# -- chapter 11 ---------------------------------------------------------------------------------------------
 
 
 class Bench:
@@ -216,7 +188,7 @@ class Bench:
             for i in (0, 1)
         ]  # fmt: skip
         friction = [Block("motor_friction", {"thd": f"speeds[{i}]", "tau": f"modelled[{i}]"}) for i in (0, 1)]
-        D = critical(self.joint, SOFT) if K else 0.0
+        D = float(2 * np.sqrt(SOFT * self.joint.inertias[0])) if K else 0.0
         law: list[Element] = [
             Sum("tau_link", (K, "q_des"), (-K, "x[0]"), (-D, "x[1]")),
             Block("antagonistic_sharing", {"torque": "tau_link"}),
@@ -245,11 +217,6 @@ class Bench:
         return simulate(self.library, loop_around(plant, law), scenarios, ["x", "tau"])
 
 
-def critical(joint: Joint, K: float) -> float:
-    """Damping [N m s/rad] that would be critical for the link on a spring of stiffness K."""
-    return float(2 * np.sqrt(K * joint.inertias[0]))
-
-
 def force_steps(bench: Bench) -> list[Figure]:
     """Figure 11.1: what feed-forward and friction compensation do to a step of the pretension, the joint held."""
     held = replace(bench.joint, inertias=bench.joint.inertias * [1e10, 1, 1])
@@ -267,14 +234,12 @@ def force_steps(bench: Bench) -> list[Figure]:
         arrivals = settling(TIMES[:-STEP_AT], forces[STEP_AT:], wanted[-1], wanted[0], 0.1) * 1e3
         lines = {"desired": wanted, "without": forces[:, 0], "with": forces[:, 1]}
         found.append(Figure(
-            number=number, title=f"A step of the tendon force with and without {subject}",
-            claim=f"The {subject} improves the force step.",
-            found=(
-                f"At {TICKS * PERIOD:.1f} s the error is {errors[0]:.2g} N without and {errors[1]:.2g} N with it; the force "
-                f"stays within 10 % of the step {_after(arrivals[0])} and {_after(arrivals[1])}."
-            ),
-            holds=bool(errors[1] < errors[0] / 2 and arrivals[1] <= arrivals[0]),
-            draw=curves(TIMES, lines, "t [s]", "tendon force [N]", "--", ":"),
+            number, f"A step of the tendon force with and without {subject}",
+            f"The {subject} improves the force step.",
+            f"At {TICKS * PERIOD:.1f} s the error is {errors[0]:.2g} N without and {errors[1]:.2g} N with it; the force "
+            f"stays within 10 % of the step {_after(arrivals[0])} and {_after(arrivals[1])}.",
+            bool(errors[1] < errors[0] / 2 and arrivals[1] <= arrivals[0]),
+            curves(TIMES, lines, "t [s]", "tendon force [N]", "--", ":"),
         ))  # fmt: skip
     return found
 
@@ -327,13 +292,9 @@ def sweep(bench: Bench) -> Figure:
     peaks = np.array(SWEEP)[gain.argmax(axis=0)]
     lines = {f"pretension {f:g} N": each for f, each in zip(TENSIONS, gain.T, strict=True)}
     return Figure(
-        number="11.4",
-        title="Gain of the joint over frequency at three pretensions (simulated)",
-        claim="The resonance moves with the mechanical stiffness, so two time scales hold in a limited range.",
-        found=(
-            f"The gain is highest at {', '.join(f'{peak:g}' for peak in peaks)} Hz, where it is "
-            f"{', '.join(f'{peak:.2f}' for peak in gain.max(axis=0))}. {CHOSEN}"
-        ),
-        holds=bool(np.all(np.diff(peaks) > 0)),
-        draw=curves(SWEEP, lines, "frequency [Hz]", "amplitude of the angle per desired angle", *["o-"] * 3),
-    )
+        "11.4", "Gain of the joint over frequency at three pretensions (simulated)",
+        "The resonance moves with the mechanical stiffness, so two time scales hold in a limited range.",
+        f"The gain is highest at {listed(peaks, 'g')} Hz, where it is "
+        f"{', '.join(f'{peak:.2f}' for peak in gain.max(axis=0))}. {CHOSEN}", bool(np.all(np.diff(peaks) > 0)),
+        curves(SWEEP, lines, "frequency [Hz]", "amplitude of the angle per desired angle", *["o-"] * 3),
+    )  # fmt: skip

@@ -13,11 +13,11 @@ import numpy as np
 from scipy.optimize import brentq
 
 from awiwi_gen.hand import Hand
-from awiwi_gen.loops.joint import TABLE_12_1, TABLE_12_1_TARGET, TABLE_13_1, TABLE_14_2, Array
+from awiwi_gen.loops.joint import TABLE_12_1, TABLE_12_1_TARGET, TABLE_13_1, TABLE_14_2
 from awiwi_gen.loops.sampled import is_implementable, report
-from awiwi_gen.loops.step import settling
+from awiwi_gen.loops.step import run, settling
 from awiwi_gen.results import Draw, Figure, curves
-from awiwi_gen.simulate import PERIOD, Actuator, Block, Loop, Scenario, simulate
+from awiwi_gen.simulate import PERIOD, Array, Block, Scenario
 
 STIFFNESSES = np.linspace(0.43, 1.15, 73)  # N m/rad, as captioned
 COSTS_13 = (0.0001, 0.01, 1.0)
@@ -31,9 +31,6 @@ LOAD_AT, END = 0.5, 1.0  # s
 def figures(library: Any, hand: Hand) -> list[Figure]:
     """All of them; they need nothing of the hand."""
     return [open_loop(), placed(library), *optimal(library), *state_dependent(library)]
-
-
-# -- chapter 12 -----------------------------------------------------------------------------------------------
 
 
 def open_loop() -> Figure:
@@ -52,8 +49,7 @@ def open_loop() -> Figure:
         "The third and fourth pole hardly move.",
         f"They move by {moved:.1%}, while the fast pair grows from {fast[0]:.0f} to "
         f"{fast[-1]:.0f} 1/s. The captioned range of link friction is that of the spring; with it the fastest pole would "
-        f"be at {real:.2g} 1/s or beyond.",
-        moved < 0.05, _poles(shown),
+        f"be at {real:.2g} 1/s or beyond.", moved < 0.05, _poles(shown),
     )  # fmt: skip
 
 
@@ -86,9 +82,6 @@ def _poles(groups: dict[str, list[Array]], **settings: Any) -> Draw:
     points = {label: np.concatenate(poles) for label, poles in groups.items()}
     lines = {label: (every.real, every.imag) for label, every in points.items()}
     return curves(None, lines, "real part [1/s]", "imaginary part [1/s]", ".", ".", markersize=2, **settings)
-
-
-# -- chapter 13 -----------------------------------------------------------------------------------------------
 
 
 def optimal(library: Any) -> list[Figure]:
@@ -134,15 +127,11 @@ def optimal(library: Any) -> list[Figure]:
 def on_the_clock(library: Any, K: Array, ticks: int) -> Array:
     """States (ticks, 4) of table 13.1 from START under u = -K x, a period late."""
     law = Block("pole_placement_law", {"x_des": "goal", "u": "command"})
-    loop = Loop([Block("plant_joint_linear")], [law], {"x": "xd"}, actuators=[Actuator("command", "u")])
     values = {
         "x": START, "plant": TABLE_13_1.numbers, "damping": (TABLE_13_1.dq, TABLE_13_1.dtheta), "load": 0.0,
         "K": K, "goal": np.zeros(4), "u_des": 0.0,
     }  # fmt: skip
-    return simulate(library, loop, [Scenario(values, ticks)], ["x"])[0]["x"]
-
-
-# -- chapter 14 -----------------------------------------------------------------------------------------------
+    return run(library, [Block("plant_joint_linear")], [law], Scenario(values, ticks), late=True)["x"]
 
 
 def state_dependent(library: Any) -> list[Figure]:
@@ -157,10 +146,11 @@ def state_dependent(library: Any) -> list[Figure]:
     adaptive = Block("sdre_joint", {"spring": "spring_known", "u": "command"})
     fixed = Block("pole_placement_law", {"K": "K_last", "u": "command"})
     load = np.where(np.arange(ticks) * PERIOD < LOAD_AT, 0.0, LOAD)
-    traces = []
-    for law, watch in ((adaptive, ["x", "K"]), (fixed, ["x"])):
-        loop = Loop([Block("plant_joint_nonlinear")], [law], {"x": "xd"}, actuators=[Actuator("command", "u")])
-        traces += simulate(library, loop, [Scenario(values, ticks, {"load": load})], watch)
+    scenario, joint = Scenario(values, ticks, {"load": load}), [Block("plant_joint_nonlinear")]
+    traces = [
+        run(library, joint, [law], scenario, watch, late=True)
+        for law, watch in ((adaptive, ["x", "K"]), (fixed, ["x"]))
+    ]
     times, gains = traces[0].time, traces[0]["K"] / at_rest
     difference = np.abs(traces[0]["x"] - traces[1]["x"])[:, 0]
     free = times < LOAD_AT
@@ -183,7 +173,6 @@ def state_dependent(library: Any) -> list[Figure]:
             "14.5", "Gains of figure 14.4",
             "The gains follow the stiffness, which only a load changes.",
             f"They change by {change[0]:.0%} in free motion and by {change[1]:.0%} under load.",
-            change[1] > 2 * change[0],
-            curves(times, shares, "t [s]", "gain, as a share of the fixed one", *"----:"),
+            change[1] > 2 * change[0], curves(times, shares, "t [s]", "gain, as a share of the fixed one", *"----:"),
         ),
     ]  # fmt: skip

@@ -37,20 +37,14 @@ def draws(library: Any, number: str, title: str, R: float, box: Box, runs: int, 
     found = [nearest(library, TABLE_16_1, wanted, draw(box, samples, seed), corrected) for seed in range(runs)]
     loops = [impedance_loop(library, TABLE_16_1, each.gains) for each in found]
     times = np.linspace(0, END, 501)
-    steps = np.array([STEP + loop.response([-STEP, 0, 0, 0], times)[:, 0] for loop in loops])
+    steps = np.array([loop.step(STEP, times) for loop in loops])
     slowest = [float(loop.poles().real.max()) for loop in loops]
     apart = float(np.ptp(steps, axis=0).max() / STEP)
     arrived = float(steps[:, -1].min() / STEP)
-
     return Figure(
-        number=f"{number} ({title})",
-        title=f"Steps of drawn gains, {title}",
-        claim="All drawn gains move the link alike.",
-        found=(
-            "The curves are up to "
-            f"{apart:.0%} of the step apart, have slowest poles from {min(slowest):.2g} to {max(slowest):.2g} 1/s, "
-            f"and cover at least {arrived:.0%} of the step in {END * 1e3:.0f} ms."
-        ),
-        holds=apart < ALIKE and arrived > 0.95,
-        draw=curves(times * 1e3, steps.T, "t [ms]", "q [rad]"),
-    )
+        f"{number} ({title})", f"Steps of drawn gains, {title}",
+        "All drawn gains move the link alike.", "The curves are up to "
+        f"{apart:.0%} of the step apart, have slowest poles from {min(slowest):.2g} to {max(slowest):.2g} 1/s, "
+        f"and cover at least {arrived:.0%} of the step in {END * 1e3:.0f} ms.", apart < ALIKE and arrived > 0.95,
+        curves(times * 1e3, steps.T, "t [ms]", "q [rad]"),
+    )  # fmt: skip

@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from awiwi_gen.hand import Hand
+from awiwi_gen.hand import Hand, Motor
 from awiwi_gen.loops.sampled import is_implementable
-from awiwi_gen.loops.step import overshoot, settling
-from awiwi_gen.results import Draw, Figure, curves
+from awiwi_gen.loops.step import overshoot, run, settling
+from awiwi_gen.results import Draw, Figure, curves, listed
 from awiwi_gen.simulate import PERIOD, Actuator, Array, Block, Element, Loop, Scenario, Sensor, Sum, simulate
 
 STEPS = np.array([[10.0, 20.0], [20.0, 30.0], [30.0, 40.0], [40.0, 50.0]])  # N, from and to (section 10.4)
@@ -33,7 +33,7 @@ def figures(library: Any, hand: Hand) -> list[Figure]:
     """All of them, for hands with motors and lever springs."""
     if not hand.motor or not hand.spring:
         return []
-    bench = Bench(library, hand)
+    bench = Bench(library, hand.motor)
     return [feedforward(bench), fixed(bench), scheduled(bench), measured(bench), state_dependent(bench)]
 
 
@@ -42,22 +42,17 @@ class Bench:
     """A motor that pulls a tendon with a lever spring, whose other end is held (figure 14.1)."""
 
     library: Any
-    hand: Hand
+    motor: Motor
 
     @property
     def radius(self) -> float:
         """Of the motor's pulley [m]."""
-        return float(self.hand.motor.pulley) if self.hand.motor else 0.0
+        return float(self.motor.pulley)
 
     @property
     def inertia(self) -> float:
         """Of the motor, at its output [kg m^2]."""
         return 2 * float(self.library.motor_energy(1.0))
-
-    @property
-    def limit(self) -> float:
-        """Of the motor's torque [N m]."""
-        return float(self.hand.motor.torque) if self.hand.motor else 0.0
 
     def stiffness(self, force: Any) -> Array:
         """Slope of the tendon's force over its elongation [N/m]."""
@@ -94,7 +89,10 @@ class Bench:
             Sum("xd[0]", (1.0, "x[1]")),
             Block("motor_acceleration", {"theta": "x[0]", "thd": "x[1]", "tau": "u", "thdd": "xd[1]"}),
         ]
-        sensors, actuators = [Sensor("f", "measured", noise, RESOLUTION)], [Actuator("command", "u", self.limit)]
+        sensors, actuators = (
+            [Sensor("f", "measured", noise, RESOLUTION)],
+            [Actuator("command", "u", float(self.motor.torque))],
+        )
         loop = Loop(plant, law, {"x": "xd"}, sensors, actuators)
         scenarios = [
             Scenario(
@@ -142,9 +140,8 @@ def fixed(bench: Bench) -> Figure:
     lines = {f"{start:g} to {goal:g} N": run for (start, goal), run in zip(STEPS, forces.T, strict=True)}
     return Figure(
         "10.2", "Force steps with gains tuned at 30 N",
-        "Ideal at 30 N, underdamped below.",
-        f"Damping ratios {', '.join(f'{ratio:.2f}' for ratio in ratios)} at {_forces()} N, overshoots "
-        f"{', '.join(f'{share:.1%}' for share in beyond)}. The text calls both sides underdamped.",
+        "Ideal at 30 N, underdamped below.", f"Damping ratios {listed(ratios, '.2f')} at {_forces()} N, overshoots "
+        f"{listed(beyond, '.1%')}. The text calls both sides underdamped.",
         bool(np.all(np.diff(ratios) > 0) and beyond[0] > beyond[1] and beyond[-1] <= beyond[1]),
         curves(_times(), lines, "t [s]", "tendon force [N]"),
     )  # fmt: skip
@@ -169,11 +166,11 @@ def measured(bench: Bench) -> Figure:
     """Figure 10.4, simulated: the same with noise and with friction that is known only in part."""
     runs = [bench.steps(gains, compensated=KNOWN, noise=NOISE) for gains in bench.both_gains()]
     errors = [np.abs(forces - STEPS[:, 1]).mean(axis=0) * 1e3 * DURATION for forces in runs]
-    listed = [", ".join(f"{each:.0f}" for each in error) for error in errors]
+    sums = [listed(error, ".0f") for error in errors]
     return Figure(
         "10.4", f"Figure 10.3 with noise of {NOISE:g} N and {KNOWN:.0%} of the friction compensated",
         "In the experiments scheduled gains are better than fixed ones in all cases.",
-        f"The error sums up to {listed[1]} N ms with scheduled and to {listed[0]} N ms with fixed gains, at {_forces()} N.",
+        f"The error sums up to {sums[1]} N ms with scheduled and to {sums[0]} N ms with fixed gains, at {_forces()} N.",
         bool(np.all(errors[1] <= 1.001 * errors[0])), _shares(runs),
     )  # fmt: skip
 
@@ -200,23 +197,20 @@ def state_dependent(bench: Bench) -> Figure:
         "state-dependent": Block("sdre_tendon", {"theta": "x[0]", "thd": "x[1]", "theta_des": "goal", "u": "command"}),
         "fixed": Block(
             "pole_placement_law",
-            {
-                "K": "K_rest", "x": ("x", "zeros[0:2]"), "x_des": ("goal", "zeros"), "u_des": "hold", "u": "command",
-            },
+            {"K": "K_rest", "x": ("x", "zeros[0:2]"), "x_des": ("goal", "zeros"), "u_des": "hold", "u": "command"},
         ),
     }  # fmt: skip
     forces = {}
     for name, law in laws.items():
-        loop = Loop([Block("plant_tendon")], [law], {"x": "xd"}, actuators=[Actuator("command", "u", late=False)])
-        (trace,) = simulate(bench.library, loop, [Scenario(values, TICKS, inputs)], ["x"])
+        trace = run(bench.library, [Block("plant_tendon")], [law], Scenario(values, TICKS, inputs))
         forces[name] = bench.force(trace["x"][:, 0])
     apart = float(np.abs(forces["state-dependent"] - forces["fixed"]).max())
     return Figure(
         "14.3", "State-dependent and fixed optimal gains on a tendon's force",
         "The two are hardly distinguishable.",
         f"They are {apart:.2g} N apart at most. Computed without delay, as printed; "
-        f"with that, the law of table 14.1 is {clock.reason}.",
-        apart < 0.5, curves(_times(), forces, "t [s]", "tendon force [N]", "-", "--"),
+        f"with that, the law of table 14.1 is {clock.reason}.", apart < 0.5,
+        curves(_times(), forces, "t [s]", "tendon force [N]", "-", "--"),
     )  # fmt: skip
 
 
@@ -239,4 +233,4 @@ def _times() -> Array:
 
 
 def _forces() -> str:
-    return ", ".join(f"{force:g}" for force in STEPS[:, 1])
+    return listed(STEPS[:, 1], "g")

@@ -12,8 +12,7 @@ import numpy as np
 
 from awiwi_gen.hand import Hand, Wrist
 from awiwi_gen.results import Figure, curves
-
-Array = np.ndarray[Any, Any]
+from awiwi_gen.simulate import Array
 
 FLEXION, ABDUCTION = np.radians(30.0), np.radians(20.0)
 EXACT = 1e-15  # m; what "numerical inaccuracies" may mean for lengths of some centimetres
@@ -34,13 +33,10 @@ def bars(library: Any, wrist: Wrist) -> Figure:
     errors = bar_errors(library, wrist, *motion(library, wrist)).max(axis=-1)
     labels = "step of the motion", "largest error of a bar's length [m]"
     return Figure(
-        number="6.9",
-        title="Errors of the six distances between the points of the wrist",
-        claim="The distances stay constant up to rounding.",
-        found=f"Within {worst:.0e} m over the whole range of the wrist.",
-        holds=bool(worst < EXACT),
-        draw=curves(np.arange(len(errors)), errors, *labels, ylim=(0, 1.5 * worst)),
-    )
+        "6.9", "Errors of the six distances between the points of the wrist",
+        "The distances stay constant up to rounding.", f"Within {worst:.0e} m over the whole range of the wrist.",
+        bool(worst < EXACT), curves(np.arange(len(errors)), errors, *labels, ylim=(0, 1.5 * worst)),
+    )  # fmt: skip
 
 
 def displacements(library: Any, wrist: Wrist) -> Figure:
@@ -58,16 +54,12 @@ def displacements(library: Any, wrist: Wrist) -> Figure:
         axes.set(xlabel="step of the motion: flexion, then abduction", ylabel="tendon displacement [mm]")
 
     return Figure(
-        number="6.10",
-        title="Tendon displacements that a wrist motion causes",
-        claim="Flexion hardly moves the tendons, abduction moves them in proportion to their distance from the median.",
-        found=(
-            f"Flexion moves them by up to {np.abs(flexing).max() * 1e3:.2f} mm, abduction {ratio:.1f} times as far; the "
-            f"correlation with the distance is at least {linear:.3f} in each layer."
-        ),
-        holds=bool(ratio > 5 and linear > 0.99),
-        draw=draw,
-    )
+        "6.10", "Tendon displacements that a wrist motion causes",
+        "Flexion hardly moves the tendons, abduction moves them in proportion to their distance from the median.",
+        f"Flexion moves them by up to {np.abs(flexing).max() * 1e3:.2f} mm, abduction {ratio:.1f} times as far; the "
+        f"correlation with the distance is at least {linear:.3f} in each layer.", bool(ratio > 5 and linear > 0.99),
+        draw,
+    )  # fmt: skip
 
 
 def layers(wrist: Wrist) -> list[tuple[Array, Array]]:

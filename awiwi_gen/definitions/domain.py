@@ -1,0 +1,25 @@
+"""Where results exist, for kernels whose formulas do not ask: one expression per condition, positive where it holds."""
+
+from typing import Any
+
+import sympy
+from sympy import Expr, Matrix
+
+from awiwi_gen.definitions.kinematics import joint_angles
+
+
+def loops_close(finger: Any, q: Matrix, *_: Matrix) -> list[Expr]:
+    """For every four-bar of a finger, how far its diagonal is from the longest and the shortest, by the law of cosines."""
+    guards = []
+    for link, angle in zip(finger.links, joint_angles(finger, q).values(), strict=True):
+        bar = link.four_bar
+        if bar is not None:
+            crank = angle + bar.reference
+            squared = bar.ground**2 + bar.crank**2 - 2 * bar.ground * bar.crank * sympy.cos(crank)
+            guards.append(1 - ((bar.coupler**2 + bar.rocker**2 - squared) / (2 * bar.coupler * bar.rocker)) ** 2)
+    return guards
+
+
+def within_travel(motor: Any, theta: Matrix, *_: Matrix) -> list[Expr]:
+    """Whether the motor's angle is within its travel, with a margin of 1 / 256."""
+    return [1 - (theta[0] / (motor.travel * sympy.Rational(257, 256))) ** 2]

@@ -1,0 +1,44 @@
+"""The libraries that a small install lacks, and the error that says how to get them.
+
+`pip install awiwi_gen` brings what loads and calls generated C. The extras in `pyproject.toml` bring the rest.
+"""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+
+from awiwi_gen.errors import MissingExtraError
+
+ORDER = ("cli", "generate", "studies")  # each includes those before it
+# The module, the package that has it, and the extra that installs it.
+EXTRAS = {
+    "casadi": ("casadi", "generate"),
+    "flint": ("python-flint", "generate"),
+    "jinja2": ("jinja2", "generate"),
+    "pydantic": ("pydantic", "cli"),
+    "sympy": ("sympy", "generate"),
+    "tree_sitter": ("tree-sitter", "generate"),
+    "tree_sitter_toml": ("tree-sitter-toml", "generate"),
+    "typer": ("typer", "cli"),
+    "matplotlib": ("matplotlib", "studies"),
+    "scipy": ("scipy", "studies"),
+}
+COMMAND_LINE = ("typer", "pydantic")  # Typer imports pydantic
+HAND = ("pydantic", "tree_sitter", "tree_sitter_toml")  # to read a hand file
+GENERATE = ("casadi", "flint", "jinja2", "sympy", *HAND)  # to derive, emit and prove
+
+
+def require(purpose: str, *modules: str) -> None:
+    """Raise MissingExtraError, naming every package that is missing, unless all modules are installed."""
+    if absent := missing(purpose, *modules):
+        raise MissingExtraError(absent)
+
+
+def missing(purpose: str, *modules: str) -> str:
+    """The sentence about those modules that are not installed, or nothing."""
+    absent = [EXTRAS[module] for module in modules if find_spec(module) is None]
+    packages = [package for package, _ in absent]
+    extra = max((extra for _, extra in absent), key=ORDER.index, default="")
+    listed = " and ".join([", ".join(packages[:-1])] * (len(packages) > 1) + packages[-1:])
+    them = "it" if len(packages) == 1 else "them"
+    return f"{purpose} needs {listed}; install {them}: pip install 'awiwi_gen[{extra}]'" if absent else ""

@@ -1,0 +1,30 @@
+"""Where results exist, for kernels whose formulas do not ask: one expression per condition, positive where it holds."""
+
+from typing import Any
+
+import casadi as ca
+from casadi import SX
+
+from awiwi_gen.structure import coordinates, leaders, radius
+
+
+def loops_close(finger: Any, q: SX, *_: SX) -> list[SX]:
+    """For every four-bar of a finger, the squared area of its triangle by its sides (Heron), relative to the largest."""
+    place, leader, guards = coordinates(finger), leaders(finger), []
+    for link in finger.links:
+        bar = link.four_bar
+        if bar is not None:
+            angle = q[place[link.joint]]
+            if link.joint in leader:
+                angle = angle * radius(finger, leader[link.joint]) / radius(finger, link.joint)
+            end = bar.crank * ca.cos(angle + bar.reference), bar.crank * ca.sin(angle + bar.reference)
+            squared = (bar.ground - end[0]) ** 2 + end[1] ** 2
+            longest, shortest = (bar.coupler + bar.rocker) ** 2, (bar.coupler - bar.rocker) ** 2
+            guards.append((longest - squared) * (squared - shortest) / (2 * bar.coupler * bar.rocker) ** 2)
+    return guards
+
+
+def within_travel(motor: Any, theta: SX, *_: SX) -> list[SX]:
+    """Whether the motor's angle is within its travel, with a margin of 1 / 256, from both ends."""
+    share = theta / (motor.travel + motor.travel / 256)
+    return [(1 - share) * (1 + share)]
