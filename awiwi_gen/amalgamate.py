@@ -21,6 +21,7 @@ BANNER = "/* All kernels in one file, made by awiwi-gen amalgamate; do not edit.
 # clang reports inline functions that are not used only outside of headers, where they stood.
 QUIET = '#ifdef __clang__\n#pragma clang diagnostic ignored "-Wunused-function"\n#endif\n'
 HEADER, SOURCE = "awiwi.h", "awiwi.c"
+PUBLIC = (HEADER, "params.h", "self_test.h")  # what the one header holds
 INCLUDE = re.compile(r'^#include "([^"]+)"\n', re.M)
 SKIPPED = r'/\*.*?\*/|//[^\n]*|"(?:\\.|[^"\\\n])*"'
 TOKEN = re.compile(rf"{SKIPPED}|(?P<access>\.|->)?\b(?P<name>[A-Za-z_]\w*)", re.S)
@@ -41,7 +42,7 @@ def amalgamate(directory: Path) -> dict[str, str]:
     if "kernels.h" not in files:
         raise InputError(f"{directory} has no kernels.h; expected a generated directory, see awiwi-gen generate")
     sources = {name: text for name, text in files.items() if name.endswith(".c")}
-    public = _ordered(HEADER, files)
+    public = list(dict.fromkeys(h for name in PUBLIC if name in files for h in _ordered(name, files)))
     private = [name for text in sources.values() for name in _ordered_includes(text, files)]
     bodies = [body for name in {*public, *private} for body in STRUCT.findall(files[name])]
     members = {match["name"] for body in bodies for match in TOKEN.finditer(body)}

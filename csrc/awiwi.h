@@ -7,6 +7,7 @@
 #include "awiwi_regulators.h"
 #include "awiwi_simulate.h"
 #include "awiwi_solvers.h"
+#include "awiwi_version.h"
 #include "kernels.h"
 
 #endif

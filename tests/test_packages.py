@@ -127,7 +127,7 @@ def installed(tree, tmp_path_factory) -> Path:
 def test_cmake_finds_the_package(installed, driver, tmp_path):
     folder, expected = driver
     (tmp_path / "CMakeLists.txt").write_text(
-        "cmake_minimum_required(VERSION 3.15)\nproject(user C)\nfind_package(awiwi 1 REQUIRED)\n"
+        "cmake_minimum_required(VERSION 3.15)\nproject(user C)\nfind_package(awiwi 2 REQUIRED)\n"
         f"add_executable(user {HERE / 'run.c'} {folder / 'table.c'})\n"
         f"target_include_directories(user PRIVATE {folder})\ntarget_link_libraries(user PRIVATE awiwi::awiwi)\n"
     )

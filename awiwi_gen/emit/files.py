@@ -11,7 +11,7 @@ import jinja2
 import numpy as np
 
 from awiwi_gen.emit.c import CFunction
-from awiwi_gen.emit.names import C99_SIGNIFICANT, function_name, short_name
+from awiwi_gen.emit.names import C99_SIGNIFICANT, OWN_NAMES, function_name, short_name
 from awiwi_gen.emit.options import Options
 from awiwi_gen.ir.elementary import OWN, numbers
 from awiwi_gen.ir.trig import constants
@@ -144,8 +144,7 @@ def scalar_files(options: Options) -> dict[str, str]:
 
 def aliases(prefix: str, functions: Sequence[CFunction]) -> list[tuple[str, str]]:
     """The external names that are too long for C99's 31 characters, with their short names."""
-    own = [f"{prefix}_model_digest", f"{prefix}_default_numbers"]
-    names = [*own, *(function_name(prefix, function.name) for function in functions)]
+    names = [function_name(prefix, name) for name in (*OWN_NAMES, *(function.name for function in functions))]
     return [(name, short_name(name)) for name in names if len(name) > C99_SIGNIFICANT]
 
 

@@ -28,7 +28,7 @@ from awiwi_gen.pipeline import Job, cached_tree
 from .board import run_board
 from .driver import golden_inputs, python_digests, write_driver
 from .figures import Figures, compare, measure, read_table, write_table
-from .programs import Run, TargetError, kernel_objects, run_kernels
+from .programs import SELF_TEST, Run, TargetError, kernel_objects, run_kernels
 from .toolchains import REFERENCE, ROOT, TARGETS, Target, missing_packages, version
 
 
@@ -64,9 +64,8 @@ def main() -> int:
             selected = [t for t in targets if everything or "-O2" in t.flags]
             for target, result in run_all(Job(hand, Options(scalar), chosen.only), selected).items():
                 column = f"{target.name} {scalar}"
-                print(
-                    f"{column}: {len(result.runs)} kernels, {'FAILED' if result.faults else 'equal bits'}", flush=True
-                )
+                good = "the self-test sees it" if target.damaged else "equal bits"
+                print(f"{column}: {len(result.runs) - 1} kernels, {'FAILED' if result.faults else good}", flush=True)
                 faults += [f"{column}: {fault}" for fault in result.faults]
                 if result.figures:
                     table[column], compilers[column] = result.figures, version(target.compiler)
@@ -92,9 +91,8 @@ def run_all(job: Job, targets: list[Target]) -> dict[Target, Result]:
 
     def run(target: Target) -> Result:
         runs = run_kernels(generated, driver, target)
-        different = [name for name in expected if runs[name].digest != expected[name]]
-        faults = [f"{name}: bits differ from those of the verified library" for name in different]
-        if not target.emulator:
+        faults = judge_bits(runs, expected, target)
+        if not target.measured:
             return Result(runs, {}, faults)
         objects = kernel_objects(generated, target)
         size = target.compiler.removesuffix("gcc") + "size"
@@ -103,6 +101,19 @@ def run_all(job: Job, targets: list[Target]) -> dict[Target, Result]:
 
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         return dict(zip(targets, pool.map(run, targets), strict=True))
+
+
+def judge_bits(runs: dict[str, Run], expected: dict[str, str], target: Target) -> list[str]:
+    """Kernels whose bits differ from those expected; of a damaged build, that the self-test did not see it."""
+    different = [name for name in expected if runs[name].digest != expected[name]]
+    if target.damaged:
+        return [] if SELF_TEST in different else ["the self-test passes, although the build computes something else"]
+    return [
+        f"{name}: fails on kernel {int(runs[name].digest, 16)} of self_test.c"
+        if name == SELF_TEST
+        else f"{name}: bits differ from those of the verified library"
+        for name in different
+    ]
 
 
 def judge(compilers: dict[str, str], table: dict[str, dict[str, Figures]], accept: bool) -> list[str]:

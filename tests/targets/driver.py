@@ -17,7 +17,7 @@ import numpy as np
 from awiwi_gen.pipeline import Job
 from awiwi_gen.verify.samples import draw
 
-from .programs import EMPTY
+from .programs import EMPTY, SELF_TEST
 
 Array = np.ndarray[Any, Any]
 ORDINARY = (0, 1, 2, 3, 5, 8, 16, 21)  # straight, lower and upper limits, corners, the inside of the ranges
@@ -64,7 +64,7 @@ def write_driver(directory: Path, manifest: Mapping[str, Any], inputs: Mapping[s
     text = "\n\n".join(['#include "run.h"', *parts, f"const struct kernel kernels[] = {{\n{table},\n}};"])
     most_in = max(array.shape[1] for array in inputs.values())
     most_out = max(_size(entry["outputs"]) for entry in manifest["kernels"])
-    header = HEADER.format(word=word, rows=len(first), inputs=most_in, outputs=most_out)
+    header = HEADER.format(word=word, rows=len(first), inputs=most_in, outputs=most_out, prefix=manifest["prefix"])
     directory.mkdir(parents=True, exist_ok=True)
     (directory / "run.h").write_text(header)
     path = directory / "table.c"
@@ -92,6 +92,9 @@ struct kernel {{
 
 extern const struct kernel kernels[];
 extern const int kernel_count;
+
+int {prefix}_self_test(const char **failed);
+#define SELF_TEST {prefix}_self_test
 
 #endif
 """
@@ -124,8 +127,8 @@ def _wrapper(name: str, entry: Mapping[str, Any], prefix: str) -> str:
 
 
 def python_digests(library: Any, inputs: Mapping[str, Array]) -> dict[str, str]:
-    """The digests that the driver prints, computed from the library that Python loads."""
-    made = {}
+    """The digests that the driver prints, computed from the library that Python loads; 0 of the self-test."""
+    made = {SELF_TEST: f"{0:016x}"}
     for entry in library.manifest["kernels"]:
         rows = inputs[entry["name"]]
         arrays, offset = [], 0

@@ -11,7 +11,7 @@ from dataclasses import astuple, dataclass
 from functools import cache
 from pathlib import Path
 
-from .programs import Run, run_tool
+from .programs import CSRC, Run, run_tool
 from .toolchains import HERE
 
 TABLE = HERE / "figures.tsv"
@@ -75,7 +75,7 @@ class CallGraph:
 def measure(
     prefix: str, runs: Mapping[str, Run], objects: Sequence[Path], size: str
 ) -> tuple[dict[str, Figures], list[str]]:
-    """Figures by kernel, and by hand-written file as ``csrc/riccati``; and the kernels that used more stack than that.
+    """Figures by kernel, by hand-written file as ``csrc/riccati``, and of the self-test; and the kernels that used more stack than that.
 
     ``size`` is the binutils program of the target.
     """
@@ -89,7 +89,7 @@ def measure(
             if runs[name].stack > stack:
                 faults.append(f"{name} used {runs[name].stack} bytes of stack; its call graph has {stack}")
         elif code + constants:
-            figures[f"csrc/{name}"] = Figures(code, constants, 0, 0)
+            figures[f"csrc/{name}" if (CSRC / f"{name}.c").exists() else name] = Figures(code, constants, 0, 0)
     return figures, faults
 
 

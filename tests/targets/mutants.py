@@ -30,8 +30,8 @@ import awiwi_gen
 from awiwi_gen.pipeline import Job, cached_tree
 
 from .driver import golden_inputs, write_driver
-from .programs import CSRC, FLAGS, compile_all, run_tool
-from .toolchains import HERE, ROOT, Target
+from .programs import CSRC, compile_all, run_tool
+from .toolchains import HERE, ROOT, STRICT, Target
 
 Array = np.ndarray[Any, Any]
 HOST = Target("x86-64 gcc -O1", "gcc", ("-O1",))
@@ -116,7 +116,7 @@ class Bench:
             source, made = Path(scratch) / mutant.path.name, Path(scratch) / "mutant.o"
             source.write_text(mutant.text, encoding="utf-8")
             options = ("-O1", SANITIZERS, "-fno-sanitize-recover=all")
-            command = ["gcc", *FLAGS, *options, *(f"-I{folder}" for folder in self.includes), "-c", source, "-o", made]
+            command = ["gcc", *STRICT, *options, *(f"-I{folder}" for folder in self.includes), "-c", source, "-o", made]
             if subprocess.run(command, capture_output=True, check=False).returncode:
                 return False
             return self.run(mutant.path, made) == self.expected

@@ -11,12 +11,13 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from .toolchains import BOARD, FLAGS, HERE, ROOT, SHIFT, Target, version
+from .toolchains import BOARD, HERE, ROOT, SHIFT, Target, version
 
 CSRC = ROOT / "csrc"
 OBJECTS = ROOT / "build" / "targets" / "objects"
 PATIENCE = 300  # seconds; emulated kernels take a few
 EMPTY = "(empty)"  # the driver's kernel that does nothing
+SELF_TEST = "(self-test)"  # the driver's line with the result of the boot self-test
 
 
 class TargetError(Exception):
@@ -52,9 +53,8 @@ def _digest_of(path: Path) -> bytes:
 def compile_object(source: Path, includes: Sequence[Path], target: Target) -> Path:
     """The object of a C file for a target; beside it its call graph with stack sizes (.ci), which gcc writes."""
     headers = sorted(path for folder in includes for path in folder.glob("*.h"))
-    command = [target.compiler, *FLAGS, *target.flags, *(f"-I{folder}" for folder in includes)]
-    graphs = bool(target.emulator)  # the targets whose stack the table has; all of them compile with gcc
-    if graphs:
+    command = [target.compiler, *target.language, *target.flags, *(f"-I{folder}" for folder in includes)]
+    if target.measured:
         command.append("-fcallgraph-info=su")
     key = hashlib.sha256("\0".join([*command, version(target.compiler), source.name]).encode())
     for path in (source, *headers):
@@ -64,7 +64,7 @@ def compile_object(source: Path, includes: Sequence[Path], target: Target) -> Pa
         OBJECTS.mkdir(parents=True, exist_ok=True)
         partial = made.with_suffix(f".{os.getpid()}.o")
         run_tool(*command, "-c", source, "-o", partial)
-        if graphs:
+        if target.measured:
             partial.with_suffix(".ci").replace(made.with_suffix(".ci"))
         partial.replace(made)
     return made

@@ -1,5 +1,6 @@
 /* Runs every kernel of the table on its golden inputs; prints a digest of the output bits and, on bare metal, what the
-   call cost. One line per kernel: name, digest, executed instructions in units of the timer, bytes of stack. */
+   call cost. One line per kernel: name, digest, executed instructions in units of the timer, bytes of stack. The last line
+   has the result of the boot self-test in place of a digest: 0, or which kernel failed. */
 #include "run.h"
 
 #include <stdint.h>
@@ -104,6 +105,15 @@ static void show_hex(uint64_t value, int digits)
     show(text);
 }
 
+static void show_line(const char *name, uint64_t digest, uint32_t time, uint32_t stack)
+{
+    show(name);
+    show_hex(digest, 16);
+    show_hex(time, 8);
+    show_hex(stack, 8);
+    show("\n");
+}
+
 static int run(const struct kernel *kernel)
 {
     static awiwi_real in[MOST_INPUTS], out[MOST_OUTPUTS + MARGIN];
@@ -126,11 +136,9 @@ static int run(const struct kernel *kernel)
         const uint32_t depth = deepest(kernel, in, out);
         stack = depth > stack ? depth : stack;
     }
-    show(kernel->name);
-    show_hex(digest, 16);
-    show_hex(worst, 8);
-    show_hex(stack, 8);
-    show(whole ? "\n" : " writes outside its outputs\n");
+    show_line(kernel->name, digest, worst, stack);
+    if (!whole)
+        show("writes outside its outputs\n");
     return whole;
 }
 
@@ -140,5 +148,6 @@ int main(void)
     start();
     for (int i = 0; i < kernel_count; i++)
         whole &= run(&kernels[i]);
+    show_line("(self-test)", (uint64_t)SELF_TEST(0), 0, 0);
     return !whole;
 }
