@@ -3,7 +3,7 @@
 # make check  is generated/ fresh?   make bench  us and the peers, side by side
 # make report the figures of the source, computed again, with all proofs: build/report/index.html
 # make torture  hours: 10 000 mutated hand files, 200 random hands, 10 000 damaged caches, 200 kills
-# make firmware  every kernel on every target: equal bits, committed figures (ACCEPT=1 writes them, ALL=1: more)
+# make firmware  every kernel on every target: equal bits, committed figures (ACCEPT=1 writes them, ALL=1: more, QUICK=1: what CI runs)
 # make analysis  gcc -fanalyzer, clang-tidy and cppcheck: no finding without a reason
 # make mutants  change one operator or constant of csrc/ at a time (COUNT=60: some of them); hours for all
 # make clean  remove what make made (generated/ stays: it is checked in)
@@ -46,7 +46,7 @@ bench: .venv/installed .venv-bench/installed
 	@$(BIN)/python -m bench
 
 firmware: .venv/installed
-	@$(BIN)/python -m tests.targets $(if $(ACCEPT),--accept) $(if $(ALL),--all)
+	@$(BIN)/python -m tests.targets $(if $(ACCEPT),--accept) $(if $(ALL),--all) $(if $(QUICK),--quick)
 
 analysis: .venv/installed
 	@$(BIN)/python -m tests.targets.analysis

@@ -281,7 +281,8 @@ static awiwi_real reach(const task *s, const vector f, const vector step, int *s
    steps left. */
 static int take(const task *s, const vector step, awiwi_real most, int *steps, vector f, model *here, int *stopped)
 {
-    for (awiwi_real share = reach(s, f, step, stopped); share > 0; share /= 2, *stopped = -1) {
+    awiwi_real share = reach(s, f, step, stopped);
+    while (share > 0) {
         vector trial;
         model there;
         for (int i = 0; i < s->count; i++)
@@ -296,6 +297,8 @@ static int take(const task *s, const vector step, awiwi_real most, int *steps, v
         }
         if (--*steps <= 0)
             break;
+        share /= 2;
+        *stopped = -1;
     }
     return AWIWI_NOT_CONVERGED;
 }

@@ -206,6 +206,8 @@ def test_keywords_macros_and_our_own_identifiers_are_kernels_that_compile_or_are
         ("int8", "t", "int8_t is taken by the C or C++ standard"),
         ("own", "dense", "dense.c would collide with csrc/dense.c"),
         ("own", "model", "model.c would collide with model.c"),
+        ("own", "self_test", "self_test.c would collide with self_test.c"),
+        ("own", "api_version", "own_api_version is taken by kernels.h"),
         ("own", "a b", "not a usable name"),
         ("own", "threads", "kernel 'threads': Python or the Python interface has this name"),
         ("own", "lambda", "kernel 'lambda': Python or the Python interface has this name"),

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import subprocess
 from pathlib import Path
 
 import pytest
-from samples import ONE_FINGER
+from commands import ONE_FINGER
 from targets.driver import golden_inputs, python_digests, write_driver
 from targets.programs import run_tool
 from targets.toolchains import HERE
@@ -16,12 +17,22 @@ from targets.toolchains import HERE
 import awiwi_gen
 from awiwi_gen.amalgamate import BANNER, amalgamate, write
 from awiwi_gen.build import load
+from awiwi_gen.emit.options import Options
 from awiwi_gen.errors import InputError, OutputError
 from awiwi_gen.pipeline import Job, cached_tree
 from awiwi_gen.resources import CSRC
 
 STRICT = ["-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wdouble-promotion", "-Wshadow", "-Werror"]
-MAIN = '#include "awiwi.h"\nint main(void) { return claw_model_digest[0] == 0; }\n'
+MAIN = """#include "awiwi.h"
+%s
+int main(void)
+{
+    const char *failed;
+    return claw_api_version != AWIWI_API_VERSION || claw_self_test(&failed) || claw_model_digest[0] == 0;
+}
+"""
+ONE, MANY = MAIN % "", MAIN % '#include "self_test.h"'  # of an amalgamation, of a generated directory
+VERSION = ".".join(re.findall(r"define AWIWI_API_[A-Z]+ (\d+)", (CSRC / "awiwi_version.h").read_text()))
 
 
 @pytest.fixture(scope="module")
@@ -85,8 +96,31 @@ def test_the_driver_notices_a_change_in_one_number(job, tree, driver):
 
 
 def test_one_header_is_cpp_as_well(one, tmp_path):
-    (tmp_path / "main.cpp").write_text(MAIN)
+    (tmp_path / "main.cpp").write_text(ONE)
     run_tool(need("g++"), "-std=c++98", *STRICT, "-fsyntax-only", f"-I{one}", tmp_path / "main.cpp")
+
+
+@pytest.mark.parametrize("options", [Options("f32"), Options(params="runtime"), Options(math="libm")], ids=str)
+def test_one_file_of_every_variant_finds_itself_sound(options, job, tmp_path):
+    write(cached_tree(Job(job.hand, options, "jaw_*")), tmp_path)
+    (tmp_path / "main.c").write_text(ONE)
+    run_tool("gcc", "-std=c99", "-O1", tmp_path / "main.c", tmp_path / "awiwi.c", "-lm", "-o", tmp_path / "main")
+
+    run_tool(tmp_path / "main")
+
+
+def test_a_part_of_the_kernels_is_a_firmware_of_its_own(job, tmp_path):
+    part = cached_tree(Job(job.hand, only="jaw_tendon_distribution"))
+    (tmp_path / "main.c").write_text(MANY)
+    sources = [tmp_path / "main.c", *sorted(part.glob("*.c")), *sorted(CSRC.glob("*.c"))]
+    run_tool("gcc", "-std=c99", *STRICT, f"-I{part}", f"-I{CSRC}", *sources, "-lm", "-o", tmp_path / "main")
+
+    assert {path.stem for path in part.glob("jaw_*.c")} == {
+        "jaw_tendon_distribution",
+        "jaw_tendon_stiffness",
+        "jaw_coupling",
+    }
+    run_tool(tmp_path / "main")
 
 
 def test_local_names_get_the_name_of_their_file_and_members_of_public_structs_stay(tree):
@@ -148,6 +182,39 @@ def test_pkg_config_finds_the_library(installed, driver, tmp_path):
     assert digests(tmp_path / "user") == expected
 
 
+def test_a_program_in_cpp_links_the_library_and_finds_it_sound(installed, tmp_path):
+    (tmp_path / "main.cpp").write_text(MANY)
+    library = next(installed.rglob("libawiwi.a"))
+    run_tool(
+        need("g++"), f"-I{installed}/include/awiwi", tmp_path / "main.cpp", library, "-lm", "-o", tmp_path / "user"
+    )
+
+    run_tool(tmp_path / "user")
+
+
+def test_cmake_builds_the_kernels_in_a_project_of_its_own(tree, tmp_path):
+    (tmp_path / "main.c").write_text(MANY)
+    (tmp_path / "CMakeLists.txt").write_text(
+        "cmake_minimum_required(VERSION 3.15)\nproject(user C)\n"
+        f"set(AWIWI_GENERATED {tree})\nadd_subdirectory({CSRC} awiwi)\n"
+        "add_executable(user main.c)\ntarget_link_libraries(user PRIVATE awiwi::awiwi)\n"
+    )
+    run_tool(need("cmake"), "-S", tmp_path, "-B", tmp_path / "build")
+    run_tool("cmake", "--build", tmp_path / "build", "-j2")
+
+    run_tool(tmp_path / "build" / "user")
+
+
+def test_packages_and_documents_have_the_version_of_the_header(installed):
+    pc = next(installed.rglob("awiwi.pc")).read_text()
+    latest = re.search(r"^## (.+)", (CSRC.parent / "docs" / "c_api.md").read_text(), re.M)
+
+    assert re.fullmatch(r"\d+\.\d+\.\d+", VERSION)
+    assert f"Version: {VERSION}\n" in pc
+    assert f'PACKAGE_VERSION "{VERSION}"' in next(installed.rglob("awiwiConfigVersion.cmake")).read_text()
+    assert latest[1] == VERSION
+
+
 def test_a_generated_directory_that_is_none_stops_cmake_with_the_fix(tmp_path):
     command = [need("cmake"), "-S", str(CSRC), "-B", str(tmp_path / "b"), f"-DAWIWI_GENERATED={tmp_path}"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -157,7 +224,7 @@ def test_a_generated_directory_that_is_none_stops_cmake_with_the_fix(tmp_path):
 
 
 def test_a_makefile_includes_the_fragment(tree, tmp_path):
-    (tmp_path / "main.c").write_text(MAIN)
+    (tmp_path / "main.c").write_text(MANY)
     (tmp_path / "Makefile").write_text(
         f"all: main\nAWIWI_GENERATED := {tree}\ninclude {CSRC}/awiwi.mk\n"
         "main: main.c $(AWIWI_OBJECTS)\n\t$(CC) $(AWIWI_CPPFLAGS) $^ -lm -o $@\n"

@@ -75,7 +75,8 @@ class CallGraph:
 def measure(
     prefix: str, runs: Mapping[str, Run], objects: Sequence[Path], size: str
 ) -> tuple[dict[str, Figures], list[str]]:
-    """Figures by kernel, by hand-written file as ``csrc/riccati``, and of the self-test; and the kernels that used more stack than that.
+    """Figures by kernel, by hand-written file as ``csrc/riccati``, and of the self-test; and what used more stack than
+    that.
 
     ``size`` is the binutils program of the target.
     """
