@@ -65,6 +65,11 @@ class Mutant:
         return self.path.name, self.before.strip(), self.after.strip()
 
 
+def mutated_files(pattern: str = "*.c") -> list[Path]:
+    """The C files of csrc that are changed: all but the simulator, which is no firmware."""
+    return [path for path in sorted(CSRC.glob(pattern)) if path.name != "simulate.c"]
+
+
 def mutants(path: Path) -> Iterator[Mutant]:
     """All changes of one operator or one whole number in a C file."""
     text = path.read_text(encoding="utf-8")
@@ -137,7 +142,7 @@ def main() -> int:
     parser.add_argument("--only", default="*.c", help="pattern of file names")
     chosen = parser.parse_args()
     bench = Bench()
-    every = [m for path in sorted(CSRC.glob(chosen.only)) if path.name != "simulate.c" for m in mutants(path)]
+    every = [mutant for path in mutated_files(chosen.only) for mutant in mutants(path)]
     if chosen.count:
         every = random.Random(chosen.count).sample(every, min(chosen.count, len(every)))  # noqa: S311 no secret
     with ThreadPoolExecutor(os.cpu_count()) as pool:
