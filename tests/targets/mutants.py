@@ -4,7 +4,8 @@ python -m tests.targets.mutants                every mutant
 python -m tests.targets.mutants --count 60     a fixed random choice of them
 
 A mutant is found where it does not compile, does not end, crashes, or changes a bit of an output of a kernel that
-iterates, on its golden inputs. One that survives must have a line in survivors.tsv that says why it changes no result.
+iterates, on its golden inputs, or of a solver or reader on those of problems.c. One that survives must have a line in
+survivors.tsv that says why it changes no result.
 Exit codes: 0 done, 1 a mutant survives without a reason.
 """
 
@@ -88,7 +89,7 @@ def _with_degenerate(rows: Array) -> Array:
 
 
 class Bench:
-    """The unchanged program, and the objects that a mutant is linked with."""
+    """The two unchanged programs, kernels and problems.c, and the objects that a mutant is linked with."""
 
     def __init__(self) -> None:
         job = Job(awiwi_gen.Hand.load())
@@ -101,19 +102,23 @@ class Bench:
         self.includes = (self.generated, CSRC, self.driver)
         needed = [*sorted(self.generated.glob("*.c")), HERE / "run.c", self.driver / "table.c"]
         self.sources = sorted(CSRC.glob("*.c"))
-        self.rest = compile_all(needed, self.includes, HOST)
+        self.kernels = compile_all(needed, self.includes, HOST)
+        self.problems = compile_all([HERE / "problems.c"], self.includes, HOST)
         self.objects = dict(zip(self.sources, compile_all(self.sources, self.includes, HOST), strict=True))
         self.expected = self.run(self.sources[0], self.objects[self.sources[0]])
 
     def run(self, path: Path, changed: Path) -> str | None:
-        """What the program prints with another object for one file; None where it crashes or does not end."""
+        """What both programs print with another object for one file; None where one crashes or does not end."""
         others = [made for source, made in self.objects.items() if source != path]
-        program = changed.with_suffix(".elf")
-        run_tool("gcc", SANITIZERS, *self.rest, *others, changed, "-lm", "-o", program)
-        try:
-            return subprocess.run([program], capture_output=True, text=True, check=True, timeout=LONGEST).stdout
-        except subprocess.SubprocessError:
-            return None
+        program, printed = changed.with_suffix(".elf"), ""
+        for main in (self.problems, self.kernels):
+            run_tool("gcc", SANITIZERS, *main, *others, changed, "-lm", "-o", program)
+            try:
+                done = subprocess.run([program], capture_output=True, text=True, check=True, timeout=LONGEST)
+            except subprocess.SubprocessError:
+                return None
+            printed += done.stdout
+        return printed
 
     def survives(self, mutant: Mutant) -> bool:
         """Whether a mutant compiles and prints the same."""
