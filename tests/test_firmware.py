@@ -22,7 +22,7 @@ MATH = {
     "sin", "cos", "sincos", "tan", "asin", "acos", "atan", "atan2", "sqrt", "exp", "log", "fabs", "fmin", "fmax",
     "ldexp", "frexp",
 }  # fmt: skip
-SILENT = {"memcpy", "memset", "memmove", "_GLOBAL_OFFSET_TABLE_"}  # what a C compiler may call without being asked
+SILENT = {"memcmp", "memcpy", "memset", "memmove", "_GLOBAL_OFFSET_TABLE_"}  # what a C compiler may call without being asked
 STRINGS = re.compile(r'/\*.*?\*/|"[^"\n]*"', re.DOTALL)
 
 

@@ -115,7 +115,7 @@ static double scaled(void)
     return pow(10, random_in(-6, 6));
 }
 
-/* Plants with modes that the input does not reach, costs of any rank and size, and costs that are negative by a little. */
+/* Plants with modes that the input does not reach; costs of any rank and size, or negative by a little. */
 static void regulator(int number)
 {
     const int n = 1 + number % 4, rank = number % (n + 1), cut = number % 5 < 2 ? number % n : n;
