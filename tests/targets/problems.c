@@ -115,6 +115,20 @@ static double scaled(void)
     return pow(10, random_in(-6, 6));
 }
 
+/* Another basis for the first and the last state: what the input does not reach is then zero up to rounding only. */
+static void turn(int n, double *A, double *b, double angle)
+{
+    const double c = cos(angle), s = sin(angle);
+    const int last = n - 1;
+    for (int k = 0; k < 2 * n + 1 && n > 1; k++) { /* rows of [A b], then columns of A */
+        double *x = k < n ? A + k : k == n ? b : A + (k - n - 1) * n;
+        double *y = k < n ? x + last * n : x + last;
+        const double first = *x;
+        *x = c * first - s * *y;
+        *y = s * first + c * *y;
+    }
+}
+
 /* Plants with modes that the input does not reach; costs of any rank and size, or negative by a little. */
 static void regulator(int number)
 {
@@ -134,6 +148,10 @@ static void regulator(int number)
             A[i * n + j] = 0;
         A[i * n + i] -= 3 * (number % 3);
     }
+    if (number % 2)
+        turn(n, A, b, random_in(0, 3));
+    for (int i = 0; number % 37 == 1 && i < n; i++)
+        b[i] *= 1e-200; /* costs overflow */
     if (number % 9 == 0)
         Q[n * n - 1] -= pow(10, random_in(-18, 0));
     if (number % 29 == 0)
