@@ -185,7 +185,9 @@ def check(
 
 
 @command()
-def amalgamate(directory: Path = GENERATED, output: Output = Path("build/one"), as_json: Json = False) -> None:
+def amalgamate(
+    directory: Annotated[Path, typer.Argument()] = GENERATED, output: Output = Path("build/one"), as_json: Json = False
+) -> None:
     """Write all C of the directory as one header and one C file, awiwi.h and awiwi.c in the output directory."""
     from awiwi_gen.amalgamate import run
 

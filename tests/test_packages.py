@@ -8,7 +8,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from samples import ONE_FINGER
+from commands import ONE_FINGER
 from targets.driver import golden_inputs, python_digests, write_driver
 from targets.programs import run_tool
 from targets.toolchains import HERE

@@ -10,7 +10,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from samples import ONE_FINGER, points
+from commands import ONE_FINGER
+from samples import ONE_FINGER as TEXT
+from samples import points
 
 import awiwi_gen
 from awiwi_gen.build import load
@@ -22,7 +24,6 @@ from awiwi_gen.parameters import numbers_file
 from awiwi_gen.pipeline import Job, cached_tree, verify
 
 RUNTIME = Options(params="runtime")
-TEXT = ONE_FINGER.read_text(encoding="utf-8")
 STATUS = (
     "ok", "too short", "bad magic", "bad version", "bad size", "bad crc", "wrong scalar", "wrong model", "wrong count",
     "not finite", "out of range", "unusable",
@@ -240,7 +241,7 @@ def test_the_command_writes_the_file_and_lists_the_numbers(tree, tmp_path, capsy
     from awiwi_gen.__main__ import app
 
     target = tmp_path / "finger.bin"
-    words = ["params", "--hand", str(ONE_FINGER), "--generated", str(tree)]
+    words = ["params", "--hand", ONE_FINGER, "--generated", str(tree)]
     done = CliRunner().invoke(app, [*words, "-o", str(target), "--json"])
     listed = CliRunner().invoke(app, words)
 
