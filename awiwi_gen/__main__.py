@@ -110,14 +110,15 @@ def make_job(
     params: Params = Params.baked,
     only: str = "*",
     math: Math = Math.own,
+    read: Any = None,
 ) -> Any:
-    """A job from command-line options. Raises InputError where the pattern matches no kernel."""
+    """A job from options and the hand, if it was read before. Raises InputError where the pattern matches no kernel."""
     from awiwi_gen.emit.options import Options
     from awiwi_gen.hand import Hand
     from awiwi_gen.pipeline import Job
     from awiwi_gen.report import Progress
 
-    job = Job(Hand.load(hand), Options(scalar.value, params.value, math.value), only, progress=Progress())
+    job = Job(read or Hand.load(hand), Options(scalar.value, params.value, math.value), only, progress=Progress())
     if only != "*" and not fnmatch.filter([kernel.name for kernel in job.catalog], only):
         raise InputError(
             f"--only {only}: {why_absent(job.hand, only) or f'no kernel has such a name; see {listing(hand)}'}"
@@ -167,8 +168,8 @@ def check(
     from awiwi_gen.pipeline import state
     from awiwi_gen.report import counted, print_json, print_left_out, state_lines
 
-    job = make_job(hand, scalar, params, only, math)
-    warnings = Hand.review(hand)[1]
+    read, warnings = Hand.review(hand)
+    job = make_job(hand, scalar, params, only, math, read)
     absent = left_out_names(job.hand)
     found = state(job, output)
     if as_json:
@@ -185,7 +186,9 @@ def check(
 
 
 @command()
-def amalgamate(directory: Path = GENERATED, output: Output = Path("build/one"), as_json: Json = False) -> None:
+def amalgamate(
+    directory: Annotated[Path, typer.Argument()] = GENERATED, output: Output = Path("build/one"), as_json: Json = False
+) -> None:
     """Write all C of the directory as one header and one C file, awiwi.h and awiwi.c in the output directory."""
     from awiwi_gen.amalgamate import run
 

@@ -35,7 +35,7 @@ def derivations(kernels: Sequence[Kernel], records: Mapping[str, Record]) -> dic
 
 
 def numbers_of(hand: Hand, kernels: Sequence[Kernel], records: Mapping[str, Record]) -> Numbers | None:
-    """The numbers that kernels read, in the order of the hand file; None if there are none."""
+    """The numbers that kernels or their callers read, in the order of the hand file; None if there are none."""
     derived, paths, zeros = derivations(kernels, records), set[str](), set[str]()
     for kernel in kernels:
         record = records[kernel.name]
@@ -43,7 +43,8 @@ def numbers_of(hand: Hand, kernels: Sequence[Kernel], records: Mapping[str, Reco
         zeros |= {f"{kernel.path}.{path}".lstrip(".") for path in record.zeros}
         if kernel.solver is not None:
             paths |= {f"{kernel.path}.{path}" for each in kernel.solver.limits.values() for path in each if path}
-    quantities = {path: quantity for path, quantity in hand.quantities().items() if path in paths}
+    # Gains are inputs of the laws: the firmware reads them and passes them on.
+    quantities = {path: each for path, each in hand.quantities().items() if path in paths or path.startswith("gains[")}
     if not quantities:
         return None
     permitted = ranges(hand)

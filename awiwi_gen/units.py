@@ -15,6 +15,7 @@ import unicodedata
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import lru_cache
 from typing import NamedTuple
 
 from awiwi_gen.errors import Fault, InputError
@@ -240,7 +241,7 @@ def parse_quantity(text: str) -> Quantity:
         name, factor, known = _FOREIGN[written]
         value = Fraction(number[0]) * Fraction(factor)
         raise _fault(text, f'is in {name}, which are not read; did you mean "{_decimal(value)} {known}"?')
-    scale, unit = _parse_scaled_unit(text, written)
+    scale, unit = _scaled_unit(text, written)
     return Quantity(Fraction(number[0]) * scale, unit, text)
 
 
@@ -249,28 +250,36 @@ def parse_unit(text: str) -> Unit:
 
     Raises `InputError` for unknown units.
     """
-    return _parse_scaled_unit(text, text.strip())[1]
+    return _scaled_unit(text, text.strip())[1]
 
 
-def _parse_scaled_unit(whole: str, text: str) -> tuple[Fraction, Unit]:
+def _scaled_unit(whole: str, text: str) -> tuple[Fraction, Unit]:
+    try:
+        return _parse_scaled_unit(text)
+    except ValueError as error:
+        raise _fault(whole, str(error)) from None
+
+
+@lru_cache(maxsize=256)  # a hand file has hundreds of numbers in a dozen units
+def _parse_scaled_unit(text: str) -> tuple[Fraction, Unit]:
     """Product, then at most one slash, then one factor or a bracket: so that "N/m s" cannot be read in two ways."""
     above, slash, below = (part.strip() for part in text.partition("/"))
-    scale, unit = (Fraction(1), one) if above in ("", "1") else _parse_product(whole, above)
+    scale, unit = (Fraction(1), one) if above in ("", "1") else _parse_product(above)
     if not slash:
         return scale, unit
     bracket = re.fullmatch(r"\(([^()]*)\)", below)
     if "/" in below or (bracket is None and len(below.split()) != 1):
-        raise _fault(whole, 'divides by several factors; bracket them, as in "kg/(m s^2)"')
-    divisor, divisor_unit = _parse_product(whole, bracket[1] if bracket else below)
+        raise ValueError('divides by several factors; bracket them, as in "kg/(m s^2)"')
+    divisor, divisor_unit = _parse_product(bracket[1] if bracket else below)
     return scale / divisor, unit / divisor_unit
 
 
-def _parse_product(whole: str, text: str) -> tuple[Fraction, Unit]:
+def _parse_product(text: str) -> tuple[Fraction, Unit]:
     scale, unit = Fraction(1), one
     for word in text.replace("*", " ").replace("·", " ").split() or [""]:
         factor = _FACTOR.fullmatch(word)
         if factor is None or factor["symbol"] not in _SYMBOLS:
-            raise _fault(whole, f'has the unknown unit "{word}"{_suggestion(word)}')
+            raise ValueError(f'has the unknown unit "{word}"{_suggestion(word)}')
         symbol_scale, symbol_unit = _SYMBOLS[factor["symbol"]]
         power = int(factor["power"] or 1)
         scale, unit = scale * symbol_scale**power, unit * symbol_unit**power

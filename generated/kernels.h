@@ -1734,8 +1734,8 @@ void awiwi_guiding_friction(const double f_in[1], const double bend_in[1], doubl
  * exceed K_eff in every direction, otherwise no positive definite K_imp exists. For K_mech = eps K_eff
  * (eq. 8.2), K_imp is eps / (eps - 1) K_eff.
  * Source: eq. 8.1, with the condition of section 8.2 mended.
- *   in   K_eff[4][4] in N m/rad, from [0.011, -0.00275, -0.00275, -0.00275, -0.00275, 0.011, -0.00275, -0.00275, -0.00275, -0.00275, 0.011, -0.00275, -0.00275, -0.00275, -0.00275, 0.011] to [0.11, 0.00275, 0.00275, 0.00275, 0.00275, 0.11, 0.00275, 0.00275, 0.00275, 0.00275, 0.11, 0.00275, 0.00275, 0.00275, 0.00275, 0.11]
- *   in   K_mech[4][4] in N m/rad, from [0.22, -0.0275, -0.0275, -0.0275, -0.0275, 0.22, -0.0275, -0.0275, -0.0275, -0.0275, 0.22, -0.0275, -0.0275, -0.0275, -0.0275, 0.22] to [7.6, 0.0275, 0.0275, 0.0275, 0.0275, 7.6, 0.0275, 0.0275, 0.0275, 0.0275, 7.6, 0.0275, 0.0275, 0.0275, 0.0275, 7.6]
+ *   in   K_eff[4][4] in N m/rad, from [0.01, -0.0025, -0.0025, -0.0025, -0.0025, 0.01, -0.0025, -0.0025, -0.0025, -0.0025, 0.01, -0.0025, -0.0025, -0.0025, -0.0025, 0.01] to [0.1, 0.0025, 0.0025, 0.0025, 0.0025, 0.1, 0.0025, 0.0025, 0.0025, 0.0025, 0.1, 0.0025, 0.0025, 0.0025, 0.0025, 0.1]
+ *   in   K_mech[4][4] in N m/rad, from [0.2, -0.025, -0.025, -0.025, -0.025, 0.2, -0.025, -0.025, -0.025, -0.025, 0.2, -0.025, -0.025, -0.025, -0.025, 0.2] to [5.8, 0.025, 0.025, 0.025, 0.025, 5.8, 0.025, 0.025, 0.025, 0.025, 5.8, 0.025, 0.025, 0.025, 0.025, 5.8]
  *   out  K_imp[4][4] in N m/rad
  * Returns 0 where all inputs and outputs are finite and pivot 0 of K_eff is positive and pivot 1 of
  * K_eff is positive and pivot 2 of K_eff is positive and pivot 3 of K_eff is positive and pivot 0 of
@@ -1749,8 +1749,8 @@ int awiwi_stiffness_correction(const double K_eff_in[16], const double K_mech_in
  * Controller stiffness k_imp of one joint, and its sensitivity dk_imp/dk_mech to errors of the
  * tendons' stiffness.
  * Source: eq. 8.1.
- *   in   k_eff[1] in N m/rad, 0.00275 to 0.165
- *   in   k_mech[1] in N m/rad, 0.1925 to 7.6
+ *   in   k_eff[1] in N m/rad, 0.0025 to 0.15
+ *   in   k_mech[1] in N m/rad, 0.175 to 5.8
  *   out  k_imp[1] in N m/rad
  *   out  sensitivity[1] in 1
  * Returns 0 where all inputs and outputs are finite and k_eff is positive and k_mech - k_eff is

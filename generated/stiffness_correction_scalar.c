@@ -3,8 +3,8 @@
  * Controller stiffness k_imp of one joint, and its sensitivity dk_imp/dk_mech to errors of the
  * tendons' stiffness.
  * Source: eq. 8.1.
- *   in   k_eff[1] in N m/rad, 0.00275 to 0.165
- *   in   k_mech[1] in N m/rad, 0.1925 to 7.6
+ *   in   k_eff[1] in N m/rad, 0.0025 to 0.15
+ *   in   k_mech[1] in N m/rad, 0.175 to 5.8
  *   out  k_imp[1] in N m/rad
  *   out  sensitivity[1] in 1
  * Returns 0 where all inputs and outputs are finite and k_eff is positive and k_mech - k_eff is

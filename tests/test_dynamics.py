@@ -13,7 +13,13 @@ G = np.array([3.0, -7.0, 6.0])  # m/s^2
 
 
 def kernels(lib, finger):
-    return lambda name, *inputs: lib[f"{finger}_{name}"](*inputs)
+    """A finger's kernels by family; of one output and a status, the output alone."""
+
+    def call(name, *inputs):
+        found = lib[f"{finger}_{name}"](*inputs)
+        return found[0] if isinstance(found, tuple) and found._fields[1:] == ("status",) else found
+
+    return call
 
 
 def motions(lib, finger, count=200):

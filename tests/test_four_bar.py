@@ -102,8 +102,8 @@ def test_the_metacarpal_turns_as_the_coupler_does(lib, hand):
     q = np.linspace(-0.5, 0.65, 24)
     joints = np.zeros((24, 4))
     joints[:, 0] = q
-    metacarpal = lib.fifth_link_poses(joints)[:, 0, :3, :3]
-    at_rest = lib.fifth_link_poses(np.zeros(4))[0, :3, :3]
+    metacarpal = lib.fifth_link_poses(joints).T[:, 0, :3, :3]
+    at_rest = lib.fifth_link_poses(np.zeros(4)).T[0, :3, :3]
     turned = np.einsum("ij,sik->sjk", at_rest, metacarpal)  # about the joint's z
 
     angle = np.arctan2(turned[:, 1, 0], turned[:, 0, 0])

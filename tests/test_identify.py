@@ -36,7 +36,7 @@ def friction(lib, noise):
 def ripple(lib, noise):
     """One turn of the output at constant speed with its mean torque, at 3 kHz and 1 rad/s, with 20 mNm of noise."""
     theta = np.arange(-np.pi, np.pi, 1 / 3000)
-    return theta, lib.motor_ripple(theta) + 0.88 + noise.normal(0, 0.02, theta.shape)
+    return theta, lib.motor_ripple(theta).tau + 0.88 + noise.normal(0, 0.02, theta.shape)
 
 
 @pytest.fixture

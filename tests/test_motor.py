@@ -49,47 +49,47 @@ def test_the_inertia_at_the_output_counts_the_rotor_ten_thousand_times(motor):
 def test_acceleration_undoes_torque(motor):
     theta, thd, thdd = random(500, 5, 20, 1000)
     f = np.linspace(0, 100, 500)
-    tau = motor.motor_torque(theta, thd, thdd, f)
+    tau = motor.motor_torque(theta, thd, thdd, f).tau
 
-    assert motor.motor_acceleration(theta, thd, tau, f) == pytest.approx(thdd, abs=1e-10)
+    assert motor.motor_acceleration(theta, thd, tau, f).thdd == pytest.approx(thdd, abs=1e-10)
 
 
 def test_the_motors_power_goes_into_motion_friction_ripple_and_tendon(motor):
     theta, thd, thdd = random(500, 5, 20, 1000)
     f = np.linspace(0, 100, 500)
     momentum = 2 * motor.motor_energy(thd) / thd
-    wasted = (motor.motor_friction(thd) + motor.motor_ripple(theta)) * thd
+    wasted = (motor.motor_friction(thd) + motor.motor_ripple(theta).tau) * thd
 
-    power = motor.motor_torque(theta, thd, thdd, f) * thd
+    power = motor.motor_torque(theta, thd, thdd, f).tau * thd
     assert power == pytest.approx(momentum * thdd + wasted + 0.004 * f * thd, abs=1e-11)
 
 
 def test_friction_brakes_a_free_motor_but_as_printed_in_3_2_it_would_drive_it(motor):
-    held = motor.motor_ripple(0.0)  # ripple is fed forward, so that friction is alone
+    held = motor.motor_ripple(0.0).tau  # ripple is fed forward, so that friction is alone
 
     def speed_after(end, acceleration):
         return solve_ivp(lambda _, thd: acceleration(thd), (0, end), [5.0], "Radau", rtol=1e-8, atol=1e-14).y[0, -1]
 
-    assert abs(speed_after(0.05, lambda thd: motor.motor_acceleration(0.0, thd, held, 0.0))) < 1e-12
+    assert abs(speed_after(0.05, lambda thd: motor.motor_acceleration(0.0, thd, held, 0.0).thdd)) < 1e-12
     assert speed_after(0.02, lambda thd: motor.motor_friction(thd) / INERTIA) > 15
 
 
 def test_compensated_friction_leaves_a_motor_free_only_in_the_corrected_plant(motor):
     theta, thd = random(200, 5, 20)
-    resistance = motor.motor_friction(thd) + motor.motor_ripple(theta)
+    resistance = motor.motor_friction(thd) + motor.motor_ripple(theta).tau
 
-    assert motor.motor_acceleration(theta, thd, resistance, 0.0) == pytest.approx(0, abs=1e-9)
+    assert motor.motor_acceleration(theta, thd, resistance, 0.0).thdd == pytest.approx(0, abs=1e-9)
     # Eq. 10.1 adds friction to the motor's torque, eq. 10.2 adds its estimate once more: twice 0.85 Nm at 1 rad/s.
     assert 2 * motor.motor_friction(1.0) == pytest.approx(1.71, abs=0.01)
 
 
 def test_the_share_that_is_compensated_is_taken_away_and_the_rest_still_brakes(motor):
     theta, thd = random(200, 5, 20)
-    fed = motor.motor_compensation(theta, thd)
-    resistance = motor.motor_friction(thd) + motor.motor_ripple(theta)
+    fed = motor.motor_compensation(theta, thd).tau
+    resistance = motor.motor_friction(thd) + motor.motor_ripple(theta).tau
 
     assert fed == pytest.approx(0.9 * resistance, abs=1e-14)
-    coasting = motor.motor_acceleration(theta, thd, fed, 0.0)
+    coasting = motor.motor_acceleration(theta, thd, fed, 0.0).thdd
     fast = np.abs(thd) > 2  # where ripple is smaller than friction
     assert np.all(coasting[fast] * thd[fast] < 0)
 
@@ -113,7 +113,7 @@ def test_damping_is_the_slope_of_friction_and_bounds_the_step_of_a_simulation(mo
 @pytest.mark.parametrize("speed", [0.5, 1.0])
 def test_the_ripples_main_line_is_at_the_rotors_speed(motor, speed):
     time = np.arange(-np.pi, np.pi, 2 * np.pi / 4096) / speed  # one turn of the output
-    amplitude = 2 * np.abs(np.fft.rfft(motor.motor_ripple(speed * time))) / len(time)
+    amplitude = 2 * np.abs(np.fft.rfft(motor.motor_ripple(speed * time).tau)) / len(time)
     frequency = np.fft.rfftfreq(len(time), time[1] - time[0])
 
     assert 2 * np.pi * frequency[np.argmax(amplitude)] == pytest.approx(100 * speed)
@@ -122,12 +122,12 @@ def test_the_ripples_main_line_is_at_the_rotors_speed(motor, speed):
 
 def test_ripple_repeats_with_the_angle_but_as_printed_in_3_7_it_would_not_move(motor):
     angle = np.linspace(-4, -2, 1001)
-    assert motor.motor_ripple(angle + 2 * np.pi) == pytest.approx(motor.motor_ripple(angle), abs=1e-13)
+    assert motor.motor_ripple(angle + 2 * np.pi).tau == pytest.approx(motor.motor_ripple(angle).tau, abs=1e-13)
 
     # The printed argument is a speed; at constant speed that is one number, and figure 3.4 would be flat.
-    printed = motor.motor_ripple(np.full(1001, 1.0))
+    printed = motor.motor_ripple(np.full(1001, 1.0)).tau
     assert np.ptp(printed) == 0
-    assert np.ptp(motor.motor_ripple(1.0 * angle)) > 0.12
+    assert np.ptp(motor.motor_ripple(1.0 * angle).tau) > 0.12
 
 
 def test_ripples_are_the_sum_of_the_files_waves(motor):
@@ -135,7 +135,7 @@ def test_ripples_are_the_sum_of_the_files_waves(motor):
     waves = [(100, 0.06, 40), (200, 0.025, -75), (1, 0.03, 10), (3, 0.012, 120)]
     expected = sum(a * np.sin(n * theta + np.radians(phase)) for n, a, phase in waves)
 
-    assert motor.motor_ripple(theta) == pytest.approx(expected, abs=1e-13)
+    assert motor.motor_ripple(theta).tau == pytest.approx(expected, abs=1e-13)
 
 
 def test_a_hand_without_a_motor_has_none_of_its_kernels():

@@ -259,7 +259,7 @@ def test_the_command_writes_the_file_and_lists_the_numbers(tree, tmp_path, capsy
     from awiwi_gen.__main__ import app
 
     target = tmp_path / "finger.bin"
-    words = ["params", "--hand", str(ONE_FINGER), "--generated", str(tree)]
+    words = ["params", "--hand", ONE_FINGER, "--generated", str(tree)]
     done = CliRunner().invoke(app, [*words, "-o", str(target), "--json"])
     listed = CliRunner().invoke(app, words)
 

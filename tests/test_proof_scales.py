@@ -161,14 +161,14 @@ def test_a_four_bar_whose_range_leaves_zero_out_starts_parallel_at_the_near_end(
     link = hand.fingers["one"].links[0]
     job = Job(hand, only="one_link_poses")
     near_end = min((float(link.low), float(link.high)), key=abs)
-    axes = load(cached_tree(job), job.store).one_link_poses([near_end])[0, :3, :3]
+    axes = load(cached_tree(job), job.store).one_link_poses([near_end]).T[0, :3, :3]
 
     assert float(link.low) * float(link.high) > 0
     np.testing.assert_allclose(axes, np.round(axes), atol=1e-12)  # nothing but the quarter turn before the joint
 
 
 def test_a_four_bar_whose_range_holds_zero_has_the_structure_it_always_had():
-    finger = Hand.load(ONE_FINGER).fingers["jaw"]
+    finger = Hand.parse(ONE_FINGER).fingers["jaw"]
 
     assert finger.structure()["links"][0] == ["root", "none", 1]
     assert finger.links[0].start == 0

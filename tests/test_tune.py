@@ -111,7 +111,7 @@ def test_the_generated_parameters_carry_the_gains_to_the_last_bit(tuned, own):
     done = CliRunner().invoke(app, [str(argument) for argument in arguments])
 
     assert done.exit_code == 0, done.output
-    text = (made / "model.c").read_text()
+    text = (made / "params.c").read_text()
     for number, each in enumerate(found):
         for name in GAINS:
             value = re.search(rf"\.gains_{number}_{name} = ([^,]+),", text)

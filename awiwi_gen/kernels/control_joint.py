@@ -28,19 +28,23 @@ def joint_laws(hand: Hand) -> list[Kernel]:
 
 
 def joint_stiffness(hand: Hand) -> tuple[float, float]:
-    """Least and largest stiffness [N m/rad] that the tendons on a joint's pulley give it, to two digits."""
+    """Least and largest stiffness [N m/rad] that the tendons on a joint's pulley give it, rounded to include both."""
     low, high = float(hand.limits.tendon_stiffness_low), float(hand.limits.tendon_stiffness_high)
     if hand.spring:
         levers = [Lever(spring) for spring in (hand.spring, *hand.spring.calibrated.values())]
         low = min(lever.at(lever.slack).stiffness for lever in levers)
         high = max(lever.at(lever.taut).stiffness for lever in levers)
+        if fibre := hand.tendon:  # in series with the spring
+            own = float(fibre.modulus) * float(fibre.section) / float(fibre.length)
+            low, high = (1 / (1 / end + 1 / own) for end in (low, high))
     squares = [
         float(pulley.radius) ** 2 * sum(over[1:] == pulley.joint for tendon in finger.tendons for over in tendon.over)
         for finger in hand.fingers.values()
         for pulley in finger.pulleys
     ]
     found = [square for square in squares if square > 0] or [1.0]
-    return float(f"{low * min(found):.2g}"), float(f"{high * max(found):.2g}")
+    # Two digits; 5 % is the most that rounding can lose.
+    return float(f"{low * min(found) / 1.05:.2g}"), float(f"{high * max(found) * 1.05:.2g}")
 
 
 def stiffness_ports(low: float, high: float) -> dict[str, Port]:

@@ -113,7 +113,8 @@ def drives(library: Any, finger: str, pulley: float) -> list[Drive]:
     coupling = library[f"{finger}_coupling"]
     straight = np.zeros(coupling.inputs[0]["shape"])
     arms = np.abs(coupling(straight))
-    masses = np.diagonal(library[f"{finger}_mass_matrix"](straight))
+    found = library[f"{finger}_mass_matrix"](straight)
+    masses = np.diagonal(found if isinstance(found, np.ndarray) else found.M)  # of a four-bar, a status comes with M
     inertia, share = 2 * float(library.motor_energy(1.0)), -(-len(arms) // len(straight))
     _, places = linear_sum_assignment(np.repeat(arms, share, axis=1), maximize=True)
     joints = [int(place) // share for place in places]

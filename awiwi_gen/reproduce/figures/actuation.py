@@ -43,7 +43,7 @@ def friction(library: Any, motor: Motor) -> Figure:
     fastest, turn = float(motor.velocity) / 4, 2 * np.pi / float(motor.gear_ratio)
     speeds = fastest * np.linspace(-1, 1, 41) ** 3
     theta = np.linspace(0, 4 * turn, 800, endpoint=False)  # "a few motor periods"
-    torque = library.motor_torque(theta, speeds[:, None], 0.0, 0.0) + generator.normal(0, TORQUE_NOISE, (41, 800))
+    torque = library.motor_torque(theta, speeds[:, None], 0.0, 0.0).tau + generator.normal(0, TORQUE_NOISE, (41, 800))
     mean, low, high = torque.mean(axis=1), torque.min(axis=1), torque.max(axis=1)
     fit = fit_friction(speeds, mean)
     model = library.motor_friction(speeds)
