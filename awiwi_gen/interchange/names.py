@@ -1,0 +1,101 @@
+"""Names that C can have, from names as people write them: `robot0:FFJ3` becomes `ffj3`."""
+
+from __future__ import annotations
+
+import os.path
+import re
+from collections.abc import Callable, Iterable
+
+from pydantic import TypeAdapter, ValidationError
+
+from awiwi_gen.hand.parts import FingerName, JointName, Prefix
+
+_FINGER, _JOINT, _PREFIX = TypeAdapter(FingerName), TypeAdapter(JointName), TypeAdapter(Prefix)
+_LONGEST_JOINT, _LONGEST_FINGER = 24, 16
+_FINGERS = {  # words that models use, and the finger they mean
+    "thumb": "thumb", "index": "index", "middle": "middle", "ring": "ring", "pinky": "pinky", "little": "little", "medium": "middle",
+    "ff": "ff", "mf": "mf", "rf": "rf", "lf": "lf", "th": "th", "if": "index", "pf": "pinky",
+}  # fmt: skip
+
+
+def _usable(adapter: TypeAdapter[str], text: str) -> bool:
+    try:
+        adapter.validate_python(text)
+    except ValidationError:
+        return False
+    return True
+
+
+def plain(text: str) -> str:
+    """Lower-case letters, digits and single underscores; a leading digit gets a letter before it.
+
+    >>> plain("robot0:FF J3"), plain("2nd")
+    ('robot0_ff_j3', 'n2nd')
+    """
+    name = re.sub(r"[^a-z0-9]+", "_", text.lower()).strip("_")
+    return f"n{name}" if not name or name[0].isdigit() else name
+
+
+def joint_names(published: Iterable[str]) -> dict[str, str]:
+    """Published name -> name of the hand file, for all joints of the hand; a prefix that all have is dropped."""
+    names = list(published)
+    common = _common(names)
+    return _unique(names, lambda name: _fitted(plain(name.removeprefix(common))))
+
+
+def _common(names: list[str]) -> str:
+    """What all names begin with, up to and including a separator that is not a letter or digit."""
+    start = os.path.commonprefix(names) if len(names) > 1 else ""
+    found = re.match(r".*[^A-Za-z0-9]", start)
+    return found[0] if found else ""
+
+
+def _fitted(name: str) -> str:
+    for ending in ("_joint", "_link"):
+        if len(name) > _LONGEST_JOINT:
+            name = name.removesuffix(ending)
+    name = name[:_LONGEST_JOINT].rstrip("_")
+    return name if _usable(_JOINT, name) else f"{name[: _LONGEST_JOINT - 2]}_j"
+
+
+def _unique(names: Iterable[str], mapped: Callable[[str], str]) -> dict[str, str]:
+    found: dict[str, str] = {}
+    for name in names:
+        short, number = mapped(name), 2
+        while short in found.values():
+            ending = f"_{number}"
+            short, number = mapped(name)[: _LONGEST_JOINT - len(ending)].rstrip("_") + ending, number + 1
+        found[name] = short
+    return found
+
+
+def finger_names(chains: Iterable[list[str]]) -> list[str]:
+    """A name for each finger, from the names of its bodies and joints: a word that they use, or what they begin with."""
+    found: list[str] = []
+    for number, names in enumerate(chains, start=1):
+        words = [word for name in names for word in re.split(r"[^a-z]+", _split(name))]
+        known = [_FINGERS[word] for word in words if word in _FINGERS]
+        begin = re.sub(r"[^a-z0-9]", "", os.path.commonprefix([plain(name) for name in names]))[:_LONGEST_FINGER]
+        candidates = [max(known, key=known.count)] if known else []
+        candidates += [begin, f"finger{number}"]
+        found.append(next(name for name in candidates if name not in found and _usable(_FINGER, name)))
+    return found
+
+
+def _split(name: str) -> str:
+    """Lower case, with a space where a lower-case letter meets a capital, and after the two letters of FFJ3."""
+    spaced = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name)
+    spaced = re.sub(r"\b(FF|MF|RF|LF|TH|IF|PF)(?=[A-Za-z])", r"\1 ", spaced)
+    spaced = re.sub(r"\b(ff|mf|rf|lf|th)(?=(?:proximal|middle|distal|knuckle|base|hub|metacarpal|j\d))", r"\1 ", spaced)
+    return spaced.lower()
+
+
+def prefix_of(name: str) -> str:
+    """A prefix of C symbols from the name of a model."""
+    short = plain(name)[:16].rstrip("_")
+    return short if _usable(_PREFIX, short) else "hand"
+
+
+def check_finger(name: str) -> bool:
+    """Whether a finger may have this name."""
+    return _usable(_FINGER, name)
