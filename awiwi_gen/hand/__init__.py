@@ -36,7 +36,7 @@ class Hand(Part):
     name: Title
     limits: Limits
     fingers: Annotated[
-        dict[FingerName, Finger], Field(min_length=1, max_length=8, examples=["[[fingers.index.links]]"])
+        dict[FingerName, Finger], Field(min_length=1, max_length=32, examples=["[[fingers.index.links]]"])
     ]
     wrist: Wrist | None = None
     motor: Motor | None = None

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import Protocol
 
-from awiwi_gen.hand.parts import Finger, FourBar, Keys, Limits, Link, Part, covers
+from awiwi_gen.hand.massless import without_inertia
+from awiwi_gen.hand.parts import Finger, FourBar, Inertia, Keys, Limits, Link, Part, covers
 from awiwi_gen.hand.pose import Chain
 from awiwi_gen.hand.wrist import Wrist, closure
 from awiwi_gen.units import Quantity
@@ -27,14 +28,19 @@ _CLOSURE_STEPS = 1000
 _WIDEST_GYRATION = 1.0  # m; the ratio of a plausible moment to a plausible mass can still be absurd
 _NARROWEST_RANGE = 0.01  # deg; less than the backlash of any joint
 _SHORTEST_SPAN = 1e-4  # m; less than the thickness of a tendon
+_BODY = {
+    "mass": 'a mass such as "1.5 g"',
+    "com": 'a point such as ["6 mm", "0 mm", "0 mm"]',
+    "inertia": 'a tensor such as { xx = "35 g mm^2", ... }',
+}
 _LEAST_ARM = 1e-7  # m; a tendon with less than this about every joint pulls nothing
 
 
 def complaints(limits: Limits, fingers: Mapping[str, Finger], wrist: Wrist | None = None) -> Iterator[Complaint]:
     """All faults of a hand whose single values are valid."""
     yield from below(("limits",), _limits(limits))
-    links = [link for finger in fingers.values() for link in finger.links]
-    alone = sum(not _is_of_a_body(_tensor(link)) for link in links) == 1
+    tensors = [_tensor(link.inertia) for finger in fingers.values() for link in finger.links if link.inertia]
+    alone = sum(not _is_of_a_body(tensor) for tensor in tensors) == 1
     for name, finger in fingers.items():
         yield from below(("fingers", name), _finger(finger, alone))
     if wrist:
@@ -94,10 +100,13 @@ def _finger(finger: Finger, alone: bool) -> Iterator[Complaint]:
         yield from below(("pulleys", index), sources(pulley))
     for index, tendon in enumerate(finger.tendons):
         yield from below(("tendons", index), sources(tendon))
+    if finger.base:
+        yield from below(("base",), sources(finger.base))
     misnamed = [*_names(finger)]
     yield from misnamed
     if not misnamed and all(link.low and link.high for link in finger.links if link.joint in finger.joints):
         yield from _tendons(finger)
+        yield from _singular(finger)
 
 
 # ---------------------------------------------------------------------------------------------------- names
@@ -181,44 +190,57 @@ def _link(link: Link, follows: bool, alone: bool) -> Iterator[Complaint]:
             yield (key,), f'= "{given}" is one too many: this joint follows another, which has the range'
     if link.low and link.high and not follows:
         yield from _range(link)
-    yield from below(("inertia",), _inertia(link, alone))
+    yield from _body(link, alone)
     if link.four_bar:
         yield from below(("four_bar",), sources(link.four_bar))
+        if link.reference is not None:
+            yield ("reference",), f'= "{link.reference}" is at a four-bar, whose angles count from four_bar.reference'
         if follows:
             yield ("four_bar",), "is at a joint that follows another; it needs an independent joint"
         elif link.low and link.high:
             yield from below(("four_bar",), _closure(link.four_bar, link.low, link.high))
 
 
-def _tensor(link: Link) -> Tensor:
-    return {key: getattr(link.inertia, key).value for key, _, _ in link.inertia.entries()}
+def _body(link: Link, alone: bool) -> Iterator[Complaint]:
+    """A link has all that makes a body, or nothing of it."""
+    given = {key: getattr(link, key) is not None for key in _BODY}
+    if link.mass is not None and link.com is not None and link.inertia is not None:
+        yield from below(("inertia",), _inertia(link.inertia, link.mass, link.com, alone))
+    elif any(given.values()):
+        present = " and ".join(key for key in given if given[key])
+        for key in (key for key in given if not given[key]):
+            yield (key,), f"is missing; expected {_BODY[key]} beside {present} (a link without mass has none of them)"
 
 
-def _inertia(link: Link, alone: bool) -> Iterator[Complaint]:
+def _tensor(inertia: Inertia) -> Tensor:
+    return {key: getattr(inertia, key).value for key, _, _ in inertia.entries()}
+
+
+def _inertia(inertia: Inertia, mass: Quantity, com: Sequence[Quantity], alone: bool) -> Iterator[Complaint]:
     """The tensor is that of a body. A slip is suggested where no other tensor of the hand is wrong."""
-    tensor = _tensor(link)
-    gyration = math.sqrt((tensor["xx"] + tensor["yy"] + tensor["zz"]) / (2 * link.mass.value))
+    tensor = _tensor(inertia)
+    gyration = math.sqrt((tensor["xx"] + tensor["yy"] + tensor["zz"]) / (2 * mass.value))
     if gyration > _WIDEST_GYRATION:
-        yield (), f"is too large for a mass of {link.mass}: radius of gyration {gyration:.3g} m"
+        yield (), f"is too large for a mass of {mass}: radius of gyration {gyration:.3g} m"
     if _is_of_a_body(tensor):
         return
     message = "breaks the triangle inequality of the principal moments: no body is like that"
-    if not alone or (slip := _slip(link, tensor)) is None:
+    rod = mass.value * sum(c.value**2 for c in com) / 3 or Fraction(1)
+    if not alone or (slip := _slip(rod, tensor)) is None:
         yield (), message
         return
     key, factor = slip
     much = f"{1 / factor} times too large" if factor < 1 else f"{factor} times too small"
-    shown = getattr(link.inertia, key)
+    shown = getattr(inertia, key)
     yield (key,), f'= "{shown}" {message}; {key} is probably {much} (a slipped decimal point?)'
 
 
-def _slip(link: Link, tensor: Tensor) -> tuple[str, Fraction] | None:
+def _slip(rod: Fraction, tensor: Tensor) -> tuple[str, Fraction] | None:
     """The likeliest entry with a slipped decimal point, and the factor that corrects it.
 
     That is a slip by one digit rather than more, in a moment rather than a product, and towards a bone: a rod from the
-    joint, with its centre c half way, has m (2 c)^2 / 12 across.
+    joint, with its centre c half way, has the moment `rod`, m (2 c)^2 / 12, across.
     """
-    rod = link.mass.value * sum(c.value**2 for c in link.com) / 3 or Fraction(1)
     found = []
     for key, value in tensor.items():
         for factor in _SLIPS:
@@ -260,6 +282,20 @@ def _closure(bar: FourBar, low: Quantity, high: Quantity) -> Iterator[Complaint]
             return
 
 
+def _singular(finger: Finger) -> Iterator[Complaint]:
+    """Every motion moves some inertia: else accelerations do not exist."""
+    if found := without_inertia(finger):
+        joint, q = found
+        keys: Keys = ("links", [link.joint for link in finger.links].index(joint), "joint")
+        need = "expected mass, com and inertia for a link that only this joint moves, or armature"
+        yield keys, f'= "{joint}" moves no inertia of its own at {_told(finger, q)}; {need}'
+
+
+def _told(finger: Finger, q: Sequence[float]) -> str:
+    """A pose in words."""
+    return ", ".join(f"{joint} = {math.degrees(x):.4g} deg" for joint, x in zip(finger.joints, q, strict=True))
+
+
 # ---------------------------------------------------------------------------------------------------- tendons
 
 
@@ -271,11 +307,11 @@ def _tendons(finger: Finger) -> Iterator[Complaint]:
         if tendon.span:
             length, q = chain.shortest(index)
             if length < _SHORTEST_SPAN:
-                pose = ", ".join(
-                    f"{joint} = {math.degrees(x):.4g} deg" for joint, x in zip(finger.joints, q, strict=True)
-                )
                 least = f"expected at least {_SHORTEST_SPAN * 1e3:g} mm in every pose"
-                yield ("tendons", index, "span"), f"has a length of {length * 1e3:.2g} mm at {pose}; {least}"
+                yield (
+                    ("tendons", index, "span"),
+                    f"has a length of {length * 1e3:.2g} mm at {_told(finger, q)}; {least}",
+                )
                 continue
         if max(abs(arm) for coupling in arms for arm in coupling[index]) < _LEAST_ARM:
             yield ("tendons", index), "pulls nothing: its length is the same in every pose"

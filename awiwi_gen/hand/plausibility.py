@@ -41,6 +41,7 @@ def remarks(fingers: Mapping[str, Finger]) -> Iterator[Remark]:
         ("fingers", name, "links", index): Body.of(link, _longest(finger))
         for name, finger in fingers.items()
         for index, link in enumerate(finger.links)
+        if link.mass is not None
     }
     found = {keys: list(body.remarks()) for keys, body in bodies.items()}
     unusual = [keys for keys, each in found.items() if each]
@@ -76,8 +77,10 @@ class Body:
 
     @classmethod
     def of(cls, link: Link, longest: float) -> Body:
-        """The body of a link in a finger whose longest bone has this length [m]."""
+        """The body of a link with mass, in a finger whose longest bone has this length [m]."""
         inertia = link.inertia
+        if link.mass is None or link.com is None or inertia is None:
+            raise ValueError(f"the link of {link.joint} has no body")
         x, y, z = (float(value) for value in link.com)
         moments = float(inertia.xx), float(inertia.yy), float(inertia.zz)
         products = float(inertia.xy), float(inertia.xz), float(inertia.yz)

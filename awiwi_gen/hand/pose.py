@@ -1,7 +1,7 @@
 """A finger's pose and tendons in plain floats: what the checks of a hand file need before anything is derived.
 
-Frames are those of the definition of the kinematics: offset, fixed turn, rotation about z (eq. 5.2, 5.3); a four-bar is
-a crank of angle q + reference and a coupler. Everything is a function of the n independent joint angles q [rad].
+Frames are those of the definition of the kinematics: offset, fixed rotation, rotation about z (eq. 5.2, 5.3); a four-bar
+is a crank of angle q + reference and a coupler. Everything is a function of the n independent joint angles q [rad].
 """
 
 from __future__ import annotations
@@ -10,15 +10,18 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 
-from awiwi_gen.hand.parts import Finger, FourBar
+from awiwi_gen.hand.parts import Finger, FourBar, Link
 
-__all__ = ["Chain"]
+__all__ = ["Chain", "point"]
 
 Vector = tuple[float, float, float]
 Axes = tuple[Vector, Vector, Vector]  # unit vectors of a frame, in base axes
+Frame = tuple[Axes, Vector]  # with its origin
 
 _SAMPLES = 24
-_PRIMES = (2, 3, 5, 7, 11, 13, 17, 19)  # their square roots spread samples evenly over up to eight joints
+# Their square roots spread samples evenly over up to 32 joints.
+_PRIMES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53, 59, 61, 67, 71, 73, 79, 83, 89, 97, 101, 103, 107,
+           109, 113, 127, 131)  # fmt: skip
 _STEP = 1e-5  # rad, of central differences: errors of 1e-10 relative
 _SWEEPS, _SECTIONS = 3, 24  # of a search for the shortest length, joint by joint
 _SHORTENING = 0.5  # a length that falls below this share of its mean is searched for zero
@@ -39,7 +42,10 @@ class Chain:
             leader = finger.leaders.get(link.joint, link.joint)
             factor = radii[leader] / radii[link.joint] if leader != link.joint else 1.0
             self._angles.append((self.joints.index(leader), factor))
-        self._links = [(link.turn, _floats(link.offset), link.four_bar) for link in finger.links]
+        self._links = [
+            (_elementary(link), _floats(link.offset), float(link.reference or 0), float(link.start), link.four_bar)
+            for link in finger.links
+        ]
         self._order = {link.joint: index for index, link in enumerate(finger.links)}
         self._radii = radii
         self._spans = [
@@ -95,25 +101,35 @@ class Chain:
     def _distance(self, q: Sequence[float], seat: int, start: Vector, end: Vector) -> float:
         """Length of a straight run from a point of the base frame to one before the joint of link `seat` [m]."""
         axes, origin = self._seat(q, seat)
-        return math.dist(_point(axes, origin, end), start)
+        return math.dist(point(axes, origin, end), start)
 
-    def _seat(self, q: Sequence[float], joint: int) -> tuple[Axes, Vector]:
-        """The frame in which a joint rotates: after its fixed turn, before its rotation."""
+    def _seat(self, q: Sequence[float], joint: int) -> Frame:
+        """The frame in which a joint rotates: after its fixed rotation, before its own."""
+        return next(seat for number, (seat, _) in enumerate(self.frames(q)) if number == joint)
+
+    def frames(self, q: Sequence[float]) -> Iterator[tuple[Frame, Frame]]:
+        """Of every link, the frame in which its joint rotates, and its own."""
         axes: Axes = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
         origin: Vector = (0.0, 0.0, 0.0)
         offset: Vector = (0.0, 0.0, 0.0)
-        for number, (turn, following, bar) in enumerate(self._links):
-            origin, axes = _point(axes, origin, offset), _turned(axes, turn)
-            if number == joint:
-                break
-            column, factor = self._angles[number]
-            angle = q[column] * factor
+        for (turns, following, drawn, start, bar), (column, factor) in zip(self._links, self._angles, strict=True):
+            origin = point(axes, origin, offset)
+            for axis, angle in turns:
+                axes = _rotated(axes, angle, axis)
+            seat, angle = (axes, origin), q[column] * factor
             if bar:
                 reference = float(bar.reference)
-                origin = _point(_rotated(axes, angle + reference), origin, (float(bar.crank), 0.0, 0.0))
-                angle = _coupler(bar, angle + reference) - _coupler(bar, reference)
-            axes, offset = _rotated(axes, angle), following
-        return axes, origin
+                origin = point(_rotated(axes, angle + reference), origin, (float(bar.crank), 0.0, 0.0))
+                angle = _coupler(bar, angle + reference) - _coupler(bar, start + reference)
+            axes, offset = _rotated(axes, angle - drawn), following
+            yield seat, (axes, origin)
+
+
+def _elementary(link: Link) -> list[tuple[int, float]]:
+    """The fixed rotations in front of a joint: axis and angle [rad], in order."""
+    turn = [] if link.turn == "none" else [("xyz".index(link.turn[0]), math.radians(float(link.turn[1:])))]
+    roll, pitch, yaw = link.rpy or (0, 0, 0)
+    return [*turn, *((axis, float(angle)) for axis, angle in ((2, yaw), (1, pitch), (0, roll)) if angle)]
 
 
 def _floats(point: Sequence[object]) -> Vector:
@@ -121,7 +137,8 @@ def _floats(point: Sequence[object]) -> Vector:
     return x, y, z
 
 
-def _point(axes: Axes, origin: Vector, local: Vector) -> Vector:
+def point(axes: Axes, origin: Vector, local: Vector) -> Vector:
+    """A point of a frame in base axes [m]."""
     (a, b, c), (x, y, z) = axes, local
     return (
         origin[0] + x * a[0] + y * b[0] + z * c[0],
@@ -138,11 +155,6 @@ def _rotated(axes: Axes, angle: float, about: int = 2) -> Axes:
     new[(about + 1) % 3] = (c * first[0] + s * second[0], c * first[1] + s * second[1], c * first[2] + s * second[2])
     new[(about + 2) % 3] = (c * second[0] - s * first[0], c * second[1] - s * first[1], c * second[2] - s * first[2])
     return new[0], new[1], new[2]
-
-
-def _turned(axes: Axes, turn: str) -> Axes:
-    """The axes after a fixed quarter turn such as "x+90"."""
-    return axes if turn == "none" else _rotated(axes, math.radians(float(turn[1:])), "xyz".index(turn[0]))
 
 
 def _coupler(bar: FourBar, crank: float) -> float:

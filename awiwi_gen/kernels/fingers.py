@@ -31,14 +31,19 @@ def finger_kernels(hand: Hand, name: str, finger: Finger) -> list[Kernel]:
     """All kernels of one finger."""
     size = Size(len(finger.joints), len(finger.tendons), len(finger.links))
     ports = input_ports(hand, finger, size)
-    kernels = per_finger.kernels(name, finger, f"fingers.{name}", finger.structure(), ports, size)
+    return guarded(finger, per_finger.kernels(name, finger, f"fingers.{name}", finger.structure(), ports, size))
+
+
+def guarded(finger: Finger, kernels: list[Kernel]) -> list[Kernel]:
+    """The kernels of a finger; those that depend on where the links are return a status if it has four-bars."""
     loops = tuple(f"the four-bar of {link.joint} closes" for link in finger.links if link.four_bar)
     return [within(k, "domain", "loops_close", loops) if loops and moves_the_chain(k) else k for k in kernels]
 
 
 def moves_the_chain(kernel: Kernel) -> bool:
     """Whether a kernel depends on where the links are; tendons only depend on angles."""
-    return any(route.module.endswith((".kinematics", ".dynamics")) for route in kernel.routes.values())
+    rooms = (".kinematics", ".dynamics", ".palm")
+    return "q" in kernel.inputs and any(route.module.endswith(rooms) for route in kernel.routes.values())
 
 
 def input_ports(hand: Hand, finger: Finger, size: Size) -> dict[str, Port]:

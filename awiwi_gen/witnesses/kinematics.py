@@ -4,7 +4,7 @@ import casadi as ca
 from casadi import SX
 
 from awiwi_gen.structure import Finger
-from awiwi_gen.witnesses.dynamics.assembly import assemble
+from awiwi_gen.witnesses.dynamics.assembly import about_z, assemble, turns_of
 
 _Z = SX([0, 0, 1])
 
@@ -48,7 +48,8 @@ def point_before_joint(finger: Finger, q: SX, name: str, local: SX) -> SX:
     assembly = assemble(finger, q)
     index = next(i for i, link in enumerate(finger.links) if link.joint == name)
     before = [joint for joint in assembly.joints if joint.link < index]
-    local = local + _Z * assembly.joints[len(before)].shift
+    _, yaw = turns_of(finger.links[index])
+    local = about_z((ca.cos(yaw), ca.sin(yaw))) @ local + _Z * assembly.joints[len(before)].shift
     if before and before[-1].next_rotation is None:
         local = before[-1].rotation @ local
     return assembly.base_point(len(before), local)

@@ -21,7 +21,7 @@ from typing import Any
 import casadi as ca
 from casadi import SX
 
-from awiwi_gen.structure import Finger, coordinates, leaders, quarter_turns, radius
+from awiwi_gen.structure import Finger, coordinates, fixed_turns, leaders, radius
 from awiwi_gen.witnesses.four_bar import FourBar, Vector
 
 _ZERO, _Z = SX(0), SX([0, 0, 1])
@@ -60,7 +60,7 @@ class Moments:
         """The same body in other axes."""
         return Moments(self.mass, rotation @ self.first, rotation @ self.second @ rotation.T, self.trace)
 
-    def rotated_about_z(self, c: SX, s: SX) -> "Moments":
+    def rotatedabout_z(self, c: SX, s: SX) -> "Moments":
         """`rotated` by the angle with this cosine and sine: 8 products for S, by the double angle, instead of 24."""
         x, y, z = ca.vertsplit(self.first)
         xx, xy, xz, yy, yz, zz = (self.second[i, j] for i, j in ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)))
@@ -70,6 +70,13 @@ class Moments:
             yy + c * difference, xx - c * difference, zz, xy + s * difference, c * xz - s * yz, s * xz + c * yz
         )
         return Moments(self.mass, ca.vertcat(*first), second, self.trace)
+
+    def turned(self, turn: "Turn") -> "Moments":
+        """`rotated` about one axis: a quarter turn costs nothing, another one as much as about z."""
+        if all(entry.is_constant() for entry in turn.cos_sin):
+            return self.rotated(turn.matrix())
+        to_z = turn.permutation()
+        return self.rotated(to_z).rotatedabout_z(*turn.cos_sin).rotated(to_z.T)
 
     def split(self) -> tuple["Moments", "Moments"]:
         """The part that a rotation about z does not change, as mass on the z axis, and the rest."""
@@ -86,13 +93,49 @@ class Moments:
 
 
 @dataclass(frozen=True)
+class Turn:
+    """A fixed rotation about coordinate axis number `axis`, by the angle with this cosine and sine."""
+
+    axis: int
+    cos_sin: Vector
+
+    def permutation(self) -> SX:
+        """The rotation (3 x 3) that makes its axis the z axis: a cyclic permutation."""
+        return SX.eye(3)[[(self.axis + 1 + k) % 3 for k in range(3)], :]
+
+    def matrix(self) -> SX:
+        """The rotation (3 x 3)."""
+        to_z = self.permutation()
+        return ca.densify(to_z.T @ about_z(self.cos_sin) @ to_z)
+
+
+def turns_of(link: Any) -> tuple[list[Turn], Any]:
+    """The fixed rotations of a link in front of its joint, in order, and an angle about z.
+
+    That is the angle [rad] of a last rotation about z, which the joint's angle takes up; 0 if there is none.
+    """
+    steps, last = fixed_turns(link), 0
+    if steps and steps[-1][:2] == (2, None) and link.four_bar is None:
+        last = steps.pop()[2]
+    return [Turn(axis, cos_sin_of(quarters, angle)) for axis, quarters, angle in steps], last
+
+
+def cos_sin_of(quarters: int | None, angle: Any) -> Vector:
+    """Cosine and sine of so many quarter turns, exactly, or of an angle [rad] if `quarters` is None."""
+    if quarters is None:
+        return ca.cos(angle), ca.sin(angle)
+    c, s = [(1, 0), (0, 1), (-1, 0), (0, -1)][quarters % 4]
+    return SX(c), SX(s)
+
+
+@dataclass(frozen=True)
 class Joint:
     """One joint of the chain and the body it moves, in the body's working axes.
 
     The joint's angle is a function of coordinate number `coordinate`, with the derivative `ratio` and the second
     derivative `ratio_derivative`. If the next joint has another axis, the working axes rotate with this joint, by the
-    angle with cosine and sine `cos_sin`, and then by `next_rotation` (3 x 3), the fixed rotation of the next joint.
-    Otherwise they are the axes before the joint, and `next_rotation` is None.
+    angle with cosine and sine `cos_sin`, and then by `next_rotation` (3 x 3), the fixed rotation of the next joint, which
+    is the product of `next_turns`. Otherwise they are the axes before the joint, and `next_rotation` is None.
 
     In working axes, `axis` (3) is the joint's axis, `offset` (3) [m] leads to the next joint, and `rotation` (3 x 3)
     takes the link's own axes to the working axes. `link_offset` and `link_body` are offset and body in the link's own
@@ -104,6 +147,7 @@ class Joint:
     ratio_derivative: SX
     cos_sin: Vector
     next_rotation: SX | None
+    next_turns: Sequence[Turn]
     axis: SX
     offset: SX
     body: Moments
@@ -115,15 +159,19 @@ class Joint:
 
     def outward(self, vectors: SX) -> SX:
         """Vectors (columns) of the axes before the joint, in working axes."""
-        return vectors if self.next_rotation is None else self.next_rotation.T @ (_about_z(self.cos_sin).T @ vectors)
+        return vectors if self.next_rotation is None else self.next_rotation.T @ (about_z(self.cos_sin).T @ vectors)
 
     def inward(self, vectors: SX) -> SX:
         """Vectors (columns) of the working axes, in the axes before the joint."""
-        return vectors if self.next_rotation is None else _about_z(self.cos_sin) @ (self.next_rotation @ vectors)
+        return vectors if self.next_rotation is None else about_z(self.cos_sin) @ (self.next_rotation @ vectors)
 
     def body_inward(self, body: Moments) -> Moments:
         """A body of the working axes, in the axes before the joint."""
-        return body if self.next_rotation is None else body.rotated(self.next_rotation).rotated_about_z(*self.cos_sin)
+        if self.next_rotation is None:
+            return body
+        for turn in reversed(self.next_turns):
+            body = body.turned(turn)
+        return body.rotatedabout_z(*self.cos_sin)
 
 
 @dataclass(frozen=True)
@@ -154,13 +202,13 @@ class Assembly:
 
 @dataclass(frozen=True)
 class _Part:
-    """A joint of the chain as the hand file gives it: a fixed rotation, then a rotation about z.
+    """A joint of the chain as the hand file gives it: its fixed rotations, then a rotation about z.
 
     The angle about z is `angle`, or for the coupler of a four-bar the angle with cosine and sine `cos_sin`.
     """
 
     coordinate: int
-    fixed_rotation: SX | None
+    turns: Sequence[Turn]
     angle: SX
     cos_sin: Vector | None
     ratio: SX
@@ -169,6 +217,11 @@ class _Part:
     body: Moments
     link: int
     shift: SX = _ZERO
+
+    @property
+    def fixed_rotation(self) -> SX | None:
+        """The fixed rotation (3 x 3); None if there is none."""
+        return fixed_rotation(self.turns)
 
 
 def assemble(finger: Finger, q: SX) -> Assembly:
@@ -187,10 +240,11 @@ def assemble(finger: Finger, q: SX) -> Assembly:
         if part.cos_sin is not None:
             start, angle = _sum_of_angles(before_crank, part.cos_sin), SX(0)
         cos_sin = _sum_of_angles(start, (ca.cos(angle), ca.sin(angle)))
-        next_rotation = following.fixed_rotation if following is not None else None
+        next_turns = following.turns if following is not None else []
+        next_rotation = fixed_rotation(next_turns)
         in_link = (part.link, part.shift, part.offset, body)
         if next_rotation is None:
-            rotation, axis, body = _about_z(cos_sin), _Z, body.rotated_about_z(*cos_sin)
+            rotation, axis, body = about_z(cos_sin), _Z, body.rotatedabout_z(*cos_sin)
         else:
             rotation, axis, body = next_rotation.T, next_rotation.T @ _Z, body.rotated(next_rotation.T)
         offset = rotation @ part.offset
@@ -201,6 +255,7 @@ def assemble(finger: Finger, q: SX) -> Assembly:
                 part.ratio_derivative,
                 cos_sin,
                 next_rotation,
+                next_turns,
                 axis,
                 offset,
                 body,
@@ -216,20 +271,22 @@ def _parts(finger: Finger, q: SX) -> Iterator[_Part]:
     position, follows = coordinates(finger), leaders(finger)
     for index, link in enumerate(finger.links):
         coordinate = position[link.joint]
-        angle, fixed, offset, body = q[coordinate], _fixed_rotation(link.turn), ca.vertcat(*link.offset), _body(link)
+        angle, offset, body = q[coordinate], ca.vertcat(*link.offset), _body(link)
+        turns, yaw = turns_of(link)
         if link.four_bar is None:
             ratio = SX(1)
             if link.joint in follows:
                 ratio = SX(radius(finger, follows[link.joint])) / radius(finger, link.joint)
-            yield _Part(coordinate, fixed, ratio * angle, None, ratio, SX(0), offset, body, index)
+            angle = ratio * angle + yaw - (0 if link.reference is None else link.reference)
+            yield _Part(coordinate, turns, angle, None, ratio, SX(0), offset, body, index)
         else:
             crank = angle + link.four_bar.reference
             start = SX(link.start + link.four_bar.reference)
             now, (c, s) = FourBar(link.four_bar, crank), FourBar(link.four_bar, start).coupler
             arm = ca.vertcat(link.four_bar.crank, 0, 0)
-            yield _Part(coordinate, fixed, crank, None, SX(1), SX(0), arm, Moments.none(), index)
+            yield _Part(coordinate, turns, crank, None, SX(1), SX(0), arm, Moments.none(), index)
             relative = _sum_of_angles(now.coupler, (c, -s))
-            yield _Part(coordinate, None, SX(0), relative, now.ratio - 1, now.ratio_derivative, offset, body, index)
+            yield _Part(coordinate, [], SX(0), relative, now.ratio - 1, now.ratio_derivative, offset, body, index)
 
 
 def _shifted(parts: Sequence[_Part]) -> Iterator[_Part]:
@@ -260,6 +317,8 @@ def _masses_moved_inward(parts: Sequence[_Part]) -> tuple[list[Moments], SX]:
 
 def _body(link: Any) -> Moments:
     """A link's mass moments about its joint, in its own axes."""
+    if link.mass is None:
+        return Moments.none()
     i = link.inertia
     tensor = _symmetric(i.xx, i.yy, i.zz, i.xy, i.xz, i.yz)
     second = ca.trace(tensor) / 2 * SX.eye(3) - tensor
@@ -270,7 +329,7 @@ def _symmetric(xx: SX, yy: SX, zz: SX, xy: SX, xz: SX, yz: SX) -> SX:
     return ca.vertcat(ca.horzcat(xx, xy, xz), ca.horzcat(xy, yy, yz), ca.horzcat(xz, yz, zz))
 
 
-def _about_z(cos_sin: Vector) -> SX:
+def about_z(cos_sin: Vector) -> SX:
     """Rotation (3 x 3) about z by the angle with this cosine and sine."""
     c, s = cos_sin
     return ca.vertcat(ca.horzcat(c, -s, 0), ca.horzcat(s, c, 0), ca.horzcat(0, 0, 1))
@@ -281,15 +340,9 @@ def _sum_of_angles(one: Vector, other: Vector) -> Vector:
     return one[0] * other[0] - one[1] * other[1], one[1] * other[0] + one[0] * other[1]
 
 
-def _fixed_rotation(turn: str) -> SX | None:
-    """The fixed rotation (3 x 3) before a joint, a signed permutation; None if there is none."""
-    axis, quarters = quarter_turns(turn)
-    if not quarters:
-        return None
-    first, second = (axis + 1) % 3, (axis + 2) % 3
-    c, s = [(1, 0), (0, 1), (-1, 0), (0, -1)][quarters % 4]
-    rotation = SX.zeros(3, 3)
-    rotation[axis, axis] = 1
-    rotation[first, first] = rotation[second, second] = c
-    rotation[second, first], rotation[first, second] = s, -s
-    return rotation
+def fixed_rotation(turns: Sequence[Turn]) -> SX | None:
+    """The product (3 x 3) of fixed rotations; None if it is no rotation."""
+    product = SX.eye(3)
+    for turn in turns:
+        product = product @ turn.matrix()
+    return None if ca.sparsify(product).is_eye() else product
