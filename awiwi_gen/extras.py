@@ -9,7 +9,7 @@ from importlib.util import find_spec
 
 from awiwi_gen.errors import MissingExtraError
 
-ORDER = ("cli", "generate", "studies")  # each includes those before it
+ORDER = ("cli", "generate", "studies", "interchange")  # each but the last includes those before it
 # The module, the package that has it, and the extra that installs it.
 EXTRAS = {
     "casadi": ("casadi", "generate"),
@@ -21,6 +21,7 @@ EXTRAS = {
     "tree_sitter_toml": ("tree-sitter-toml", "generate"),
     "typer": ("typer", "cli"),
     "matplotlib": ("matplotlib", "studies"),
+    "mujoco": ("mujoco", "interchange"),
     "scipy": ("scipy", "studies"),
 }
 COMMAND_LINE = ("typer", "pydantic")  # Typer imports pydantic

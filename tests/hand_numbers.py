@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import tomllib
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -82,7 +83,11 @@ def mass_matrix(finger: dict[str, Any], q: np.ndarray) -> np.ndarray:
             J[:, k] = [*np.cross(axis, centre - frames[k][1]), *axis]
         t = link["inertia"]
         tensor = np.array([[t["xx"], t["xy"], t["xz"]], [t["xy"], t["yy"], t["yz"]], [t["xz"], t["yz"], t["zz"]]])
-        total += J.T @ np.block([[link["mass"] * np.eye(3), np.zeros((3, 3))], [np.zeros((3, 3)), axes @ tensor @ axes.T]]) @ J
+        total += (
+            J.T
+            @ np.block([[link["mass"] * np.eye(3), np.zeros((3, 3))], [np.zeros((3, 3)), axes @ tensor @ axes.T]])
+            @ J
+        )
     return matrix.T @ total @ matrix
 
 
@@ -106,6 +111,6 @@ def tendon_lengths(finger: dict[str, Any], q: np.ndarray) -> np.ndarray:
     lengths = []
     for tendon in finger.get("tendons", []):
         points = [frames[p["link"]][1] + frames[p["link"]][0] @ np.array(p["at"]) for p in tendon.get("path", [])]
-        straight = sum(float(np.linalg.norm(b - a)) for a, b in zip(points, points[1:], strict=False))
+        straight = sum(float(np.linalg.norm(b - a)) for a, b in pairwise(points))
         lengths.append(tendon["rest"] + straight + sum(arm * angles[j] for j, arm in tendon.get("arms", {}).items()))
     return np.array(lengths)

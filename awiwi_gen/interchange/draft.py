@@ -82,7 +82,9 @@ def draft(model: Model, palm: str = "", named: Mapping[str, str] | None = None) 
     root = palm_of(model, palm)
     chains, losses = find(model, root, named or {})
     names = joint_names(joint.name for chain in chains for joint in chain.joints)
-    labels = finger_names([[model.bodies[s.body].name for s in c.segments] + [j.name for j in c.joints] for c in chains])
+    labels = finger_names(
+        [[model.bodies[s.body].name for s in c.segments] + [j.name for j in c.joints] for c in chains]
+    )
     chains = [Chain(c.name or label, c.carrier, c.segments) for c, label in zip(chains, labels, strict=True)]
     owner = {joint.name: chain.name for chain in chains for joint in chain.joints}
     locks, lost = followed(model.locks, owner, names)
@@ -143,9 +145,7 @@ def _finger(
         axes=pose_axes.T @ base,
         carrier=model.bodies[carrier].name,
         links=tuple(links),
-        tendons=tuple(
-            _tendon(model, tendon, names, locks, places, (base, axes[0].anchor)) for tendon in tendons
-        ),
+        tendons=tuple(_tendon(model, tendon, names, locks, places, (base, axes[0].anchor)) for tendon in tendons),
         followed=tuple(locks[joint.name] for joint in chain.joints if joint.name in locks),
     )
 

@@ -91,7 +91,9 @@ def find(model: Model, palm: int, named: Mapping[str, str]) -> tuple[list[Chain]
     else:
         chains = [Chain("", palm, tuple(_segments(model, start))) for start in _starts(model, palm)]
     if not chains:
-        raise _fault(model, f"body {model.bodies[palm].name}", "carries no moving body; expected fingers below the palm")
+        raise _fault(
+            model, f"body {model.bodies[palm].name}", "carries no moving body; expected fingers below the palm"
+        )
     for chain in chains:
         for joint in chain.joints:
             if joint.kind != "hinge":

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
@@ -92,8 +91,7 @@ def link_frames(base: Array, axes: list[Axis]) -> list[Frame]:
     """The frames of all links of a finger, from the base's axes (3 x 3) and the joints' axes."""
     found: list[Frame] = []
     before = base
-    for axis, following in pairwise([*axes, None]):
-        assert axis is not None
+    for axis, following in zip(axes, [*axes[1:], None], strict=True):
         local = before.T @ axis.direction
         turn, roll = _aligned(local), 0.0
         if turn is None:

@@ -138,7 +138,9 @@ def prepare(spec: Any, without: set[str]) -> list[Loss]:
     wrapped = {wrap.target.name for tendon in kept for wrap in tendon.path if _is_geom(wrap)}
     geoms = [geom for body in bodies for geom in body.geoms]
     losses = [
-        _loss("geoms that collide: the hand file has no contacts", geoms, lambda geom: geom.contype or geom.conaffinity),
+        _loss(
+            "geoms that collide: the hand file has no contacts", geoms, lambda geom: geom.contype or geom.conaffinity
+        ),
         _loss("meshes", spec.meshes),
         _loss("sensors", spec.sensors),
         _loss("keyframes", spec.keys),
@@ -150,7 +152,18 @@ def prepare(spec: Any, without: set[str]) -> list[Loss]:
         ),
         _loss("tendons left out as asked", [each for each in spec.tendons if each.name in without]),
     ]
-    for kind in ("skins", "hfields", "flexes", "pairs", "excludes", "sensors", "keys", "actuators", "cameras", "lights"):
+    for kind in (
+        "skins",
+        "hfields",
+        "flexes",
+        "pairs",
+        "excludes",
+        "sensors",
+        "keys",
+        "actuators",
+        "cameras",
+        "lights",
+    ):
         for each in list(getattr(spec, kind)):
             spec.delete(each)
     for tendon in list(spec.tendons):

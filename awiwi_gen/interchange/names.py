@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import os.path
 import re
 from collections.abc import Callable, Iterable
 
 from pydantic import TypeAdapter, ValidationError
 
-from awiwi_gen.hand.parts import FingerName, JointName, Prefix
+from awiwi_gen.hand.part import FingerName, JointName, Prefix
 
 _FINGER, _JOINT, _PREFIX = TypeAdapter(FingerName), TypeAdapter(JointName), TypeAdapter(Prefix)
 _LONGEST_JOINT, _LONGEST_FINGER = 24, 16
 _FINGERS = {  # words that models use, and the finger they mean
-    "thumb": "thumb", "index": "index", "middle": "middle", "ring": "ring", "pinky": "pinky", "little": "little", "medium": "middle",
+    "thumb": "thumb", "index": "index", "middle": "middle", "ring": "ring", "pinky": "pinky", "little": "little", 
+    "medium": "middle",
     "ff": "ff", "mf": "mf", "rf": "rf", "lf": "lf", "th": "th", "if": "index", "pf": "pinky",
 }  # fmt: skip
 
@@ -45,9 +45,15 @@ def joint_names(published: Iterable[str]) -> dict[str, str]:
 
 def _common(names: list[str]) -> str:
     """What all names begin with, up to and including a separator that is not a letter or digit."""
-    start = os.path.commonprefix(names) if len(names) > 1 else ""
+    start = shared_start(names) if len(names) > 1 else ""
     found = re.match(r".*[^A-Za-z0-9]", start)
     return found[0] if found else ""
+
+
+def shared_start(texts: list[str]) -> str:
+    """The letters that all texts begin with."""
+    first, last = min(texts), max(texts)
+    return next((first[:n] for n, pair in enumerate(zip(first, last, strict=False)) if pair[0] != pair[1]), first)
 
 
 def _fitted(name: str) -> str:
@@ -75,7 +81,7 @@ def finger_names(chains: Iterable[list[str]]) -> list[str]:
     for number, names in enumerate(chains, start=1):
         words = [word for name in names for word in re.split(r"[^a-z]+", _split(name))]
         known = [_FINGERS[word] for word in words if word in _FINGERS]
-        begin = re.sub(r"[^a-z0-9]", "", os.path.commonprefix([plain(name) for name in names]))[:_LONGEST_FINGER]
+        begin = re.sub(r"[^a-z0-9]", "", shared_start([plain(name) for name in names]))[:_LONGEST_FINGER]
         candidates = [max(known, key=known.count)] if known else []
         candidates += [begin, f"finger{number}"]
         found.append(next(name for name in candidates if name not in found and _usable(_FINGER, name)))

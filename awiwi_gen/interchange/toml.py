@@ -55,16 +55,17 @@ def _finger_lines(finger: DraftFinger, file: str) -> list[str]:
     head = f"fingers.{finger.name}"
     lines = [f"# {finger.name}: {len(finger.links)} links, {len(finger.tendons)} tendons", "", f"[{head}]"]
     if finger.followed:
-        lines += ["# Only the ratio of these two radii counts: the couplings have no pulleys in the source.", "pulleys = ["]
+        lines += [
+            "# Only the ratio of these two radii counts: the couplings have no pulleys in the source.",
+            "pulleys = [",
+        ]
         lines += [f"    {row}," for row in _pulleys(finger.followed)]
         lines += ["]", "couplings = ["]
         lines += [f'    {{ follower = "{f.follower}", leader = "{f.leader}" }},' for f in finger.followed]
         lines += ["]"]
         lines += [f"# {f.follower} = {f.sign} * ({f.published} - {f.offset!r} rad)" for f in finger.followed if f.moved]
     lines += ["", f"[{head}.base]", f"position = {_lengths(finger.position)}"]
-    rpy = tidy(rpy_of(finger.axes), 1.0)
-    if any(rpy):
-        lines += [f"rpy = {_listed(map(angle, rpy))}"]
+    lines += [f"rpy = {_listed(map(angle, tidy(rpy_of(finger.axes), 1.0)))}"]
     lines += [f"source = {_text(cite(f'{file} body {finger.carrier}'))}"]
     for link in finger.links:
         lines += ["", f"[[{head}.links]]", *_link_lines(link, file)]
@@ -94,7 +95,11 @@ def _link_lines(link: DraftLink, file: str) -> list[str]:
     lines += [f"offset = {_lengths(link.offset)}"]
     sources = dict.fromkeys(link.assumed, "assumed")
     if link.mass is not None:
-        lines += [f"mass = {_text(mass(link.mass))}", f"com = {_lengths(link.com)}", f"inertia = {_tensor(link.inertia)}"]
+        lines += [
+            f"mass = {_text(mass(link.mass))}",
+            f"com = {_lengths(link.com)}",
+            f"inertia = {_tensor(link.inertia)}",
+        ]
         sources |= dict.fromkeys(("mass", "com", "inertia"), body)
     if joint.armature:
         lines += [f"armature = {_text(quantity(joint.armature, 'kg m^2'))}"]
