@@ -154,8 +154,8 @@ def _entry(kernel: Kernel, reason: str) -> dict[str, Any]:
         return {"name": name, "shape": list(spec.shape), "unit": spec.unit_text}
 
     def ranged(name: str, spec: Port) -> dict[str, Any]:
-        low, high = zip(*spec.bounds(), strict=True)
-        return port(name, spec) | {"low": list(low), "high": list(high)}
+        bounds = spec.bounds()
+        return port(name, spec) | {"low": [low for low, _ in bounds], "high": [high for _, high in bounds]}
 
     entry = {
         "name": kernel.name,

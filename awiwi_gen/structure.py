@@ -4,7 +4,9 @@ A finger is anything with these attributes (the hand file's `Finger` and its sym
 
     links[i]      joint, turn, offset[3], mass, com[3], inertia.{xx,yy,zz,xy,xz,yz}, start, four_bar (or None)
     pulleys[i]    joint, radius
-    tendons[i]    rest, over (senses and joints: "+flexion", "-pip"), span (None or from_[3], to[3], joint)
+    tendons[i]    rest, over (senses and joints: "+flexion", "-pip"), arms (joint -> arm), span (None or from_[3], to[3],
+                  joint), path (points: link, at[3]), spring (None or stiffness, rest)
+    pulled, strings   the tendons without a spring, and those with one
     couplings[i]  follower, leader
 
 The numbers may be symbols of either library. Independent joints are counted along the chain, base to tip.
@@ -25,6 +27,11 @@ def coordinates(finger: Finger) -> dict[str, int]:
     follows = leaders(finger)
     free = [link.joint for link in finger.links if link.joint not in follows]
     return {link.joint: free.index(follows.get(link.joint, link.joint)) for link in finger.links}
+
+
+def link_number(finger: Finger, name: str) -> int:
+    """Index of the link that a joint moves; -1 for "palm", the base frame."""
+    return -1 if name == "palm" else next(i for i, link in enumerate(finger.links) if link.joint == name)
 
 
 def radius(finger: Finger, joint: str) -> Any:

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from fractions import Fraction
 from typing import Protocol
 
-from awiwi_gen.hand.parts import Finger, FourBar, Keys, Limits, Link, Part, covers
+from awiwi_gen.hand.parts import PALM, Finger, FourBar, Keys, Limits, Link, Part, covers
 from awiwi_gen.hand.pose import Chain
 from awiwi_gen.hand.wrist import Wrist, closure
 from awiwi_gen.units import Quantity
@@ -38,7 +38,7 @@ def complaints(limits: Limits, fingers: Mapping[str, Finger], wrist: Wrist | Non
     for name, finger in fingers.items():
         yield from below(("fingers", name), _finger(finger, alone))
     if wrist:
-        yield from below(("wrist",), _wrist(wrist, sum(len(finger.tendons) for finger in fingers.values())))
+        yield from below(("wrist",), _wrist(wrist, sum(len(finger.pulled) for finger in fingers.values())))
 
 
 class Sourced(Protocol):
@@ -122,8 +122,15 @@ def _names(finger: Finger) -> Iterator[Complaint]:
             if name[1:] in over[:index]:
                 yield keys, f'= "{name}" comes twice in one tendon'
             yield from _known(keys, name, name[1:], pulleys, "pulley")
-        if not tendon.over and not tendon.span:
-            yield ("tendons", number), "neither runs over a pulley nor has a span; it would pull nothing"
+        for name in tendon.arms:
+            yield from _known(("tendons", number, "arms", name), name, name, joints, "joint")
+        for index, point in enumerate(tendon.path):
+            keys = ("tendons", number, "path", index, "link")
+            yield from _known(keys, point.link, point.link, [*joints, PALM], "link")
+            if point.link == PALM in joints:
+                yield keys, f'= "{PALM}" is the base frame, and a joint of this finger; rename the joint'
+        if not (tendon.over or tendon.arms or tendon.span or tendon.path):
+            yield ("tendons", number), "has neither over nor arms nor span nor path; it would pull nothing"
         if tendon.span:
             keys, end = ("tendons", number, "span", "joint"), tendon.span.joint
             yield from _known(keys, end, end, joints, "joint")
@@ -264,18 +271,31 @@ def _closure(bar: FourBar, low: Quantity, high: Quantity) -> Iterator[Complaint]
 
 
 def _tendons(finger: Finger) -> Iterator[Complaint]:
-    """Every tendon moves with some joint, and a span has a length in every pose: else its derivatives do not exist."""
+    """Every tendon moves with some joint, and straight lines have a length in every pose, as derivatives need."""
     chain = Chain(finger)
     arms = [*chain.couplings()]
     for index, tendon in enumerate(finger.tendons):
-        if tendon.span:
-            length, q = chain.shortest(index)
-            if length < _SHORTEST_SPAN:
-                pose = ", ".join(
-                    f"{joint} = {math.degrees(x):.4g} deg" for joint, x in zip(finger.joints, q, strict=True)
-                )
-                least = f"expected at least {_SHORTEST_SPAN * 1e3:g} mm in every pose"
-                yield ("tendons", index, "span"), f"has a length of {length * 1e3:.2g} mm at {pose}; {least}"
-                continue
-        if max(abs(arm) for coupling in arms for arm in coupling[index]) < _LEAST_ARM:
+        short = [*_without_length(chain, index)]
+        yield from below(("tendons", index), short)
+        if not short and max(abs(arm) for coupling in arms for arm in coupling[index]) < _LEAST_ARM:
             yield ("tendons", index), "pulls nothing: its length is the same in every pose"
+        if tendon.spring and not short and (longest := chain.longest(index)) <= float(tendon.spring.rest):
+            slack = f'= "{tendon.spring.rest}" leaves the string slack in every pose'
+            yield (
+                ("tendons", index, "spring", "rest"),
+                f"{slack}; expected less than its length, {longest * 1e3:.4g} mm",
+            )
+
+
+def _without_length(chain: Chain, index: int) -> Iterator[Complaint]:
+    """The first straight line of a tendon whose ends meet in some pose."""
+    spanned = chain.finger.tendons[index].span is not None
+    for number, line in enumerate(chain.lines[index]):
+        length, q = chain.shortest(line)
+        if length < _SHORTEST_SPAN:
+            keys: Keys = ("span",) if spanned and number == 0 else ("path", number - spanned + 1)
+            what = "has a length of" if keys == ("span",) else "lies behind the point before it by"
+            pose = ", ".join(f"{joint} = {math.degrees(x):.4g} deg" for joint, x in zip(chain.joints, q, strict=True))
+            least = f"expected at least {_SHORTEST_SPAN * 1e3:g} mm in every pose"
+            yield keys, f"{what} {length * 1e3:.2g} mm at {pose}; {least}"
+            return

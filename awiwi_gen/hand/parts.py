@@ -18,10 +18,27 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, PlainValidato
 from awiwi_gen.hand.measure import Measure
 from awiwi_gen.units import Quantity
 
-__all__ = ["Coupling", "Finger", "FourBar", "Inertia", "Limits", "Link", "Measure", "Part", "Pulley", "Span", "Tendon"]
+__all__ = [
+    "Coupling",
+    "Finger",
+    "FourBar",
+    "Inertia",
+    "Limits",
+    "Link",
+    "Measure",
+    "Part",
+    "PathPoint",
+    "Pulley",
+    "ReturnSpring",
+    "Span",
+    "Tendon",
+]
 
 Keys = tuple[str | int, ...]
 """The path of a value in a hand file: `("fingers", "index", "links", 1, "mass")`."""
+
+MOST = 32  # fingers of a hand; links, pulleys, tendons and couplings of a finger
+PALM = "palm"  # in place of a joint: the finger's base frame
 
 
 Angle = Annotated[Quantity, Measure("20 deg", "-360 deg", "360 deg")]
@@ -282,13 +299,45 @@ class Span(Part):
     joint: JointName
 
 
+class PathPoint(Part):
+    """A point that a tendon passes, fixed in a link: in the frame after that joint's rotation, or in the base frame."""
+
+    link: Annotated[JointName, Field(examples=['"palm"', '"flexion"'])]
+    at: Point
+
+
+class ReturnSpring(Part):
+    """What makes a tendon an elastic string: its force is stiffness * (length - rest), and none where it is slack."""
+
+    stiffness: Annotated[Quantity, Measure("100 N/m", "0.001 N/m", "1000000000 N/m")]
+    rest: Length
+
+
 class Tendon(Part):
-    """Path length in the finger: rest + sum of sense * radius * angle over the pulleys + the length of the span."""
+    """Path length in the finger: a sum of all that its keys describe.
+
+    These are the rest, sense * radius * angle over the pulleys, arm * angle of joints with an arm of this tendon's own,
+    the length of the span, and the straight lines from point to point of the path. A motor pulls it unless it has a
+    spring.
+    """
 
     rest: Length
-    over: Annotated[tuple[Over, ...], Field(strict=False, max_length=8)] = ()
+    over: Annotated[tuple[Over, ...], Field(strict=False, max_length=MOST)] = ()
+    arms: Annotated[dict[JointName, Length], Field(max_length=MOST)] = {}
     span: Span | None = None
+    path: Annotated[tuple[PathPoint, ...], Field(strict=False, min_length=2, max_length=MOST)] = ()
+    spring: ReturnSpring | None = None
     source: Source
+
+    def structure(self) -> list[Any]:
+        """Everything but the numbers."""
+        more = {
+            "arms": list(self.arms),
+            "path": [point.link for point in self.path],
+            "spring": self.spring is not None,
+        }
+        found = {key: value for key, value in more.items() if value}
+        return [list(self.over), self.span and self.span.joint, *([found] if found else [])]
 
 
 class Coupling(Part):
@@ -301,12 +350,10 @@ class Coupling(Part):
 class Finger(Part):
     """A serial chain from the palm to the tip, and the tendons that pull it."""
 
-    links: Annotated[tuple[Link, ...], Field(strict=False, min_length=1, max_length=8, examples=["[[...links]]"])]
-    pulleys: Annotated[tuple[Pulley, ...], Field(strict=False, max_length=8)] = ()
-    tendons: Annotated[
-        tuple[Tendon, ...], Field(strict=False, min_length=1, max_length=16, examples=["[[...tendons]]"])
-    ]
-    couplings: Annotated[tuple[Coupling, ...], Field(strict=False, max_length=8)] = ()
+    links: Annotated[tuple[Link, ...], Field(strict=False, min_length=1, max_length=MOST, examples=["[[...links]]"])]
+    pulleys: Annotated[tuple[Pulley, ...], Field(strict=False, max_length=MOST)] = ()
+    tendons: Annotated[tuple[Tendon, ...], Field(strict=False, max_length=MOST)] = ()
+    couplings: Annotated[tuple[Coupling, ...], Field(strict=False, max_length=MOST)] = ()
 
     @property
     def leaders(self) -> dict[str, str]:
@@ -319,6 +366,16 @@ class Finger(Part):
         return tuple(link.joint for link in self.links if link.joint not in self.leaders)
 
     @property
+    def pulled(self) -> tuple[Tendon, ...]:
+        """The m tendons that motors pull, in the order of the arrays over tendons; the others are return strings."""
+        return tuple(tendon for tendon in self.tendons if tendon.spring is None)
+
+    @property
+    def strings(self) -> tuple[Tendon, ...]:
+        """The elastic return strings."""
+        return tuple(tendon for tendon in self.tendons if tendon.spring is not None)
+
+    @property
     def radii(self) -> dict[str, Quantity]:
         """Joint -> radius of its pulley."""
         return {pulley.joint: pulley.radius for pulley in self.pulleys}
@@ -328,7 +385,7 @@ class Finger(Part):
         return {
             "links": [[link.joint, link.turn, link.four_bar_structure()] for link in self.links],
             "pulleys": [pulley.joint for pulley in self.pulleys],
-            "tendons": [[list(tendon.over), tendon.span and tendon.span.joint] for tendon in self.tendons],
+            "tendons": [tendon.structure() for tendon in self.tendons],
             "couplings": [[coupling.follower, coupling.leader] for coupling in self.couplings],
         }
 

@@ -51,7 +51,7 @@ def remarks(fingers: Mapping[str, Finger]) -> Iterator[Remark]:
             cause = f"; {alike} of {len(found)} links are like this: look for one cause" if alike >= _MANY else slip
             yield Remark((*keys, *remark.keys), remark.message + cause, remark.ratio)
     for name, finger in fingers.items():
-        for each in (*_pulleys(finger), *_ranges(finger), *_one_sided(finger)):
+        for each in (*_pulleys(finger), *_ranges(finger)):
             yield Remark(("fingers", name, *each.keys), each.message, each.ratio)
 
 
@@ -212,21 +212,3 @@ def _ranges(finger: Finger) -> Iterator[Remark]:
             continue
         found = f'= "{link.low}" leaves a range of {width:.3g} deg up to high = "{link.high}"{hint}'
         yield Remark(("links", index, "low"), found, ratio)
-
-
-def _one_sided(finger: Finger) -> Iterator[Remark]:
-    """Joints that pulleys alone move, and not to both sides."""
-    order = [link.joint for link in finger.links]
-    spanned = {joint for tendon in finger.tendons if tendon.span for joint in order[: order.index(tendon.span.joint)]}
-    for joint in finger.joints:
-        if joint in spanned:
-            continue
-        # A follower's pulley takes as much tendon as its leader's, so the senses of both add up.
-        senses = [
-            sum(1 if name[0] == "+" else -1 for name in tendon.over if finger.leaders.get(name[1:], name[1:]) == joint)
-            for tendon in finger.tendons
-        ]
-        pulled = {"+": any(sense > 0 for sense in senses), "-": any(sense < 0 for sense in senses)}
-        if missing := [f'"{sign}{joint}"' for sign, found in pulled.items() if not found]:
-            need = f'= "{joint}" has no tendon over {" nor ".join(missing)}; tendons only pull, to one side each'
-            yield Remark(("links", order.index(joint), "joint"), need, (2 - len(missing)) / 2)
