@@ -21,7 +21,8 @@ from awiwi_gen.hand.file import HandFile
 from awiwi_gen.hand.gains import Gains, gains_complaints, with_gains
 from awiwi_gen.hand.lint import complaints
 from awiwi_gen.hand.lint_actuation import actuator_complaints
-from awiwi_gen.hand.parts import MOST, Finger, FingerName, Limits, Link, Part, Prefix, Title
+from awiwi_gen.hand.names import FingerName, Prefix, Title
+from awiwi_gen.hand.parts import MOST, Finger, Limits, Link, Part
 from awiwi_gen.hand.plausibility import remarks
 from awiwi_gen.hand.wrist import Wrist
 from awiwi_gen.resources import DEFAULT_HAND

@@ -1,7 +1,6 @@
 """Physics and cross-references: what no hand can have, although every single value of its file is valid.
 
-Each check yields complaints, `(keys, predicate)` pairs, relative to the table it is given. Arithmetic is exact where
-the numbers allow it, so that a flat plate, whose moments fulfil xx + yy = zz, is not refused for a rounding error.
+Each check yields complaints, `(keys, predicate)` pairs, relative to the table it is given.
 """
 
 from __future__ import annotations
@@ -9,22 +8,19 @@ from __future__ import annotations
 import difflib
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from fractions import Fraction
 from typing import Protocol
 
 from awiwi_gen.hand.parts import PALM, Finger, FourBar, Keys, Limits, Link, Part, covers
 from awiwi_gen.hand.pose import Chain
+from awiwi_gen.hand.tensors import tensor_complaints
 from awiwi_gen.hand.wrist import Wrist, closure
 from awiwi_gen.units import Quantity
 
 __all__ = ["Complaint", "below", "complaints", "sources"]
 
 Complaint = tuple[Keys, str]
-Tensor = dict[str, Fraction]
 
-_SLIPS = [Fraction(10) ** places for places in (-3, -2, -1, 1, 2, 3)]
 _CLOSURE_STEPS = 1000
-_WIDEST_GYRATION = 1.0  # m; the ratio of a plausible moment to a plausible mass can still be absurd
 _NARROWEST_RANGE = 0.01  # deg; less than the backlash of any joint
 _SHORTEST_SPAN = 1e-4  # m; less than the thickness of a tendon
 _LEAST_ARM = 1e-7  # m; a tendon with less than this about every joint pulls nothing
@@ -33,10 +29,9 @@ _LEAST_ARM = 1e-7  # m; a tendon with less than this about every joint pulls not
 def complaints(limits: Limits, fingers: Mapping[str, Finger], wrist: Wrist | None = None) -> Iterator[Complaint]:
     """All faults of a hand whose single values are valid."""
     yield from below(("limits",), _limits(limits))
-    links = [link for finger in fingers.values() for link in finger.links]
-    alone = sum(not _is_of_a_body(_tensor(link)) for link in links) == 1
     for name, finger in fingers.items():
-        yield from below(("fingers", name), _finger(finger, alone))
+        yield from below(("fingers", name), _finger(finger))
+    yield from tensor_complaints(fingers)
     if wrist:
         yield from below(("wrist",), _wrist(wrist, sum(len(finger.pulled) for finger in fingers.values())))
 
@@ -87,9 +82,9 @@ def _wrist(wrist: Wrist, tendons: int) -> Iterator[Complaint]:
     yield from backwards or closure(wrist)
 
 
-def _finger(finger: Finger, alone: bool) -> Iterator[Complaint]:
+def _finger(finger: Finger) -> Iterator[Complaint]:
     for index, link in enumerate(finger.links):
-        yield from below(("links", index), _link(link, link.joint in finger.leaders, alone))
+        yield from below(("links", index), _link(link, link.joint in finger.leaders))
     for index, pulley in enumerate(finger.pulleys):
         yield from below(("pulleys", index), sources(pulley))
     for index, tendon in enumerate(finger.tendons):
@@ -178,7 +173,7 @@ def sources(part: Sourced) -> Iterator[Complaint]:
 # ---------------------------------------------------------------------------------------------------- links
 
 
-def _link(link: Link, follows: bool, alone: bool) -> Iterator[Complaint]:
+def _link(link: Link, follows: bool) -> Iterator[Complaint]:
     yield from sources(link)
     for key in ("low", "high"):
         given = getattr(link, key)
@@ -188,68 +183,12 @@ def _link(link: Link, follows: bool, alone: bool) -> Iterator[Complaint]:
             yield (key,), f'= "{given}" is one too many: this joint follows another, which has the range'
     if link.low and link.high and not follows:
         yield from _range(link)
-    yield from below(("inertia",), _inertia(link, alone))
     if link.four_bar:
         yield from below(("four_bar",), sources(link.four_bar))
         if follows:
             yield ("four_bar",), "is at a joint that follows another; it needs an independent joint"
         elif link.low and link.high:
             yield from below(("four_bar",), _closure(link.four_bar, link.low, link.high))
-
-
-def _tensor(link: Link) -> Tensor:
-    return {key: getattr(link.inertia, key).value for key, _, _ in link.inertia.entries()}
-
-
-def _inertia(link: Link, alone: bool) -> Iterator[Complaint]:
-    """The tensor is that of a body. A slip is suggested where no other tensor of the hand is wrong."""
-    tensor = _tensor(link)
-    gyration = math.sqrt((tensor["xx"] + tensor["yy"] + tensor["zz"]) / (2 * link.mass.value))
-    if gyration > _WIDEST_GYRATION:
-        yield (), f"is too large for a mass of {link.mass}: radius of gyration {gyration:.3g} m"
-    if _is_of_a_body(tensor):
-        return
-    message = "breaks the triangle inequality of the principal moments: no body is like that"
-    if not alone or (slip := _slip(link, tensor)) is None:
-        yield (), message
-        return
-    key, factor = slip
-    much = f"{1 / factor} times too large" if factor < 1 else f"{factor} times too small"
-    shown = getattr(link.inertia, key)
-    yield (key,), f'= "{shown}" {message}; {key} is probably {much} (a slipped decimal point?)'
-
-
-def _slip(link: Link, tensor: Tensor) -> tuple[str, Fraction] | None:
-    """The likeliest entry with a slipped decimal point, and the factor that corrects it.
-
-    That is a slip by one digit rather than more, in a moment rather than a product, and towards a bone: a rod from the
-    joint, with its centre c half way, has m (2 c)^2 / 12 across.
-    """
-    rod = link.mass.value * sum(c.value**2 for c in link.com) / 3 or Fraction(1)
-    found = []
-    for key, value in tensor.items():
-        for factor in _SLIPS:
-            corrected = tensor | {key: value * factor}
-            if _is_of_a_body(corrected):
-                across = (corrected["xx"] + corrected["yy"] + corrected["zz"]) / 2
-                by_one = factor in (10, Fraction(1, 10))
-                found.append((not by_one, key[0] != key[1], abs(math.log(across / rod)), key, factor))
-    return min(found)[3:] if found else None
-
-
-def _is_of_a_body(inertia: Tensor) -> bool:
-    """Whether some distribution of mass has this tensor.
-
-    I = tr(S) E - S with the second moments S = integral of r r^T dm, so a body has S >= 0: that is the triangle
-    inequality of the principal moments, without finding them. It holds if no invariant of S (no sum of products of its
-    eigenvalues) is negative; the second is zero only for a needle, whose inertia is singular.
-    """
-    d, e, f = (-inertia[key] for key in ("xy", "xz", "yz"))
-    total = (inertia["xx"] + inertia["yy"] + inertia["zz"]) / 2
-    a, b, c = (total - inertia[key] for key in ("xx", "yy", "zz"))
-    pairs = a * b + a * c + b * c - d**2 - e**2 - f**2
-    determinant = a * b * c + 2 * d * e * f - a * f**2 - b * e**2 - c * d**2
-    return total > 0 and pairs > 0 and determinant >= 0
 
 
 def _closure(bar: FourBar, low: Quantity, high: Quantity) -> Iterator[Complaint]:
