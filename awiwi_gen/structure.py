@@ -5,7 +5,9 @@ A finger is anything with these attributes (the hand file's `Finger` and its sym
     links[i]      joint, turn, offset[3], mass, com[3], inertia.{xx,yy,zz,xy,xz,yz} (or None of the three), start;
                   quarters[3], and None or rpy[3], reference, four_bar, armature, damping, friction, spring
     pulleys[i]    joint, radius
-    tendons[i]    rest, over (senses and joints: "+flexion", "-pip"), span (None or from_[3], to[3], joint)
+    tendons[i]    rest, over (senses and joints: "+flexion", "-pip"), arms (joint -> arm), span (None or from_[3], to[3],
+                  joint), path (points: link, at[3]), spring (None or stiffness, rest)
+    pulled, strings   the tendons without a spring, and those with one
     couplings[i]  follower, leader
     base          None or position[3], turn, quarters[3], rpy[3]
 
@@ -27,6 +29,11 @@ def coordinates(finger: Finger) -> dict[str, int]:
     follows = leaders(finger)
     free = [link.joint for link in finger.links if link.joint not in follows]
     return {link.joint: free.index(follows.get(link.joint, link.joint)) for link in finger.links}
+
+
+def link_number(finger: Finger, name: str) -> int:
+    """Index of the link that a joint moves; -1 for "palm", the base frame."""
+    return -1 if name == "palm" else next(i for i, link in enumerate(finger.links) if link.joint == name)
 
 
 def radius(finger: Finger, joint: str) -> Any:

@@ -21,7 +21,8 @@ from awiwi_gen.hand.file import HandFile
 from awiwi_gen.hand.gains import Gains, gains_complaints, with_gains
 from awiwi_gen.hand.lint import complaints
 from awiwi_gen.hand.lint_actuation import actuator_complaints
-from awiwi_gen.hand.parts import Finger, FingerName, Limits, Link, Part, Prefix, Title
+from awiwi_gen.hand.names import FingerName, Prefix, Title
+from awiwi_gen.hand.parts import MOST, Finger, Limits, Link, Part
 from awiwi_gen.hand.plausibility import remarks
 from awiwi_gen.hand.wrist import Wrist
 from awiwi_gen.resources import DEFAULT_HAND
@@ -36,7 +37,7 @@ class Hand(Part):
     name: Title
     limits: Limits
     fingers: Annotated[
-        dict[FingerName, Finger], Field(min_length=1, max_length=32, examples=["[[fingers.index.links]]"])
+        dict[FingerName, Finger], Field(min_length=1, max_length=MOST, examples=["[[fingers.index.links]]"])
     ]
     wrist: Wrist | None = None
     motor: Motor | None = None
@@ -46,15 +47,15 @@ class Hand(Part):
 
     @property
     def tendons(self) -> int:
-        """Number of tendons of all fingers."""
-        return sum(len(finger.tendons) for finger in self.fingers.values())
+        """Number of tendons of all fingers that motors pull."""
+        return sum(len(finger.pulled) for finger in self.fingers.values())
 
     @property
     def blocks(self) -> dict[str, tuple[slice, slice]]:
         """Finger -> slices of its tendons and its joints in arrays over all tendons and joints of the hand."""
         found, row, column = {}, 0, 0
         for name, finger in self.fingers.items():
-            tendons, joints = len(finger.tendons), len(finger.joints)
+            tendons, joints = len(finger.pulled), len(finger.joints)
             found[name] = slice(row, row + tendons), slice(column, column + joints)
             row, column = row + tendons, column + joints
         return found

@@ -7,7 +7,8 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, PrivateAttr
 
 from awiwi_gen.hand.measure import Measure
-from awiwi_gen.hand.part import Angle, JointName, Mass, Moment, Part, Point, Product, Size, Source
+from awiwi_gen.hand.names import JointName, Source
+from awiwi_gen.hand.part import Angle, Mass, Moment, Part, Point, Product, Size
 from awiwi_gen.units import Quantity, parse_quantity
 
 Turn = Annotated[Literal["none", "x+90", "x-90", "y+90", "y-90", "z+90", "z-90"], Field(examples=['"none"', '"x+90"'])]

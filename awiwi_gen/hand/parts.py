@@ -6,47 +6,26 @@ branch of a four-bar) is structure, on which derivations depend, while they neve
 
 from __future__ import annotations
 
-import re
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, Field
+from pydantic import Field
 
 from awiwi_gen.hand.links import Base, FourBar, Inertia, Link
 from awiwi_gen.hand.measure import Measure
-from awiwi_gen.hand.part import (
-    Angle,
-    FingerName,
-    JointName,
-    Keys,
-    Length,
-    Moment,
-    Part,
-    Point,
-    Prefix,
-    Size,
-    Source,
-    Title,
-    covers,
-    join,
-)
+from awiwi_gen.hand.names import FingerName, JointName, Over, Prefix, Source, Title
+from awiwi_gen.hand.part import Angle, Keys, Length, Moment, Part, Point, Size, covers, join
 from awiwi_gen.units import Quantity
 
 # fmt: off
 __all__ = [
-    "Angle", "Base", "Coupling", "Finger", "FingerName", "FourBar", "Inertia", "Keys", "Length", "Limits", "Link",
-    "Measure", "Moment", "Part", "Point", "Prefix", "Pulley", "Size", "Source", "Span", "Tendon", "Title", "covers",
-    "join",
+    "MOST", "PALM", "Angle", "Base", "Coupling", "Finger", "FingerName", "FourBar", "Inertia", "Keys", "Length",
+    "Limits", "Link", "Measure", "Moment", "Part", "PathPoint", "Point", "Prefix", "Pulley", "ReturnSpring", "Size",
+    "Source", "Span", "Tendon", "Title", "covers", "join",
 ]
 # fmt: on
 
-
-def _over(text: str) -> str:
-    if not re.fullmatch(r"[+-][a-z][a-z0-9_]*", text):
-        raise ValueError('is not a sense and a pulley; expected something such as "+pip"')
-    return text
-
-
-Over = Annotated[str, AfterValidator(_over)]
+MOST = 32  # fingers of a hand; links, pulleys, tendons and couplings of a finger
+PALM = "palm"  # in place of a joint: the finger's base frame
 
 
 class Pulley(Part):
@@ -69,13 +48,45 @@ class Span(Part):
     joint: JointName
 
 
+class PathPoint(Part):
+    """A point that a tendon passes, fixed in a link: in the frame after that joint's rotation, or in the base frame."""
+
+    link: Annotated[JointName, Field(examples=['"palm"', '"flexion"'])]
+    at: Point
+
+
+class ReturnSpring(Part):
+    """What makes a tendon an elastic string: its force is stiffness * (length - rest), and none where it is slack."""
+
+    stiffness: Annotated[Quantity, Measure("100 N/m", "0.001 N/m", "1000000000 N/m")]
+    rest: Length
+
+
 class Tendon(Part):
-    """Path length in the finger: rest + sum of sense * radius * angle over the pulleys + the length of the span."""
+    """Path length in the finger: a sum of all that its keys describe.
+
+    These are the rest, sense * radius * angle over the pulleys, arm * angle of joints with an arm of this tendon's own,
+    the length of the span, and the straight lines from point to point of the path. A motor pulls it unless it has a
+    spring.
+    """
 
     rest: Length
-    over: Annotated[tuple[Over, ...], Field(strict=False, max_length=8)] = ()
+    over: Annotated[tuple[Over, ...], Field(strict=False, max_length=MOST)] = ()
+    arms: Annotated[dict[JointName, Length], Field(max_length=MOST)] = {}  # noqa: RUF012
     span: Span | None = None
+    path: Annotated[tuple[PathPoint, ...], Field(strict=False, min_length=2, max_length=MOST)] = ()
+    spring: ReturnSpring | None = None
     source: Source
+
+    def structure(self) -> list[Any]:
+        """Everything but the numbers."""
+        more = {
+            "arms": list(self.arms),
+            "path": [point.link for point in self.path],
+            "spring": self.spring is not None,
+        }
+        found = {key: value for key, value in more.items() if value}
+        return [list(self.over), self.span and self.span.joint, *([found] if found else [])]
 
 
 class Coupling(Part):
@@ -88,12 +99,10 @@ class Coupling(Part):
 class Finger(Part):
     """A serial chain from the palm to the tip, and the tendons that pull it."""
 
-    links: Annotated[tuple[Link, ...], Field(strict=False, min_length=1, max_length=32, examples=["[[...links]]"])]
-    pulleys: Annotated[tuple[Pulley, ...], Field(strict=False, max_length=32)] = ()
-    tendons: Annotated[
-        tuple[Tendon, ...], Field(strict=False, min_length=1, max_length=16, examples=["[[...tendons]]"])
-    ]
-    couplings: Annotated[tuple[Coupling, ...], Field(strict=False, max_length=32)] = ()
+    links: Annotated[tuple[Link, ...], Field(strict=False, min_length=1, max_length=MOST, examples=["[[...links]]"])]
+    pulleys: Annotated[tuple[Pulley, ...], Field(strict=False, max_length=MOST)] = ()
+    tendons: Annotated[tuple[Tendon, ...], Field(strict=False, max_length=MOST)] = ()
+    couplings: Annotated[tuple[Coupling, ...], Field(strict=False, max_length=MOST)] = ()
     base: Base | None = None
 
     @property
@@ -117,6 +126,16 @@ class Finger(Part):
         return any(link.passive for link in self.links)
 
     @property
+    def pulled(self) -> tuple[Tendon, ...]:
+        """The m tendons that motors pull, in the order of the arrays over tendons; the others are return strings."""
+        return tuple(tendon for tendon in self.tendons if tendon.spring is None)
+
+    @property
+    def strings(self) -> tuple[Tendon, ...]:
+        """The elastic return strings."""
+        return tuple(tendon for tendon in self.tendons if tendon.spring is not None)
+
+    @property
     def radii(self) -> dict[str, Quantity]:
         """Joint -> radius of its pulley."""
         return {pulley.joint: pulley.radius for pulley in self.pulleys}
@@ -126,7 +145,7 @@ class Finger(Part):
         return {
             "links": [link.structure() for link in self.links],
             "pulleys": [pulley.joint for pulley in self.pulleys],
-            "tendons": [[list(tendon.over), tendon.span and tendon.span.joint] for tendon in self.tendons],
+            "tendons": [tendon.structure() for tendon in self.tendons],
             "couplings": [[coupling.follower, coupling.leader] for coupling in self.couplings],
             **({"base": self.base.quarters} if self.base else {}),
         }

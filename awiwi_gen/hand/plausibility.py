@@ -7,7 +7,7 @@ one number, and no other, removes all warnings of the hand's bodies.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -21,7 +21,9 @@ _DENSEST, _LIGHTEST = 12e3, 5.0  # [kg/m^3]: lead, and less than any foam
 _ALONG_JOINT, _ALONG_COM = 0.28, 0.2  # second moment along the bone, in squares of its length: rods have 1/3 and 1/12
 _LARGEST_PULLEY, _SMALLEST_PULLEY = 1.0, 0.02  # radius in lengths of the finger's longest bone
 _SMALLEST_RANGE, _LARGEST_RANGE = 5.0, 270.0  # of a joint [deg]
-_FACTORS = (0.001, 0.01, 0.1, 10.0, 100.0, 1000.0)
+_SLIPS = [
+    (key, factor) for key in ("offset", "com", "mass", "inertia") for factor in (0.001, 0.01, 0.1, 10.0, 100.0, 1000.0)
+]
 _MANY = 3  # links with the same warning have one cause rather than a slip each
 
 Vector = tuple[float, float, float]
@@ -46,14 +48,30 @@ def remarks(fingers: Mapping[str, Finger]) -> Iterator[Remark]:
     found = {keys: list(body.remarks()) for keys, body in bodies.items()}
     unusual = [keys for keys, each in found.items() if each]
     slip = bodies[unusual[0]].slip() if len(unusual) == 1 else ""
+    shared = _shared_cause([*bodies.values()]) if len(unusual) >= _MANY else ""
     for keys in unusual:
         for remark in found[keys]:
             alike = sum(any(other.keys == remark.keys for other in each) for each in found.values())
-            cause = f"; {alike} of {len(found)} links are like this: look for one cause" if alike >= _MANY else slip
+            cause = f"; {alike} of {len(found)} links are like this: {shared}" if alike >= _MANY else slip
             yield Remark((*keys, *remark.keys), remark.message + cause, remark.ratio)
     for name, finger in fingers.items():
-        for each in (*_pulleys(finger), *_ranges(finger), *_one_sided(finger)):
+        for each in (*_pulleys(finger), *_ranges(finger)):
             yield Remark(("fingers", name, *each.keys), each.message, each.ratio)
+
+
+def _shared_cause(bodies: Sequence[Body]) -> str:
+    """The one mistake in all bodies of a hand without which there would be no remark, if there is exactly one."""
+    found = [
+        f"{key} is probably {_much(factor)} everywhere"
+        for key, factor in _SLIPS
+        if not any([*body.scaled(key, factor).remarks()] for body in bodies)
+    ]
+    return found[0] if len(found) == 1 else "look for one cause"
+
+
+def _much(factor: float) -> str:
+    """A wrong number in words, by the factor that corrects it."""
+    return f"{1 / factor:g} times too large" if factor < 1 else f"{factor:g} times too small"
 
 
 def _longest(finger: Finger) -> float:
@@ -157,19 +175,12 @@ class Body:
 
     def slip(self) -> str:
         """The slip of a decimal point that explains all remarks, if there is exactly one."""
-        scaled = [
-            (key, factor)
-            for key in ("offset", "com", "mass", "inertia")
-            for factor in _FACTORS
-            if not any(self._scaled(key, factor).remarks())
-        ]
-        if len(scaled) != 1:
-            return ""
-        ((key, factor),) = scaled
-        much = f"{1 / factor:g} times too large" if factor < 1 else f"{factor:g} times too small"
-        return f"; {key} is probably {much}"
+        found = [(key, factor) for key, factor in _SLIPS if not [*self.scaled(key, factor).remarks()]]
+        return f"; {found[0][0]} is probably {_much(found[0][1])}" if len(found) == 1 else ""
 
-    def _scaled(self, key: str, factor: float) -> Body:
+    def scaled(self, key: str, factor: float) -> Body:
+        """The body with the numbers of one key multiplied by a factor."""
+
         def times(vector: Vector) -> Vector:
             return vector[0] * factor, vector[1] * factor, vector[2] * factor
 
@@ -215,21 +226,3 @@ def _ranges(finger: Finger) -> Iterator[Remark]:
             continue
         found = f'= "{link.low}" leaves a range of {width:.3g} deg up to high = "{link.high}"{hint}'
         yield Remark(("links", index, "low"), found, ratio)
-
-
-def _one_sided(finger: Finger) -> Iterator[Remark]:
-    """Joints that pulleys alone move, and not to both sides."""
-    order = [link.joint for link in finger.links]
-    spanned = {joint for tendon in finger.tendons if tendon.span for joint in order[: order.index(tendon.span.joint)]}
-    for joint in finger.joints:
-        if joint in spanned:
-            continue
-        # A follower's pulley takes as much tendon as its leader's, so the senses of both add up.
-        senses = [
-            sum(1 if name[0] == "+" else -1 for name in tendon.over if finger.leaders.get(name[1:], name[1:]) == joint)
-            for tendon in finger.tendons
-        ]
-        pulled = {"+": any(sense > 0 for sense in senses), "-": any(sense < 0 for sense in senses)}
-        if missing := [f'"{sign}{joint}"' for sign, found in pulled.items() if not found]:
-            need = f'= "{joint}" has no tendon over {" nor ".join(missing)}; tendons only pull, to one side each'
-            yield Remark(("links", order.index(joint), "joint"), need, (2 - len(missing)) / 2)

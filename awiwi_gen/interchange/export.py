@@ -14,7 +14,9 @@ from awiwi_gen.hand import Finger, Hand, Link
 from awiwi_gen.interchange.frames import turn_matrix
 from awiwi_gen.interchange.model import Array, Loss
 
-FRICTION = "dry friction is a smooth curve in the hand: the format has its torque, without the velocity at which it rises"
+FRICTION = (
+    "dry friction is a smooth curve in the hand: the format has its torque, without the velocity at which it rises"
+)
 
 
 @dataclass(frozen=True, eq=False)

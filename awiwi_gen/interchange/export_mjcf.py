@@ -6,7 +6,6 @@ implicitfast, with which the damping of tendons does not diverge.
 
 from __future__ import annotations
 
-from itertools import pairwise
 from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
@@ -110,7 +109,9 @@ class _Writer:
         body = SubElement(parent, "body", name=f"{self.name}_{link.joint}")
         _place(body, position, axes)
         if link.mass is None:
-            self._lose(f"links without mass: {SPECK * 1e6:g} mg, because MuJoCo moves no body without", body.get("name", ""))
+            self._lose(
+                f"links without mass: {SPECK * 1e6:g} mg, because MuJoCo moves no body without", body.get("name", "")
+            )
             SubElement(body, "inertial", pos="0 0 0", mass=text(SPECK), diaginertia=text([SPECK * 1e-6] * 3))
         else:
             _inertial(body, float(link.mass), vector(link.com or ()), waiting[-1].inertia)
@@ -153,8 +154,8 @@ class _Writer:
         written = []
         if arms:
             written.append(SubElement(self.sections["tendon"], "fixed", name=name))
-            for joint, arm in arms.items():
-                SubElement(written[-1], "joint", joint=f"{self.name}_{joint}", coef=text(arm))
+            for joint, coefficient in arms.items():
+                SubElement(written[-1], "joint", joint=f"{self.name}_{joint}", coef=text(coefficient))
         for number, points in enumerate(self._lines(tendon)):
             full = name if not written else f"{name}_line{number}"
             written.append(SubElement(self.sections["tendon"], "spatial", name=full))

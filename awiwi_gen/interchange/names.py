@@ -7,12 +7,12 @@ from collections.abc import Callable, Iterable
 
 from pydantic import TypeAdapter, ValidationError
 
-from awiwi_gen.hand.part import FingerName, JointName, Prefix
+from awiwi_gen.hand.names import FingerName, JointName, Prefix
 
 _FINGER, _JOINT, _PREFIX = TypeAdapter(FingerName), TypeAdapter(JointName), TypeAdapter(Prefix)
 _LONGEST_JOINT, _LONGEST_FINGER = 24, 16
 _FINGERS = {  # words that models use, and the finger they mean
-    "thumb": "thumb", "index": "index", "middle": "middle", "ring": "ring", "pinky": "pinky", "little": "little", 
+    "thumb": "thumb", "index": "index", "middle": "middle", "ring": "ring", "pinky": "pinky", "little": "little",
     "medium": "middle",
     "ff": "ff", "mf": "mf", "rf": "rf", "lf": "lf", "th": "th", "if": "index", "pf": "pinky",
 }  # fmt: skip

@@ -28,16 +28,21 @@ def joint_laws(hand: Hand) -> list[Kernel]:
 
 
 def joint_stiffness(hand: Hand) -> tuple[float, float]:
-    """Least and largest stiffness [N m/rad] that the tendons on a joint's pulley give it, to two digits."""
+    """Least and largest stiffness [N m/rad] that tendons with constant arms give a joint, to two digits."""
     low, high = float(hand.limits.tendon_stiffness_low), float(hand.limits.tendon_stiffness_high)
     if hand.spring:
         levers = [Lever(spring) for spring in (hand.spring, *hand.spring.calibrated.values())]
         low = min(lever.at(lever.slack).stiffness for lever in levers)
         high = max(lever.at(lever.taut).stiffness for lever in levers)
     squares = [
-        float(pulley.radius) ** 2 * sum(over[1:] == pulley.joint for tendon in finger.tendons for over in tendon.over)
+        float(pulley.radius) ** 2 * sum(over[1:] == pulley.joint for tendon in finger.pulled for over in tendon.over)
         for finger in hand.fingers.values()
         for pulley in finger.pulleys
+    ]
+    squares += [
+        sum(float(tendon.arms[joint]) ** 2 for tendon in finger.pulled if joint in tendon.arms)
+        for finger in hand.fingers.values()
+        for joint in finger.joints
     ]
     found = [square for square in squares if square > 0] or [1.0]
     return float(f"{low * min(found):.2g}"), float(f"{high * max(found):.2g}")

@@ -220,6 +220,11 @@ def the_joint_stiffness_is_the_falling_torque(
     return rate + _times(joint_stiffness["K"], qd), rate
 
 
+def the_power_of_return_strings_is_taken_from_their_energy(x: Motion, return_torque: Any) -> Residual:
+    power = _dot(return_torque["tau"], x.inputs["qd"])
+    return power + x.rate("return_torque", "energy", q=x.inputs["qd"]), power
+
+
 def the_bars_of_the_wrist_keep_their_lengths(x: Motion, wrist_points: Any) -> Residual:
     a0, a, b = (np.array([ball(x.values[f"{point}[{i}]"]) for i in range(3)]) for point in ("a0", "a", "b"))
     b0, c0, c = b - b, b * [0, 1, 0], b * [1, 0, 1]
@@ -283,6 +288,7 @@ LAWS: tuple[Callable[..., Residual], ...] = (
     the_power_of_the_joints_is_taken_from_the_tendons,
     the_joint_stiffness_is_symmetric,
     the_joint_stiffness_is_the_falling_torque,
+    the_power_of_return_strings_is_taken_from_their_energy,
     the_bars_of_the_wrist_keep_their_lengths,
     the_wrist_rotates_the_palm,
     the_wrist_coupling_is_the_derivative_of_the_lengths,

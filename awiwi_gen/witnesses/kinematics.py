@@ -55,5 +55,23 @@ def point_before_joint(finger: Finger, q: SX, name: str, local: SX) -> SX:
     return assembly.base_point(len(before), local)
 
 
+def point_of_link(finger: Finger, q: SX, link: int, local: SX) -> tuple[SX, SX]:
+    """Base coordinates (3) [m] of a point (3) [m] of a link's frame, and their rates (3 x n) [m/rad]: axis x lever.
+
+    Link -1 is the base frame.
+    """
+    assembly, rates = assemble(finger, q), SX.zeros(3, q.numel())
+    moving = [each for each in zip(assembly.joints, assembly.axes(), strict=True) if each[0].link <= link]
+    if not moving:
+        return local, rates
+    last = moving[-1][0]
+    point = last.rotation @ (local + _Z * last.shift)
+    for joint, axes in reversed(moving):
+        lever = point if joint is last else joint.offset + point
+        rates[:, joint.coordinate] += joint.ratio * (axes @ ca.cross(joint.axis, lever))
+        point = joint.inward(lever)
+    return assembly.base_rotation.T @ point, rates
+
+
 def _pose(axes: SX, origin: SX) -> SX:
     return ca.vertcat(ca.horzcat(axes, origin), SX([[0, 0, 0, 1]]))
