@@ -300,12 +300,12 @@ def test_a_span_that_reaches_a_length_of_zero_within_the_range_is_found() -> Non
     assert message.endswith("expected at least 0.1 mm in every pose")
 
 
-def test_nine_fingers_are_too_many_and_none_too_few() -> None:
+def test_33_fingers_are_too_many_and_none_too_few() -> None:
     head, finger = ONE_FINGER.split("[fingers.jaw]")
-    nine = [("[fingers.jaw]" + finger).replace("jaw", f"jaw{i}") for i in range(9)]
-    assert "fingers has 9 entries; expected at most 8" in faults_of(head + "\n".join(nine))
+    many = [("[fingers.jaw]" + finger).replace("jaw", f"jaw{i}") for i in range(33)]
+    assert "fingers has 33 entries; expected at most 32" in faults_of(head + "\n".join(many))
     assert "fingers has 0 entries; expected at least 1" in faults_of(head + "[fingers]")
-    assert len(Hand.parse(head + "\n".join(nine[:8])).fingers) == 8
+    assert len(Hand.parse(head + "\n".join(many[:32])).fingers) == 32
 
 
 def test_all_faults_are_told_at_once_from_top_to_bottom() -> None:
