@@ -11,7 +11,7 @@ The parts of a hand are in `parts`, reading a file is in `file`, what no hand ca
 from __future__ import annotations
 
 import os
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
@@ -33,6 +33,7 @@ __all__ = ["Fibre", "Finger", "Hand", "Limits", "Link", "Motor", "Spring", "Wris
 class Hand(Part):
     """A whole hand; the order of its fingers is the order of their tendons in the forearm."""
 
+    version: Annotated[Literal[1, 2], Field(alias="schema", examples=["2"])] = 1
     prefix: Prefix
     name: Title
     limits: Limits

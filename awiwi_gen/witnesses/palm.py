@@ -4,7 +4,7 @@ import casadi as ca
 from casadi import SX
 
 from awiwi_gen.structure import Finger, fixed_turns
-from awiwi_gen.witnesses.dynamics.assembly import Turn, cos_sin_of
+from awiwi_gen.witnesses.dynamics.assembly import Turn
 from awiwi_gen.witnesses.kinematics import fingertip_pose
 
 
@@ -26,4 +26,4 @@ def palm_gravity(finger: Finger, g_palm: SX) -> SX:
 
 
 def _turns(finger: Finger) -> list[Turn]:
-    return [Turn(axis, cos_sin_of(quarters, angle)) for axis, quarters, angle in fixed_turns(finger.base)]
+    return [Turn(*step) for step in fixed_turns(finger.base)]

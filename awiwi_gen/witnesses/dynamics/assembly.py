@@ -60,7 +60,7 @@ class Moments:
         """The same body in other axes."""
         return Moments(self.mass, rotation @ self.first, rotation @ self.second @ rotation.T, self.trace)
 
-    def rotatedabout_z(self, c: SX, s: SX) -> "Moments":
+    def rotated_about_z(self, c: SX, s: SX) -> "Moments":
         """`rotated` by the angle with this cosine and sine: 8 products for S, by the double angle, instead of 24."""
         x, y, z = ca.vertsplit(self.first)
         xx, xy, xz, yy, yz, zz = (self.second[i, j] for i, j in ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)))
@@ -76,7 +76,7 @@ class Moments:
         if all(entry.is_constant() for entry in turn.cos_sin):
             return self.rotated(turn.matrix())
         to_z = turn.permutation()
-        return self.rotated(to_z).rotatedabout_z(*turn.cos_sin).rotated(to_z.T)
+        return self.rotated(to_z).rotated_about_z(*turn.cos_sin).rotated(to_z.T)
 
     def split(self) -> tuple["Moments", "Moments"]:
         """The part that a rotation about z does not change, as mass on the z axis, and the rest."""
@@ -94,10 +94,19 @@ class Moments:
 
 @dataclass(frozen=True)
 class Turn:
-    """A fixed rotation about coordinate axis number `axis`, by the angle with this cosine and sine."""
+    """A fixed rotation about coordinate axis number `axis`: so many quarter turns, or by an angle if that is None."""
 
     axis: int
-    cos_sin: Vector
+    quarters: int | None
+    angle: Any
+
+    @property
+    def cos_sin(self) -> Vector:
+        """Cosine and sine of its angle; exact for quarter turns."""
+        if self.quarters is None:
+            return ca.cos(self.angle), ca.sin(self.angle)
+        c, s = [(1, 0), (0, 1), (-1, 0), (0, -1)][self.quarters % 4]
+        return SX(c), SX(s)
 
     def permutation(self) -> SX:
         """The rotation (3 x 3) that makes its axis the z axis: a cyclic permutation."""
@@ -110,22 +119,29 @@ class Turn:
 
 
 def turns_of(link: Any) -> tuple[list[Turn], Any]:
-    """The fixed rotations of a link in front of its joint, in order, and an angle about z.
+    """The fixed rotations of a link in front of its joint, in order, and an angle [rad] that its joint's angle takes up.
 
-    That is the angle [rad] of a last rotation about z, which the joint's angle takes up; 0 if there is none.
+    Any rotation is one about z, one about x and one about z. The last one is the joint's, so a rotation about several
+    axes costs as much as one about x: the first is taken up by the joint before (`assemble`).
     """
-    steps, last = fixed_turns(link), 0
-    if steps and steps[-1][:2] == (2, None) and link.four_bar is None:
-        last = steps.pop()[2]
-    return [Turn(axis, cos_sin_of(quarters, angle)) for axis, quarters, angle in steps], last
+    turns = [Turn(*step) for step in fixed_turns(link)]
+    if link.four_bar is not None:  # its coupler starts where the crank's angle is not zero
+        return turns, 0
+    if sum(turn.quarters is None for turn in turns) > 1:
+        rotation = _product(turns)
+        across = ca.sqrt(rotation[0, 2] ** 2 + rotation[1, 2] ** 2)
+        first, last = ca.atan2(rotation[0, 2], -rotation[1, 2]), ca.atan2(rotation[2, 0], rotation[2, 1])
+        return [Turn(2, None, first), Turn(0, None, ca.atan2(across, rotation[2, 2]))], last
+    if turns and turns[-1].axis == 2 and turns[-1].quarters is None:
+        return turns[:-1], turns[-1].angle
+    return turns, 0
 
 
-def cos_sin_of(quarters: int | None, angle: Any) -> Vector:
-    """Cosine and sine of so many quarter turns, exactly, or of an angle [rad] if `quarters` is None."""
-    if quarters is None:
-        return ca.cos(angle), ca.sin(angle)
-    c, s = [(1, 0), (0, 1), (-1, 0), (0, -1)][quarters % 4]
-    return SX(c), SX(s)
+def _product(turns: Sequence[Turn]) -> SX:
+    product = SX.eye(3)
+    for turn in turns:
+        product = product @ turn.matrix()
+    return product
 
 
 @dataclass(frozen=True)
@@ -135,7 +151,8 @@ class Joint:
     The joint's angle is a function of coordinate number `coordinate`, with the derivative `ratio` and the second
     derivative `ratio_derivative`. If the next joint has another axis, the working axes rotate with this joint, by the
     angle with cosine and sine `cos_sin`, and then by `next_rotation` (3 x 3), the fixed rotation of the next joint, which
-    is the product of `next_turns`. Otherwise they are the axes before the joint, and `next_rotation` is None.
+    is the product of `next_turns`. A first turn about z is part of `cos_sin` instead. Otherwise they are the axes before
+    the joint, and `next_rotation` is None.
 
     In working axes, `axis` (3) is the joint's axis, `offset` (3) [m] leads to the next joint, and `rotation` (3 x 3)
     takes the link's own axes to the working axes. `link_offset` and `link_body` are offset and body in the link's own
@@ -171,7 +188,7 @@ class Joint:
             return body
         for turn in reversed(self.next_turns):
             body = body.turned(turn)
-        return body.rotatedabout_z(*self.cos_sin)
+        return body.rotated_about_z(*self.cos_sin)
 
 
 @dataclass(frozen=True)
@@ -239,14 +256,21 @@ def assemble(finger: Finger, q: SX) -> Assembly:
         angle += part.angle
         if part.cos_sin is not None:
             start, angle = _sum_of_angles(before_crank, part.cos_sin), SX(0)
-        cos_sin = _sum_of_angles(start, (ca.cos(angle), ca.sin(angle)))
         next_turns = following.turns if following is not None else []
-        next_rotation = fixed_rotation(next_turns)
+        to_next, taken = fixed_rotation(next_turns), SX(0)
+        if len(next_turns) > 1 and next_turns[0].axis == 2 and next_turns[0].quarters is None:
+            taken, next_turns = next_turns[0].angle, next_turns[1:]
+        cos_sin = _sum_of_angles(start, (ca.cos(angle + taken), ca.sin(angle + taken)))
         in_link = (part.link, part.shift, part.offset, body)
-        if next_rotation is None:
-            rotation, axis, body = about_z(cos_sin), _Z, body.rotatedabout_z(*cos_sin)
+        if to_next is None:
+            next_rotation, rotation, axis, body = None, about_z(cos_sin), _Z, body.rotated_about_z(*cos_sin)
         else:
-            rotation, axis, body = next_rotation.T, next_rotation.T @ _Z, body.rotated(next_rotation.T)
+            next_rotation, rotation, axis, body = (
+                _product(next_turns),
+                to_next.T,
+                to_next.T @ _Z,
+                body.rotated(to_next.T),
+            )
         offset = rotation @ part.offset
         joints.append(
             Joint(
@@ -342,7 +366,5 @@ def _sum_of_angles(one: Vector, other: Vector) -> Vector:
 
 def fixed_rotation(turns: Sequence[Turn]) -> SX | None:
     """The product (3 x 3) of fixed rotations; None if it is no rotation."""
-    product = SX.eye(3)
-    for turn in turns:
-        product = product @ turn.matrix()
+    product = _product(turns)
     return None if ca.sparsify(product).is_eye() else product
