@@ -87,8 +87,8 @@ def export(
 
 
 def _import_table(file: Path, into: Path | None, output: Path | None, as_json: bool) -> int:
-    from awiwi_gen.interchange.csv import updated
     from awiwi_gen.interchange.loss import write_whole
+    from awiwi_gen.interchange.masses import updated
 
     if into is None:
         raise InputError(f"{file} is a table of masses; name the hand file that takes them with --into FILE")
@@ -100,7 +100,7 @@ def _import_table(file: Path, into: Path | None, output: Path | None, as_json: b
     if as_json:
         _print_json({"file": str(target), "changed": changes})
     else:
-        print(printable("\n".join([*changes, f"{target}: {len(changes)} numbers changed"])))
+        print(printable("\n".join([*changes, f"{target}: {len(changes)} links changed"])))
     return 0
 
 

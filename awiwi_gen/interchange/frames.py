@@ -15,7 +15,7 @@ import numpy as np
 
 from awiwi_gen.interchange.model import Array
 
-__all__ = ["Axis", "Frame", "base_frame", "link_frames", "rpy_of", "turn_matrix"]
+__all__ = ["Axis", "Frame", "base_frame", "link_frames", "rotation_about_z", "rpy_of", "turn_matrix"]
 
 ALIGNED = 1e-12
 """Largest sine of the angle between two directions that are one but for rounding."""
@@ -50,6 +50,11 @@ def turn_matrix(turn: str) -> Array:
         return np.eye(3)
     axis, sign = _TURNS[turn]
     return np.rint(_about(axis, sign * math.pi / 2)) + 0.0
+
+
+def rotation_about_z(angle: float) -> Array:
+    """The matrix (3 x 3) of a joint's rotation."""
+    return _about(2, angle)
 
 
 def _about(axis: int, angle: float) -> Array:

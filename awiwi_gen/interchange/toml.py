@@ -95,11 +95,7 @@ def _link_lines(link: DraftLink, file: str) -> list[str]:
     lines += [f"offset = {_lengths(link.offset)}"]
     sources = dict.fromkeys(link.assumed, "assumed")
     if link.mass is not None:
-        lines += [
-            f"mass = {_text(mass(link.mass))}",
-            f"com = {_lengths(link.com)}",
-            f"inertia = {_tensor(link.inertia)}",
-        ]
+        lines += [f"{key} = {each}" for key, each in mass_and_inertia(link.mass, link.com, link.inertia).items()]
         sources |= dict.fromkeys(("mass", "com", "inertia"), body)
     if joint.armature:
         lines += [f"armature = {_text(quantity(joint.armature, 'kg m^2'))}"]
@@ -172,6 +168,11 @@ def angle(radians: float) -> str:
     if abs(math.radians(degrees) - radians) <= 2e-16 * max(1.0, abs(radians)):
         return quantity(degrees, "deg")
     return quantity(radians, "rad")
+
+
+def mass_and_inertia(kilograms: float, com: Array, inertia: Array) -> dict[str, str]:
+    """The keys of a body, as TOML: mass, com (3) and the tensor about it (3 x 3), in SI."""
+    return {"mass": _text(mass(kilograms)), "com": _lengths(com), "inertia": _tensor(inertia)}
 
 
 def _lengths(values: Array) -> str:
