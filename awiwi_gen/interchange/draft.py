@@ -81,11 +81,9 @@ def draft(model: Model, palm: str = "", named: Mapping[str, str] | None = None) 
             raise InputError(f"--finger {name}=...: is not a usable name of a finger; expected letters a-z and digits")
     root = palm_of(model, palm)
     chains, losses = find(model, root, named or {})
-    names = joint_names(joint.name for chain in chains for joint in chain.joints)
-    labels = finger_names(
-        [[model.bodies[s.body].name for s in c.segments] + [j.name for j in c.joints] for c in chains]
-    )
+    labels = finger_names(_labels(model, chain) for chain in chains)
     chains = [Chain(c.name or label, c.carrier, c.segments) for c, label in zip(chains, labels, strict=True)]
+    names = joint_names({chain.name: [joint.name for joint in chain.joints] for chain in chains})
     owner = {joint.name: chain.name for chain in chains for joint in chain.joints}
     locks, lost = followed(model.locks, owner, names)
     routed, left = _routed(model, chains, owner)
@@ -102,6 +100,13 @@ def draft(model: Model, palm: str = "", named: Mapping[str, str] | None = None) 
         losses=(*model.losses, *losses, *lost, *left, *_approximated(chains, fingers)),
         notes=model.notes,
     )
+
+
+def _labels(model: Model, chain: Chain) -> tuple[str, list[str]]:
+    """The name of the body that carries a finger, and those of its bodies and joints."""
+    bodies = [model.bodies[segment.body].name for segment in chain.segments]
+    carrier = model.bodies[model.bodies[chain.segments[0].body].parent].name
+    return carrier, [*bodies, *(joint.name for joint in chain.joints)]
 
 
 def _approximated(chains: list[Chain], fingers: tuple[DraftFinger, ...]) -> list[Loss]:

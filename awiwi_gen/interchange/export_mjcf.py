@@ -27,7 +27,7 @@ from awiwi_gen.interchange.export import (
 from awiwi_gen.interchange.model import Array, Loss
 
 SPECK = 1e-9
-"""Mass [kg] and radius of gyration [m] times 1000 of bodies that have none in the hand: MuJoCo moves no other bodies."""
+"""Mass [kg] of bodies that have none in the hand, with a radius of gyration of 1 mm: MuJoCo moves no body without."""
 
 
 def text_and_losses(hand: Hand) -> tuple[str, list[Loss]]:

@@ -19,7 +19,7 @@ __all__ = ["Axis", "Frame", "base_frame", "link_frames", "rotation_about_z", "rp
 
 ALIGNED = 1e-12
 """Largest sine of the angle between two directions that are one but for rounding."""
-_TURNS = {"x+90": (0, 1), "x-90": (0, -1), "y+90": (1, 1), "y-90": (1, -1)}
+_TURNS = ("none", "x+90", "x-90", "y+90", "y-90")  # one for each direction of the next axis but that opposite z
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,8 +48,7 @@ def turn_matrix(turn: str) -> Array:
     """The exact matrix (3 x 3) of a quarter turn such as "x+90"."""
     if turn == "none":
         return np.eye(3)
-    axis, sign = _TURNS[turn]
-    return np.rint(_about(axis, sign * math.pi / 2)) + 0.0
+    return np.rint(_about("xyz".index(turn[0]), math.radians(float(turn[1:])))) + 0.0
 
 
 def rotation_about_z(angle: float) -> Array:
@@ -77,7 +76,7 @@ def _aligned(local: Array) -> str | None:
     nearest = np.rint(local)
     if abs(nearest).sum() != 1 or np.linalg.norm(local - nearest) > ALIGNED or nearest[2] < 0:
         return None
-    return next(turn for turn in ("none", *_TURNS) if np.array_equal(turn_matrix(turn)[:, 2], nearest))
+    return next(turn for turn in _TURNS if np.array_equal(turn_matrix(turn)[:, 2], nearest))
 
 
 def _yaw_and_roll(local: Array) -> tuple[float, float]:

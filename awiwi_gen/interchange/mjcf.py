@@ -18,6 +18,8 @@ from awiwi_gen.errors import Fault, InputError
 from awiwi_gen.interchange.model import Array, Body, Joint, Lock, Loss, Model, Site, Tendon
 from awiwi_gen.interchange.quarter import quarter_angle, quarter_axis, quarter_rotation
 
+SPECK = 1e-9
+"""Mass [kg] that a moving body gets which has none, because MuJoCo refuses those; no more counts as a mass."""
 KINDS = ("free", "ball", "slide", "hinge")
 _INCLUDE = re.compile(r'<include\s[^>]*?file\s*=\s*"([^"]+)"')
 _RPY = re.compile(r'(\brpy\s*=\s*")([^"]*)(")')
@@ -31,12 +33,13 @@ def read(path: Path, exact: bool = False, without: Iterable[str] = ()) -> Model:
     """
     spec, notes = parse(path, exact)
     losses = prepare(spec, set(without))
+    massless = {body.name for body in spec.bodies[1:] if body.explicitinertial and body.mass <= SPECK}
     compiled = compile_spec(spec, path)
     tendons, lost = _tendons(compiled)
     return Model(
         name=spec.modelname or path.stem,
         file=path.name,
-        bodies=tuple(_body(compiled, index) for index in range(compiled.nbody)),
+        bodies=tuple(_body(compiled, index, massless) for index in range(compiled.nbody)),
         joints=tuple(_joint(compiled, index) for index in range(compiled.njnt)),
         tendons=tendons,
         locks=_locks(compiled),
@@ -67,9 +70,18 @@ def parse(path: Path, exact: bool) -> tuple[Any, list[str]]:
     except (ValueError, mujoco.FatalError) as error:
         raise _refused(path, error) from None
     spec.compiler.fusestatic = False
+    if re.search(r"<robot\b", text):
+        _weigh(spec)
     if not exact:
         notes += _quarter_turns(spec)
     return spec, notes
+
+
+def _weigh(spec: Any) -> None:
+    """Give moving links of a URDF that have no inertial the least that MuJoCo accepts."""
+    for body in spec.bodies[1:]:
+        if body.joints and not body.mass and not body.geoms:
+            body.mass, body.inertia, body.explicitinertial = SPECK, [SPECK * 1e-6] * 3, True
 
 
 def _includes(text: str, folder: Path) -> dict[str, bytes]:
@@ -233,14 +245,15 @@ def rotation(quat: Any) -> Array:
     return np.where(np.abs(matrix - exact) < 1e-15, exact, matrix).reshape(3, 3)
 
 
-def _body(compiled: Any, index: int) -> Body:
+def _body(compiled: Any, index: int, massless: set[str]) -> Body:
     axes = rotation(compiled.body_iquat[index])
+    name = compiled.body(index).name or f"body{index}"
     return Body(
-        name=compiled.body(index).name or f"body{index}",
+        name=name,
         parent=int(compiled.body_parentid[index]),
         position=compiled.body_pos[index].copy(),
         axes=rotation(compiled.body_quat[index]),
-        mass=float(compiled.body_mass[index]),
+        mass=0.0 if name in massless else float(compiled.body_mass[index]),
         com=compiled.body_ipos[index].copy(),
         inertia=axes @ np.diag(compiled.body_inertia[index]) @ axes.T,
     )

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable, Mapping
 
 from pydantic import TypeAdapter, ValidationError
 
 from awiwi_gen.hand.names import FingerName, JointName, Prefix
+from awiwi_gen.hand.parts import PALM
 
 _FINGER, _JOINT, _PREFIX = TypeAdapter(FingerName), TypeAdapter(JointName), TypeAdapter(Prefix)
 _LONGEST_JOINT, _LONGEST_FINGER = 24, 16
@@ -36,11 +37,18 @@ def plain(text: str) -> str:
     return f"n{name}" if not name or name[0].isdigit() else name
 
 
-def joint_names(published: Iterable[str]) -> dict[str, str]:
-    """Published name -> name of the hand file, for all joints of the hand; a prefix that all have is dropped."""
-    names = list(published)
-    common = _common(names)
-    return _unique(names, lambda name: _fitted(plain(name.removeprefix(common))))
+def joint_names(fingers: Mapping[str, list[str]]) -> dict[str, str]:
+    """Published name -> name in the hand file, for all joints of all fingers.
+
+    A prefix that all joints of the hand have is dropped, and the finger's name where all its joints begin with it.
+    """
+    common = _common([name for names in fingers.values() for name in names])
+    found: dict[str, str] = {}
+    for finger, names in fingers.items():
+        short = {name: plain(name.removeprefix(common)) for name in names}
+        own = f"{finger}_" if all(each.startswith(f"{finger}_") for each in short.values()) else ""
+        found |= _unique({name: _fitted(each.removeprefix(own)) for name, each in short.items()})
+    return found
 
 
 def _common(names: list[str]) -> str:
@@ -61,28 +69,33 @@ def _fitted(name: str) -> str:
         if len(name) > _LONGEST_JOINT:
             name = name.removesuffix(ending)
     name = name[:_LONGEST_JOINT].rstrip("_")
-    return name if _usable(_JOINT, name) else f"{name[: _LONGEST_JOINT - 2]}_j"
+    return name if _usable(_JOINT, name) and name != PALM else f"{name[: _LONGEST_JOINT - 2]}_j"
 
 
-def _unique(names: Iterable[str], mapped: Callable[[str], str]) -> dict[str, str]:
+def _unique(names: Mapping[str, str]) -> dict[str, str]:
+    """The same names, with a number where one comes twice."""
     found: dict[str, str] = {}
-    for name in names:
-        short, number = mapped(name), 2
+    for name, wanted in names.items():
+        short, number = wanted, 2
         while short in found.values():
             ending = f"_{number}"
-            short, number = mapped(name)[: _LONGEST_JOINT - len(ending)].rstrip("_") + ending, number + 1
+            short, number = wanted[: _LONGEST_JOINT - len(ending)].rstrip("_") + ending, number + 1
         found[name] = short
     return found
 
 
-def finger_names(chains: Iterable[list[str]]) -> list[str]:
-    """A name for each finger, from the names of its bodies and joints: a word that they use, or what they begin with."""
+def finger_names(chains: Iterable[tuple[str, list[str]]]) -> list[str]:
+    """A name for each finger, from the body that carries it and the names of its bodies and joints.
+
+    That is index for index_base, else a word such as thumb that the names use, or what they begin with.
+    """
     found: list[str] = []
-    for number, names in enumerate(chains, start=1):
+    for number, (carrier, names) in enumerate(chains, start=1):
         words = [word for name in names for word in re.split(r"[^a-z]+", _split(name))]
         known = [_FINGERS[word] for word in words if word in _FINGERS]
         begin = re.sub(r"[^a-z0-9]", "", shared_start([plain(name) for name in names]))[:_LONGEST_FINGER]
-        candidates = [max(known, key=known.count)] if known else []
+        candidates = [carrier.removesuffix("_base")] if carrier.endswith("_base") else []
+        candidates += [max(known, key=known.count)] if known else []
         candidates += [begin, f"finger{number}"]
         found.append(next(name for name in candidates if name not in found and _usable(_FINGER, name)))
     return found
