@@ -205,6 +205,15 @@ def test_a_chain_that_ends_without_mass_needs_armature(tmp_path):
     assert message.endswith("expected mass, com and inertia for a link that only this joint moves, or armature")
 
 
+def test_a_rotor_that_outweighs_its_finger_is_remarked(tmp_path):
+    path = tmp_path / "hand.toml"
+    path.write_text(chain({}, {"armature": '"0.03 kg m^2"'}, {"armature": '"2e-6 kg m^2"'}))
+    warnings = awiwi_gen.Hand.review(path)[1]
+
+    assert [warning.key for warning in warnings] == ["fingers.arm.links[1].armature"]
+    assert re.search(r'= "0.03 kg m\^2" is [\d.e+]+ times the inertia of all links', warnings[0].message)
+
+
 def test_a_follower_may_end_the_chain_without_mass(skew):
     head, end = SKEW_FINGER.read_text().rsplit("[[fingers", 1)
     body = re.compile(r"(mass|com|inertia|armature) = .*\n")
