@@ -35,6 +35,8 @@ if absent := extras.missing("awiwi-gen", *extras.COMMAND_LINE):
 
 import typer
 
+from awiwi_gen.interchange.command import export, import_
+
 app = typer.Typer(
     help="From the CAD numbers of a tendon-driven hand to verified real-time C.",
     no_args_is_help=True,
@@ -105,13 +107,9 @@ def command(*needs: str) -> Callable[[Callable[..., int | None]], Callable[..., 
 
 
 def make_job(
-    hand: Path | None,
-    scalar: Scalar = Scalar.f64,
-    params: Params = Params.baked,
-    only: str = "*",
-    math: Math = Math.own,
+    hand: Path | None, scalar: Scalar = Scalar.f64, params: Params = Params.baked, only: str = "*", math: Math = Math.own,
     read: Any = None,
-) -> Any:
+) -> Any:  # fmt: skip
     """A job from options and the hand, if it was read before. Raises InputError where the pattern matches no kernel."""
     from awiwi_gen.emit.options import Options
     from awiwi_gen.hand import Hand
@@ -372,6 +370,10 @@ def simulate(
     shown = one_run(hand, law, gains, scenario, force, plant) if one else benchmark(hand, law, gains)
     shown.show(as_json)
     return 0
+
+
+command(*HAND)(import_)
+command(*HAND)(export)
 
 
 def main() -> None:

@@ -154,8 +154,8 @@ def _entry(kernel: Kernel, reason: str) -> dict[str, Any]:
         return {"name": name, "shape": list(spec.shape), "unit": spec.unit_text}
 
     def ranged(name: str, spec: Port) -> dict[str, Any]:
-        low, high = zip(*spec.bounds(), strict=True)
-        return port(name, spec) | {"low": list(low), "high": list(high)}
+        bounds = spec.bounds()
+        return port(name, spec) | {"low": [low for low, _ in bounds], "high": [high for _, high in bounds]}
 
     entry = {
         "name": kernel.name,
@@ -192,9 +192,10 @@ def counted(number: int, noun: str) -> str:
 
 
 def print_left_out(reasons: Mapping[str, str]) -> None:
-    """A line for each kernel that the hand cannot have."""
-    for name, reason in reasons.items():
-        print(f"left out: {name}: {reason}")
+    """The kernels that the hand cannot have: a line for each reason."""
+    for reason in dict.fromkeys(reasons.values()):
+        names = [name for name, why in reasons.items() if why == reason]
+        print(f"left out: {', '.join(names)}: {reason}")
 
 
 def error_entry(error: AwiwiError) -> dict[str, Any]:

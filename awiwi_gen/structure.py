@@ -2,10 +2,14 @@
 
 A finger is anything with these attributes (the hand file's `Finger` and its symbolic copies are):
 
-    links[i]      joint, turn, offset[3], mass, com[3], inertia.{xx,yy,zz,xy,xz,yz}, start, four_bar (or None)
+    links[i]      joint, turn, offset[3], mass, com[3], inertia.{xx,yy,zz,xy,xz,yz} (or None of the three), start;
+                  quarters[3], and None or rpy[3], reference, four_bar, armature, damping, friction, spring
     pulleys[i]    joint, radius
-    tendons[i]    rest, over (senses and joints: "+flexion", "-pip"), span (None or from_[3], to[3], joint)
+    tendons[i]    rest, over (senses and joints: "+flexion", "-pip"), arms (joint -> arm), span (None or from_[3], to[3],
+                  joint), path (points: link, at[3]), spring (None or stiffness, rest)
+    pulled, strings   the tendons without a spring, and those with one
     couplings[i]  follower, leader
+    base          None or position[3], turn, quarters[3], rpy[3]
 
 The numbers may be symbols of either library. Independent joints are counted along the chain, base to tip.
 """
@@ -27,6 +31,11 @@ def coordinates(finger: Finger) -> dict[str, int]:
     return {link.joint: free.index(follows.get(link.joint, link.joint)) for link in finger.links}
 
 
+def link_number(finger: Finger, name: str) -> int:
+    """Index of the link that a joint moves; -1 for "palm", the base frame."""
+    return -1 if name == "palm" else next(i for i, link in enumerate(finger.links) if link.joint == name)
+
+
 def radius(finger: Finger, joint: str) -> Any:
     """Radius of the pulley around a joint [m]."""
     return next(pulley.radius for pulley in finger.pulleys if pulley.joint == joint)
@@ -35,6 +44,18 @@ def radius(finger: Finger, joint: str) -> Any:
 def quarter_turns(turn: str) -> tuple[int, int]:
     """A fixed rotation such as "x+90" as (axis, number of 90 degree rotations): (0, 1); "none" is (2, 0)."""
     return (2, 0) if turn == "none" else ("xyz".index(turn[0]), int(turn[1:]) // 90)
+
+
+def fixed_turns(part: Any) -> list[tuple[int, int | None, Any]]:
+    """The fixed rotations of a link in front of its joint, or of a finger's base, in order; none by zero.
+
+    Each is (axis, quarters, angle): so many quarter turns about that axis, or by the angle [rad] if `quarters` is None.
+    """
+    axis, quarters = quarter_turns(part.turn)
+    steps = [(axis, quarters, None)]
+    if part.rpy is not None:
+        steps += [(k, part.quarters[k], part.rpy[k]) for k in (2, 1, 0)]
+    return [step for step in steps if step[1] != 0]
 
 
 def sense(over: str) -> tuple[int, str]:

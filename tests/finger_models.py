@@ -63,6 +63,9 @@ STRUCTURES: dict[str, dict[str, Any]] = {
 KINDS = list(STRUCTURES)
 FOUR_BAR = {"ground": 0.012, "crank": 0.010, "coupler": 0.0075, "rocker": 0.011, "reference": 1.1}
 
+# What joints may have besides, see tests/test_joint_dynamics.py.
+NOTHING_ELSE = dict.fromkeys(("rpy", "reference", "armature", "damping", "friction", "spring"))
+
 Leaf = Callable[[str, float], Any]
 
 
@@ -91,6 +94,7 @@ def make(kind: str, leaf: Leaf, **special: float) -> Tree:
             inertia=Tree(**moments, **products),
             start=0,
             four_bar=Tree(**loop, branch=1) if joint == structure.get("four_bar") else None,
+            **NOTHING_ELSE,
         )
 
     def span(index: int, joint: str) -> Tree:

@@ -72,6 +72,13 @@ def test_kernels_that_need_more_tendons_than_there_are_are_left_out(tendons):
 SPAN = 'span = {{ from = ["2 mm", "{}", "1 mm"], to = ["5 mm", "1 mm", "0 mm"], joint = "mid" }}'
 
 
+def test_a_joint_without_a_tendon_to_one_side_is_a_reason_not_a_fault():
+    hand = routed(over("+root", "+mid"), over("+root", "-mid"), over("-mid"))
+
+    (reason,) = left_out(hand).values()
+    assert reason == "tendons only pull, and none pulls towards +root"
+
+
 def test_spans_count_for_the_rank():
     one_span, two_joints = SPAN.format("3 mm"), (over("+mid"), over("-mid"))
 

@@ -53,7 +53,7 @@ ONE_SIDED = Path(ONE_FINGER).read_text().replace('"-root"', '"+root"')
 def test_kernels_that_the_tendons_make_impossible_are_named_with_the_reason(tmp_path):
     hand = tmp_path / "one sided.toml"
     hand.write_text(ONE_SIDED)
-    reason = "tendons only pull, and no forces give a torque towards +root"
+    reason = "tendons only pull, and none pulls towards +root"
     line = f"left out: jaw_tendon_distribution: {reason}"
 
     assert line in told("check", "--hand", hand, "-o", tmp_path / "out").splitlines()

@@ -189,7 +189,7 @@ PHYSICS = {
         JAW + '.pulleys[1].joint = "midd" names no joint of this finger; did you mean "mid"?',
     ),
     "tendon over nothing": (
-        'over = ["-mid"]', "over = []", JAW + ".tendons[2] neither runs over a pulley nor has a span",
+        'over = ["-mid"]', "over = []", JAW + ".tendons[2] has neither over nor arms nor span nor path",
     ),
     "unknown pulley": (
         '"-mid"', '"-midd"',
@@ -291,7 +291,7 @@ def test_a_slip_is_suggested_only_where_it_explains_the_hand() -> None:
 def test_a_span_that_reaches_a_length_of_zero_within_the_range_is_found() -> None:
     # A crank of 10 mm and a coupler: the collar of `mid` is where this span begins in one pose between the samples.
     finger = Hand.parse(ONE_FINGER).fingers["jaw"]
-    _, meeting = Chain(finger)._seat([0.123, 0.0], 1)
+    _, meeting = Chain(finger)._frame([0.123, 0.0], 1, False)
     start = ", ".join(f'"{x * 1e3:.9f} mm"' for x in meeting)
     span = f'span = {{ from = [{start}], to = ["0 mm", "0 mm", "0 mm"], joint = "mid" }}'
     message = faults_of(ONE_FINGER.replace('over = ["-mid"]', span))
@@ -300,12 +300,12 @@ def test_a_span_that_reaches_a_length_of_zero_within_the_range_is_found() -> Non
     assert message.endswith("expected at least 0.1 mm in every pose")
 
 
-def test_nine_fingers_are_too_many_and_none_too_few() -> None:
+def test_33_fingers_are_too_many_and_none_too_few() -> None:
     head, finger = ONE_FINGER.split("[fingers.jaw]")
-    nine = [("[fingers.jaw]" + finger).replace("jaw", f"jaw{i}") for i in range(9)]
-    assert "fingers has 9 entries; expected at most 8" in faults_of(head + "\n".join(nine))
+    many = [("[fingers.jaw]" + finger).replace("jaw", f"jaw{i}") for i in range(33)]
+    assert "fingers has 33 entries; expected at most 32" in faults_of(head + "\n".join(many))
     assert "fingers has 0 entries; expected at least 1" in faults_of(head + "[fingers]")
-    assert len(Hand.parse(head + "\n".join(nine[:8])).fingers) == 8
+    assert len(Hand.parse(head + "\n".join(many[:32])).fingers) == 32
 
 
 def test_all_faults_are_told_at_once_from_top_to_bottom() -> None:

@@ -36,7 +36,7 @@ TOP = [
     ["judge", "golden"],
     ["parallel", "tasks"],
     ["pipeline"],
-    ["report", "explain", "terminal", "simulate", "results", "amalgamate"],
+    ["report", "explain", "terminal", "simulate", "results", "amalgamate", "interchange"],
     ["loops", "identify"],
     [*ROOMS],
     ["__init__"],
@@ -48,6 +48,7 @@ HOMES = {
     "casadi": {"witnesses", "ir/from_casadi.py", "derive.py"},
     "jinja2": {"emit/files.py"},
     "cffi": {"build.py"},
+    "mujoco": {"interchange/mjcf.py", "interchange/wraps.py"},
 }
 FILES = sorted(path for path in PACKAGE.rglob("*.py"))
 

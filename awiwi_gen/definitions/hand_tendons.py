@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 import sympy
-from sympy import Matrix
+from sympy import Expr, Matrix
 
 from awiwi_gen.definitions import tendons
 from awiwi_gen.definitions import wrist as wrists
@@ -43,6 +43,11 @@ def joint_stiffness(hand: Hand, q: Matrix, f: Matrix, k: Matrix) -> Matrix:
 def _blocks(hand: Hand, of_finger: Callable[..., Matrix], q: Matrix, *by_tendon: Matrix) -> list[Matrix]:
     """A quantity of each finger, from its rows of the joint angles and of the arrays over tendons."""
     return [
-        of_finger(hand.fingers[name], Matrix(q[joints]), *(Matrix(array[rows]) for array in by_tendon))
+        of_finger(hand.fingers[name], _column(q[joints]), *(_column(array[rows]) for array in by_tendon))
         for name, (rows, joints) in hand.blocks.items()
     ]
+
+
+def _column(elements: list[Expr]) -> Matrix:
+    """A column, also of no elements, which SymPy would give no columns."""
+    return Matrix(len(elements), 1, elements)

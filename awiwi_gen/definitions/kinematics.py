@@ -1,8 +1,9 @@
 """Kinematics of a finger by its definition: transformations multiplied along the chain (eq. 5.2, 5.3, table 5.1).
 
-The frame of link i is T_i = T_(i-1) Trans(offset_(i-1)) R(turn_i) Rz(c_i), that of the fingertip lies one offset
-beyond the last. The chain angles c are functions of the n independent joint angles q: a coupled joint rotates in
-proportion to its leader (eq. 5.16), and a four-bar counts twice, as its massless crank (angle q + reference, offset
+The frame of link i is T_i = T_(i-1) Trans(offset_(i-1)) R_i Rz(c_i), that of the fingertip lies one offset beyond the
+last. R_i is the fixed rotation: the link's turn, then its roll, pitch and yaw as in URDF. The chain angles c are functions
+of the n independent joint angles q: a joint rotates by its angle less its reference, a coupled joint's angle is in
+proportion to its leader's (eq. 5.16), and a four-bar counts twice, as its massless crank (angle q + reference, offset
 along the crank) and as its coupler, which is parallel to the turned frame at q = 0, or at the end of the joint's range
 that is nearest to it.
 
@@ -10,13 +11,14 @@ All velocities are derivatives of positions. Entries of results may be `Named` s
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import sympy
 from sympy import Expr, Matrix
 
 from awiwi_gen.definitions.four_bar import four_bar_angles
 from awiwi_gen.definitions.naming import Derivation
-from awiwi_gen.structure import Finger, coordinates, leaders, quarter_turns, radius
+from awiwi_gen.structure import Finger, coordinates, fixed_turns, leaders, radius
 
 
 @dataclass(frozen=True)
@@ -84,8 +86,9 @@ def frames(finger: Finger, q: Matrix, derivation: Derivation) -> list[Frame]:
     for link in finger.links:
         origin = chain[-1].point(offset)
         # Rotations about the same axis are one rotation, by the sum of their angles.
-        if link.turn != "none":
-            fixed, angle = chain[-1].axes * _fixed_rotation(link.turn), sympy.S.Zero
+        turned = fixed_rotation(link)
+        if turned != sympy.eye(3):
+            fixed, angle = chain[-1].axes * turned, sympy.S.Zero
         angle += next(angles)
         if link.four_bar is not None:
             origin += fixed * rotation(angle) * Matrix([link.four_bar.crank, 0, 0])
@@ -99,7 +102,7 @@ def joint_frames(finger: Finger, q: Matrix, derivation: Derivation) -> dict[str,
     """Joint -> the frame in which it rotates: at the joint, after its fixed rotation and before its own."""
     found, offset = {}, sympy.zeros(3, 1)
     for link, before in zip(finger.links, frames(finger, q, derivation)[:-2], strict=True):
-        found[link.joint] = Frame(before.axes * _fixed_rotation(link.turn), before.point(offset))
+        found[link.joint] = Frame(before.axes * fixed_rotation(link), before.point(offset))
         offset = Matrix(link.offset)
     return found
 
@@ -110,18 +113,20 @@ def rotation(angle: Expr) -> Matrix:
     return Matrix([[c, -s, 0], [s, c, 0], [0, 0, 1]])
 
 
-def _fixed_rotation(turn: str) -> Matrix:
-    """The fixed rotation (3 x 3) before a joint: a multiple of 90 degrees about one axis."""
-    axis, quarters = quarter_turns(turn)
-    order = [(k + 2 - axis) % 3 for k in range(3)]
-    return rotation(quarters * sympy.pi / 2).extract(order, order)
+def fixed_rotation(part: Any) -> Matrix:
+    """The fixed rotation (3 x 3) of a link in front of its joint, or of a finger's base."""
+    product = sympy.eye(3)
+    for axis, quarters, angle in fixed_turns(part):
+        order = [(k + 2 - axis) % 3 for k in range(3)]
+        product *= rotation(angle if quarters is None else quarters * sympy.pi / 2).extract(order, order)
+    return product
 
 
 def _chain_angles(finger: Finger, q: Matrix, derivation: Derivation) -> list[Expr]:
     angles: list[Expr] = []
     for link, own in zip(finger.links, joint_angles(finger, q).values(), strict=True):
         if link.four_bar is None:
-            angles.append(own)
+            angles.append(own if link.reference is None else own - link.reference)
         else:
             reference = link.four_bar.reference
             cranks = own + reference, link.start + reference

@@ -1,20 +1,27 @@
 """Tendon lengths of a finger and what follows from them by differentiation (eq. 5.5 to 5.13, 5.20 to 5.23).
 
 h are the lengths of the tendons' paths in the finger, and P = dh/dq. Tendons pull, so forces f cause the joint torques
-tau = -P' f. The joint stiffness is -d tau/dq.
+tau = -P' f. The joint stiffness is -d tau/dq. These are the tendons that motors pull; elastic return strings have a
+function of their own.
 """
+
+from collections.abc import Iterable
+from itertools import pairwise
+from typing import Any
 
 import sympy
 from sympy import Expr, Matrix
 
-from awiwi_gen.definitions.kinematics import joint_angles, joint_frames
+from awiwi_gen.definitions.kinematics import frames, joint_angles, joint_frames
 from awiwi_gen.definitions.naming import Derivation
-from awiwi_gen.structure import Finger, radius, sense
+from awiwi_gen.structure import Finger, link_number, radius, sense
+
+Tendon = Any
 
 
 def tendon_lengths(finger: Finger, q: Matrix) -> Matrix:
-    """Path lengths h (m) [m]: arcs on pulleys (eq. 5.5) and straight spans of tensegrity joints (eq. 5.20, 5.22)."""
-    return _lengths(finger, q, Derivation())
+    """Path lengths h (m) [m]: arcs on pulleys (eq. 5.5) and straight lines, as in tensegrity joints (eq. 5.20, 5.22)."""
+    return _lengths(finger, finger.pulled, q, Derivation())
 
 
 def coupling(finger: Finger, q: Matrix) -> Matrix:
@@ -47,23 +54,49 @@ def joint_torque_and_stiffness(finger: Finger, q: Matrix, f: Matrix, k: Matrix) 
     return -p.T * f, sum(geometric, p.T * sympy.diag(*k) * p)
 
 
-def _lengths(finger: Finger, q: Matrix, derivation: Derivation) -> Matrix:
-    angles, frames = joint_angles(finger, q), joint_frames(finger, q, derivation)
+def return_torque(finger: Finger, q: Matrix) -> tuple[Matrix, Expr]:
+    """Joint torques (n) [N m] of the elastic return strings, -P' F, and their energy [J].
+
+    A string pulls with F = stiffness * stretch, where the stretch is its length beyond its rest, or zero if it is slack.
+    """
+    derivation = Derivation()
+    lengths = _lengths(finger, finger.strings, q, derivation)
+    tau, energy = sympy.zeros(len(q), 1), sympy.S.Zero
+    for length, string in zip(lengths, finger.strings, strict=True):
+        beyond = derivation.name(length - string.spring.rest)
+        stretch = derivation.name((beyond + abs(beyond)) / 2)
+        tau -= string.spring.stiffness * stretch * Matrix([derivation.partial(length, angle) for angle in q])
+        energy += string.spring.stiffness * stretch**2 / 2
+    return tau, energy
+
+
+def _lengths(finger: Finger, tendons: Iterable[Tendon], q: Matrix, derivation: Derivation) -> Matrix:
+    angles, before = joint_angles(finger, q), joint_frames(finger, q, derivation)
+    links = frames(finger, q, derivation)[:-1]  # the base, then the frames of the links
+
+    def straight(a: Any, b: Any) -> Expr:
+        one, other = link_number(finger, a.link), link_number(finger, b.link)
+        start, end = Matrix(a.at), Matrix(b.at)
+        line = end - start if one == other else links[other + 1].point(end) - links[one + 1].point(start)
+        return derivation.name(sympy.sqrt(sum(x**2 for x in derivation.name_all(line))))
+
     lengths: list[Expr] = []
-    for tendon in finger.tendons:
+    for tendon in tendons:
         length = tendon.rest
         for over in tendon.over:
             sign, joint = sense(over)
             length += sign * radius(finger, joint) * angles[joint]
+        length += sum(arm * angles[joint] for joint, arm in tendon.arms.items())
         if tendon.span is not None:
-            span = frames[tendon.span.joint].point(Matrix(tendon.span.to)) - Matrix(tendon.span.from_)
+            span = before[tendon.span.joint].point(Matrix(tendon.span.to)) - Matrix(tendon.span.from_)
             length += derivation.name(sympy.sqrt(sum(x**2 for x in derivation.name_all(span))))
+        length += sum(straight(a, b) for a, b in pairwise(tendon.path))
         lengths.append(length)
-    return Matrix(lengths)
+    return Matrix(len(lengths), 1, lengths)
 
 
 def _coupling(finger: Finger, q: Matrix, derivation: Derivation) -> Matrix:
-    h = _lengths(finger, q, derivation)
+    h = _lengths(finger, finger.pulled, q, derivation)
     return Matrix(len(h), len(q), lambda i, j: derivation.partial(h[i], q[j]))
 
 

@@ -11,7 +11,7 @@ The parts of a hand are in `parts`, reading a file is in `file`, what no hand ca
 from __future__ import annotations
 
 import os
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
@@ -21,7 +21,8 @@ from awiwi_gen.hand.file import HandFile
 from awiwi_gen.hand.gains import Gains, gains_complaints, with_gains
 from awiwi_gen.hand.lint import complaints
 from awiwi_gen.hand.lint_actuation import actuator_complaints
-from awiwi_gen.hand.parts import Finger, FingerName, Limits, Link, Part, Prefix, Title
+from awiwi_gen.hand.names import FingerName, Prefix, Title
+from awiwi_gen.hand.parts import MOST, Finger, Limits, Link, Part
 from awiwi_gen.hand.plausibility import remarks
 from awiwi_gen.hand.wrist import Wrist
 from awiwi_gen.resources import DEFAULT_HAND
@@ -32,11 +33,12 @@ __all__ = ["Fibre", "Finger", "Hand", "Limits", "Link", "Motor", "Spring", "Wris
 class Hand(Part):
     """A whole hand; the order of its fingers is the order of their tendons in the forearm."""
 
+    version: Annotated[Literal[1, 2], Field(alias="schema", examples=["2"])] = 1
     prefix: Prefix
     name: Title
     limits: Limits
     fingers: Annotated[
-        dict[FingerName, Finger], Field(min_length=1, max_length=8, examples=["[[fingers.index.links]]"])
+        dict[FingerName, Finger], Field(min_length=1, max_length=MOST, examples=["[[fingers.index.links]]"])
     ]
     wrist: Wrist | None = None
     motor: Motor | None = None
@@ -46,15 +48,15 @@ class Hand(Part):
 
     @property
     def tendons(self) -> int:
-        """Number of tendons of all fingers."""
-        return sum(len(finger.tendons) for finger in self.fingers.values())
+        """Number of tendons of all fingers that motors pull."""
+        return sum(len(finger.pulled) for finger in self.fingers.values())
 
     @property
     def blocks(self) -> dict[str, tuple[slice, slice]]:
         """Finger -> slices of its tendons and its joints in arrays over all tendons and joints of the hand."""
         found, row, column = {}, 0, 0
         for name, finger in self.fingers.items():
-            tendons, joints = len(finger.tendons), len(finger.joints)
+            tendons, joints = len(finger.pulled), len(finger.joints)
             found[name] = slice(row, row + tendons), slice(column, column + joints)
             row, column = row + tendons, column + joints
         return found

@@ -10,7 +10,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from awiwi_gen.hand.parts import Angle, Length, Measure, Moment, Part, Size, Source
+from awiwi_gen.hand.names import Source
+from awiwi_gen.hand.parts import Angle, Length, Measure, Moment, Part, Size
 from awiwi_gen.units import Quantity
 
 __all__ = ["CalibratedUnit", "Fibre", "Friction", "Motor", "Ripple", "Roller", "Sensor", "Spring", "Wheel"]

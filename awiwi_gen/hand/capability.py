@@ -1,7 +1,8 @@
 """What a hand's tendons can do, and which kernels cannot exist because of what they cannot do.
 
 Tendons only pull: the torques -P' f of forces f >= 0 form a cone. Lengths tell the joint angles where P = dh/dq has as
-many independent columns as there are joints; a torque of any direction needs the cone to be the whole space.
+many independent columns as there are joints; a torque of any direction needs the cone to be the whole space. Only
+tendons with motors count. Return strings pull with a force of their own that no controller changes.
 """
 
 from __future__ import annotations
@@ -18,6 +19,9 @@ if TYPE_CHECKING:
 
 __all__ = ["left_out", "left_out_names"]
 
+# Kernel families of a finger that need tendons at all.
+_NEED_TENDONS = ("tendon_lengths", "coupling", "coupling_derivative", "joint_torque", "joint_stiffness",
+                 "joint_torque_and_stiffness")  # fmt: skip
 # Kernel families of a finger that need tendon lengths to tell the joint angles, and tendons that can give any torque.
 _NEED_LENGTHS = ("joint_estimate", "joint_estimate_error")
 _NEED_TORQUES = ("tendon_distribution",)
@@ -28,26 +32,44 @@ _RESIDUAL = 1e-7  # likewise for the part of a torque that no forces give
 
 def left_out(hand: Hand) -> dict[tuple[str, str], str]:
     """(path of a part, kernel family) -> why this kernel cannot exist for the hand; empty for most hands."""
-    return {
+    found = {
         (f"fingers.{name}", family): reason
         for name, finger in hand.fingers.items()
         for family, reason in _of_finger(finger)
     }
+    without = [name for name, finger in hand.fingers.items() if not finger.pulled]
+    driven = ("tendon_stiffness", *(["measured_lengths"] if hand.motor else []))
+    found |= {("", f"{name}_{family}"): _none(hand.fingers[name]) for name in without for family in driven}
+    if not hand.tendons:
+        found |= dict.fromkeys(_of_all_tendons(hand), "no motor pulls a tendon of this hand")
+    return found
+
+
+def _of_all_tendons(hand: Hand) -> list[tuple[str, str]]:
+    """(Path of a part, kernel family) of every kernel with an array over the tendons of the whole hand."""
+    found = [("", f"hand_{family}") for family in ("tendon_lengths", "coupling", "joint_torque", "joint_stiffness")]
+    found += [("wrist", f"wrist_{family}") for family in ("tendon_lengths", "coupling") if hand.wrist]
+    return found + [("spring", "calibration_readings")] * bool(hand.spring)
 
 
 def left_out_names(hand: Hand) -> dict[str, str]:
     """The same by the name that the kernel would have."""
-    return {f"{path.partition('.')[2]}_{family}": reason for (path, family), reason in left_out(hand).items()}
+    return {"_".join([*path.split(".")[1:], family]): reason for (path, family), reason in left_out(hand).items()}
 
 
 @lru_cache(maxsize=64)
 def _of_finger(finger: Finger) -> tuple[tuple[str, str], ...]:
     """(Kernel family, reason) for every kernel that no pose of the finger allows."""
-    chain = Chain(finger)
-    couplings = [*chain.couplings()]
+    if not finger.pulled:
+        return tuple((family, _none(finger)) for family in (*_NEED_TENDONS, *_NEED_LENGTHS, *_NEED_TORQUES))
+    rows = [row for row, tendon in enumerate(finger.tendons) if tendon.spring is None]
+    couplings = [[coupling[row] for row in rows] for coupling in Chain(finger).couplings()]
     found: list[tuple[str, str]] = []
     lengths = _indistinct(couplings, finger.joints)
-    torques = lengths or _beyond_pull(couplings, finger.joints)
+    one_sided = _one_sided(couplings, finger.joints)
+    torques = "; ".join(filter(None, (lengths, one_sided))) or _beyond_pull(couplings, finger.joints)
+    if torques and finger.strings:
+        torques += "; return strings do not count, for no motor pulls them"
     found += [
         (family, f"{lengths}: tendon lengths do not determine the joint angles") for family in _NEED_LENGTHS if lengths
     ]
@@ -56,11 +78,16 @@ def _of_finger(finger: Finger) -> tuple[tuple[str, str], ...]:
     return tuple(found)
 
 
+def _none(finger: Finger) -> str:
+    """That a finger has no tendons with motors."""
+    return "no motor pulls the finger: it has return strings only" if finger.strings else "the finger has no tendons"
+
+
 def _indistinct_base(finger: Finger, couplings: Sequence[Any]) -> list[str]:
     """Why the straight spans of a finger that could have a tensegrity base do not tell its base joints apart, if so."""
     order = [link.joint for link in finger.links]
-    rows = [row for row, tendon in enumerate(finger.tendons) if tendon.span]
-    ends = [order.index(tendon.span.joint) for tendon in finger.tendons if tendon.span]
+    rows = [row for row, tendon in enumerate(finger.pulled) if tendon.span]
+    ends = [order.index(tendon.span.joint) for tendon in finger.pulled if tendon.span]
     base = {finger.leaders.get(joint, joint) for joint in order[: max(ends, default=0)]}
     columns = [column for column, joint in enumerate(finger.joints) if joint in base]
     spans = [[[coupling[row][column] for column in columns] for row in rows] for coupling in couplings]
@@ -78,6 +105,20 @@ def _indistinct(couplings: Sequence[Any], joints: Sequence[str]) -> str:
         if best == len(joints):
             return ""
     return f"the tendons move only {best} of the {len(joints)} joints {', '.join(joints)} independently"
+
+
+def _one_sided(couplings: Sequence[Any], joints: Sequence[str]) -> str:
+    """Which joints are pulled to one side only in all of the poses, and to which side nothing pulls; empty if none."""
+    import numpy as np
+
+    arms: Any = np.array([_scaled(coupling) for coupling in couplings])
+    lengthens, shortens = (arms > _RANK).any(axis=(0, 1)), (arms < -_RANK).any(axis=(0, 1))
+    missing = [
+        f"{'-' if pulled_up else '+'}{joint}"
+        for joint, pulled_up, pulled_down in zip(joints, shortens, lengthens, strict=True)
+        if pulled_up != pulled_down
+    ]
+    return f"tendons only pull, and none pulls towards {' and '.join(missing)}" if missing else ""
 
 
 def _beyond_pull(couplings: Sequence[Any], joints: Sequence[str]) -> str:

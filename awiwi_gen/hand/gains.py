@@ -18,7 +18,8 @@ from pydantic import Field
 
 from awiwi_gen.errors import InputError
 from awiwi_gen.hand.file import HandFile
-from awiwi_gen.hand.parts import Keys, Measure, Part, Source
+from awiwi_gen.hand.names import Source
+from awiwi_gen.hand.parts import Keys, Measure, Part
 from awiwi_gen.units import Quantity
 
 __all__ = ["GainsFile", "TendonGains", "gains_complaints", "with_gains"]

@@ -1,44 +1,45 @@
 """Physics and cross-references: what no hand can have, although every single value of its file is valid.
 
-Each check yields complaints, `(keys, predicate)` pairs, relative to the table it is given. Arithmetic is exact where
-the numbers allow it, so that a flat plate, whose moments fulfil xx + yy = zz, is not refused for a rounding error.
+Each check yields complaints, `(keys, predicate)` pairs, relative to the table it is given.
 """
 
 from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Iterable, Iterator, Mapping
-from fractions import Fraction
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Protocol
 
-from awiwi_gen.hand.parts import Finger, FourBar, Keys, Limits, Link, Part, covers
+from awiwi_gen.hand.massless import without_inertia
+from awiwi_gen.hand.parts import PALM, Finger, FourBar, Keys, Limits, Link, Part, covers
 from awiwi_gen.hand.pose import Chain
+from awiwi_gen.hand.tensors import tensor_complaints
 from awiwi_gen.hand.wrist import Wrist, closure
 from awiwi_gen.units import Quantity
 
 __all__ = ["Complaint", "below", "complaints", "sources"]
 
 Complaint = tuple[Keys, str]
-Tensor = dict[str, Fraction]
 
-_SLIPS = [Fraction(10) ** places for places in (-3, -2, -1, 1, 2, 3)]
 _CLOSURE_STEPS = 1000
-_WIDEST_GYRATION = 1.0  # m; the ratio of a plausible moment to a plausible mass can still be absurd
 _NARROWEST_RANGE = 0.01  # deg; less than the backlash of any joint
 _SHORTEST_SPAN = 1e-4  # m; less than the thickness of a tendon
+_BODY = {
+    "mass": 'a mass such as "1.5 g"',
+    "com": 'a point such as ["6 mm", "0 mm", "0 mm"]',
+    "inertia": 'a tensor such as { xx = "35 g mm^2", ... }',
+}
 _LEAST_ARM = 1e-7  # m; a tendon with less than this about every joint pulls nothing
 
 
 def complaints(limits: Limits, fingers: Mapping[str, Finger], wrist: Wrist | None = None) -> Iterator[Complaint]:
     """All faults of a hand whose single values are valid."""
     yield from below(("limits",), _limits(limits))
-    links = [link for finger in fingers.values() for link in finger.links]
-    alone = sum(not _is_of_a_body(_tensor(link)) for link in links) == 1
     for name, finger in fingers.items():
-        yield from below(("fingers", name), _finger(finger, alone))
+        yield from below(("fingers", name), _finger(finger))
+    yield from tensor_complaints(fingers)
     if wrist:
-        yield from below(("wrist",), _wrist(wrist, sum(len(finger.tendons) for finger in fingers.values())))
+        yield from below(("wrist",), _wrist(wrist, sum(len(finger.pulled) for finger in fingers.values())))
 
 
 class Sourced(Protocol):
@@ -87,17 +88,20 @@ def _wrist(wrist: Wrist, tendons: int) -> Iterator[Complaint]:
     yield from backwards or closure(wrist)
 
 
-def _finger(finger: Finger, alone: bool) -> Iterator[Complaint]:
+def _finger(finger: Finger) -> Iterator[Complaint]:
     for index, link in enumerate(finger.links):
-        yield from below(("links", index), _link(link, link.joint in finger.leaders, alone))
+        yield from below(("links", index), _link(link, link.joint in finger.leaders))
     for index, pulley in enumerate(finger.pulleys):
         yield from below(("pulleys", index), sources(pulley))
     for index, tendon in enumerate(finger.tendons):
         yield from below(("tendons", index), sources(tendon))
+    if finger.base:
+        yield from below(("base",), sources(finger.base))
     misnamed = [*_names(finger)]
     yield from misnamed
     if not misnamed and all(link.low and link.high for link in finger.links if link.joint in finger.joints):
         yield from _tendons(finger)
+        yield from _singular(finger)
 
 
 # ---------------------------------------------------------------------------------------------------- names
@@ -122,8 +126,15 @@ def _names(finger: Finger) -> Iterator[Complaint]:
             if name[1:] in over[:index]:
                 yield keys, f'= "{name}" comes twice in one tendon'
             yield from _known(keys, name, name[1:], pulleys, "pulley")
-        if not tendon.over and not tendon.span:
-            yield ("tendons", number), "neither runs over a pulley nor has a span; it would pull nothing"
+        for name in tendon.arms:
+            yield from _known(("tendons", number, "arms", name), name, name, joints, "joint")
+        for index, point in enumerate(tendon.path):
+            keys = ("tendons", number, "path", index, "link")
+            yield from _known(keys, point.link, point.link, [*joints, PALM], "link")
+            if point.link == PALM in joints:
+                yield keys, f'= "{PALM}" is the base frame, and a joint of this finger; rename the joint'
+        if not (tendon.over or tendon.arms or tendon.span or tendon.path):
+            yield ("tendons", number), "has neither over nor arms nor span nor path; it would pull nothing"
         if tendon.span:
             keys, end = ("tendons", number, "span", "joint"), tendon.span.joint
             yield from _known(keys, end, end, joints, "joint")
@@ -171,7 +182,7 @@ def sources(part: Sourced) -> Iterator[Complaint]:
 # ---------------------------------------------------------------------------------------------------- links
 
 
-def _link(link: Link, follows: bool, alone: bool) -> Iterator[Complaint]:
+def _link(link: Link, follows: bool) -> Iterator[Complaint]:
     yield from sources(link)
     for key in ("low", "high"):
         given = getattr(link, key)
@@ -181,68 +192,24 @@ def _link(link: Link, follows: bool, alone: bool) -> Iterator[Complaint]:
             yield (key,), f'= "{given}" is one too many: this joint follows another, which has the range'
     if link.low and link.high and not follows:
         yield from _range(link)
-    yield from below(("inertia",), _inertia(link, alone))
+    yield from _body(link)
     if link.four_bar:
         yield from below(("four_bar",), sources(link.four_bar))
+        if link.reference is not None:
+            yield ("reference",), f'= "{link.reference}" is at a four-bar, whose angles count from four_bar.reference'
         if follows:
             yield ("four_bar",), "is at a joint that follows another; it needs an independent joint"
         elif link.low and link.high:
             yield from below(("four_bar",), _closure(link.four_bar, link.low, link.high))
 
 
-def _tensor(link: Link) -> Tensor:
-    return {key: getattr(link.inertia, key).value for key, _, _ in link.inertia.entries()}
-
-
-def _inertia(link: Link, alone: bool) -> Iterator[Complaint]:
-    """The tensor is that of a body. A slip is suggested where no other tensor of the hand is wrong."""
-    tensor = _tensor(link)
-    gyration = math.sqrt((tensor["xx"] + tensor["yy"] + tensor["zz"]) / (2 * link.mass.value))
-    if gyration > _WIDEST_GYRATION:
-        yield (), f"is too large for a mass of {link.mass}: radius of gyration {gyration:.3g} m"
-    if _is_of_a_body(tensor):
-        return
-    message = "breaks the triangle inequality of the principal moments: no body is like that"
-    if not alone or (slip := _slip(link, tensor)) is None:
-        yield (), message
-        return
-    key, factor = slip
-    much = f"{1 / factor} times too large" if factor < 1 else f"{factor} times too small"
-    shown = getattr(link.inertia, key)
-    yield (key,), f'= "{shown}" {message}; {key} is probably {much} (a slipped decimal point?)'
-
-
-def _slip(link: Link, tensor: Tensor) -> tuple[str, Fraction] | None:
-    """The likeliest entry with a slipped decimal point, and the factor that corrects it.
-
-    That is a slip by one digit rather than more, in a moment rather than a product, and towards a bone: a rod from the
-    joint, with its centre c half way, has m (2 c)^2 / 12 across.
-    """
-    rod = link.mass.value * sum(c.value**2 for c in link.com) / 3 or Fraction(1)
-    found = []
-    for key, value in tensor.items():
-        for factor in _SLIPS:
-            corrected = tensor | {key: value * factor}
-            if _is_of_a_body(corrected):
-                across = (corrected["xx"] + corrected["yy"] + corrected["zz"]) / 2
-                by_one = factor in (10, Fraction(1, 10))
-                found.append((not by_one, key[0] != key[1], abs(math.log(across / rod)), key, factor))
-    return min(found)[3:] if found else None
-
-
-def _is_of_a_body(inertia: Tensor) -> bool:
-    """Whether some distribution of mass has this tensor.
-
-    I = tr(S) E - S with the second moments S = integral of r r^T dm, so a body has S >= 0: that is the triangle
-    inequality of the principal moments, without finding them. It holds if no invariant of S (no sum of products of its
-    eigenvalues) is negative; the second is zero only for a needle, whose inertia is singular.
-    """
-    d, e, f = (-inertia[key] for key in ("xy", "xz", "yz"))
-    total = (inertia["xx"] + inertia["yy"] + inertia["zz"]) / 2
-    a, b, c = (total - inertia[key] for key in ("xx", "yy", "zz"))
-    pairs = a * b + a * c + b * c - d**2 - e**2 - f**2
-    determinant = a * b * c + 2 * d * e * f - a * f**2 - b * e**2 - c * d**2
-    return total > 0 and pairs > 0 and determinant >= 0
+def _body(link: Link) -> Iterator[Complaint]:
+    """A link has all that makes a body, or nothing of it."""
+    present = [key for key in _BODY if getattr(link, key) is not None]
+    if present:
+        for key in (key for key in _BODY if key not in present):
+            beside = " and ".join(present)
+            yield (key,), f"is missing; expected {_BODY[key]} beside {beside} (a link without mass has none of them)"
 
 
 def _closure(bar: FourBar, low: Quantity, high: Quantity) -> Iterator[Complaint]:
@@ -260,22 +227,49 @@ def _closure(bar: FourBar, low: Quantity, high: Quantity) -> Iterator[Complaint]
             return
 
 
+def _singular(finger: Finger) -> Iterator[Complaint]:
+    """Every motion moves some inertia: else accelerations do not exist."""
+    if found := without_inertia(finger):
+        joint, q = found
+        keys: Keys = ("links", [link.joint for link in finger.links].index(joint), "joint")
+        need = "expected mass, com and inertia for a link that only this joint moves, or armature"
+        yield keys, f'= "{joint}" moves no inertia of its own at {_told(finger, q)}; {need}'
+
+
+def _told(finger: Finger, q: Sequence[float]) -> str:
+    """A pose in words."""
+    return ", ".join(f"{joint} = {math.degrees(x):.4g} deg" for joint, x in zip(finger.joints, q, strict=True))
+
+
 # ---------------------------------------------------------------------------------------------------- tendons
 
 
 def _tendons(finger: Finger) -> Iterator[Complaint]:
-    """Every tendon moves with some joint, and a span has a length in every pose: else its derivatives do not exist."""
+    """Every tendon moves with some joint, and straight lines have a length in every pose, as derivatives need."""
     chain = Chain(finger)
     arms = [*chain.couplings()]
     for index, tendon in enumerate(finger.tendons):
-        if tendon.span:
-            length, q = chain.shortest(index)
-            if length < _SHORTEST_SPAN:
-                pose = ", ".join(
-                    f"{joint} = {math.degrees(x):.4g} deg" for joint, x in zip(finger.joints, q, strict=True)
-                )
-                least = f"expected at least {_SHORTEST_SPAN * 1e3:g} mm in every pose"
-                yield ("tendons", index, "span"), f"has a length of {length * 1e3:.2g} mm at {pose}; {least}"
-                continue
-        if max(abs(arm) for coupling in arms for arm in coupling[index]) < _LEAST_ARM:
+        short = [*_without_length(chain, index)]
+        yield from below(("tendons", index), short)
+        if not short and max(abs(arm) for coupling in arms for arm in coupling[index]) < _LEAST_ARM:
             yield ("tendons", index), "pulls nothing: its length is the same in every pose"
+        if tendon.spring and not short and (longest := chain.longest(index)) <= float(tendon.spring.rest):
+            slack = f'= "{tendon.spring.rest}" leaves the string slack in every pose'
+            yield (
+                ("tendons", index, "spring", "rest"),
+                f"{slack}; expected less than its length, {longest * 1e3:.4g} mm",
+            )
+
+
+def _without_length(chain: Chain, index: int) -> Iterator[Complaint]:
+    """The first straight line of a tendon whose ends meet in some pose."""
+    spanned = chain.finger.tendons[index].span is not None
+    for number, line in enumerate(chain.lines[index]):
+        length, q = chain.shortest(line)
+        if length < _SHORTEST_SPAN:
+            keys: Keys = ("span",) if spanned and number == 0 else ("path", number - spanned + 1)
+            what = "has a length of" if keys == ("span",) else "lies behind the point before it by"
+            pose = ", ".join(f"{joint} = {math.degrees(x):.4g} deg" for joint, x in zip(chain.joints, q, strict=True))
+            least = f"expected at least {_SHORTEST_SPAN * 1e3:g} mm in every pose"
+            yield keys, f"{what} {length * 1e3:.2g} mm at {pose}; {least}"
+            return

@@ -8,7 +8,7 @@ import re
 from collections.abc import Callable, Sequence
 from functools import partial
 from types import NoneType, UnionType
-from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin
+from typing import TYPE_CHECKING, Annotated, Any, Union, get_args, get_origin
 
 from pydantic import BaseModel
 
@@ -128,7 +128,7 @@ def _at(schema: type[BaseModel], keys: Keys) -> tuple[Any, list[Any]]:
             wanted, notes = get_args(wanted)[0 if get_origin(wanted) is tuple else 1], []
         else:
             return None, []
-        if get_origin(wanted) is UnionType and get_args(wanted)[1] is NoneType:
+        if get_origin(wanted) in (Union, UnionType) and get_args(wanted)[1] is NoneType:
             wanted = get_args(wanted)[0]
         if get_origin(wanted) is Annotated:
             wanted, *more = get_args(wanted)

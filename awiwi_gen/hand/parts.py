@@ -6,260 +6,26 @@ branch of a four-bar) is structure, on which derivations depend, while they neve
 
 from __future__ import annotations
 
-import hashlib
-import json
-import re
-from collections.abc import Callable, Iterator
-from functools import partial
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, PlainValidator, PrivateAttr
+from pydantic import Field
 
+from awiwi_gen.hand.links import Base, FourBar, Inertia, Link
 from awiwi_gen.hand.measure import Measure
+from awiwi_gen.hand.names import FingerName, JointName, Over, Prefix, Source, Title
+from awiwi_gen.hand.part import Angle, Keys, Length, Moment, Part, Point, Size, covers, join
 from awiwi_gen.units import Quantity
 
-__all__ = ["Coupling", "Finger", "FourBar", "Inertia", "Limits", "Link", "Measure", "Part", "Pulley", "Span", "Tendon"]
-
-Keys = tuple[str | int, ...]
-"""The path of a value in a hand file: `("fingers", "index", "links", 1, "mass")`."""
-
-
-Angle = Annotated[Quantity, Measure("20 deg", "-360 deg", "360 deg")]
-Length = Annotated[Quantity, Measure("6.2 mm", "-1 m", "1 m")]
-Size = Annotated[Quantity, Measure("6.2 mm", "10 um", "1 m")]
-# Models have bodies of a microgram and less where two joint axes meet.
-Mass = Annotated[Quantity, Measure("1.5 g", "1 ng", "10 kg")]
-Moment = Annotated[Quantity, Measure("35 g mm^2", "1e-9 g mm^2", "1 kg m^2")]
-Product = Annotated[Quantity, Measure("-2 g mm^2", "-1 kg m^2", "1 kg m^2")]
-Point = Annotated[tuple[Length, Length, Length], Field(strict=False, examples=['["6 mm", "0 mm", "0 mm"]'])]
-
-
-# ---------------------------------------------------------------------------------------------------- names and texts
-
-# Keywords up to C23 and C++23: both languages include the generated header.
-_C = """alignas alignof asm auto bool break case char const constexpr continue default do double else enum extern false
-    float for fortran goto if inline int long nullptr register restrict return short signed sizeof static static_assert
-    struct switch thread_local true typedef typeof union unsigned void volatile while"""
-_CPP = """and and_eq bitand bitor catch char8_t char16_t char32_t class co_await co_return co_yield compl concept
-    const_cast consteval constinit decltype delete dynamic_cast explicit export final friend import module mutable
-    namespace new noexcept not not_eq operator or or_eq override private protected public reinterpret_cast requires
-    static_cast template this throw try typeid typename using virtual wchar_t xor xor_eq"""
-_KEYWORDS = frozenset(f"{_C} {_CPP}".split())
-# A finger's name begins the names of its kernels, so it must differ from the first word of every other kernel.
-_KERNELS = """backstepping batch calibration cascade finger force forearm friction guiding hand impedance joint joints
-    lever lqr model motor observer optimal palm params pole sdre self spring status step stiffness tendon tendons test
-    version wrist"""
-_TAKEN = frozenset(_KERNELS.split())
-
-
-def _identifier(text: str, longest: int, underscores: bool = True, taken: frozenset[str] = frozenset()) -> str:
-    if not re.fullmatch(r"[a-z](?:_?[a-z0-9])*" if underscores else r"[a-z][a-z0-9]*", text) or len(text) > longest:
-        inside = ", 0-9 and single underscores" if underscores else " and 0-9"
-        raise ValueError(f"is not a usable name; expected a letter, then a-z{inside}, at most {longest} in all")
-    if text in _KEYWORDS:
-        raise ValueError("is a keyword of C or C++")
-    if text in taken:
-        raise ValueError("is a name that the generated C reserves")
-    return text
-
-
-def _one_line(text: str) -> str:
-    """Text for a C comment: it must not close the comment, continue it, or hide characters."""
-    if not text.strip() or not text.isprintable() or len(text) > 80:
-        raise ValueError("is not one line of 1 to 80 printable characters")
-    for bad in ("*/", "/*", "\\", "??"):
-        if bad in text:
-            raise ValueError(f"contains {bad}, which does not belong in a C comment")
-    return text
-
-
-_MOST_SOURCES = 64  # keys of one table's source; no table has as many numbers
-
-
-def _source(value: object) -> str | dict[str, str]:
-    """One text for all numbers of a table, or one per key; `span.from` in TOML is a table in a table."""
-    if isinstance(value, str):
-        return _one_line(value)
-    if isinstance(value, dict) and len(value) > _MOST_SOURCES:
-        raise ValueError(f"has {len(value)} entries; expected at most {_MOST_SOURCES}")
-    if not isinstance(value, dict) or not value:
-        raise ValueError('is not a source; expected "table 5.1", or { mass = "table 5.1", default = "assumed" }')
-    flat: dict[str, str] = {}
-    for key, source in value.items():
-        inner = _source(source)
-        flat |= {key: inner} if isinstance(inner, str) else {f"{key}.{below}": text for below, text in inner.items()}
-    return dict(sorted(flat.items()))
-
-
-def _over(text: str) -> str:
-    if not re.fullmatch(r"[+-][a-z][a-z0-9_]*", text):
-        raise ValueError('is not a sense and a pulley; expected something such as "+pip"')
-    return text
-
-
-Prefix = Annotated[str, AfterValidator(partial(_identifier, longest=16)), Field(examples=['"awiwi"'])]
-FingerName = Annotated[str, AfterValidator(partial(_identifier, longest=16, underscores=False, taken=_TAKEN))]
-JointName = Annotated[str, AfterValidator(partial(_identifier, longest=24)), Field(examples=['"flexion"'])]
-Title = Annotated[str, AfterValidator(_one_line), Field(examples=['"Awiwi hand"'])]
-Source = Annotated[
-    str | dict[str, str],
-    PlainValidator(_source, json_schema_input_type=str | dict[str, str]),
-    Field(examples=['"table 5.1"', '"assumed"']),
+# fmt: off
+__all__ = [
+    "MOST", "PALM", "Angle", "Base", "Coupling", "Finger", "FingerName", "FourBar", "Inertia", "Keys", "Length",
+    "Limits", "Link", "Measure", "Moment", "Part", "PathPoint", "Point", "Prefix", "Pulley", "ReturnSpring", "Size",
+    "Source", "Span", "Tendon", "Title", "covers", "join",
 ]
-Over = Annotated[str, AfterValidator(_over)]
-Turn = Annotated[Literal["none", "x+90", "x-90", "y+90", "y-90", "z+90", "z-90"], Field(examples=['"none"', '"x+90"'])]
+# fmt: on
 
-
-# ---------------------------------------------------------------------------------------------------- parts
-
-
-class Part(BaseModel):
-    """A frozen part of a hand."""
-
-    model_config = ConfigDict(strict=True, frozen=True, extra="forbid")
-
-    def quantities(self) -> dict[str, Quantity]:
-        """Every number by its path, relative to this part: `links[1].mass`."""
-        return {path: quantity for path, quantity, _ in _leaves(self)}
-
-    def sources(self) -> dict[str, str]:
-        """The source of each number, by the same paths as `quantities`."""
-        return {path: source for path, _, source in _leaves(self)}
-
-    def assumed(self) -> dict[str, Quantity]:
-        """The numbers whose source marks them as guesses."""
-        return {path: quantity for path, quantity, source in _leaves(self) if source.startswith("assumed")}
-
-    def symbolic(self, leaf: Callable[[str, Quantity], object]) -> Any:
-        """The same tree, methods included, with `leaf(path, quantity)` in the place of each number."""
-        return _replaced(self, "", leaf)
-
-    def digest(self) -> str:
-        """SHA-256 of the values of this part, as 64 hexadecimal digits; the layout of its text does not count.
-
-        "6.5 mm" and "0.65 cm" are the same number and give the same digest.
-        """
-        exact = self.symbolic(lambda _, quantity: str(quantity.value))
-        return hashlib.sha256(json.dumps(exact.model_dump(mode="json", by_alias=True)).encode()).hexdigest()
-
-    def __hash__(self) -> int:
-        return hash(self.digest())  # pydantic cannot hash the dictionaries inside
-
-    def entries(self) -> Iterator[tuple[str, str, object]]:
-        """Key in the file, attribute and value of each field, in the order of the schema."""
-        for name, field in type(self).model_fields.items():
-            yield field.alias or name, name, getattr(self, name)
-
-
-def _leaves(node: object) -> Iterator[tuple[str, Quantity, str]]:
-    """All (relative path, quantity, source) below a node; the nearest `source` above a number applies."""
-    match node:
-        case Quantity():
-            yield "", node, ""
-        case tuple() | dict():
-            items = node.items() if isinstance(node, dict) else ((f"[{i}]", item) for i, item in enumerate(node))
-            for key, item in items:
-                for path, quantity, source in _leaves(item):
-                    yield join(key, path), quantity, source
-        case Part():
-            own = getattr(node, "source", {})
-            for key, _, item in node.entries():
-                for below, quantity, source in _leaves(item):
-                    path = join(key, below)
-                    yield path, quantity, source or _source_of(own, path)
-
-
-def _source_of(source: str | dict[str, str], path: str) -> str:
-    """The entry of a table's `source` for one of its numbers: the longest key that covers it, else the default."""
-    if isinstance(source, str):
-        return source
-    covering = [key for key in source if covers(key, path)]
-    return source[max(covering, key=len)] if covering else source.get("default", "")
-
-
-def covers(key: str, path: str) -> bool:
-    """Whether a path is `key` or lies below it: "com" covers "com[1]", not "com_x"."""
-    return path == key or path.startswith((f"{key}.", f"{key}["))
-
-
-def _replaced(node: object, path: str, leaf: Callable[[str, Quantity], object]) -> Any:
-    match node:
-        case Quantity():
-            return leaf(path, node)
-        case tuple():
-            return tuple(_replaced(item, f"{path}[{index}]", leaf) for index, item in enumerate(node))
-        case dict():
-            return {key: _replaced(item, join(path, key), leaf) for key, item in node.items()}
-        case Part():
-            new = {name: _replaced(item, join(path, key), leaf) for key, name, item in node.entries()}
-            return node.model_copy(update=new)
-    return node
-
-
-def join(path: str, below: str) -> str:
-    """The path of what lies below another path."""
-    return f"{path}{below}" if below.startswith("[") or not below or not path else f"{path}.{below}"
-
-
-class Inertia(Part):
-    """Inertia tensor about the centre of mass in link axes; `xy` is an entry of it: minus the integral of x y dm."""
-
-    xx: Moment
-    yy: Moment
-    zz: Moment
-    xy: Product
-    xz: Product
-    yz: Product
-
-
-class FourBar(Part):
-    """Planar four-bar: the joint turns the crank, the link is the coupler. Crank angle = reference + joint angle.
-
-    The crank turns at the origin, the rocker's pivot lies at distance `ground` on the x axis from which crank angles
-    count; `branch` tells the open assembly from the crossed one.
-    """
-
-    ground: Size
-    crank: Size
-    coupler: Size
-    rocker: Size
-    reference: Angle
-    branch: Annotated[Literal[1, -1], Field(examples=["1", "-1"])]
-    source: Source
-
-
-class Link(Part):
-    """A rigid body and the joint that moves it: first the fixed `turn`, then the joint's rotation about z.
-
-    `offset` leads from this joint to the next one (or to the fingertip), `com` to the centre of mass, in link axes.
-    """
-
-    joint: JointName
-    turn: Turn
-    low: Angle | None = None
-    high: Angle | None = None
-    offset: Point
-    mass: Mass
-    com: Point
-    inertia: Annotated[Inertia, Field(examples=['{ xx = "35 g mm^2", ... }'])]
-    four_bar: FourBar | None = None
-    source: Source
-    _limit_next_to_zero: str = PrivateAttr("")  # structure: it stays where numbers become symbols
-
-    def model_post_init(self, context: Any, /) -> None:
-        """Note which limit is nearest to zero, if the range leaves zero out."""
-        above, below = (self.low and self.low.value > 0), (self.high and self.high.value < 0)
-        self._limit_next_to_zero = "low" if above else "high" if below else ""
-
-    @property
-    def start(self) -> Any:
-        """The joint angle of the range that is nearest to zero: there a coupler is parallel to the turned frame."""
-        return getattr(self, self._limit_next_to_zero) if self._limit_next_to_zero else 0
-
-    def four_bar_structure(self) -> Any:
-        """None, the branch, or the branch and the limit where the coupler starts."""
-        branch = self.four_bar and self.four_bar.branch
-        return [branch, self._limit_next_to_zero] if branch and self._limit_next_to_zero else branch
+MOST = 32  # fingers of a hand; links, pulleys, tendons and couplings of a finger
+PALM = "palm"  # in place of a joint: the finger's base frame
 
 
 class Pulley(Part):
@@ -282,13 +48,45 @@ class Span(Part):
     joint: JointName
 
 
+class PathPoint(Part):
+    """A point that a tendon passes, fixed in a link: in the frame after that joint's rotation, or in the base frame."""
+
+    link: Annotated[JointName, Field(examples=['"palm"', '"flexion"'])]
+    at: Point
+
+
+class ReturnSpring(Part):
+    """What makes a tendon an elastic string: its force is stiffness * (length - rest), and none where it is slack."""
+
+    stiffness: Annotated[Quantity, Measure("100 N/m", "0.001 N/m", "1000000000 N/m")]
+    rest: Length
+
+
 class Tendon(Part):
-    """Path length in the finger: rest + sum of sense * radius * angle over the pulleys + the length of the span."""
+    """Path length in the finger: a sum of all that its keys describe.
+
+    These are the rest, sense * radius * angle over the pulleys, arm * angle of joints with an arm of this tendon's own,
+    the length of the span, and the straight lines from point to point of the path. A motor pulls it unless it has a
+    spring.
+    """
 
     rest: Length
-    over: Annotated[tuple[Over, ...], Field(strict=False, max_length=8)] = ()
+    over: Annotated[tuple[Over, ...], Field(strict=False, max_length=MOST)] = ()
+    arms: Annotated[dict[JointName, Length], Field(max_length=MOST)] = {}  # noqa: RUF012
     span: Span | None = None
+    path: Annotated[tuple[PathPoint, ...], Field(strict=False, min_length=2, max_length=MOST)] = ()
+    spring: ReturnSpring | None = None
     source: Source
+
+    def structure(self) -> list[Any]:
+        """Everything but the numbers."""
+        more = {
+            "arms": list(self.arms),
+            "path": [point.link for point in self.path],
+            "spring": self.spring is not None,
+        }
+        found = {key: value for key, value in more.items() if value}
+        return [list(self.over), self.span and self.span.joint, *([found] if found else [])]
 
 
 class Coupling(Part):
@@ -301,12 +99,11 @@ class Coupling(Part):
 class Finger(Part):
     """A serial chain from the palm to the tip, and the tendons that pull it."""
 
-    links: Annotated[tuple[Link, ...], Field(strict=False, min_length=1, max_length=8, examples=["[[...links]]"])]
-    pulleys: Annotated[tuple[Pulley, ...], Field(strict=False, max_length=8)] = ()
-    tendons: Annotated[
-        tuple[Tendon, ...], Field(strict=False, min_length=1, max_length=16, examples=["[[...tendons]]"])
-    ]
-    couplings: Annotated[tuple[Coupling, ...], Field(strict=False, max_length=8)] = ()
+    links: Annotated[tuple[Link, ...], Field(strict=False, min_length=1, max_length=MOST, examples=["[[...links]]"])]
+    pulleys: Annotated[tuple[Pulley, ...], Field(strict=False, max_length=MOST)] = ()
+    tendons: Annotated[tuple[Tendon, ...], Field(strict=False, max_length=MOST)] = ()
+    couplings: Annotated[tuple[Coupling, ...], Field(strict=False, max_length=MOST)] = ()
+    base: Base | None = None
 
     @property
     def leaders(self) -> dict[str, str]:
@@ -319,6 +116,26 @@ class Finger(Part):
         return tuple(link.joint for link in self.links if link.joint not in self.leaders)
 
     @property
+    def has_armature(self) -> bool:
+        """Whether any joint has armature."""
+        return any(link.armature is not None for link in self.links)
+
+    @property
+    def passive(self) -> bool:
+        """Whether any joint has a torque of its own: damping, friction or a spring."""
+        return any(link.passive for link in self.links)
+
+    @property
+    def pulled(self) -> tuple[Tendon, ...]:
+        """The m tendons that motors pull, in the order of the arrays over tendons; the others are return strings."""
+        return tuple(tendon for tendon in self.tendons if tendon.spring is None)
+
+    @property
+    def strings(self) -> tuple[Tendon, ...]:
+        """The elastic return strings."""
+        return tuple(tendon for tendon in self.tendons if tendon.spring is not None)
+
+    @property
     def radii(self) -> dict[str, Quantity]:
         """Joint -> radius of its pulley."""
         return {pulley.joint: pulley.radius for pulley in self.pulleys}
@@ -326,10 +143,11 @@ class Finger(Part):
     def structure(self) -> dict[str, Any]:
         """Everything but the numbers, ready for JSON: fingers with equal structures share their derivations."""
         return {
-            "links": [[link.joint, link.turn, link.four_bar_structure()] for link in self.links],
+            "links": [link.structure() for link in self.links],
             "pulleys": [pulley.joint for pulley in self.pulleys],
-            "tendons": [[list(tendon.over), tendon.span and tendon.span.joint] for tendon in self.tendons],
+            "tendons": [tendon.structure() for tendon in self.tendons],
             "couplings": [[coupling.follower, coupling.leader] for coupling in self.couplings],
+            **({"base": self.base.quarters} if self.base else {}),
         }
 
 

@@ -7,11 +7,12 @@ one number, and no other, removes all warnings of the hand's bodies.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from awiwi_gen.hand.parts import Finger, Keys, Link
+from awiwi_gen.hand.pose import Chain, point
 
 __all__ = ["Remark", "remarks"]
 
@@ -21,7 +22,10 @@ _DENSEST, _LIGHTEST = 12e3, 5.0  # [kg/m^3]: lead, and less than any foam
 _ALONG_JOINT, _ALONG_COM = 0.28, 0.2  # second moment along the bone, in squares of its length: rods have 1/3 and 1/12
 _LARGEST_PULLEY, _SMALLEST_PULLEY = 1.0, 0.02  # radius in lengths of the finger's longest bone
 _SMALLEST_RANGE, _LARGEST_RANGE = 5.0, 270.0  # of a joint [deg]
-_FACTORS = (0.001, 0.01, 0.1, 10.0, 100.0, 1000.0)
+_HEAVIEST_ROTOR = 1000.0  # armature over the inertia of all links that the joint moves
+_SLIPS = [
+    (key, factor) for key in ("offset", "com", "mass", "inertia") for factor in (0.001, 0.01, 0.1, 10.0, 100.0, 1000.0)
+]
 _MANY = 3  # links with the same warning have one cause rather than a slip each
 
 Vector = tuple[float, float, float]
@@ -41,18 +45,35 @@ def remarks(fingers: Mapping[str, Finger]) -> Iterator[Remark]:
         ("fingers", name, "links", index): Body.of(link, _longest(finger))
         for name, finger in fingers.items()
         for index, link in enumerate(finger.links)
+        if link.mass is not None
     }
     found = {keys: list(body.remarks()) for keys, body in bodies.items()}
     unusual = [keys for keys, each in found.items() if each]
     slip = bodies[unusual[0]].slip() if len(unusual) == 1 else ""
+    shared = _shared_cause([*bodies.values()]) if len(unusual) >= _MANY else ""
     for keys in unusual:
         for remark in found[keys]:
             alike = sum(any(other.keys == remark.keys for other in each) for each in found.values())
-            cause = f"; {alike} of {len(found)} links are like this: look for one cause" if alike >= _MANY else slip
+            cause = f"; {alike} of {len(found)} links are like this: {shared}" if alike >= _MANY else slip
             yield Remark((*keys, *remark.keys), remark.message + cause, remark.ratio)
     for name, finger in fingers.items():
-        for each in (*_pulleys(finger), *_ranges(finger), *_one_sided(finger)):
+        for each in (*_pulleys(finger), *_ranges(finger), *_rotors(finger)):
             yield Remark(("fingers", name, *each.keys), each.message, each.ratio)
+
+
+def _shared_cause(bodies: Sequence[Body]) -> str:
+    """The one mistake in all bodies of a hand without which there would be no remark, if there is exactly one."""
+    found = [
+        f"{key} is probably {_much(factor)} everywhere"
+        for key, factor in _SLIPS
+        if not any([*body.scaled(key, factor).remarks()] for body in bodies)
+    ]
+    return found[0] if len(found) == 1 else "look for one cause"
+
+
+def _much(factor: float) -> str:
+    """A wrong number in words, by the factor that corrects it."""
+    return f"{1 / factor:g} times too large" if factor < 1 else f"{factor:g} times too small"
 
 
 def _longest(finger: Finger) -> float:
@@ -76,8 +97,10 @@ class Body:
 
     @classmethod
     def of(cls, link: Link, longest: float) -> Body:
-        """The body of a link in a finger whose longest bone has this length [m]."""
+        """The body of a link with mass, in a finger whose longest bone has this length [m]."""
         inertia = link.inertia
+        if link.mass is None or link.com is None or inertia is None:
+            raise ValueError(f"the link of {link.joint} has no body")
         x, y, z = (float(value) for value in link.com)
         moments = float(inertia.xx), float(inertia.yy), float(inertia.zz)
         products = float(inertia.xy), float(inertia.xz), float(inertia.yz)
@@ -154,19 +177,12 @@ class Body:
 
     def slip(self) -> str:
         """The slip of a decimal point that explains all remarks, if there is exactly one."""
-        scaled = [
-            (key, factor)
-            for key in ("offset", "com", "mass", "inertia")
-            for factor in _FACTORS
-            if not any(self._scaled(key, factor).remarks())
-        ]
-        if len(scaled) != 1:
-            return ""
-        ((key, factor),) = scaled
-        much = f"{1 / factor:g} times too large" if factor < 1 else f"{factor:g} times too small"
-        return f"; {key} is probably {much}"
+        found = [(key, factor) for key, factor in _SLIPS if not [*self.scaled(key, factor).remarks()]]
+        return f"; {found[0][0]} is probably {_much(found[0][1])}" if len(found) == 1 else ""
 
-    def _scaled(self, key: str, factor: float) -> Body:
+    def scaled(self, key: str, factor: float) -> Body:
+        """The body with the numbers of one key multiplied by a factor."""
+
         def times(vector: Vector) -> Vector:
             return vector[0] * factor, vector[1] * factor, vector[2] * factor
 
@@ -214,19 +230,24 @@ def _ranges(finger: Finger) -> Iterator[Remark]:
         yield Remark(("links", index, "low"), found, ratio)
 
 
-def _one_sided(finger: Finger) -> Iterator[Remark]:
-    """Joints that pulleys alone move, and not to both sides."""
-    order = [link.joint for link in finger.links]
-    spanned = {joint for tendon in finger.tendons if tendon.span for joint in order[: order.index(tendon.span.joint)]}
-    for joint in finger.joints:
-        if joint in spanned:
-            continue
-        # A follower's pulley takes as much tendon as its leader's, so the senses of both add up.
-        senses = [
-            sum(1 if name[0] == "+" else -1 for name in tendon.over if finger.leaders.get(name[1:], name[1:]) == joint)
-            for tendon in finger.tendons
-        ]
-        pulled = {"+": any(sense > 0 for sense in senses), "-": any(sense < 0 for sense in senses)}
-        if missing := [f'"{sign}{joint}"' for sign, found in pulled.items() if not found]:
-            need = f'= "{joint}" has no tendon over {" nor ".join(missing)}; tendons only pull, to one side each'
-            yield Remark(("links", order.index(joint), "joint"), need, (2 - len(missing)) / 2)
+def _rotors(finger: Finger) -> Iterator[Remark]:
+    """Rotors that outweigh all that their joint moves, in the middle of the range."""
+    if not finger.has_armature:
+        return
+    chain = Chain(finger)
+    frames = list(chain.frames(chain.poses()[0]))
+    for index, link in enumerate(finger.links):
+        (_, _, axis), joint = frames[index][0]
+        moved = 0.0
+        for other, (_, (axes, origin)) in zip(finger.links[index:], frames[index:], strict=True):
+            if other.mass is None or other.com is None or other.inertia is None:
+                continue
+            x, y, z = (float(value) for value in other.com)
+            arm = [a - b for a, b in zip(point(axes, origin, (x, y, z)), joint, strict=True)]
+            along = sum(a * b for a, b in zip(arm, axis, strict=True))
+            spread = float(other.inertia.xx.value + other.inertia.yy.value + other.inertia.zz.value) / 3
+            moved += spread + float(other.mass) * (sum(a * a for a in arm) - along**2)
+        ratio = float(link.armature or 0) / moved if moved else 0.0
+        if ratio > _HEAVIEST_ROTOR:
+            found = f'= "{link.armature}" is {ratio:.3g} times the inertia of all links that this joint moves'
+            yield Remark(("links", index, "armature"), found, ratio)

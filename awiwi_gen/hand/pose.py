@@ -1,7 +1,7 @@
 """A finger's pose and tendons in plain floats: what the checks of a hand file need before anything is derived.
 
-Frames are those of the definition of the kinematics: offset, fixed turn, rotation about z (eq. 5.2, 5.3); a four-bar is
-a crank of angle q + reference and a coupler. Everything is a function of the n independent joint angles q [rad].
+Frames are those of the definition of the kinematics: offset, fixed rotation, rotation about z (eq. 5.2, 5.3); a four-bar
+is a crank of angle q + reference and a coupler. Everything is a function of the n independent joint angles q [rad].
 """
 
 from __future__ import annotations
@@ -9,19 +9,31 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
+from itertools import pairwise
+from typing import NamedTuple
 
-from awiwi_gen.hand.parts import Finger, FourBar
+from awiwi_gen.hand.parts import MOST, PALM, Finger, FourBar, Link, Tendon
 
-__all__ = ["Chain"]
+__all__ = ["Chain", "Spot", "point"]
 
 Vector = tuple[float, float, float]
 Axes = tuple[Vector, Vector, Vector]  # unit vectors of a frame, in base axes
+Frame = tuple[Axes, Vector]  # with its origin
 
 _SAMPLES = 24
-_PRIMES = (2, 3, 5, 7, 11, 13, 17, 19)  # their square roots spread samples evenly over up to eight joints
+# Square roots of primes spread samples evenly over up to 32 joints.
+_PRIMES = [p for p in range(2, 132) if all(p % d for d in range(2, p))][:MOST]
 _STEP = 1e-5  # rad, of central differences: errors of 1e-10 relative
 _SWEEPS, _SECTIONS = 3, 24  # of a search for the shortest length, joint by joint
 _SHORTENING = 0.5  # a length that falls below this share of its mean is searched for zero
+
+
+class Spot(NamedTuple):
+    """A point of the chain: coordinates in the frame of a link (-1: the base), before or after its joint's rotation."""
+
+    link: int
+    rotated: bool
+    at: Vector
 
 
 class Chain:
@@ -39,15 +51,14 @@ class Chain:
             leader = finger.leaders.get(link.joint, link.joint)
             factor = radii[leader] / radii[link.joint] if leader != link.joint else 1.0
             self._angles.append((self.joints.index(leader), factor))
-        self._links = [(link.turn, _floats(link.offset), link.four_bar) for link in finger.links]
+        self._links = [
+            (_elementary(link), _floats(link.offset), float(link.reference or 0), float(link.start), link.four_bar)
+            for link in finger.links
+        ]
         self._order = {link.joint: index for index, link in enumerate(finger.links)}
         self._radii = radii
-        self._spans = [
-            (self._order[tendon.span.joint], _floats(tendon.span.from_), _floats(tendon.span.to))
-            if tendon.span
-            else None
-            for tendon in finger.tendons
-        ]
+        # The straight lines of every tendon: that of its span, if it has one, then those of its path.
+        self.lines = [self._lines_of(tendon) for tendon in finger.tendons]
 
     def poses(self) -> list[list[float]]:
         """Joint angles spread over the range: the middle, both ends, and an even sequence between them [rad]."""
@@ -56,33 +67,30 @@ class Chain:
         return [[a + (b - a) * x for a, b, x in zip(self.low, self.high, each, strict=True)] for each in shares]
 
     def couplings(self) -> Iterator[list[list[float]]]:
-        """The coupling in all `poses`; once if there are no spans, for pulleys have the same arms everywhere."""
-        yield from map(self.coupling, self.poses() if any(self._spans) else self.poses()[:1])
+        """The coupling in all `poses`; once if no line is straight, for pulleys have the same arms everywhere."""
+        yield from map(self.coupling, self.poses() if any(self.lines) else self.poses()[:1])
 
     def coupling(self, q: Sequence[float]) -> list[list[float]]:
-        """P = dh/dq (m x n) [m/rad]: senses times radii, and central differences of the spans' lengths."""
+        """dh/dq [m/rad], a row for each tendon of the file: senses times radii, arms, and central differences of lines."""
         rows = []
-        for tendon, span in zip(self.finger.tendons, self._spans, strict=True):
+        for tendon, lines in zip(self.finger.tendons, self.lines, strict=True):
             row = [0.0] * len(self.joints)
-            for name in tendon.over:
-                column, factor = self._angles[self._order[name[1:]]]
-                row[column] += math.copysign(self._radii[name[1:]] * factor, 1.0 if name[0] == "+" else -1.0)
-            if span:
+            for joint, arm in self._arms(tendon):
+                column, factor = self._angles[self._order[joint]]
+                row[column] += arm * factor
+            if lines:
                 for column in range(len(row)):
                     ends = [list(q), list(q)]
                     ends[0][column] -= _STEP
                     ends[1][column] += _STEP
-                    before, after = (self._distance(end, *span) for end in ends)
+                    before, after = (sum(self.distance(end, line) for line in lines) for end in ends)
                     row[column] += (after - before) / (2 * _STEP)
             rows.append(row)
         return rows
 
-    def shortest(self, tendon: int) -> tuple[float, list[float]]:
-        """The shortest length of a tendon's span over the range [m], and the joint angles of it [rad]."""
-        span = self._spans[tendon]
-        if span is None:
-            raise ValueError(f"tendon {tendon} has no span")
-        distance = partial(self._distance, seat=span[0], start=span[1], end=span[2])
+    def shortest(self, line: tuple[Spot, Spot]) -> tuple[float, list[float]]:
+        """The shortest length of a straight line over the range [m], and the joint angles of it [rad]."""
+        distance = partial(self.distance, line=line)
         found = sorted((distance(q), q) for q in self.poses())
         length, q = found[0]
         if length > _SHORTENING * sum(each for each, _ in found) / len(found):
@@ -92,28 +100,71 @@ class Chain:
                 q = _least(distance, q, column, ends)
         return distance(q), q
 
-    def _distance(self, q: Sequence[float], seat: int, start: Vector, end: Vector) -> float:
-        """Length of a straight run from a point of the base frame to one before the joint of link `seat` [m]."""
-        axes, origin = self._seat(q, seat)
-        return math.dist(_point(axes, origin, end), start)
+    def longest(self, tendon: int) -> float:
+        """The longest length of a tendon [m]: at the best ends of the ranges, lines being searched joint by joint."""
+        found = max(self.poses(), key=partial(self._length, tendon))
+        for _ in range(_SWEEPS):
+            for column, ends in enumerate(zip(self.low, self.high, strict=True)):
+                found = _least(lambda q: -self._length(tendon, q), found, column, ends)
+        return self._length(tendon, found)
 
-    def _seat(self, q: Sequence[float], joint: int) -> tuple[Axes, Vector]:
-        """The frame in which a joint rotates: after its fixed turn, before its rotation."""
+    def _length(self, number: int, q: Sequence[float]) -> float:
+        """Length of a tendon [m]."""
+        tendon = self.finger.tendons[number]
+        length = float(tendon.rest) + sum(self.distance(q, line) for line in self.lines[number])
+        for joint, arm in self._arms(tendon):
+            column, factor = self._angles[self._order[joint]]
+            length += arm * factor * q[column]
+        return length
+
+    def _arms(self, tendon: Tendon) -> list[tuple[str, float]]:
+        """Joints and the length per angle [m/rad] that a tendon has there: signed radii of pulleys, and its own arms."""
+        signed = [(over[1:], math.copysign(self._radii[over[1:]], float(f"{over[0]}1"))) for over in tendon.over]
+        return signed + [(joint, float(arm)) for joint, arm in tendon.arms.items()]
+
+    def distance(self, q: Sequence[float], line: tuple[Spot, Spot]) -> float:
+        """Length of a straight line [m]."""
+        start, end = (point(*self._frame(q, spot.link, spot.rotated), spot.at) for spot in line)
+        return math.dist(start, end)
+
+    def _lines_of(self, tendon: Tendon) -> list[tuple[Spot, Spot]]:
+        """A span begins in the base frame and ends before a rotation; points of a path move with their links."""
+        span, number = tendon.span, {PALM: -1, **self._order}
+        straight = []
+        if span:
+            straight.append((Spot(-1, True, _floats(span.from_)), Spot(number[span.joint], False, _floats(span.to))))
+        spots = [Spot(number[each.link], True, _floats(each.at)) for each in tendon.path]
+        return straight + list(pairwise(spots))
+
+    def _frame(self, q: Sequence[float], joint: int, rotated: bool) -> Frame:
+        """The frame of a joint after its fixed turn, before or after its rotation; that of the base for joint -1."""
+        if joint < 0:
+            return ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), (0.0, 0.0, 0.0)
+        return next(both[rotated] for number, both in enumerate(self.frames(q)) if number == joint)
+
+    def frames(self, q: Sequence[float]) -> Iterator[tuple[Frame, Frame]]:
+        """Of every link, the frame in which its joint rotates, and its own."""
         axes: Axes = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
         origin: Vector = (0.0, 0.0, 0.0)
         offset: Vector = (0.0, 0.0, 0.0)
-        for number, (turn, following, bar) in enumerate(self._links):
-            origin, axes = _point(axes, origin, offset), _turned(axes, turn)
-            if number == joint:
-                break
-            column, factor = self._angles[number]
-            angle = q[column] * factor
+        for (turns, following, drawn, start, bar), (column, factor) in zip(self._links, self._angles, strict=True):
+            origin = point(axes, origin, offset)
+            for axis, angle in turns:
+                axes = _rotated(axes, angle, axis)
+            seat, angle = (axes, origin), q[column] * factor
             if bar:
                 reference = float(bar.reference)
-                origin = _point(_rotated(axes, angle + reference), origin, (float(bar.crank), 0.0, 0.0))
-                angle = _coupler(bar, angle + reference) - _coupler(bar, reference)
-            axes, offset = _rotated(axes, angle), following
-        return axes, origin
+                origin = point(_rotated(axes, angle + reference), origin, (float(bar.crank), 0.0, 0.0))
+                angle = _coupler(bar, angle + reference) - _coupler(bar, start + reference)
+            axes, offset = _rotated(axes, angle - drawn), following
+            yield seat, (axes, origin)
+
+
+def _elementary(link: Link) -> list[tuple[int, float]]:
+    """The fixed rotations in front of a joint: axis and angle [rad], in order."""
+    turn = [] if link.turn == "none" else [("xyz".index(link.turn[0]), math.radians(float(link.turn[1:])))]
+    roll, pitch, yaw = link.rpy or (0, 0, 0)
+    return [*turn, *((axis, float(angle)) for axis, angle in ((2, yaw), (1, pitch), (0, roll)) if angle)]
 
 
 def _floats(point: Sequence[object]) -> Vector:
@@ -121,7 +172,8 @@ def _floats(point: Sequence[object]) -> Vector:
     return x, y, z
 
 
-def _point(axes: Axes, origin: Vector, local: Vector) -> Vector:
+def point(axes: Axes, origin: Vector, local: Vector) -> Vector:
+    """A point of a frame in base axes [m]."""
     (a, b, c), (x, y, z) = axes, local
     return (
         origin[0] + x * a[0] + y * b[0] + z * c[0],
@@ -138,11 +190,6 @@ def _rotated(axes: Axes, angle: float, about: int = 2) -> Axes:
     new[(about + 1) % 3] = (c * first[0] + s * second[0], c * first[1] + s * second[1], c * first[2] + s * second[2])
     new[(about + 2) % 3] = (c * second[0] - s * first[0], c * second[1] - s * first[1], c * second[2] - s * first[2])
     return new[0], new[1], new[2]
-
-
-def _turned(axes: Axes, turn: str) -> Axes:
-    """The axes after a fixed quarter turn such as "x+90"."""
-    return axes if turn == "none" else _rotated(axes, math.radians(float(turn[1:])), "xyz".index(turn[0]))
 
 
 def _coupler(bar: FourBar, crank: float) -> float:

@@ -20,7 +20,8 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from awiwi_gen.hand.parts import Angle, Keys, Part, Point, Source
+from awiwi_gen.hand.names import Source
+from awiwi_gen.hand.parts import Angle, Keys, Part, Point
 
 __all__ = ["Linkage", "Swing", "Wrist", "WristTendon", "closure"]
 

@@ -15,6 +15,7 @@ from awiwi_gen.kernels.fibres import fibre_kernels
 from awiwi_gen.kernels.fingers import finger_kernels
 from awiwi_gen.kernels.fingers_control import elastic_kernels
 from awiwi_gen.kernels.four_bars import four_bar_kernels
+from awiwi_gen.kernels.joints import documented, optional_kernels
 from awiwi_gen.kernels.measured import measured_kernels
 from awiwi_gen.kernels.motors import motor_kernels
 from awiwi_gen.kernels.plants import plant_kernels
@@ -36,7 +37,8 @@ def declared(hand: Hand) -> list[Kernel]:
         for name, finger in hand.fingers.items()
         for kernel in [
             *elastic_kernels(hand, name, finger),
-            *finger_kernels(hand, name, finger),
+            *documented(finger, finger_kernels(hand, name, finger)),
+            *optional_kernels(hand, name, finger),
             *base_kernels(hand, name, finger),
             *four_bar_kernels(name, finger),
         ]

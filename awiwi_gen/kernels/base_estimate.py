@@ -14,6 +14,7 @@ from awiwi_gen.hand import Finger, Hand
 from awiwi_gen.kernel import Kernel, Port, Solver
 from awiwi_gen.kernels.declare import Family
 from awiwi_gen.kernels.fingers import Size, input_ports, joint_limits, limit_paths
+from awiwi_gen.kernels.fingers_control import moved
 from awiwi_gen.units import rad
 
 TRIALS = 50  # as in algorithm 1; figure 5.17 shows that 15 are enough for noisy lengths
@@ -35,7 +36,7 @@ def base_kernels(hand: Hand, name: str, finger: Finger) -> list[Kernel]:
     base = base_of(finger)
     if not base.spans:
         return []
-    whole = input_ports(hand, finger, Size(len(finger.joints), len(finger.tendons), len(finger.links)))
+    whole = input_ports(hand, finger, Size(len(finger.joints), len(finger.pulled), len(finger.links)))
     ports = {"h": subset(whole["h"], base.spans), "start": subset(whole["start"], base.joints)}
     return of_base.kernels(name, finger, f"fingers.{name}", finger.structure(), ports, base)
 
@@ -43,12 +44,12 @@ def base_kernels(hand: Hand, name: str, finger: Finger) -> list[Kernel]:
 def base_of(finger: Finger) -> Base:
     """The spans, and the joints between them and the palm; empty if the tendons of spans run over other joints too."""
     order = [link.joint for link in finger.links]
-    spans = tuple(i for i, tendon in enumerate(finger.tendons) if tendon.span)
-    ends = [order.index(tendon.span.joint) for tendon in finger.tendons if tendon.span]
+    spans = tuple(i for i, tendon in enumerate(finger.pulled) if tendon.span)
+    ends = [order.index(tendon.span.joint) for tendon in finger.pulled if tendon.span]
     leaders = [finger.leaders.get(joint, joint) for joint in order[: max(ends, default=0)]]
     joints = tuple(i for i, joint in enumerate(finger.joints) if joint in leaders)
-    on_pulleys = {finger.leaders.get(over[1:], over[1:]) for i in spans for over in finger.tendons[i].over}
-    return Base(spans, joints) if on_pulleys <= set(leaders) and len(joints) <= len(spans) else Base((), ())
+    others = set().union(*(moved(finger, finger.pulled[i]) for i in spans)) - set(leaders)
+    return Base(spans, joints) if not others and len(joints) <= len(spans) else Base((), ())
 
 
 def subset(port: Port, elements: tuple[int, ...]) -> Port:
@@ -70,7 +71,7 @@ def gradient_search(finger: Finger) -> Solver:
         arrays={"low": tuple(low[j] for j in base.joints), "high": tuple(high[j] for j in base.joints)},
         strings={
             "joints": str(len(finger.joints)),
-            "tendons": str(len(finger.tendons)),
+            "tendons": str(len(finger.pulled)),
             "search": f"awiwi_gradient_search(&problem, h_in, start_in, {TRIALS}, 0, q_out)",
         },
         iterations=TRIALS + 1,

@@ -28,7 +28,7 @@ def joint_laws(hand: Hand) -> list[Kernel]:
 
 
 def joint_stiffness(hand: Hand) -> tuple[float, float]:
-    """Least and largest stiffness [N m/rad] that the tendons on a joint's pulley give it, rounded to include both."""
+    """Least and largest stiffness [N m/rad] that tendons with constant arms give a joint, rounded to include both."""
     low, high = float(hand.limits.tendon_stiffness_low), float(hand.limits.tendon_stiffness_high)
     if hand.spring:
         levers = [Lever(spring) for spring in (hand.spring, *hand.spring.calibrated.values())]
@@ -38,9 +38,14 @@ def joint_stiffness(hand: Hand) -> tuple[float, float]:
             own = float(fibre.modulus) * float(fibre.section) / float(fibre.length)
             low, high = (1 / (1 / end + 1 / own) for end in (low, high))
     squares = [
-        float(pulley.radius) ** 2 * sum(over[1:] == pulley.joint for tendon in finger.tendons for over in tendon.over)
+        float(pulley.radius) ** 2 * sum(over[1:] == pulley.joint for tendon in finger.pulled for over in tendon.over)
         for finger in hand.fingers.values()
         for pulley in finger.pulleys
+    ]
+    squares += [
+        sum(float(tendon.arms[joint]) ** 2 for tendon in finger.pulled if joint in tendon.arms)
+        for finger in hand.fingers.values()
+        for joint in finger.joints
     ]
     found = [square for square in squares if square > 0] or [1.0]
     # Two digits; 5 % is the most that rounding can lose.

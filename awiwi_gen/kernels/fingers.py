@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 from awiwi_gen.hand import Hand
 from awiwi_gen.hand.lever import Lever
-from awiwi_gen.hand.parts import Finger, Tendon
+from awiwi_gen.hand.parts import Finger, PathPoint, Tendon
 from awiwi_gen.kernel import Kernel, Port, Solver
 from awiwi_gen.kernels.declare import Family, within
+from awiwi_gen.structure import link_number
 from awiwi_gen.units import J, N, Unit, kg, m, one, rad, s
 
 
@@ -29,16 +32,22 @@ STIFFEST = 50.0  # [N m/rad]; more than the tendons of a hand give a joint
 
 def finger_kernels(hand: Hand, name: str, finger: Finger) -> list[Kernel]:
     """All kernels of one finger."""
-    size = Size(len(finger.joints), len(finger.tendons), len(finger.links))
+    size = Size(len(finger.joints), len(finger.pulled), len(finger.links))
     ports = input_ports(hand, finger, size)
-    kernels = per_finger.kernels(name, finger, f"fingers.{name}", finger.structure(), ports, size)
+    return guarded(finger, per_finger.kernels(name, finger, f"fingers.{name}", finger.structure(), ports, size))
+
+
+def guarded(finger: Finger, kernels: list[Kernel]) -> list[Kernel]:
+    """The kernels of a finger; those that depend on where the links are return a status if it has four-bars."""
     loops = tuple(f"the four-bar of {link.joint} closes" for link in finger.links if link.four_bar)
+    kernels = [kernel for kernel in kernels if kernel.family != "return_torque" or finger.strings]
     return [within(k, "domain", "loops_close", loops) if loops and moves_the_chain(k) else k for k in kernels]
 
 
 def moves_the_chain(kernel: Kernel) -> bool:
     """Whether a kernel depends on where the links are; tendons only depend on angles."""
-    return any(route.module.endswith((".kinematics", ".dynamics")) for route in kernel.routes.values())
+    rooms = (".kinematics", ".dynamics", ".palm")
+    return "q" in kernel.inputs and any(route.module.endswith(rooms) for route in kernel.routes.values())
 
 
 def input_ports(hand: Hand, finger: Finger, size: Size) -> dict[str, Port]:
@@ -46,7 +55,7 @@ def input_ports(hand: Hand, finger: Finger, size: Size) -> dict[str, Port]:
     n, limits = (size.joints,), hand.limits
     low, high = joint_limits(finger)
     slack, taut = force_range(hand)
-    shortest, longest = zip(*(length_range(finger, tendon) for tendon in finger.tendons), strict=True)
+    lengths = [length_range(finger, tendon) for tendon in finger.pulled]
 
     def symmetric(shape: tuple[int, ...], unit: Unit, limit: Any) -> Port:
         return Port(shape, unit, -float(limit), float(limit))
@@ -58,7 +67,7 @@ def input_ports(hand: Hand, finger: Finger, size: Size) -> dict[str, Port]:
         "tau": symmetric(n, N * m, limits.joint_torque),
         "f": Port((size.tendons,), N, 0.0, float(limits.tendon_force)),
         "k": Port((size.tendons,), N / m, float(limits.tendon_stiffness_low), float(limits.tendon_stiffness_high)),
-        "h": Port((size.tendons,), m, shortest, longest),
+        "h": Port((size.tendons,), m, tuple(low for low, _ in lengths), tuple(high for _, high in lengths)),
         "start": Port(n, rad, low, high),
         "noise": Port((), m, 0.0, 1e-3),
         "g": symmetric((3,), m / s**2, limits.gravity),
@@ -90,18 +99,31 @@ def limit_paths(finger: Finger) -> dict[str, tuple[str, ...]]:
 
 
 def length_range(finger: Finger, tendon: Tendon) -> tuple[float, float]:
-    """Bounds of a tendon's path length over all poses [m]: joints at their limits, spans from zero to their longest."""
+    """Bounds of a tendon's length over all poses [m]: joints at their limits, straight lines from zero to their longest."""
     rest, reach = float(tendon.rest), 0.0
     limits = dict(zip(finger.joints, zip(*joint_limits(finger), strict=True), strict=True))
     for over in tendon.over:
         joint = over[1:]
         leader = finger.leaders.get(joint, joint)  # the arcs on the pulleys of follower and leader are equal
         reach += float(finger.radii[leader]) * max(map(abs, limits[leader]))
+    for joint, arm in tendon.arms.items():
+        leader = finger.leaders.get(joint, joint)
+        ratio = float(finger.radii[leader]) / float(finger.radii[joint]) if leader != joint else 1.0
+        reach += abs(float(arm)) * ratio * max(map(abs, limits[leader]))
+    low, high = rest - reach, rest + reach + sum(longest(finger, a, b) for a, b in pairwise(tendon.path))
     if tendon.span is None:
-        return rest - reach, rest + reach
+        return low, high
     points = (tendon.span.from_, tendon.span.to, *(link.offset for link in finger.links))
-    longest = sum(sum(float(x) ** 2 for x in point) ** 0.5 for point in points)
-    return rest - reach, rest + reach + longest
+    return low, high + sum(sum(float(x) ** 2 for x in point) ** 0.5 for point in points)
+
+
+def longest(finger: Finger, a: PathPoint, b: PathPoint) -> float:
+    """Bound of a line's length over all poses [m]: both points away from their origins, and all offsets between, in line."""
+    first, last = sorted(link_number(finger, point.link) for point in (a, b))
+    between = finger.links[max(first, 0) : max(last, 0)]
+    vectors = [a.at, b.at, *(link.offset for link in between)]
+    cranks = [float(link.four_bar.crank) for link in finger.links[first + 1 : last + 1] if link.four_bar]
+    return sum(math.hypot(*map(float, vector)) for vector in vectors) + sum(cranks)
 
 
 POSE = (one, one, one, m) * 3 + (one,) * 4
@@ -254,19 +276,32 @@ def joint_torque_and_stiffness(finger: Any, q: Any, f: Any, k: Any) -> Any:
     """Joint torques and joint stiffness of the tendons in one call with fewer operations."""
 
 
+@per_finger(lambda z: {"tau": torque(z), "energy": Port((), J)}, "eq. 5.8, with strings for tendons", subject="tendons")
+def return_torque(finger: Any, q: Any) -> Any:
+    """Joint torques of the elastic return strings, and the energy in them.
+
+    A string pulls with its stiffness times its length beyond its rest; one that is shorter is slack and does not pull.
+    """
+
+
 # -- joint angles from tendon lengths ---------------------------------------------------------------------
 
 
+def is_curved(finger: Finger) -> bool:
+    """Whether the coupling depends on the pose, as that of straight lines does."""
+    return any(tendon.span or tendon.path for tendon in finger.pulled)
+
+
 def nonlinear_estimate(finger: Finger, iterations: int = 24) -> Solver | None:
-    """The solver of fingers with straight spans, whose coupling depends on the pose; None for other fingers."""
-    if all(tendon.span is None for tendon in finger.tendons):
+    """The solver of fingers whose coupling depends on the pose; None for other fingers."""
+    if not is_curved(finger):
         return None
     low, high = joint_limits(finger)
     return Solver(
         template="joint_estimate.c.j2",
         problem="least squares",
         uses=("tendon_lengths", "coupling"),
-        equations=tuple(range(len(finger.tendons))),
+        equations=tuple(range(len(finger.pulled))),
         unknowns=tuple(range(len(low))),
         arrays={"low": low, "high": high},
         strings={"search": f"awiwi_least_squares(&problem, h_in, start_in, {iterations}, tolerance, q_out)"},

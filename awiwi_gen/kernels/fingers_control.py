@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 from awiwi_gen.hand import Finger, Hand
@@ -11,7 +12,8 @@ from awiwi_gen.hand.lever import Lever
 from awiwi_gen.hand.parts import Tendon
 from awiwi_gen.kernel import Kernel, Port, Solver
 from awiwi_gen.kernels.declare import Family
-from awiwi_gen.kernels.fingers import force_range, per_finger
+from awiwi_gen.kernels.fingers import force_range, is_curved, per_finger
+from awiwi_gen.structure import link_number
 from awiwi_gen.units import N, m, one
 
 SEARCHES, INVERSIONS = 3 * 97, 66  # evaluations of the curve in the worst case, see csrc/awiwi_distribution.h
@@ -81,8 +83,8 @@ def elastic_kernels(hand: Hand, name: str, finger: Finger) -> list[Kernel]:
     """The kernels of a finger's tendons."""
     rows, _ = hand.blocks[name]
     elastic = Elastic(hand, range(rows.start, rows.stop))
-    ports = {"tension": Port((len(finger.tendons),), N, *force_range(hand))}
-    return of_elastic.kernels(name, elastic, "", elastic.structure(), ports, len(finger.tendons))
+    ports = {"tension": Port((len(finger.pulled),), N, *force_range(hand))}
+    return of_elastic.kernels(name, elastic, "", elastic.structure(), ports, len(finger.pulled))
 
 
 @of_elastic(
@@ -113,14 +115,17 @@ def senses(finger: Finger, tendon: Tendon) -> Counter[str]:
 def moved(finger: Finger, tendon: Tendon) -> set[str]:
     """The independent joints that a tendon pulls."""
     order = [link.joint for link in finger.links]
-    spanned = order[: order.index(tendon.span.joint)] if tendon.span else []
-    return {finger.leaders.get(joint, joint) for joint in spanned} | set(senses(finger, tendon))
+    between = order[: order.index(tendon.span.joint)] if tendon.span else []
+    for ends in pairwise(tendon.path):
+        first, last = sorted(link_number(finger, point.link) for point in ends)
+        between += order[first + 1 : last + 1]
+    return {finger.leaders.get(joint, joint) for joint in (*between, *tendon.arms)} | set(senses(finger, tendon))
 
 
 def groups(finger: Finger) -> list[list[int]]:
     """The tendons in groups; tendons that share a joint are in one group."""
     found: list[tuple[set[str], list[int]]] = []
-    for i, tendon in enumerate(finger.tendons):
+    for i, tendon in enumerate(finger.pulled):
         joints, members = moved(finger, tendon), [i]
         for other in [group for group in found if group[0] & joints]:
             found.remove(other)
@@ -134,14 +139,15 @@ def antagonists(finger: Finger, group: list[int]) -> list[tuple[int, int]]:
     rest, pairs = list(group), []
     while rest:
         first = rest.pop(0)
-        signs = senses(finger, finger.tendons[first])
-        second = next((i for i in rest if _opposite(signs, senses(finger, finger.tendons[i]))), None)
-        if second is None or not signs or any(finger.tendons[i].span for i in (first, second)):
+        signs = senses(finger, finger.pulled[first])
+        second = next((i for i in rest if _opposite(signs, senses(finger, finger.pulled[i]))), None)
+        pair = [finger.pulled[i] for i in (first, second) if i is not None]
+        if second is None or not signs or any(tendon.span or tendon.path or tendon.arms for tendon in pair):
             return []
         rest.remove(second)
         pairs.append((first, second))
     if len(pairs) == 2:
-        a, b = (senses(finger, finger.tendons[first]) for first, _ in pairs)
+        a, b = (senses(finger, finger.pulled[first]) for first, _ in pairs)
         if all(a[x] * b[y] == a[y] * b[x] for x in {*a, *b} for y in {*a, *b}):
             return []
     return pairs if len(pairs) <= 2 else []
@@ -159,12 +165,11 @@ def distribution(finger: Finger) -> Solver:
         found, first = antagonists(finger, group), len(pairs)
         pairs += [(a, b, first + (len(found) - 1 - i)) for i, (a, b) in enumerate(found)]
         searched += [] if found else group
-    spans = any(tendon.span for tendon in finger.tendons)
     return Solver(
         template="tendon_distribution.c.j2",
         problem="distribution",
-        uses=("coupling", "tendon_stiffness", *(["coupling_derivative"] if spans else [])),
-        equations=tuple(range(len(finger.tendons))),
+        uses=("coupling", "tendon_stiffness", *(["coupling_derivative"] if is_curved(finger) else [])),
+        equations=tuple(range(len(finger.pulled))),
         unknowns=tuple(range(len(finger.joints))),
         arrays={},
         strings={

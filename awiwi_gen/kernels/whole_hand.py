@@ -22,7 +22,7 @@ of_hand: Family[Size] = Family("hand_tendons")
 
 def hand_kernels(hand: Hand) -> list[Kernel]:
     """The kernels of all tendons together."""
-    sizes = {name: Size(len(f.joints), len(f.tendons), len(f.links)) for name, f in hand.fingers.items()}
+    sizes = {name: Size(len(f.joints), len(f.pulled), len(f.links)) for name, f in hand.fingers.items()}
     fingers = [input_ports(hand, finger, sizes[name]) for name, finger in hand.fingers.items()]
     ports = {name: joined([of_finger[name] for of_finger in fingers]) for name in ("q", "f", "k")}
     if hand.wrist:
@@ -34,8 +34,9 @@ def hand_kernels(hand: Hand) -> list[Kernel]:
 
 def joined(ports: list[Port]) -> Port:
     """Several ports joined into one vector."""
-    low, high = zip(*(bound for port in ports for bound in port.bounds()), strict=True)
-    return Port((len(low),), tuple(unit for port in ports for unit in port.units), low, high)
+    bounds = [bound for port in ports for bound in port.bounds()]
+    low, high = tuple(low for low, _ in bounds), tuple(high for _, high in bounds)
+    return Port((len(bounds),), tuple(unit for port in ports for unit in port.units), low, high)
 
 
 @of_hand(

@@ -75,11 +75,16 @@ def joint_of(library: Any, hand: Hand, finger: str = FINGER, joint: str = JOINT)
     """A joint of a hand, with the finger straight and its other joints held. Raises InputError where there is none."""
     if hand.motor is None or hand.spring is None or hand.motor.friction is None:
         raise InputError("a joint between tendons needs a hand with the sections [motor], with friction, and [spring]")
-    finger = finger if finger in hand.fingers else next(iter(hand.fingers))
+    pulled = [name for name, each in hand.fingers.items() if each.pulled]
+    if not pulled:
+        raise InputError("a joint between tendons needs a finger with tendons that motors pull")
+    finger = finger if finger in pulled else pulled[0]
     names = hand.fingers[finger].joints
     index = names.index(joint) if joint in names else 0
     pulley, friction = float(hand.motor.pulley), hand.motor.friction
     driven = [each for each in drives(library, finger, pulley) if each.joint == index]
+    if not driven:
+        raise InputError(f"no tendon of fingers.{finger} is left for its joint {names[index]}")
     arm, link, b = max((each.arm, each.link, each.motor) for each in driven)
     ratio = arm / pulley
     known = np.array([friction.steepness, friction.level, friction.viscosity], float)

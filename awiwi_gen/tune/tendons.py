@@ -150,7 +150,8 @@ def tune(library: Any, hand: Hand, costs: CostFile) -> list[Tuned]:
     tuned, faults = [], []
     for name, finger in hand.fingers.items():
         cost = costs.of(name)
-        for index, (joint, plant) in enumerate(plants(library, hand, name, finger, float(cost.pretension))):
+        driven = plants(library, hand, name, finger, float(cost.pretension)) if finger.pulled else []
+        for index, (joint, plant) in enumerate(driven):
             tendon = hand.blocks[name][0].start + index
             try:
                 tuned.append(tune_tendon(library, tendon, joint, plant, np.array(cost.Q), cost.R))

@@ -12,6 +12,7 @@ its own size per radian.
 from __future__ import annotations
 
 import inspect
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from fractions import Fraction
@@ -27,6 +28,8 @@ from awiwi_gen.ir.interpret import evaluate
 STEP = arb(2) ** -90
 LIMIT = 1e-40
 POSITIVE = 1e-12  # smallest eigenvalue over largest, below which a mass matrix is not credible
+
+_PASSIVE = re.compile(r"links\[\d+\]\.(damping|friction\..*|spring\..*)")
 
 Tensor = np.ndarray[Any, Any]  # of balls; the first axis runs over the samples
 
@@ -73,6 +76,20 @@ class Motion:
         )
         rate: Tensor = (ahead - behind) / (2 * STEP)
         return rate
+
+    @property
+    def has_passive_joints(self) -> bool:
+        """Whether joints have damping, friction or springs."""
+        return any(_PASSIVE.fullmatch(path) for path in self.values)
+
+    def passive(self, passive_torque: Mapping[str, Tensor] | None) -> Tensor:
+        """Torques of damping, friction and springs in the joints."""
+        return passive_torque["passive"] if passive_torque else 0 * self.inputs["qd"]
+
+    def springs(self, passive_torque: Mapping[str, Tensor] | None) -> Tensor:
+        """The part of the springs: what is left at rest."""
+        at_rest = self.inputs | {"qd": 0 * self.inputs["qd"]}
+        return self.at("passive_torque", at_rest)["passive"] if passive_torque else 0 * self.inputs["qd"]
 
     def per_radian(self, output: Tensor) -> Tensor:
         """The size of the rate of an output of joint angles, whose derivatives are about as large as itself."""
@@ -131,14 +148,20 @@ def the_rate_of_M_less_2C_is_skew_symmetric(x: Motion, mass_matrix: Any, corioli
     return skew + _transposed(skew), _terms(coriolis_matrix["C"], x.per_radian(mass_matrix["M"]))
 
 
-def gravity_is_the_gradient_of_the_potential(x: Motion, gravity: Any, energy: Any) -> Residual:
+def gravity_is_the_gradient_of_the_potential(
+    x: Motion, gravity: Any, energy: Any, passive_torque: Any = None
+) -> Residual:
     power = x.rate("energy", "potential", q=x.inputs["qd"])
-    return power - _dot(gravity["gravity"], x.inputs["qd"]), _terms(power, x.per_radian(energy["potential"]))
+    holding = gravity["gravity"] + x.springs(passive_torque)
+    return power - _dot(holding, x.inputs["qd"]), _terms(power, x.per_radian(energy["potential"]))
 
 
-def bias_is_C_qd_plus_gravity(x: Motion, bias: Any, coriolis_matrix: Any, gravity: Any) -> Residual:
+def bias_is_C_qd_plus_gravity(
+    x: Motion, bias: Any, coriolis_matrix: Any, gravity: Any, passive_torque: Any = None
+) -> Residual:
     coriolis = _times(coriolis_matrix["C"], x.inputs["qd"])
-    return bias["bias"] - coriolis - gravity["gravity"], _terms(coriolis, gravity["gravity"])
+    rest = bias["bias"] - coriolis - gravity["gravity"]
+    return rest - x.passive(passive_torque), _terms(coriolis, gravity["gravity"], bias["bias"])
 
 
 def inverse_dynamics_is_M_qdd_plus_bias(x: Motion, inverse_dynamics: Any, mass_matrix: Any, bias: Any) -> Residual:
@@ -162,10 +185,23 @@ def the_fused_dynamics_equal_the_separate_ones(
     return _terms(*scaled), ONE
 
 
-def energy_changes_by_the_power_of_the_joint_torques(x: Motion, energy: Any, inverse_dynamics: Any) -> Residual:
+def energy_changes_by_the_power_of_the_joint_torques(
+    x: Motion, energy: Any, inverse_dynamics: Any, passive_torque: Any = None
+) -> Residual:
     along = {"q": x.inputs["qd"], "qd": x.inputs["qdd"]}
     rate = x.rate("energy", "kinetic", **along) + x.rate("energy", "potential", **along)
-    return rate - _dot(inverse_dynamics["tau"], x.inputs["qd"]), rate
+    dissipated = _dot(x.passive(passive_torque) - x.springs(passive_torque), x.inputs["qd"])
+    return rate + dissipated - _dot(inverse_dynamics["tau"], x.inputs["qd"]), _terms(rate, dissipated)
+
+
+def damping_and_friction_take_energy(x: Motion, passive_torque: Any) -> Residual:
+    power = _dot(passive_torque["passive"] - x.springs(passive_torque), x.inputs["qd"])
+    return power - abs(power), power
+
+
+def the_palm_pose_turns_like_gravity(x: Motion, palm_gravity: Any, palm_pose: Any, fingertip_pose: Any) -> Residual:
+    R, own, g = palm_pose["T"][:, :3, :3], fingertip_pose["T"][:, :3, :3], x.inputs["g_palm"]
+    return _times(_transposed(R), g) - _times(_transposed(own), palm_gravity["g"]), g
 
 
 def rotations_are_orthogonal(x: Motion, link_poses: Any) -> Residual:
@@ -218,6 +254,11 @@ def the_joint_stiffness_is_the_falling_torque(
     stretching = x.inputs["k"] * _times(coupling["P"], qd)
     rate = x.rate("joint_torque", "tau", q=qd, f=stretching)
     return rate + _times(joint_stiffness["K"], qd), rate
+
+
+def the_power_of_return_strings_is_taken_from_their_energy(x: Motion, return_torque: Any) -> Residual:
+    power = _dot(return_torque["tau"], x.inputs["qd"])
+    return power + x.rate("return_torque", "energy", q=x.inputs["qd"]), power
 
 
 def the_bars_of_the_wrist_keep_their_lengths(x: Motion, wrist_points: Any) -> Residual:
@@ -274,6 +315,8 @@ LAWS: tuple[Callable[..., Residual], ...] = (
     forward_dynamics_solves_the_equations_of_motion,
     the_fused_dynamics_equal_the_separate_ones,
     energy_changes_by_the_power_of_the_joint_torques,
+    damping_and_friction_take_energy,
+    the_palm_pose_turns_like_gravity,
     rotations_are_orthogonal,
     the_jacobian_gives_the_velocity_of_the_tip,
     the_jacobian_gives_the_angular_velocity_of_the_tip,
@@ -283,6 +326,7 @@ LAWS: tuple[Callable[..., Residual], ...] = (
     the_power_of_the_joints_is_taken_from_the_tendons,
     the_joint_stiffness_is_symmetric,
     the_joint_stiffness_is_the_falling_torque,
+    the_power_of_return_strings_is_taken_from_their_energy,
     the_bars_of_the_wrist_keep_their_lengths,
     the_wrist_rotates_the_palm,
     the_wrist_coupling_is_the_derivative_of_the_lengths,
@@ -297,7 +341,7 @@ def obey(
 ) -> list[Law]:
     """Check all laws whose kernels, by family name, are given."""
     motion = Motion(graphs, inputs, values)
-    needed = {law: list(inspect.signature(law).parameters)[1:] for law in LAWS}
+    needed = {law: _kernels(law, motion.has_passive_joints) for law in LAWS}
     possible = [law for law in LAWS if graphs.keys() >= set(needed[law])]
     outputs = {family: motion.at(family) for family in {f for law in possible for f in needed[law]}}
     laws = []
@@ -310,6 +354,12 @@ def obey(
         ratio = float(np.min(eigenvalues[:, 0] / eigenvalues[:, -1]))
         laws.append(Law(part, "the mass matrix is positive definite", max(0.0, -ratio), ratio > POSITIVE))
     return laws
+
+
+def _kernels(law: Callable[..., Residual], passive: bool) -> list[str]:
+    """The families that a law needs; those with a default only where joints have passive torques."""
+    arguments = list(inspect.signature(law).parameters.values())[1:]
+    return [argument.name for argument in arguments if passive or argument.default is argument.empty]
 
 
 def _relative(residual: Tensor, terms: Tensor) -> float:

@@ -4,7 +4,7 @@ import casadi as ca
 from casadi import SX
 
 from awiwi_gen.structure import Finger
-from awiwi_gen.witnesses.dynamics.assembly import assemble
+from awiwi_gen.witnesses.dynamics.assembly import about_z, assemble, turns_of
 
 _Z = SX([0, 0, 1])
 
@@ -48,10 +48,29 @@ def point_before_joint(finger: Finger, q: SX, name: str, local: SX) -> SX:
     assembly = assemble(finger, q)
     index = next(i for i, link in enumerate(finger.links) if link.joint == name)
     before = [joint for joint in assembly.joints if joint.link < index]
-    local = local + _Z * assembly.joints[len(before)].shift
+    _, yaw = turns_of(finger.links[index])
+    local = about_z((ca.cos(yaw), ca.sin(yaw))) @ local + _Z * assembly.joints[len(before)].shift
     if before and before[-1].next_rotation is None:
         local = before[-1].rotation @ local
     return assembly.base_point(len(before), local)
+
+
+def point_of_link(finger: Finger, q: SX, link: int, local: SX) -> tuple[SX, SX]:
+    """Base coordinates (3) [m] of a point (3) [m] of a link's frame, and their rates (3 x n) [m/rad]: axis x lever.
+
+    Link -1 is the base frame.
+    """
+    assembly, rates = assemble(finger, q), SX.zeros(3, q.numel())
+    moving = [each for each in zip(assembly.joints, assembly.axes(), strict=True) if each[0].link <= link]
+    if not moving:
+        return local, rates
+    last = moving[-1][0]
+    point = last.rotation @ (local + _Z * last.shift)
+    for joint, axes in reversed(moving):
+        lever = point if joint is last else joint.offset + point
+        rates[:, joint.coordinate] += joint.ratio * (axes @ ca.cross(joint.axis, lever))
+        point = joint.inward(lever)
+    return assembly.base_rotation.T @ point, rates
 
 
 def _pose(axes: SX, origin: SX) -> SX:

@@ -1,35 +1,97 @@
 """Tendons of a finger by automatic differentiation: torques and stiffnesses are derivatives of an energy.
 
-Only the lengths are written down. The end points of straight spans come from the recursion along the chain.
+The lengths are written down, with points of straight lines from the recursion along the chain. The coupling of a path
+from point to point needs no derivative: a tight string pulls its ends by unit forces, whose moments about the joints'
+axes are its arms.
 """
+
+from collections.abc import Iterable, Iterator
+from itertools import pairwise
+from typing import Any
 
 import casadi as ca
 from casadi import SX
 
-from awiwi_gen.structure import Finger, coordinates, leaders, radius, sense
-from awiwi_gen.witnesses.kinematics import point_before_joint
+from awiwi_gen.structure import Finger, coordinates, leaders, link_number, radius, sense
+from awiwi_gen.witnesses.kinematics import point_before_joint, point_of_link
+
+Tendon = Any
 
 
 def tendon_lengths(finger: Finger, q: SX) -> SX:
     """Path lengths h (m) [m] (eq. 5.5, 5.20, 5.22)."""
+    return _column(_lengths(finger, finger.pulled, q))
+
+
+def _lengths(finger: Finger, tendons: Iterable[Tendon], q: SX, paths: bool = True) -> list[SX]:
+    """Lengths [m] of some tendons, with or without their paths from point to point."""
     position, follows = coordinates(finger), leaders(finger)
     lengths = []
-    for tendon in finger.tendons:
+    for tendon in tendons:
         length = SX(tendon.rest)
         for over in tendon.over:
             sign, joint = sense(over)
             # The coupling tendon makes the arcs on the follower's and the leader's pulley equal.
             length += sign * radius(finger, follows.get(joint, joint)) * q[position[joint]]
+        for joint, arm in tendon.arms.items():
+            leader = follows.get(joint, joint)
+            length += (
+                arm * q[position[joint]] * (1 if leader == joint else radius(finger, leader) / radius(finger, joint))
+            )
         if tendon.span is not None:
             end = point_before_joint(finger, q, tendon.span.joint, ca.vertcat(*tendon.span.to))
             length += ca.norm_2(end - ca.vertcat(*tendon.span.from_))
+        if paths:
+            length += sum(ca.norm_2(line) for line, _ in _lines(finger, tendon, q))
         lengths.append(length)
-    return ca.vertcat(*lengths)
+    return lengths
 
 
 def coupling(finger: Finger, q: SX) -> SX:
-    """P = dh/dq (m x n) [m/rad] (eq. 5.6)."""
-    return ca.densify(ca.jacobian(tendon_lengths(finger, q), q))
+    """P = dh/dq (m x n) [m/rad] (eq. 5.6): a derivative, and moments of unit vectors for paths from point to point."""
+    rows = [_arms(finger, tendon, q) for tendon in finger.pulled]
+    return ca.densify(ca.jacobian(_column(_lengths(finger, finger.pulled, q, paths=False)), q)) + ca.vertcat(*rows)
+
+
+def return_torque(finger: Finger, q: SX) -> tuple[SX, SX]:
+    """Joint torques (n) [N m] of the elastic return strings and their energy [J].
+
+    The torque is the gradient of the work of the strings' forces, which are held.
+    """
+    h = _column(_lengths(finger, finger.strings, q))
+    stiffness = _column([string.spring.stiffness for string in finger.strings])
+    rest = _column([string.spring.rest for string in finger.strings])
+    stretch = (h - rest + ca.fabs(h - rest)) / 2
+    held = SX.sym("force", h.numel())
+    tau = ca.substitute(-ca.gradient(ca.dot(held, h), q), held, stiffness * stretch)
+    return ca.densify(tau), ca.dot(stiffness, stretch**2) / 2
+
+
+def _lines(finger: Finger, tendon: Tendon, q: SX) -> Iterator[tuple[SX, SX]]:
+    """The straight lines of a path: the vector (3) [m] from a point to the next one, and its rates (3 x n) [m/rad]."""
+    for ends in pairwise(tendon.path):
+        one, other = (link_number(finger, point.link) for point in ends)
+        start, end = (ca.vertcat(*point.at) for point in ends)
+        if one == other:
+            yield end - start, SX.zeros(3, q.numel())
+        else:
+            (start, start_rates), (end, end_rates) = (
+                point_of_link(finger, q, link, at) for link, at in ((one, start), (other, end))
+            )
+            yield end - start, end_rates - start_rates
+
+
+def _arms(finger: Finger, tendon: Tendon, q: SX) -> SX:
+    """Arms (1 x n) [m/rad] of a tendon's path: moments of the unit vectors along its lines about the joints' axes."""
+    arms = SX.zeros(1, q.numel())
+    for line, rates in _lines(finger, tendon, q):
+        arms += (line / ca.norm_2(line)).T @ rates
+    return arms
+
+
+def _column(elements: list[SX]) -> SX:
+    """A column of scalars, also of none."""
+    return ca.vertcat(*elements) if elements else SX.zeros(0, 1)
 
 
 def coupling_derivative(finger: Finger, q: SX) -> list[SX]:

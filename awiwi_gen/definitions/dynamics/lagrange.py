@@ -1,7 +1,8 @@
 """Dynamics of a finger by its definition: Lagrange's equation, from the two energies (eq. 2.16, 2.17, 5.4).
 
 The kinetic energy is that of the links' centres of mass plus that of their rotation (inertia tensors about the
-centres of mass), the potential energy is that of gravity; g (3) is the acceleration of free fall [m/s^2] in the
+centres of mass) and of the rotors at the joints. The potential energy is that of gravity and of the joints' springs;
+damping and friction enter by Rayleigh's dissipation function. g (3) is the acceleration of free fall [m/s^2] in the
 finger's base axes.
 """
 
@@ -11,6 +12,7 @@ from typing import Any
 import sympy
 from sympy import Expr, Matrix
 
+from awiwi_gen.definitions.joints import dissipation, rotor_energy, spring_energy
 from awiwi_gen.definitions.kinematics import axial, frames
 from awiwi_gen.definitions.naming import Derivation, jacobian
 from awiwi_gen.structure import Finger
@@ -21,7 +23,7 @@ _NO_GRAVITY = sympy.zeros(3, 1)
 def energy(finger: Finger, q: Matrix, qd: Matrix, g: Matrix) -> tuple[Expr, Expr]:
     """Kinetic and potential energy [J] (eq. 5.4); the potential of a mass at the base frame's origin is zero."""
     lagrangian = _lagrangian(finger, q, qd, g)
-    return lagrangian.kinetic, lagrangian.potential
+    return lagrangian.kinetic, lagrangian.weight + lagrangian.elastic
 
 
 def mass_matrix(finger: Finger, q: Matrix) -> Matrix:
@@ -35,7 +37,7 @@ def coriolis_matrix(finger: Finger, q: Matrix, qd: Matrix) -> Matrix:
 
 
 def gravity(finger: Finger, q: Matrix, g: Matrix) -> Matrix:
-    """Joint torques (n) [N m] that hold the finger at rest: gradient of the potential energy."""
+    """Joint torques (n) [N m] that hold the finger's weight: gradient of its potential energy."""
     return _lagrangian(finger, q, _velocities(q), g).gravity()
 
 
@@ -52,7 +54,7 @@ def dynamics(finger: Finger, q: Matrix, qd: Matrix, g: Matrix) -> tuple[Matrix, 
 
 
 def inverse_dynamics(finger: Finger, q: Matrix, qd: Matrix, qdd: Matrix, g: Matrix) -> Matrix:
-    """Joint torques (n) [N m] of a motion: d/dt (dL/dqd) - dL/dq with L = T - V (eq. 2.16)."""
+    """Joint torques (n) [N m] of a motion: d/dt (dL/dqd) - dL/dq + dD/dqd with L = T - V (eq. 2.16)."""
     return _lagrangian(finger, q, qd, g).torques(qdd)
 
 
@@ -65,7 +67,7 @@ def inverse_dynamics_derivatives(
 
 
 def bias(finger: Finger, q: Matrix, qd: Matrix, g: Matrix) -> Matrix:
-    """Joint torques (n) [N m] of a motion without acceleration: C qd + gravity."""
+    """Joint torques (n) [N m] of a motion without acceleration: C qd + gravity + passive torques."""
     return _lagrangian(finger, q, qd, g).torques(sympy.zeros(len(q), 1))
 
 
@@ -81,10 +83,15 @@ def forward_dynamics(finger: Finger, q: Matrix, qd: Matrix, tau: Matrix, g: Matr
 
 @dataclass(frozen=True)
 class _Lagrangian:
-    """Both energies [J] of a finger that moves with qd at q, and the derivation their names belong to."""
+    """A finger that moves with qd at q, and the derivation that its names belong to.
+
+    Energies [J]: kinetic, of its weight, and elastic, of the joints' springs; dissipation is Rayleigh's function [W].
+    """
 
     kinetic: Expr
-    potential: Expr
+    weight: Expr
+    elastic: Expr
+    dissipation: Expr
     q: Matrix
     qd: Matrix
     derive: Derivation
@@ -99,17 +106,19 @@ class _Lagrangian:
         return Matrix(n, n, lambda i, j: self.derive.name(self.derive.partial(p[min(i, j)], self.qd[max(i, j)])))
 
     def gravity(self) -> Matrix:
-        """The gradient of the potential energy (n)."""
-        return Matrix([self.derive.partial(self.potential, angle) for angle in self.q])
+        """The gradient of the weight's potential energy (n)."""
+        return Matrix([self.derive.partial(self.weight, angle) for angle in self.q])
 
     def torques(self, qdd: Matrix) -> Matrix:
         """The left side of Lagrange's equation (n)."""
         motion = dict(zip(self.q, self.qd, strict=True)) | dict(zip(self.qd, qdd, strict=True))
-        difference = self.kinetic - self.potential
+        difference = self.kinetic - self.weight - self.elastic
         return Matrix(
             [
-                self.derive.along(momentum, motion) - self.derive.partial(difference, angle)
-                for momentum, angle in zip(self.momenta(), self.q, strict=True)
+                self.derive.along(momentum, motion)
+                - self.derive.partial(difference, angle)
+                + self.derive.partial(self.dissipation, velocity)
+                for momentum, angle, velocity in zip(self.momenta(), self.q, self.qd, strict=True)
             ]
         )
 
@@ -117,15 +126,17 @@ class _Lagrangian:
 def _lagrangian(finger: Finger, q: Matrix, qd: Matrix, g: Matrix) -> _Lagrangian:
     derive = Derivation()
     motion = dict(zip(q, qd, strict=True))
-    kinetic = potential = sympy.S.Zero
+    kinetic, weight = rotor_energy(finger, qd), sympy.S.Zero
     for link, frame in zip(finger.links, frames(finger, q, derive)[1:-1], strict=True):
+        if link.mass is None:
+            continue
         centre = derive.name_all(frame.point(Matrix(link.com)))
         velocity = centre.applyfunc(lambda x: derive.along(x, motion))
         skew = frame.axes.T * frame.axes.applyfunc(lambda x: derive.along(x, motion))
         spin = derive.name_all(Matrix(axial(skew)))
         kinetic += (link.mass * velocity.dot(velocity) + spin.dot(_tensor(link.inertia) * spin)) / 2
-        potential -= link.mass * g.dot(centre)
-    return _Lagrangian(kinetic, potential, q, qd, derive)
+        weight -= link.mass * g.dot(centre)
+    return _Lagrangian(kinetic, weight, spring_energy(finger, q), dissipation(finger, qd), q, qd, derive)
 
 
 def _velocities(q: Matrix) -> Matrix:

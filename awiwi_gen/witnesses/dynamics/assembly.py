@@ -21,7 +21,7 @@ from typing import Any
 import casadi as ca
 from casadi import SX
 
-from awiwi_gen.structure import Finger, coordinates, leaders, quarter_turns, radius
+from awiwi_gen.structure import Finger, coordinates, fixed_turns, leaders, radius
 from awiwi_gen.witnesses.four_bar import FourBar, Vector
 
 _ZERO, _Z = SX(0), SX([0, 0, 1])
@@ -71,6 +71,13 @@ class Moments:
         )
         return Moments(self.mass, ca.vertcat(*first), second, self.trace)
 
+    def turned(self, turn: "Turn") -> "Moments":
+        """`rotated` about one axis: a quarter turn costs nothing, another one as much as about z."""
+        if all(entry.is_constant() for entry in turn.cos_sin):
+            return self.rotated(turn.matrix())
+        to_z = turn.permutation()
+        return self.rotated(to_z).rotated_about_z(*turn.cos_sin).rotated(to_z.T)
+
     def split(self) -> tuple["Moments", "Moments"]:
         """The part that a rotation about z does not change, as mass on the z axis, and the rest."""
         z = SX.zeros(3, 3)
@@ -86,17 +93,71 @@ class Moments:
 
 
 @dataclass(frozen=True)
+class Turn:
+    """A fixed rotation about coordinate axis number `axis`: so many quarter turns, or by an angle if that is None."""
+
+    axis: int
+    quarters: int | None
+    angle: Any
+
+    @property
+    def cos_sin(self) -> Vector:
+        """Cosine and sine of its angle; exact for quarter turns."""
+        if self.quarters is None:
+            return ca.cos(self.angle), ca.sin(self.angle)
+        c, s = [(1, 0), (0, 1), (-1, 0), (0, -1)][self.quarters % 4]
+        return SX(c), SX(s)
+
+    def permutation(self) -> SX:
+        """The rotation (3 x 3) that makes its axis the z axis: a cyclic permutation."""
+        return SX.eye(3)[[(self.axis + 1 + k) % 3 for k in range(3)], :]
+
+    def matrix(self) -> SX:
+        """The rotation (3 x 3)."""
+        to_z = self.permutation()
+        return ca.densify(to_z.T @ about_z(self.cos_sin) @ to_z)
+
+
+def turns_of(link: Any) -> tuple[list[Turn], Any]:
+    """The fixed rotations of a link in front of its joint, in order, and an angle [rad] that its joint's angle takes up.
+
+    Any rotation is one about z, one about x and one about z. The last one is the joint's, so a rotation about several
+    axes costs as much as one about x: the first is taken up by the joint before (`assemble`).
+    """
+    turns = [Turn(*step) for step in fixed_turns(link)]
+    if link.four_bar is not None:  # its coupler starts where the crank's angle is not zero
+        return turns, 0
+    if sum(turn.quarters is None for turn in turns) > 1:
+        rotation = _product(turns)
+        across = ca.sqrt(rotation[0, 2] ** 2 + rotation[1, 2] ** 2)
+        first, last = ca.atan2(rotation[0, 2], -rotation[1, 2]), ca.atan2(rotation[2, 0], rotation[2, 1])
+        return [Turn(2, None, first), Turn(0, None, ca.atan2(across, rotation[2, 2]))], last
+    if turns and turns[-1].axis == 2 and turns[-1].quarters is None:
+        return turns[:-1], turns[-1].angle
+    return turns, 0
+
+
+def _product(turns: Sequence[Turn]) -> SX:
+    product = SX.eye(3)
+    for turn in turns:
+        product = product @ turn.matrix()
+    return product
+
+
+@dataclass(frozen=True)
 class Joint:
     """One joint of the chain and the body it moves, in the body's working axes.
 
     The joint's angle is a function of coordinate number `coordinate`, with the derivative `ratio` and the second
     derivative `ratio_derivative`. If the next joint has another axis, the working axes rotate with this joint, by the
-    angle with cosine and sine `cos_sin`, and then by `next_rotation` (3 x 3), the fixed rotation of the next joint.
-    Otherwise they are the axes before the joint, and `next_rotation` is None.
+    angle with cosine and sine `cos_sin`, and then by `next_rotation` (3 x 3), the fixed rotation of the next joint, which
+    is the product of `next_turns`. A first turn about z is part of `cos_sin` instead. Otherwise they are the axes before
+    the joint, and `next_rotation` is None.
 
     In working axes, `axis` (3) is the joint's axis, `offset` (3) [m] leads to the next joint, and `rotation` (3 x 3)
-    takes the link's own axes to the working axes. `link_offset` and `link_body` are offset and body in the link's own
-    axes. The body is link number `link`, or its crank. The link's frame lies on the axis, `shift` [m] beyond the joint.
+    takes the link's own axes to the working axes. `link_body` is the body in the link's own axes, and so is the offset,
+    `link_offset`, if the next joint is parallel. The body is link number `link`, or its crank. The link's frame lies on
+    the axis, `shift` [m] beyond the joint.
     """
 
     coordinate: int
@@ -104,6 +165,7 @@ class Joint:
     ratio_derivative: SX
     cos_sin: Vector
     next_rotation: SX | None
+    next_turns: Sequence[Turn]
     axis: SX
     offset: SX
     body: Moments
@@ -115,15 +177,19 @@ class Joint:
 
     def outward(self, vectors: SX) -> SX:
         """Vectors (columns) of the axes before the joint, in working axes."""
-        return vectors if self.next_rotation is None else self.next_rotation.T @ (_about_z(self.cos_sin).T @ vectors)
+        return vectors if self.next_rotation is None else self.next_rotation.T @ (about_z(self.cos_sin).T @ vectors)
 
     def inward(self, vectors: SX) -> SX:
         """Vectors (columns) of the working axes, in the axes before the joint."""
-        return vectors if self.next_rotation is None else _about_z(self.cos_sin) @ (self.next_rotation @ vectors)
+        return vectors if self.next_rotation is None else about_z(self.cos_sin) @ (self.next_rotation @ vectors)
 
     def body_inward(self, body: Moments) -> Moments:
         """A body of the working axes, in the axes before the joint."""
-        return body if self.next_rotation is None else body.rotated(self.next_rotation).rotated_about_z(*self.cos_sin)
+        if self.next_rotation is None:
+            return body
+        for turn in reversed(self.next_turns):
+            body = body.turned(turn)
+        return body.rotated_about_z(*self.cos_sin)
 
 
 @dataclass(frozen=True)
@@ -154,13 +220,14 @@ class Assembly:
 
 @dataclass(frozen=True)
 class _Part:
-    """A joint of the chain as the hand file gives it: a fixed rotation, then a rotation about z.
+    """A joint of the chain as the hand file gives it: its fixed rotations, then a rotation about z.
 
-    The angle about z is `angle`, or for the coupler of a four-bar the angle with cosine and sine `cos_sin`.
+    The angle about z is `angle`, or for the coupler of a four-bar the angle with cosine and sine `cos_sin`. `offset` leads
+    to the next joint, in the link's axes, or once joints are shifted in those in front of the next joint.
     """
 
     coordinate: int
-    fixed_rotation: SX | None
+    turns: Sequence[Turn]
     angle: SX
     cos_sin: Vector | None
     ratio: SX
@@ -169,6 +236,11 @@ class _Part:
     body: Moments
     link: int
     shift: SX = _ZERO
+
+    @property
+    def fixed_rotation(self) -> SX | None:
+        """The fixed rotation (3 x 3); None if there is none."""
+        return fixed_rotation(self.turns)
 
 
 def assemble(finger: Finger, q: SX) -> Assembly:
@@ -186,14 +258,22 @@ def assemble(finger: Finger, q: SX) -> Assembly:
         angle += part.angle
         if part.cos_sin is not None:
             start, angle = _sum_of_angles(before_crank, part.cos_sin), SX(0)
-        cos_sin = _sum_of_angles(start, (ca.cos(angle), ca.sin(angle)))
-        next_rotation = following.fixed_rotation if following is not None else None
+        next_turns = following.turns if following is not None else []
+        to_next, taken = fixed_rotation(next_turns), SX(0)
+        if len(next_turns) > 1 and next_turns[0].axis == 2 and next_turns[0].quarters is None:
+            taken, next_turns = next_turns[0].angle, next_turns[1:]
+        cos_sin = _sum_of_angles(start, (ca.cos(angle + taken), ca.sin(angle + taken)))
         in_link = (part.link, part.shift, part.offset, body)
-        if next_rotation is None:
-            rotation, axis, body = _about_z(cos_sin), _Z, body.rotated_about_z(*cos_sin)
+        if to_next is None:
+            next_rotation, rotation, axis, body = None, about_z(cos_sin), _Z, body.rotated_about_z(*cos_sin)
         else:
-            rotation, axis, body = next_rotation.T, next_rotation.T @ _Z, body.rotated(next_rotation.T)
-        offset = rotation @ part.offset
+            next_rotation, rotation, axis, body = (
+                _product(next_turns),
+                to_next.T,
+                to_next.T @ _Z,
+                body.rotated(to_next.T),
+            )
+        offset = part.offset if to_next is not None else rotation @ part.offset
         joints.append(
             Joint(
                 part.coordinate,
@@ -201,6 +281,7 @@ def assemble(finger: Finger, q: SX) -> Assembly:
                 part.ratio_derivative,
                 cos_sin,
                 next_rotation,
+                next_turns,
                 axis,
                 offset,
                 body,
@@ -216,20 +297,22 @@ def _parts(finger: Finger, q: SX) -> Iterator[_Part]:
     position, follows = coordinates(finger), leaders(finger)
     for index, link in enumerate(finger.links):
         coordinate = position[link.joint]
-        angle, fixed, offset, body = q[coordinate], _fixed_rotation(link.turn), ca.vertcat(*link.offset), _body(link)
+        angle, offset, body = q[coordinate], ca.vertcat(*link.offset), _body(link)
+        turns, yaw = turns_of(link)
         if link.four_bar is None:
             ratio = SX(1)
             if link.joint in follows:
                 ratio = SX(radius(finger, follows[link.joint])) / radius(finger, link.joint)
-            yield _Part(coordinate, fixed, ratio * angle, None, ratio, SX(0), offset, body, index)
+            angle = ratio * angle + yaw - (0 if link.reference is None else link.reference)
+            yield _Part(coordinate, turns, angle, None, ratio, SX(0), offset, body, index)
         else:
             crank = angle + link.four_bar.reference
             start = SX(link.start + link.four_bar.reference)
             now, (c, s) = FourBar(link.four_bar, crank), FourBar(link.four_bar, start).coupler
             arm = ca.vertcat(link.four_bar.crank, 0, 0)
-            yield _Part(coordinate, fixed, crank, None, SX(1), SX(0), arm, Moments.none(), index)
+            yield _Part(coordinate, turns, crank, None, SX(1), SX(0), arm, Moments.none(), index)
             relative = _sum_of_angles(now.coupler, (c, -s))
-            yield _Part(coordinate, None, SX(0), relative, now.ratio - 1, now.ratio_derivative, offset, body, index)
+            yield _Part(coordinate, [], SX(0), relative, now.ratio - 1, now.ratio_derivative, offset, body, index)
 
 
 def _shifted(parts: Sequence[_Part]) -> Iterator[_Part]:
@@ -239,9 +322,9 @@ def _shifted(parts: Sequence[_Part]) -> Iterator[_Part]:
         offset, body = part.offset + _Z * shift, part.body.moved(_Z * shift)
         before = shift
         if following is not None:
-            axis = _Z if following.fixed_rotation is None else following.fixed_rotation @ _Z
-            shift = ca.dot(axis, offset)
-            offset = offset - axis * shift
+            if following.fixed_rotation is not None:
+                offset = following.fixed_rotation.T @ offset
+            shift, offset = offset[2], ca.vertcat(offset[:2], 0)
         yield replace(part, offset=offset, body=body, shift=before)
 
 
@@ -251,15 +334,17 @@ def _masses_moved_inward(parts: Sequence[_Part]) -> tuple[list[Moments], SX]:
     for part, before in zip(reversed(parts), [*reversed(parts[:-1]), None], strict=True):
         moved, rest = (part.body + moved).split()
         bodies.append(rest)
-        if part.fixed_rotation is not None:
-            moved = moved.rotated(part.fixed_rotation)
         if before is not None:
             moved = moved.moved(before.offset)
+        if part.fixed_rotation is not None:
+            moved = moved.rotated(part.fixed_rotation)
     return bodies[::-1], moved.first
 
 
 def _body(link: Any) -> Moments:
     """A link's mass moments about its joint, in its own axes."""
+    if link.mass is None:
+        return Moments.none()
     i = link.inertia
     tensor = _symmetric(i.xx, i.yy, i.zz, i.xy, i.xz, i.yz)
     second = ca.trace(tensor) / 2 * SX.eye(3) - tensor
@@ -270,7 +355,7 @@ def _symmetric(xx: SX, yy: SX, zz: SX, xy: SX, xz: SX, yz: SX) -> SX:
     return ca.vertcat(ca.horzcat(xx, xy, xz), ca.horzcat(xy, yy, yz), ca.horzcat(xz, yz, zz))
 
 
-def _about_z(cos_sin: Vector) -> SX:
+def about_z(cos_sin: Vector) -> SX:
     """Rotation (3 x 3) about z by the angle with this cosine and sine."""
     c, s = cos_sin
     return ca.vertcat(ca.horzcat(c, -s, 0), ca.horzcat(s, c, 0), ca.horzcat(0, 0, 1))
@@ -281,15 +366,7 @@ def _sum_of_angles(one: Vector, other: Vector) -> Vector:
     return one[0] * other[0] - one[1] * other[1], one[1] * other[0] + one[0] * other[1]
 
 
-def _fixed_rotation(turn: str) -> SX | None:
-    """The fixed rotation (3 x 3) before a joint, a signed permutation; None if there is none."""
-    axis, quarters = quarter_turns(turn)
-    if not quarters:
-        return None
-    first, second = (axis + 1) % 3, (axis + 2) % 3
-    c, s = [(1, 0), (0, 1), (-1, 0), (0, -1)][quarters % 4]
-    rotation = SX.zeros(3, 3)
-    rotation[axis, axis] = 1
-    rotation[first, first] = rotation[second, second] = c
-    rotation[second, first], rotation[first, second] = s, -s
-    return rotation
+def fixed_rotation(turns: Sequence[Turn]) -> SX | None:
+    """The product (3 x 3) of fixed rotations; None if it is no rotation."""
+    product = _product(turns)
+    return None if ca.sparsify(product).is_eye() else product

@@ -1,7 +1,8 @@
 """Dynamics of a finger by recursion along the chain, the route with the fewest operations.
 
 A finger whose last joints are parallel is a planar chain in a rotating plane (`planar_chain`). For all others, torques
-come from Newton's and Euler's equations, and the mass matrix and the Coriolis matrix from composite bodies.
+come from Newton's and Euler's equations, and the mass matrix and the Coriolis matrix from composite bodies. What acts in
+the joints themselves (`joints`) is added to either.
 """
 
 from collections.abc import Callable
@@ -14,18 +15,19 @@ from awiwi_gen.witnesses.dynamics.assembly import Assembly, assemble
 from awiwi_gen.witnesses.dynamics.composite_bodies import mass_and_coriolis
 from awiwi_gen.witnesses.dynamics.newton_euler import torques, weight
 from awiwi_gen.witnesses.dynamics.planar_chain import RotatingPlane, rotating_plane
+from awiwi_gen.witnesses.joints import armature, passive_torque, spring_energy
 
 PlanarTorques = Callable[[RotatingPlane, list[SX], list[SX], SX], list[SX]]
 
 
 def mass_matrix(finger: Finger, q: SX) -> SX:
     """M (n x n) [kg m^2] by composite bodies."""
-    return _mass_and_coriolis(assemble(finger, q), SX.zeros(q.numel()))[0]
+    return _mass_and_coriolis(finger, assemble(finger, q), SX.zeros(q.numel()))[0]
 
 
 def coriolis_matrix(finger: Finger, q: SX, qd: SX) -> SX:
     """C (n x n) [N m s] by Christoffel symbols, so that dM/dt - 2 C is skew-symmetric."""
-    return _mass_and_coriolis(assemble(finger, q), qd)[1]
+    return _mass_and_coriolis(finger, assemble(finger, q), qd)[1]
 
 
 def gravity(finger: Finger, q: SX, g: SX) -> SX:
@@ -34,13 +36,13 @@ def gravity(finger: Finger, q: SX, g: SX) -> SX:
 
 
 def bias(finger: Finger, q: SX, qd: SX, g: SX) -> SX:
-    """Joint torques (n) [N m] of a motion without acceleration: C qd + gravity."""
-    return _torques(assemble(finger, q), qd, SX.zeros(q.numel()), g)
+    """Joint torques (n) [N m] of a motion without acceleration: C qd + gravity + passive torques."""
+    return _torques(assemble(finger, q), qd, SX.zeros(q.numel()), g) + passive_torque(finger, q, qd)
 
 
 def inverse_dynamics(finger: Finger, q: SX, qd: SX, qdd: SX, g: SX) -> SX:
     """Joint torques (n) [N m] of a motion (eq. 2.4 to 2.15)."""
-    return _torques(assemble(finger, q), qd, qdd, g)
+    return _torques(assemble(finger, q), qd, qdd, g) + armature(finger) * qdd + passive_torque(finger, q, qd)
 
 
 def inverse_dynamics_derivatives(finger: Finger, q: SX, qd: SX, qdd: SX, g: SX) -> tuple[SX, SX]:
@@ -49,22 +51,23 @@ def inverse_dynamics_derivatives(finger: Finger, q: SX, qd: SX, qdd: SX, g: SX) 
     The torques are written in the form with the shortest derivatives.
     """
     tau = _torques(assemble(finger, q), qd, qdd, g, RotatingPlane.torques_to_differentiate)
+    tau += passive_torque(finger, q, qd)
     return ca.jacobian(tau, q), ca.jacobian(tau, qd)
 
 
 def forward_dynamics(finger: Finger, q: SX, qd: SX, tau: SX, g: SX) -> SX:
     """Joint accelerations (n) [rad/s^2] that joint torques tau cause: M qdd = tau - bias (eq. 2.1)."""
     assembly, zero = assemble(finger, q), SX.zeros(q.numel())
-    plane = rotating_plane(assembly)
+    plane, tau = rotating_plane(assembly), tau - passive_torque(finger, q, qd)
     if plane is not None and all(joint.ratio.is_one() for joint in assembly.joints):
-        return _solve_absolute(plane, qd, tau, g)
-    return _solve(_mass_and_coriolis(assembly, zero)[0], tau - _torques(assembly, qd, zero, g))
+        return _solve_absolute(plane, armature(finger), qd, tau, g)
+    return _solve(_mass_and_coriolis(finger, assembly, zero)[0], tau - _torques(assembly, qd, zero, g))
 
 
 def dynamics(finger: Finger, q: SX, qd: SX, g: SX) -> tuple[SX, SX, SX]:
     """M (n x n) [kg m^2], C (n x n) [N m s] and the gravity torques (n) [N m] of eq. 2.17."""
     assembly = assemble(finger, q)
-    return *_mass_and_coriolis(assembly, qd), _weight(assembly, g, q.numel())
+    return *_mass_and_coriolis(finger, assembly, qd), _weight(assembly, g, q.numel())
 
 
 def energy(finger: Finger, q: SX, qd: SX, g: SX) -> tuple[SX, SX]:
@@ -74,7 +77,8 @@ def energy(finger: Finger, q: SX, qd: SX, g: SX) -> tuple[SX, SX]:
     for joint in assembly.joints:
         down = joint.outward(down)
         potential -= ca.dot(down, joint.body.first)
-    return _kinetic_energy(assembly, qd), potential
+    kinetic = _kinetic_energy(assembly, qd) + ca.dot(armature(finger), qd**2) / 2
+    return kinetic, potential + spring_energy(finger, q)
 
 
 def _kinetic_energy(assembly: Assembly, qd: SX) -> SX:
@@ -86,7 +90,12 @@ def _kinetic_energy(assembly: Assembly, qd: SX) -> SX:
     return ca.dot(qd, each_pair_once @ qd)
 
 
-def _mass_and_coriolis(assembly: Assembly, qd: SX) -> tuple[SX, SX]:
+def _mass_and_coriolis(finger: Finger, assembly: Assembly, qd: SX) -> tuple[SX, SX]:
+    mass, coriolis = _of_links(assembly, qd)
+    return mass + ca.diag(armature(finger)), coriolis
+
+
+def _of_links(assembly: Assembly, qd: SX) -> tuple[SX, SX]:
     plane = rotating_plane(assembly)
     if plane is None:
         return mass_and_coriolis(assembly, qd)
@@ -123,14 +132,18 @@ def _joint_jacobian(assembly: Assembly, qd: SX) -> tuple[SX, SX]:
     return jacobian, jacobian_rate
 
 
-def _solve_absolute(plane: RotatingPlane, qd: SX, tau: SX, g: SX) -> SX:
-    """Joint accelerations, solved for absolute angles: the diagonal of their mass matrix is constant."""
+def _solve_absolute(plane: RotatingPlane, rotors: SX, qd: SX, tau: SX, g: SX) -> SX:
+    """Joint accelerations, solved for absolute angles: the diagonal of their mass matrix is constant.
+
+    `rotors` (n) [kg m^2] is the armature.
+    """
     n, start = qd.numel(), plane.start
     differences = SX.eye(n)
     for joint in range(start, n - 1):
         differences[joint, joint + 1] = -1
     torque = plane.absolute_bias(ca.vertsplit(qd), g)
-    return differences.T @ _solve(plane.absolute_mass(), differences @ tau - ca.vertcat(*torque))
+    mass = plane.absolute_mass() + differences @ ca.diag(rotors) @ differences.T
+    return differences.T @ _solve(mass, differences @ tau - ca.vertcat(*torque))
 
 
 def _solve(mass: SX, torque: SX) -> SX:

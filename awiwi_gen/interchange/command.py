@@ -1,0 +1,132 @@
+"""The commands ``import`` and ``export``."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from awiwi_gen import extras
+from awiwi_gen.errors import InputError, printable
+
+Json = Annotated[bool, typer.Option("--json", help="Print JSON for programs.")]
+Replace = Annotated[bool, typer.Option("--replace", help="Replace a file that exists.")]
+
+
+def import_(
+    file: Annotated[Path, typer.Argument(help="MJCF or URDF, or a table in CSV of masses and inertias.")],
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Hand file to write.")] = None,
+    into: Annotated[Path | None, typer.Option("--into", help="Hand file that takes the table's numbers.")] = None,
+    palm: Annotated[str, typer.Option("--palm", help="Body that carries the fingers; found if left out.")] = "",
+    finger: Annotated[list[str] | None, typer.Option("--finger", metavar="NAME=BODY", help="Only these fingers.")] = None,
+    without: Annotated[list[str] | None, typer.Option("--without", help="Tendon to leave out.")] = None,
+    exact: Annotated[bool, typer.Option("--exact", help="Keep published roundings of quarter turns.")] = False,
+    fit: Annotated[bool, typer.Option("--fit-wraps", help="Constant arms for tendons that wrap around geoms.")] = False,
+    replace: Replace = False, as_json: Json = False,
+) -> int:  # fmt: skip
+    """Make a hand file of an MJCF or URDF model, or update a hand file's masses from a table in CSV."""
+    if file.suffix.lower() == ".csv":
+        return _import_table(file, into, output, as_json)
+    if into is not None:
+        raise InputError(f"--into {into}: only a table in CSV goes into a hand file; expected a file named *.csv")
+    extras.require("import of models", "mujoco")
+    from awiwi_gen.interchange.draft import draft
+    from awiwi_gen.interchange.loss import loss_lines, write_whole
+    from awiwi_gen.interchange.mjcf import read
+    from awiwi_gen.interchange.toml import hand_text
+
+    target = output or Path(f"{file.stem}.toml")
+    hand = draft(read(file, exact, without or (), fit), palm, _named(finger or []))
+    text = hand_text(hand, " ".join(["awiwi-gen import", *(["--exact"] if exact else [])]))
+    faults = _faults(text, str(target))
+    write_whole(target, text, replace)
+    joints = sum(len(each.links) - len(each.followed) for each in hand.fingers)
+    tendons = sum(len(each.tendons) for each in hand.fingers)
+    if as_json:
+        found = {"file": str(target), "fingers": [each.name for each in hand.fingers], "joints": joints,
+                 "tendons": tendons, "names": hand.names, "notes": list(hand.notes), "faults": faults,
+                 "losses": [loss.as_dict() for loss in hand.losses]}  # fmt: skip
+        _print_json(found)
+    else:
+        lines = [f"{target}: {len(hand.fingers)} fingers ({', '.join(each.name for each in hand.fingers)}), "
+                 f"{joints} independent joints, {tendons} tendons"]  # fmt: skip
+        lines += [f"named: {old} -> {new}" for old, new in hand.names.items()]
+        lines += [f"taken: {note}" for note in hand.notes]
+        lines += loss_lines(hand.losses)
+        print(printable("\n".join(lines)))
+        if faults:
+            print(printable("\n".join(["the file is written, but has faults:", *faults])), file=sys.stderr)
+    return 1 if faults else 0
+
+
+def export(
+    form: Annotated[str, typer.Argument(metavar="FORMAT", help="mjcf or urdf")],
+    hand: Annotated[Path | None, typer.Option("--hand", help="Hand file; the Awiwi hand if left out.")] = None,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="File to write.")] = None,
+    replace: Replace = False, as_json: Json = False,
+) -> int:  # fmt: skip
+    """Write the hand as a model of MuJoCo (mjcf) or as URDF, and say what the format cannot hold."""
+    from awiwi_gen.hand import Hand
+    from awiwi_gen.interchange import export_mjcf, export_urdf
+    from awiwi_gen.interchange.loss import loss_lines, write_whole
+
+    writers = {"mjcf": (export_mjcf.text_and_losses, ".xml"), "urdf": (export_urdf.text_and_losses, ".urdf")}
+    if form not in writers:
+        raise InputError(f"{form} is no format of export; expected mjcf or urdf")
+    writer, ending = writers[form]
+    loaded = Hand.load(hand)
+    text, losses = writer(loaded)
+    target = output or Path(f"{loaded.prefix}{ending}")
+    write_whole(target, text, replace)
+    if as_json:
+        _print_json({"file": str(target), "losses": [loss.as_dict() for loss in losses]})
+    else:
+        print(printable("\n".join([f"{target}: written", *loss_lines(losses)])))
+    return 0
+
+
+def _import_table(file: Path, into: Path | None, output: Path | None, as_json: bool) -> int:
+    from awiwi_gen.interchange.loss import write_whole
+    from awiwi_gen.interchange.masses import updated
+
+    if into is None:
+        raise InputError(f"{file} is a table of masses; name the hand file that takes them with --into FILE")
+    text, changes = updated(into, file)
+    target = output or into
+    if faults := _faults(text, str(target)):
+        raise InputError("\n".join(["nothing is written, because the hand would have faults:", *faults]))
+    write_whole(target, text)
+    if as_json:
+        _print_json({"file": str(target), "changed": changes})
+    else:
+        print(printable("\n".join([*changes, f"{target}: {len(changes)} links changed"])))
+    return 0
+
+
+def _named(options: list[str]) -> dict[str, str]:
+    found: dict[str, str] = {}
+    for option in options:
+        name, equals, body = option.partition("=")
+        if not (name and equals and body) or name in found:
+            raise InputError(f"--finger {option}: expected NAME=BODY, each name once")
+        found[name] = body
+    return found
+
+
+def _faults(text: str, name: str) -> list[str]:
+    """What the checks of hand files say of a text."""
+    from awiwi_gen.hand import Hand
+
+    try:
+        Hand.parse(text, name)
+    except InputError as error:
+        return str(error).splitlines()
+    return []
+
+
+def _print_json(value: Any) -> None:
+    from awiwi_gen.report import print_json
+
+    print_json(value)

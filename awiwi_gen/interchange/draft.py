@@ -1,0 +1,253 @@
+"""The hand file in numbers: fingers, links and tendons as its keys have them, from a tree of bodies."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from awiwi_gen.errors import Fault, InputError
+from awiwi_gen.interchange.fingers import Chain, Segment, composite, find, palm_of
+from awiwi_gen.interchange.frames import Axis, Frame, base_frame, link_frames
+from awiwi_gen.interchange.locks import Followed, followed
+from awiwi_gen.interchange.model import Array, Joint, Loss, Model, Tendon
+from awiwi_gen.interchange.names import check_finger, finger_names, joint_names, prefix_of
+
+__all__ = ["DraftFinger", "DraftHand", "DraftLink", "DraftTendon", "draft"]
+
+
+@dataclass(frozen=True, eq=False)
+class DraftLink:
+    """A link of the hand file: lengths in metres, angles in radians; `mass` is None for a link without a body."""
+
+    joint: str
+    published: Joint
+    body: str
+    frame: Frame
+    reference: float
+    limits: tuple[float, float] | None
+    spring_reference: float
+    offset: Array
+    mass: float | None
+    com: Array
+    inertia: Array
+    assumed: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class DraftTendon:
+    """A tendon of the hand file; points of a path are in the frame of the link of that joint, or of the "palm"."""
+
+    name: str
+    rest: float
+    arms: dict[str, float]
+    path: tuple[tuple[str, Array], ...]
+    stiffness: float
+    slack: float
+
+
+@dataclass(frozen=True, eq=False)
+class DraftFinger:
+    """A finger of the hand file: its base in the palm (`position`, `axes`), links, tendons, and joints that follow."""
+
+    name: str
+    position: Array
+    axes: Array
+    carrier: str
+    links: tuple[DraftLink, ...]
+    tendons: tuple[DraftTendon, ...]
+    followed: tuple[Followed, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class DraftHand:
+    """A hand file before it is written, with the table of names and the losses."""
+
+    prefix: str
+    name: str
+    file: str
+    palm: str
+    fingers: tuple[DraftFinger, ...]
+    names: dict[str, str]
+    losses: tuple[Loss, ...]
+    notes: tuple[str, ...] = field(default=())
+
+
+def draft(model: Model, palm: str = "", named: Mapping[str, str] | None = None) -> DraftHand:
+    """The hand of a model. Raises `InputError` where the hand file cannot hold it, with the element's name."""
+    for name in named or {}:
+        if not check_finger(name):
+            raise InputError(f"--finger {name}=...: is not a usable name of a finger; expected letters a-z and digits")
+    root = palm_of(model, palm)
+    chains, losses = find(model, root, named or {})
+    labels = finger_names(_labels(model, chain) for chain in chains)
+    chains = [Chain(c.name or label, c.carrier, c.segments) for c, label in zip(chains, labels, strict=True)]
+    names = joint_names({chain.name: [joint.name for joint in chain.joints] for chain in chains})
+    owner = {joint.name: chain.name for chain in chains for joint in chain.joints}
+    locks, lost = followed(model.locks, owner, names)
+    routed, left = _routed(model, chains, owner)
+    fingers = tuple(
+        _finger(model, root, chain, names, {f.published: f for f in locks}, routed[chain.name]) for chain in chains
+    )
+    return DraftHand(
+        prefix=prefix_of(model.name),
+        name=model.name,
+        file=model.file,
+        palm=model.bodies[root].name,
+        fingers=fingers,
+        names={"joint " + old: new for old, new in names.items() if old != new},
+        losses=(*model.losses, *losses, *lost, *left, *_approximated(chains, fingers)),
+        notes=model.notes,
+    )
+
+
+def _labels(model: Model, chain: Chain) -> tuple[str, list[str]]:
+    """The name of the body that carries a finger, and those of its bodies and joints."""
+    bodies = [model.bodies[segment.body].name for segment in chain.segments]
+    carrier = model.bodies[model.bodies[chain.segments[0].body].parent].name
+    return carrier, [*bodies, *(joint.name for joint in chain.joints)]
+
+
+def _approximated(chains: list[Chain], fingers: tuple[DraftFinger, ...]) -> list[Loss]:
+    joints = [joint for chain in chains for joint in chain.joints]
+    found = [
+        Loss(
+            "dry friction of joints: a smooth curve over velocity, where the model has a constraint",
+            tuple(joint.name for joint in joints if joint.friction),
+        ),
+        Loss("joints without limits: -180 to 180 deg assumed", tuple(j.name for j in joints if j.low is None)),
+        Loss(
+            "fingertips that no site or body marks: twice the distance of the centre of mass assumed",
+            tuple(finger.name for finger in fingers if "offset" in finger.links[-1].assumed),
+        ),
+    ]
+    return [loss for loss in found if loss.places]
+
+
+def _finger(
+    model: Model, palm: int, chain: Chain, names: dict[str, str], locks: Mapping[str, Followed], tendons: list[Tendon]
+) -> DraftFinger:
+    carrier = model.bodies[chain.segments[0].body].parent
+    pose_axes, pose_origin = model.poses[palm]
+    axes = [_axis(model, joint, locks.get(joint.name)) for joint in chain.joints]
+    base = base_frame(model.poses[carrier][0], axes[0])
+    frames = link_frames(base, axes)
+    tip, assumed = _tip(model, chain.segments[-1], frames[-1])
+    ends = [*(frame.origin for frame in frames[1:]), tip]
+    links: list[DraftLink] = []
+    for segment in chain.segments:
+        for joint in segment.joints:
+            frame, end = frames[len(links)], ends[len(links)]
+            holds = joint is segment.joints[-1]
+            marks = ("offset",) if assumed and len(links) == len(frames) - 1 else ()
+            lock = locks.get(joint.name)
+            links.append(_link(model, segment, joint, names[joint.name], frame, end, holds, lock, marks))
+    places = {body: links[_last(chain, segment)] for segment in chain.segments for body in segment.members}
+    return DraftFinger(
+        name=chain.name,
+        position=pose_axes.T @ (axes[0].anchor - pose_origin),
+        axes=pose_axes.T @ base,
+        carrier=model.bodies[carrier].name,
+        links=tuple(links),
+        tendons=tuple(_tendon(model, tendon, names, locks, places, (base, axes[0].anchor)) for tendon in tendons),
+        followed=tuple(locks[joint.name] for joint in chain.joints if joint.name in locks),
+    )
+
+
+def _last(chain: Chain, segment: Segment) -> int:
+    joints = [joint.name for joint in chain.joints]
+    return joints.index(segment.joints[-1].name)
+
+
+def _axis(model: Model, joint: Joint, lock: Followed | None) -> Axis:
+    axes, position = model.poses[joint.body]
+    return Axis(axes @ joint.axis * (lock.sign if lock else 1), position + axes @ joint.anchor)
+
+
+def _link(
+    model: Model, segment: Segment, joint: Joint, name: str, frame: Frame, end: Array, holds: bool,
+    lock: Followed | None, assumed: tuple[str, ...],
+) -> DraftLink:  # fmt: skip
+    mass, com, inertia = composite(model, segment) if holds else (0.0, np.zeros(3), np.zeros((3, 3)))
+    limits = (joint.low, joint.high) if joint.low is not None and joint.high is not None else (-np.pi, np.pi)
+    angle = lock.angle if lock else lambda published: published
+    return DraftLink(
+        joint=name,
+        published=joint,
+        body=model.bodies[segment.body].name,
+        frame=frame,
+        reference=angle(joint.reference) - frame.angle,
+        limits=None if lock else limits,
+        spring_reference=angle(joint.spring_reference),
+        offset=frame.axes.T @ (end - frame.origin),
+        mass=mass if mass else None,
+        com=frame.axes.T @ (com - frame.origin),
+        inertia=frame.axes.T @ inertia @ frame.axes,
+        assumed=assumed + (("low", "high") if joint.low is None and not lock else ()),
+    )
+
+
+def _tip(model: Model, segment: Segment, frame: Frame) -> tuple[Array, bool]:
+    """The fingertip in the world as drawn: a site or welded body called so, or a guess; and whether it is a guess."""
+    marks = [(s.name, model.poses[s.body][1] + model.poses[s.body][0] @ s.position)
+             for s in model.sites if s.body in segment.members]  # fmt: skip
+    marks += [(model.bodies[body].name, model.poses[body][1]) for body in segment.members[1:]]
+    tips = [place for name, place in marks if "tip" in name.lower()]
+    tips = tips or [model.poses[body][1] for body in segment.members[1:]]
+    far = max(tips, key=lambda place: float(np.linalg.norm(place - frame.origin)), default=frame.origin)
+    if np.linalg.norm(far - frame.origin) > 1e-6:
+        return far, False
+    return frame.origin + 2 * (composite(model, segment)[1] - frame.origin), True
+
+
+# -- tendons ---------------------------------------------------------------------------------------------------------
+
+
+def _routed(model: Model, chains: list[Chain], owner: Mapping[str, str]) -> tuple[dict[str, list[Tendon]], list[Loss]]:
+    """The tendons of every finger, and those of none. Raises `InputError` for a tendon over two fingers."""
+    bodies = {body: chain.name for chain in chains for segment in chain.segments for body in segment.members}
+    moving = {joint.body for joint in model.joints if joint.name not in owner}
+    routed: dict[str, list[Tendon]] = {chain.name: [] for chain in chains}
+    elsewhere, held = [], []
+    for tendon in model.tendons:
+        ends = [owner.get(joint) for joint in tendon.arms] + [bodies.get(body) for body, _ in tendon.path]
+        fingers = sorted({name for name in ends if name})
+        if len(fingers) > 1:
+            message = f"runs over the fingers {' and '.join(fingers)}; a tendon of the hand file is of one finger"
+            fix = f"leave it out with --without {tendon.name}"
+            raise InputError(Fault(file=model.file, key=f"tendon {tendon.name}", message=f"{message}; {fix}"))
+        if not fingers:
+            elsewhere.append(tendon.name)
+            continue
+        routed[fingers[0]].append(tendon)
+        far = [body for body, _ in tendon.path if body not in bodies and moving & set(model.above(body))]
+        if any(joint not in owner for joint in tendon.arms) or (far and moving & set(model.above(far[0]))):
+            held.append(tendon.name)
+    losses = [
+        Loss("tendons of no finger", tuple(elsewhere)),
+        Loss("tendons that also run over joints outside their finger, held as drawn", tuple(held)),
+    ]
+    return routed, [loss for loss in losses if loss.places]
+
+
+def _tendon(
+    model: Model, tendon: Tendon, names: dict[str, str], locks: Mapping[str, Followed],
+    places: Mapping[int, DraftLink], base: tuple[Array, Array],
+) -> DraftTendon:  # fmt: skip
+    rest, arms = tendon.constant, {}
+    reference = {joint.name: joint.reference for joint in model.joints}
+    for joint, arm in tendon.arms.items():
+        lock = locks.get(joint)
+        if joint not in names:
+            rest += arm * reference[joint]
+        else:
+            rest += arm * lock.offset if lock else 0.0
+            arms[names[joint]] = arm * (lock.sign if lock else 1)
+    path = []
+    for body, local in tendon.path:
+        axes, position = model.poses[body]
+        link = places.get(body)
+        own_axes, origin = (link.frame.axes, link.frame.origin) if link else base
+        path.append((link.joint if link else "palm", own_axes.T @ (position + axes @ local - origin)))
+    return DraftTendon(tendon.name, rest, arms, tuple(path), tendon.stiffness, tendon.rest)

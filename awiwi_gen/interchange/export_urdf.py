@@ -1,0 +1,102 @@
+"""A hand as URDF: links and joints, with mimic joints for those that follow others. URDF has no tendons."""
+
+from __future__ import annotations
+
+from xml.etree.ElementTree import Element, SubElement
+
+import numpy as np
+
+from awiwi_gen.hand import Finger, Hand
+from awiwi_gen.interchange.export import (
+    Part,
+    common_losses,
+    document,
+    has_four_bar,
+    parts,
+    ratio,
+    rpy_matrix,
+    text,
+    value,
+    vector,
+)
+from awiwi_gen.interchange.frames import rpy_of
+from awiwi_gen.interchange.model import Array, Loss
+
+
+def text_and_losses(hand: Hand) -> tuple[str, list[Loss]]:
+    """The file, and what of the hand it does not hold."""
+    root = Element("robot", name=hand.prefix)
+    SubElement(root, "link", name="palm")
+    fingers = {name: finger for name, finger in hand.fingers.items() if not has_four_bar(finger)}
+    for name, finger in fingers.items():
+        _finger(root, hand, name, finger)
+    links = [(name, link) for name, finger in fingers.items() for link in finger.links]
+    losses = [
+        *common_losses(hand),
+        Loss("tendons", tuple(f"{name} {i}" for name, finger in fingers.items() for i in range(len(finger.tendons)))),
+        Loss("armature", tuple(f"{name} {link.joint}" for name, link in links if value(link.armature))),
+        Loss("springs of joints", tuple(f"{name} {link.joint}" for name, link in links if link.spring is not None)),
+    ]
+    return document(root, hand), [loss for loss in losses if loss.places]
+
+
+def _finger(root: Element, hand: Hand, name: str, finger: Finger) -> None:
+    base = finger.base
+    position = vector(base.position) if base else np.zeros(3)
+    _fixed(root, "palm", f"{name}.base", position, rpy_matrix(base.rpy if base else None))
+    parent = f"{name}.base"
+    for part in parts(finger):
+        child = f"{name}_{part.link.joint}"
+        _link(root, child, part)
+        _joint(root, hand, name, finger, part, parent)
+        parent = child
+    _fixed(root, parent, f"{name}.tip", vector(finger.links[-1].offset), np.eye(3))
+
+
+def _fixed(root: Element, parent: str, child: str, position: Array, axes: Array) -> None:
+    SubElement(root, "link", name=child)
+    joint = SubElement(root, "joint", name=f"{child}.fixed", type="fixed")
+    SubElement(joint, "parent", link=parent)
+    SubElement(joint, "child", link=child)
+    SubElement(joint, "origin", xyz=text(position), rpy=text(rpy_of(axes)))
+
+
+def _link(root: Element, name: str, part: Part) -> None:
+    link = SubElement(root, "link", name=name)
+    if part.link.mass is None:
+        return
+    inertial = SubElement(link, "inertial")
+    SubElement(inertial, "origin", xyz=text(vector(part.link.com or ())), rpy="0 0 0")
+    SubElement(inertial, "mass", value=text(float(part.link.mass)))
+    t = part.inertia
+    SubElement(inertial, "inertia", ixx=text(t[0, 0]), iyy=text(t[1, 1]), izz=text(t[2, 2]),
+               ixy=text(t[0, 1]), ixz=text(t[0, 2]), iyz=text(t[1, 2]))  # fmt: skip
+
+
+def _joint(root: Element, hand: Hand, name: str, finger: Finger, part: Part, parent: str) -> None:
+    link = part.link
+    joint = SubElement(root, "joint", name=f"{name}_{link.joint}", type="revolute")
+    SubElement(joint, "parent", link=parent)
+    SubElement(joint, "child", link=f"{name}_{link.joint}")
+    # A joint of URDF stands at zero where it is drawn.
+    c, s = np.cos(part.reference), np.sin(part.reference)
+    drawn = part.axes @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
+    SubElement(joint, "origin", xyz=text(part.position), rpy=text(rpy_of(drawn)))
+    SubElement(joint, "axis", xyz="0 0 1")
+    low, high = _range(finger, link.joint)
+    SubElement(joint, "limit", lower=text(low), upper=text(high), effort=text(float(hand.limits.joint_torque)),
+               velocity=text(float(hand.limits.joint_velocity)))  # fmt: skip
+    if link.damping is not None or link.friction is not None:
+        friction = value(link.friction.torque) if link.friction else 0.0
+        SubElement(joint, "dynamics", damping=text(value(link.damping)), friction=text(friction))
+    if link.joint in finger.leaders:
+        leader = f"{name}_{finger.leaders[link.joint]}"
+        SubElement(joint, "mimic", joint=leader, multiplier=text(ratio(finger, link.joint)), offset="0")
+
+
+def _range(finger: Finger, joint: str) -> tuple[float, float]:
+    """Limits of a joint [rad]; those of a follower are its leader's, times the ratio."""
+    factor = ratio(finger, joint) if joint in finger.leaders else 1.0
+    leader = finger.leaders.get(joint, joint)
+    link = next(link for link in finger.links if link.joint == leader)
+    return factor * value(link.low), factor * value(link.high)

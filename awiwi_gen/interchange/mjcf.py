@@ -1,0 +1,361 @@
+"""MJCF and URDF through MuJoCo: its parser and compiler resolve defaults, includes, frames and inertias.
+
+Meshes, textures and sensors are never needed: they are counted for the loss report and removed before MuJoCo compiles.
+A mesh stays only where a body's mass is to be computed from it.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from awiwi_gen.errors import Fault, InputError
+from awiwi_gen.interchange.model import Array, Body, Joint, Lock, Loss, Model, Site, Tendon
+from awiwi_gen.interchange.quarter import quarter_angle, quarter_axis, quarter_rotation
+from awiwi_gen.interchange.urdf import require_tree
+from awiwi_gen.interchange.wraps import fitted
+
+SPECK = 1e-9
+"""Mass [kg] that a moving body gets which has none, because MuJoCo refuses those; no more counts as a mass."""
+KINDS = ("free", "ball", "slide", "hinge")
+_INCLUDE = re.compile(r'<include\s[^>]*?file\s*=\s*"([^"]+)"')
+_RPY = re.compile(r'(\brpy\s*=\s*")([^"]*)(")')
+
+
+def read(path: Path, exact: bool = False, without: Iterable[str] = (), fit: bool = False) -> Model:
+    """Read a file. Raises `InputError` where MuJoCo refuses it.
+
+    Unless `exact`, published roundings of quarter turns (1.5708) become quarter turns. The tendons named in `without`
+    are left out. With `fit`, tendons that wrap around geoms get constant arms; else they are lost.
+    """
+    spec, notes = parse(path, exact)
+    driven = {each.target for each in spec.actuators if each.trntype == mujoco.mjtTrn.mjTRN_TENDON}
+    losses = prepare(spec, set(without))
+    massless = {body.name for body in spec.bodies[1:] if body.explicitinertial and body.mass <= SPECK}
+    compiled = compile_spec(spec, path)
+    tendons, lost = _tendons(compiled, driven, fit)
+    return Model(
+        name=spec.modelname or path.stem,
+        file=path.name,
+        bodies=tuple(_body(compiled, index, massless) for index in range(compiled.nbody)),
+        joints=tuple(_joint(compiled, index) for index in range(compiled.njnt)),
+        tendons=tendons,
+        locks=_locks(compiled),
+        sites=tuple(
+            Site(compiled.site(i).name, int(compiled.site_bodyid[i]), compiled.site_pos[i].copy())
+            for i in range(compiled.nsite)
+        ),
+        losses=(*losses, *lost),
+        notes=tuple(notes),
+    )
+
+
+def parse(path: Path, exact: bool) -> tuple[Any, list[str]]:
+    """The MjSpec of a file, with quarter turns where they are meant, and notes about these."""
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = (error.strerror if isinstance(error, OSError) else None) or "is not UTF-8 text"
+        raise InputError(Fault(file=str(path), message=f"cannot be read: {reason}")) from None
+    notes: list[str] = []
+    is_urdf = re.search(r"<robot\b", text) is not None
+    if is_urdf:
+        require_tree(text, path.name)
+    try:
+        if is_urdf:
+            spec = mujoco.MjSpec.from_string(text if exact else _RPY.sub(lambda m: _quarter_rpy(m, notes), text))
+        elif path.suffix == ".xml":
+            spec = mujoco.MjSpec.from_file(str(path))
+        else:  # MuJoCo decodes only .xml and .urdf
+            spec = mujoco.MjSpec.from_string(text, include=_includes(text, path.parent))
+    except (ValueError, mujoco.FatalError) as error:
+        raise _refused(path, error) from None
+    spec.compiler.fusestatic = False
+    if is_urdf:
+        _weigh(spec)
+    if not exact:
+        notes += _quarter_turns(spec)
+    return spec, notes
+
+
+def _weigh(spec: Any) -> None:
+    """Give moving links of a URDF that have no inertial the least that MuJoCo accepts."""
+    for body in spec.bodies[1:]:
+        if body.joints and not body.mass and not body.geoms:
+            body.mass, body.inertia, body.explicitinertial = SPECK, [SPECK * 1e-6] * 3, True
+
+
+def _includes(text: str, folder: Path) -> dict[str, bytes]:
+    found: dict[str, bytes] = {}
+    for name in _INCLUDE.findall(text):
+        if (folder / name).is_file():
+            data = (folder / name).read_bytes()
+            found |= {name: data, **_includes(data.decode("utf-8", "replace"), folder)}
+    return found
+
+
+def _quarter_rpy(match: re.Match[str], notes: list[str]) -> str:
+    words = []
+    for word in match[2].split():
+        meant = quarter_angle(word)
+        if meant is not None and repr(meant) != word and float(word) != meant:
+            notes.append(f'rpy "{match[2]}": {word} is taken for {meant!r}, a quarter turn')
+        words.append(word if meant is None else repr(meant))
+    return match[1] + " ".join(words) + match[3]
+
+
+def _quarter_turns(spec: Any) -> list[str]:
+    """Replace what is within a published rounding of a quarter turn, before MuJoCo resolves it."""
+    notes: list[str] = []
+    euler = mujoco.mjtOrientation.mjORIENTATION_EULER
+    for body in spec.bodies[1:]:
+        compiler = body.compiler
+        for frame in (body.alt, *(each.alt for each in _frames(body))):
+            if frame.type == euler and not compiler.degree:
+                for k, angle in enumerate(frame.euler):
+                    meant = quarter_angle(repr(float(angle)))
+                    if meant is not None and meant != angle:
+                        frame.euler[k] = meant
+                        notes.append(f"body {body.name}: euler {angle:.9g} is taken for {meant!r}, a quarter turn")
+        if body.alt.type == mujoco.mjtOrientation.mjORIENTATION_QUAT:
+            meant_quat = quarter_rotation(np.array(body.quat))
+            if meant_quat is not None and not np.array_equal(meant_quat, body.quat):
+                if np.abs(meant_quat - np.array(body.quat) / np.linalg.norm(body.quat)).max() > 1e-14:
+                    notes.append(f"body {body.name}: quat {_listed(body.quat)} is taken for quarter turns")
+                body.quat = meant_quat
+    for joint in spec.joints:
+        meant_axis = quarter_axis(np.array(joint.axis))
+        if meant_axis is not None and not np.array_equal(meant_axis, joint.axis):
+            if np.abs(meant_axis - np.array(joint.axis) / np.linalg.norm(joint.axis)).max() > 1e-14:
+                notes.append(f"joint {joint.name}: axis {_listed(joint.axis)} is taken for {_listed(meant_axis)}")
+            joint.axis = meant_axis
+    return notes
+
+
+def _frames(body: Any) -> list[Any]:
+    found, frame = [], body.frame
+    while frame is not None:
+        found.append(frame)
+        frame = frame.frame
+    return found
+
+
+def _listed(values: Iterable[float]) -> str:
+    return " ".join(f"{value:.7g}" for value in values)
+
+
+def prepare(spec: Any, without: set[str]) -> list[Loss]:
+    """Count what a hand file cannot hold, and remove what MuJoCo need not compile."""
+    bodies = spec.bodies[1:]
+    kept = [tendon for tendon in spec.tendons if tendon.name not in without]
+    wrapped = {wrap.target.name for tendon in kept for wrap in tendon.path if _is_geom(wrap)}
+    geoms = [geom for body in bodies for geom in body.geoms]
+    losses = [
+        _loss(
+            "geoms that collide: the hand file has no contacts", geoms, lambda geom: geom.contype or geom.conaffinity
+        ),
+        _loss("meshes", spec.meshes),
+        _loss("sensors", spec.sensors),
+        _loss("keyframes", spec.keys),
+        _loss("equality constraints that are no coupling of two joints", spec.equalities, lambda e: not is_lock(e)),
+        _loss(
+            "actuators of joints: the hand file has motors of tendons only",
+            spec.actuators,
+            lambda each: each.trntype != mujoco.mjtTrn.mjTRN_TENDON,
+        ),
+        _loss("tendons left out as asked", [each for each in spec.tendons if each.name in without]),
+    ]
+    for kind in (
+        "skins",
+        "hfields",
+        "flexes",
+        "pairs",
+        "excludes",
+        "sensors",
+        "keys",
+        "actuators",
+        "cameras",
+        "lights",
+    ):
+        for each in list(getattr(spec, kind)):
+            spec.delete(each)
+    for tendon in list(spec.tendons):
+        if tendon.name in without:
+            spec.delete(tendon)
+    for equality in list(spec.equalities):
+        if not is_lock(equality):
+            spec.delete(equality)
+    computed = spec.compiler.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
+    for body in spec.bodies:
+        needed = computed or not (body.explicitinertial or body.name == "world")
+        moves = any(each.joints for each in _upwards(body))
+        for geom in list(body.geoms):
+            geom.material = ""
+            if geom.name not in wrapped and not (needed and moves):
+                spec.delete(geom)
+    used = {geom.meshname for body in spec.bodies for geom in body.geoms}
+    for mesh in list(spec.meshes):
+        if mesh.name not in used:
+            spec.delete(mesh)
+    for colored in (*spec.sites, *spec.tendons):
+        colored.material = ""
+    for kind in ("materials", "textures"):
+        for each in list(getattr(spec, kind)):
+            spec.delete(each)
+    return [loss for loss in losses if loss.places]
+
+
+def _upwards(body: Any) -> Iterable[Any]:
+    while body is not None:
+        yield body
+        body = body.parent
+
+
+def _is_geom(wrap: Any) -> bool:
+    return wrap.type in (mujoco.mjtWrap.mjWRAP_SPHERE, mujoco.mjtWrap.mjWRAP_CYLINDER)
+
+
+def is_lock(equality: Any) -> bool:
+    """Whether an equality makes one joint follow another in proportion."""
+    linear = not any(equality.data[2:5])
+    return bool(equality.type == mujoco.mjtEq.mjEQ_JOINT and equality.name2 and equality.active and linear)
+
+
+def _loss(what: str, elements: Iterable[Any], counts: Any = lambda each: True) -> Loss:
+    places = tuple(getattr(each, "name", "") or "(no name)" for each in elements if counts(each))
+    return Loss(what, places)
+
+
+def compile_spec(spec: Any, path: Path) -> Any:
+    """The MjModel of a spec. Raises `InputError` with MuJoCo's reason."""
+    try:
+        return spec.compile()
+    except (ValueError, mujoco.FatalError) as error:
+        raise _refused(path, error) from None
+
+
+def _refused(path: Path, error: Exception) -> InputError:
+    reason = " ".join(str(error).split())
+    needed = "Error opening file" in reason and "include" not in reason
+    missing = "; the mass of a body is computed from it: get the file, or give the body an inertial" if needed else ""
+    return InputError(Fault(file=str(path), message=f"is refused by MuJoCo {mujoco.__version__}: {reason}{missing}"))
+
+
+def _is_polynomial(compiled: Any, joint: int) -> bool:
+    dof = int(compiled.jnt_dofadr[joint])
+    return bool(np.any(compiled.jnt_stiffnesspoly[joint]) or np.any(compiled.dof_dampingpoly[dof]))
+
+
+def rotation(quat: Any) -> Array:
+    """The matrix (3 x 3) of a unit quaternion (w, x, y, z); quarter turns are exact."""
+    matrix = np.zeros(9)
+    mujoco.mju_quat2Mat(matrix, np.asarray(quat, float))
+    exact = np.rint(matrix)
+    return np.where(np.abs(matrix - exact) < 1e-15, exact, matrix).reshape(3, 3)
+
+
+def _body(compiled: Any, index: int, massless: set[str]) -> Body:
+    axes = rotation(compiled.body_iquat[index])
+    name = compiled.body(index).name or f"body{index}"
+    return Body(
+        name=name,
+        parent=int(compiled.body_parentid[index]),
+        position=compiled.body_pos[index].copy(),
+        axes=rotation(compiled.body_quat[index]),
+        mass=0.0 if name in massless else float(compiled.body_mass[index]),
+        com=compiled.body_ipos[index].copy(),
+        inertia=axes @ np.diag(compiled.body_inertia[index]) @ axes.T,
+    )
+
+
+def _joint(compiled: Any, index: int) -> Joint:
+    kind = KINDS[compiled.jnt_type[index]]
+    dof, at = int(compiled.jnt_dofadr[index]), int(compiled.jnt_qposadr[index])
+    scalar = kind in ("hinge", "slide")
+    limited = scalar and bool(compiled.jnt_limited[index])
+    return Joint(
+        name=compiled.joint(index).name or f"joint{index}",
+        body=int(compiled.jnt_bodyid[index]),
+        kind=kind,
+        axis=compiled.jnt_axis[index].copy(),
+        anchor=compiled.jnt_pos[index].copy(),
+        low=float(compiled.jnt_range[index, 0]) if limited else None,
+        high=float(compiled.jnt_range[index, 1]) if limited else None,
+        reference=float(compiled.qpos0[at]) if scalar else 0.0,
+        armature=float(compiled.dof_armature[dof]),
+        damping=float(compiled.dof_damping[dof]),
+        friction=float(compiled.dof_frictionloss[dof]),
+        stiffness=float(compiled.jnt_stiffness[index]),
+        spring_reference=float(compiled.qpos_spring[at]) if scalar else 0.0,
+    )
+
+
+def _locks(compiled: Any) -> tuple[Lock, ...]:
+    found = []
+    for index in range(compiled.neq):
+        follower, leader = int(compiled.eq_obj1id[index]), int(compiled.eq_obj2id[index])
+        zeros = [float(compiled.qpos0[compiled.jnt_qposadr[joint]]) for joint in (follower, leader)]
+        constant, ratio = map(float, compiled.eq_data[index, :2])
+        # MuJoCo: follower - its zero = constant + ratio * (leader - its zero).
+        offset = zeros[0] + constant - ratio * zeros[1]
+        names = [compiled.joint(joint).name for joint in (follower, leader)]
+        found.append(Lock(names[0], names[1], ratio, offset))
+    return tuple(found)
+
+
+def _tendons(compiled: Any, driven: set[str], fit: bool) -> tuple[tuple[Tendon, ...], list[Loss]]:
+    found, wraps, fits, pushed, poly, both = [], [], [], [], [], []
+    joint_wrap, site_wrap = mujoco.mjtWrap.mjWRAP_JOINT, mujoco.mjtWrap.mjWRAP_SITE
+    for index in range(compiled.ntendon):
+        name = compiled.tendon(index).name or f"tendon{index}"
+        first = int(compiled.tendon_adr[index])
+        places = range(first, first + int(compiled.tendon_num[index]))
+        kinds = {int(compiled.wrap_type[k]) for k in places}
+        stiffness = float(compiled.tendon_stiffness[index])
+        low, rest = map(float, compiled.tendon_lengthspring[index])
+        if stiffness and name in driven:
+            both.append(name)
+            stiffness = 0.0
+        spring: dict[str, Any] = {"stiffness": stiffness, "rest": rest if stiffness else 0.0}
+        if stiffness and low > 0:
+            pushed.append(name)
+        if np.any(compiled.tendon_stiffnesspoly[index]):
+            poly.append(name)
+        if kinds == {int(joint_wrap)}:
+            arms = {compiled.joint(int(compiled.wrap_objid[k])).name: float(compiled.wrap_prm[k]) for k in places}
+            found.append(Tendon(name, arms=arms, **spring))
+        elif kinds == {int(site_wrap)}:
+            sites = [int(compiled.wrap_objid[k]) for k in places]
+            path = tuple((int(compiled.site_bodyid[s]), compiled.site_pos[s].copy()) for s in sites)
+            found.append(Tendon(name, path=path, **spring))
+        elif fit:
+            tendon, error = fitted(compiled, Tendon(name, **spring), _locks(compiled))
+            found.append(tendon)
+            fits.append(f"{name} by {error * 1e3:.2g} mm")
+        else:
+            wraps.append(name)
+    losses = [
+        Loss("tendons that wrap around geoms or branch at pulleys: left out (--fit-wraps)", tuple(wraps)),
+        Loss("wraps of tendons: constant arms fitted, lengths differ at most", tuple(fits)),
+        Loss("springs of tendons that also push: the hand's springs only pull", tuple(pushed)),
+        Loss("springs of tendons that a motor pulls: the hand's tendons have one or the other", tuple(both)),
+        Loss(
+            "polynomial stiffness or damping of joints: only the linear term is kept",
+            tuple(compiled.joint(i).name for i in range(compiled.njnt) if _is_polynomial(compiled, i)),
+        ),
+        Loss("polynomial stiffness of tendons: only its linear term is kept", tuple(poly)),
+        Loss(
+            "damping, armature or friction of tendons",
+            tuple(
+                compiled.tendon(i).name
+                for i in range(compiled.ntendon)
+                if compiled.tendon_damping[i] or compiled.tendon_armature[i] or compiled.tendon_frictionloss[i]
+            ),
+        ),
+    ]
+    return tuple(found), [loss for loss in losses if loss.places]

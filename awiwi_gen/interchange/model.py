@@ -1,0 +1,158 @@
+"""What a file says of a hand, whatever its format: a tree of bodies, their joints, tendons, couplings and sites.
+
+Lengths are in metres, masses in kilograms, angles in radians. Bodies come parents first; the first one is the world.
+A body stands as drawn where every joint is at its reference.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Array", "Body", "Joint", "Lock", "Loss", "Model", "Site", "Tendon"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A rigid body: its frame in its parent's, and its mass properties in its own frame.
+
+    `axes` (3 x 3) has the body's axes as columns; `inertia` (3 x 3) is about `com` (3). A body without mass has mass 0.
+    """
+
+    name: str
+    parent: int
+    position: Array
+    axes: Array
+    mass: float
+    com: Array
+    inertia: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Joint:
+    """A joint of a body: `axis` (3, a unit vector) through `anchor` (3), both in the body's frame as drawn.
+
+    `kind` is hinge, slide, ball or free; `low` and `high` are None for a joint without limits.
+    """
+
+    name: str
+    body: int
+    kind: str
+    axis: Array
+    anchor: Array
+    low: float | None = None
+    high: float | None = None
+    reference: float = 0.0
+    armature: float = 0.0
+    damping: float = 0.0
+    friction: float = 0.0
+    stiffness: float = 0.0
+    spring_reference: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Tendon:
+    """A tendon: either `arms`, length per angle by joint, or a `path` through points (body, position in its frame).
+
+    Its length also has a `constant` part [m]. An elastic string has a `stiffness` [N/m] and no force where it is as long
+    as `rest`.
+    """
+
+    name: str
+    arms: dict[str, float] = field(default_factory=dict)
+    path: tuple[tuple[int, Array], ...] = ()
+    stiffness: float = 0.0
+    rest: float = 0.0
+    constant: float = 0.0
+
+
+@dataclass(frozen=True)
+class Lock:
+    """A joint that follows another one: follower angle = ratio * leader angle + offset."""
+
+    follower: str
+    leader: str
+    ratio: float
+    offset: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Site:
+    """A named point of a body."""
+
+    name: str
+    body: int
+    position: Array
+
+
+@dataclass(frozen=True)
+class Loss:
+    """What a file says and the other format cannot hold, or holds only in part: a sentence, and the places."""
+
+    what: str
+    places: tuple[str, ...]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Ready for JSON."""
+        return {"what": self.what, "count": len(self.places), "places": list(self.places)}
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """A whole file. `notes` say what was taken differently than published; `losses` what is not in this tree."""
+
+    name: str
+    file: str
+    bodies: tuple[Body, ...]
+    joints: tuple[Joint, ...]
+    tendons: tuple[Tendon, ...] = ()
+    locks: tuple[Lock, ...] = ()
+    sites: tuple[Site, ...] = ()
+    losses: tuple[Loss, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @cached_property
+    def poses(self) -> tuple[tuple[Array, Array], ...]:
+        """Axes (3 x 3) and position (3) of every body in the world, as drawn."""
+        found: list[tuple[Array, Array]] = []
+        for index, body in enumerate(self.bodies):
+            axes, position = found[body.parent] if index else (np.eye(3), np.zeros(3))
+            found.append((axes @ body.axes, position + axes @ body.position))
+        return tuple(found)
+
+    @cached_property
+    def children(self) -> tuple[tuple[int, ...], ...]:
+        """The children of every body, in the file's order."""
+        found: list[list[int]] = [[] for _ in self.bodies]
+        for index, body in enumerate(self.bodies[1:], start=1):
+            found[body.parent].append(index)
+        return tuple(map(tuple, found))
+
+    @cached_property
+    def joints_of(self) -> tuple[tuple[Joint, ...], ...]:
+        """The joints of every body, in the order in which they turn it."""
+        return tuple(tuple(j for j in self.joints if j.body == index) for index in range(len(self.bodies)))
+
+    def below(self, body: int) -> Iterator[int]:
+        """A body and all below it, depth first."""
+        yield body
+        for child in self.children[body]:
+            yield from self.below(child)
+
+    def above(self, body: int) -> list[int]:
+        """A body and all above it, up to the world."""
+        found = [body]
+        while found[-1]:
+            found.append(self.bodies[found[-1]].parent)
+        return found
+
+    def find(self, name: str) -> int | None:
+        """The index of a body by its name."""
+        return next((index for index, body in enumerate(self.bodies) if body.name == name), None)

@@ -1,0 +1,195 @@
+"""A hand file as text, from a draft: commented, with the source of each number."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable, Sequence
+from decimal import Decimal
+
+from awiwi_gen.interchange.draft import DraftFinger, DraftHand, DraftLink, DraftTendon
+from awiwi_gen.interchange.frames import rpy_of
+from awiwi_gen.interchange.locks import Followed
+from awiwi_gen.interchange.model import Array
+
+NOISE = 2e-15
+"""What rounding leaves of a number, relative to the largest in its vector."""
+_LIMITS = {
+    "joint_velocity": "20 rad/s",
+    "joint_acceleration": "2000 rad/s^2",
+    "joint_torque": "1 N m",
+    "tendon_force": "100 N",
+    "tendon_stiffness_low": "1000 N/m",
+    "tendon_stiffness_high": "50000 N/m",
+    "gravity": "9.81 m/s^2",
+}
+_FRICTION_VELOCITY = "0.05 rad/s"
+_LEADER_RADIUS = 0.01
+_RULE = "# " + "-" * 100
+
+
+def hand_text(hand: DraftHand, command: str = "") -> str:
+    """The hand file of a draft."""
+    lines = [f"# {hand.name}, imported from {hand.file}{' by ' + command if command else ''}."]
+    lines += [f"# The palm is the body {hand.palm}; each finger's base frame is given in the palm's frame.", "#"]
+    lines += [f"# name: {old} -> {new}" for old, new in hand.names.items()]
+    lines += [f"# taken: {note}" for note in hand.notes]
+    lines += [f"# lost: {loss.what} ({len(loss.places)})" for loss in hand.losses]
+    lines += ["", f"prefix = {_text(hand.prefix)}", f"name = {_text(cite(hand.name))}", "", "[limits]"]
+    lines += [f"{key} = {_text(value)}" for key, value in _LIMITS.items()]
+    lines += ['source = "assumed"']
+    for finger in hand.fingers:
+        lines += ["", _RULE, *_finger_lines(finger, hand.file)]
+    return "\n".join(line.rstrip() for line in lines) + "\n"
+
+
+def cite(text: str) -> str:
+    """Text that may stand in a comment of C, at most 80 characters."""
+    shown = "".join(c if c.isprintable() else " " for c in text)
+    for bad, good in (("*/", "* /"), ("/*", "/ *"), ("\\", "/"), ("??", "?")):
+        shown = shown.replace(bad, good)
+    return (shown if len(shown) <= 80 else shown[:77] + "...") or "unnamed"
+
+
+def _finger_lines(finger: DraftFinger, file: str) -> list[str]:
+    head = f"fingers.{finger.name}"
+    lines = [f"# {finger.name}: {len(finger.links)} links, {len(finger.tendons)} tendons", "", f"[{head}]"]
+    if finger.followed:
+        lines += [
+            "# Only the ratio of these two radii counts: the couplings have no pulleys in the source.",
+            "pulleys = [",
+        ]
+        lines += [f"    {row}," for row in _pulleys(finger.followed)]
+        lines += ["]", "couplings = ["]
+        lines += [f'    {{ follower = "{f.follower}", leader = "{f.leader}" }},' for f in finger.followed]
+        lines += ["]"]
+        lines += [f"# {f.follower} = {f.sign} * ({f.published} - {f.offset!r} rad)" for f in finger.followed if f.moved]
+    lines += ["", f"[{head}.base]", f"position = {_lengths(finger.position)}"]
+    lines += [f"rpy = {_listed(map(angle, tidy(rpy_of(finger.axes), 1.0)))}"]
+    lines += [f"source = {_text(cite(f'{file} body {finger.carrier}'))}"]
+    for link in finger.links:
+        lines += ["", f"[[{head}.links]]", *_link_lines(link, file)]
+    for tendon in finger.tendons:
+        lines += ["", f"[[{head}.tendons]]", *_tendon_lines(tendon, file)]
+    return lines
+
+
+def _pulleys(followed: Sequence[Followed]) -> Iterable[str]:
+    radii = {f.leader: _LEADER_RADIUS for f in followed} | {f.follower: _LEADER_RADIUS / f.ratio for f in followed}
+    for joint, radius in radii.items():
+        yield f'{{ joint = "{joint}", radius = {_text(length(radius))}, source = "assumed; only the ratio counts" }}'
+
+
+def _link_lines(link: DraftLink, file: str) -> list[str]:
+    joint, body = link.published, cite(f"{file} body {link.body}")
+    lines = [f"joint = {_text(link.joint)}"]
+    if link.frame.turn != "none" or not link.frame.roll:
+        lines += [f"turn = {_text(link.frame.turn)}"]
+    roll = tidy([link.frame.roll], 1.0)[0]
+    if roll:
+        lines += [f"rpy = {_listed(map(angle, (roll, 0.0, 0.0)))}"]
+    if reference := tidy([link.reference], 1.0)[0]:
+        lines += [f"reference = {_text(angle(reference))}"]
+    if link.limits:
+        lines += [f"{key} = {_text(angle(x))}" for key, x in zip(("low", "high"), link.limits, strict=True)]
+    lines += [f"offset = {_lengths(link.offset)}"]
+    sources = dict.fromkeys(link.assumed, "assumed")
+    if link.mass is not None:
+        lines += [f"{key} = {each}" for key, each in mass_and_inertia(link.mass, link.com, link.inertia).items()]
+        sources |= dict.fromkeys(("mass", "com", "inertia"), body)
+    if joint.armature:
+        lines += [f"armature = {_text(quantity(joint.armature, 'kg m^2'))}"]
+    if joint.damping:
+        lines += [f"damping = {_text(quantity(joint.damping, 'N m s/rad'))}"]
+    if joint.friction:
+        torque = quantity(joint.friction, "N m")
+        lines += [f'friction = {{ torque = "{torque}", velocity = "{_FRICTION_VELOCITY}" }}']
+        sources["friction.velocity"] = "assumed"
+    if joint.stiffness:
+        reference_text = angle(tidy([link.spring_reference], 1.0)[0])
+        stiffness = quantity(joint.stiffness, "N m/rad")
+        lines += [f'spring = {{ stiffness = "{stiffness}", reference = "{reference_text}" }}']
+    return [*lines, f"source = {_sources(sources, cite(f'{file} joint {joint.name}'))}"]
+
+
+def _tendon_lines(tendon: DraftTendon, file: str) -> list[str]:
+    lines = [f"rest = {_text(length(tidy([tendon.rest], 0.1)[0]))}"]
+    if tendon.arms:
+        arms = ", ".join(f"{joint} = {_text(length(arm))}" for joint, arm in tendon.arms.items())
+        lines += [f"arms = {{ {arms} }}"]
+    if tendon.path:
+        lines += ["path = ["]
+        lines += [f'    {{ link = "{link}", at = {_lengths(at)} }},' for link, at in tendon.path]
+        lines += ["]"]
+    if tendon.stiffness:
+        stiffness, rest = quantity(tendon.stiffness, "N/m"), length(tendon.slack)
+        lines += [f'spring = {{ stiffness = "{stiffness}", rest = "{rest}" }}']
+    return [*lines, f"source = {_text(cite(f'{file} tendon {tendon.name}'))}"]
+
+
+def _sources(special: dict[str, str], default: str) -> str:
+    if not special:
+        return _text(default)
+    rows = [f"{key} = {_text(value)}" for key, value in special.items()]
+    return f"{{ {', '.join(rows)}, default = {_text(default)} }}"
+
+
+# -- numbers ---------------------------------------------------------------------------------------------------------
+
+
+def tidy(values: Iterable[float] | Array, scale: float = 0.0) -> list[float]:
+    """Numbers without what rounding left: -3e-18 beside 0.045 is zero, 0.04500000000000001 is 0.045."""
+    numbers = [float(value) for value in values]
+    noise = NOISE * max([scale, *map(abs, numbers)])
+    short = [next(s for digits in (12, 17) if abs((s := float(f"{x:.{digits}g}")) - x) <= noise) for x in numbers]
+    return [0.0 if abs(x) <= noise else x for x in short]
+
+
+def quantity(value: float, unit: str, power: int = 0) -> str:
+    """A number of an SI unit in a unit that is 10^power times smaller, to the last digit of the double."""
+    exact = Decimal(repr(float(value))).scaleb(power)
+    text = f"{exact.normalize():f}" if exact and -8 < exact.adjusted() < 12 else f"{exact.normalize() + 0:e}"
+    return f"{'0' if not exact else text} {unit}"
+
+
+def length(metres: float) -> str:
+    """A length in millimetres."""
+    return quantity(metres, "mm", 3)
+
+
+def mass(kilograms: float) -> str:
+    """A mass in grams."""
+    return quantity(kilograms, "g", 3)
+
+
+def angle(radians: float) -> str:
+    """An angle in degrees if it has at most ten digits there, else in radians."""
+    degrees = float(f"{math.degrees(radians):.10g}")
+    if abs(math.radians(degrees) - radians) <= 2e-16 * max(1.0, abs(radians)):
+        return quantity(degrees, "deg")
+    return quantity(radians, "rad")
+
+
+def mass_and_inertia(kilograms: float, com: Array, inertia: Array) -> dict[str, str]:
+    """The keys of a body, as TOML: mass, com (3) and the tensor about it (3 x 3), in SI."""
+    return {"mass": _text(mass(kilograms)), "com": _lengths(com), "inertia": _tensor(inertia)}
+
+
+def _lengths(values: Array) -> str:
+    return _listed(map(length, tidy(values, 0.01)))
+
+
+def _tensor(tensor: Array) -> str:
+    symmetric = (tensor + tensor.T) / 2
+    names = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
+    values = tidy([symmetric[place] for place in names.values()])
+    rows = [f'{name} = "{quantity(value, "g mm^2", 9)}"' for name, value in zip(names, values, strict=True)]
+    return f"{{ {', '.join(rows)} }}"
+
+
+def _listed(texts: Iterable[str]) -> str:
+    return f"[{', '.join(map(_text, texts))}]"
+
+
+def _text(value: str) -> str:
+    return json.dumps(value, ensure_ascii=False)

@@ -1,0 +1,75 @@
+"""What only some fingers have: armature, damping, friction and springs in their joints, and a place in the palm."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from awiwi_gen.hand import Hand
+from awiwi_gen.hand.parts import Finger
+from awiwi_gen.kernel import Kernel, Port
+from awiwi_gen.kernels.declare import Family
+from awiwi_gen.kernels.fingers import POSE, Size, guarded, input_ports, torque
+from awiwi_gen.units import m, s
+
+per_passive: Family[Size] = Family("joints")
+per_placed: Family[Size] = Family("palm")
+
+# What kernels of all fingers contain where joints have such numbers, by family.
+ARMATURE = {
+    "mass_matrix": "Its diagonal has the joints' armature.",
+    "dynamics": "The diagonal of M has the joints' armature.",
+    "inverse_dynamics": "The diagonal of M has the joints' armature.",
+    "forward_dynamics": "The diagonal of M has the joints' armature.",
+    "energy": "The kinetic energy has that of the rotors, by the joints' armature.",
+}
+PASSIVE = {
+    "bias": "Torques of damping, friction and springs (passive_torque) are added.",
+    "inverse_dynamics": "Torques of damping, friction and springs (passive_torque) are added.",
+    "inverse_dynamics_derivatives": "Those of damping, friction and springs (passive_torque) are added.",
+    "forward_dynamics": "Torques of damping, friction and springs (passive_torque) are overcome first.",
+    "dynamics": "Torques of damping, friction and springs are in passive_torque alone.",
+    "energy": "The potential energy has that of the joints' springs.",
+}
+
+
+def documented(finger: Finger, kernels: list[Kernel]) -> list[Kernel]:
+    """The kernels of a finger; what their joints add is told in their documentation."""
+    for notes, has in ((ARMATURE, finger.has_armature), (PASSIVE, finger.passive)):
+        if has:
+            kernels = [replace(k, doc=f"{k.doc}\n{notes[k.family]}") if k.family in notes else k for k in kernels]
+    return kernels
+
+
+def optional_kernels(hand: Hand, name: str, finger: Finger) -> list[Kernel]:
+    """The kernels of a finger with passive torques in its joints, and those of a finger with a base in the palm."""
+    size = Size(len(finger.joints), len(finger.tendons), len(finger.links))
+    ports = input_ports(hand, finger, size)
+    ports["g_palm"] = ports["g"]
+    families = [family for family, has in ((per_passive, finger.passive), (per_placed, finger.base)) if has]
+    return [
+        kernel
+        for family in families
+        for kernel in guarded(finger, family.kernels(name, finger, f"fingers.{name}", finger.structure(), ports, size))
+    ]
+
+
+@per_passive(lambda z: {"passive": torque(z)}, "eq. 3.8")
+def passive_torque(finger: Any, q: Any, qd: Any) -> Any:
+    """Joint torques that damping, dry friction and springs of the joints take up.
+
+    They stand beside C qd and gravity in the equation of motion: tau = M qdd + C qd + gravity + passive.
+    """
+
+
+@per_placed(lambda z: {"T": Port((4, 4), POSE)}, "eq. 5.2, 5.3")
+def palm_pose(finger: Any, q: Any) -> Any:
+    """Pose of the fingertip: maps fingertip coordinates into the palm's frame."""
+
+
+@per_placed(lambda z: {"g": Port((3,), m / s**2)}, "eq. 5.2")
+def palm_gravity(finger: Any, g_palm: Any) -> Any:
+    """Gravity in the axes of the finger's base, from gravity in the palm's: the input g of the finger's dynamics.
+
+    So one sensor in the palm serves all fingers.
+    """

@@ -1,0 +1,115 @@
+"""One finger of a MuJoCo model: what MuJoCo says of it while everything else stands as drawn."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from awiwi_gen.interchange.draft import DraftFinger, DraftHand
+
+
+@dataclass
+class MujocoFinger:
+    """A compiled model, and the finger of it that a draft describes.
+
+    States are those of the hand file: independent joints in its order, counted as it counts them.
+    """
+
+    compiled: Any
+    hand: DraftHand
+    finger: DraftFinger
+
+    def __post_init__(self) -> None:
+        self.data = mujoco.MjData(self.compiled)
+        locks = {lock.published: lock for lock in self.finger.followed}
+        joints = [link.published.name for link in self.finger.links]
+        names = {link.published.name: link.joint for link in self.finger.links}
+        self.free = [name for name in joints if name not in locks]
+        self.qpos = [int(self.compiled.joint(name).qposadr[0]) for name in joints]
+        self.dofs = [int(self.compiled.joint(name).dofadr[0]) for name in joints]
+        self.matrix = np.zeros((len(joints), len(self.free)))
+        self.offset = np.zeros(len(joints))
+        free = [names[name] for name in self.free]
+        for row, name in enumerate(joints):
+            lock = locks.get(name)
+            self.matrix[row, free.index(lock.leader if lock else names[name])] = lock.sign * lock.ratio if lock else 1.0
+            self.offset[row] = lock.offset if lock else 0.0
+        self.last = [self._is_last(link.published.name) for link in self.finger.links]
+        mujoco.mj_resetData(self.compiled, self.data)
+        self.data.qpos[:] = self.compiled.qpos0
+        mujoco.mj_kinematics(self.compiled, self.data)
+        self.drawn = self.data.xmat.reshape(-1, 3, 3).copy()
+        self.tendons = [self.compiled.tendon(tendon.name).id for tendon in self.finger.tendons]
+
+    def _is_last(self, name: str) -> bool:
+        """Whether a joint is the last one of its body, which carries the frame of its link."""
+        joint = self.compiled.joint(name).id
+        body = int(self.compiled.jnt_bodyid[joint])
+        return joint == self.compiled.body_jntadr[body] + self.compiled.body_jntnum[body] - 1
+
+    def set(self, q: np.ndarray, qd: np.ndarray) -> None:
+        """Move the finger; everything else stands as drawn."""
+        mujoco.mj_resetData(self.compiled, self.data)
+        self.data.qpos[:] = self.compiled.qpos0
+        self.data.qpos[self.qpos] = self.matrix @ q + self.offset
+        self.data.qvel[self.dofs] = self.matrix @ qd
+        mujoco.mj_forward(self.compiled, self.data)
+
+    def mass_matrix(self) -> np.ndarray:
+        full = np.zeros((self.compiled.nv, self.compiled.nv))
+        mujoco.mj_fullM(self.compiled, self.data, full)
+        return self.matrix.T @ full[np.ix_(self.dofs, self.dofs)] @ self.matrix
+
+    def bias(self) -> np.ndarray:
+        return self.matrix.T @ self.data.qfrc_bias[self.dofs]
+
+    def passive(self) -> np.ndarray:
+        """Torques of joint dampers and springs, as they act on the joints."""
+        return self.matrix.T @ (self.data.qfrc_damper + self.data.qfrc_spring)[self.dofs]
+
+    def lengths(self) -> np.ndarray:
+        return self.data.ten_length[self.tendons]
+
+    def arms(self) -> np.ndarray:
+        full = np.zeros((self.compiled.ntendon, self.compiled.nv))
+        if self.compiled.ntendon:
+            rows = np.asarray(self.data.ten_J).reshape(-1)
+            if rows.size == full.size:
+                full = rows.reshape(full.shape)
+            else:
+                for t in range(self.compiled.ntendon):
+                    at, count = int(self.compiled.ten_J_rowadr[t]), int(self.compiled.ten_J_rownnz[t])
+                    full[t, self.compiled.ten_J_colind[at : at + count]] = rows[at : at + count]
+        return full[np.ix_(self.tendons, self.dofs)] @ self.matrix
+
+    def gravity(self) -> np.ndarray:
+        """Gravity in the finger's base frame."""
+        return self.base()[0].T @ self.compiled.opt.gravity
+
+    def base(self) -> tuple[np.ndarray, np.ndarray]:
+        """Axes and origin of the base frame in the world."""
+        palm = self.compiled.body(self.hand.palm).id
+        axes = self.data.xmat[palm].reshape(3, 3)
+        return axes @ self.finger.axes, self.data.xpos[palm] + axes @ self.finger.position
+
+    def link_frames(self) -> list[np.ndarray]:
+        """The frame (4 x 4) of each link in the base frame; of a joint with others after it in its body only z."""
+        base_axes, base_origin = self.base()
+        found = []
+        signs = {lock.follower: lock.sign for lock in self.finger.followed}
+        for link, last in zip(self.finger.links, self.last, strict=True):
+            sign = signs.get(link.joint, 1)
+            joint = self.compiled.joint(link.published.name)
+            body = int(self.compiled.jnt_bodyid[joint.id])
+            frame = np.eye(4)
+            axes = self.data.xmat[body].reshape(3, 3) @ self.drawn[body].T @ link.frame.axes
+            frame[:3, :3] = base_axes.T @ axes
+            if not last:
+                frame[:3, :2] = np.nan
+                frame[:3, 2] = base_axes.T @ self.data.xaxis[joint.id] * sign
+            frame[:3, 3] = base_axes.T @ (self.data.xanchor[joint.id] - base_origin)
+            found.append(frame)
+        return found
