@@ -10,7 +10,6 @@ import json
 import sys
 from collections.abc import Callable
 from dataclasses import replace
-from enum import StrEnum
 from functools import wraps
 from pathlib import Path
 from typing import Annotated, Any
@@ -35,6 +34,20 @@ if absent := extras.missing("awiwi-gen", *extras.COMMAND_LINE):
 
 import typer
 
+from awiwi_gen.arguments import (
+    GENERATED,
+    PAGE,
+    HandFile,
+    Json,
+    Math,
+    MathOption,
+    Only,
+    Output,
+    Params,
+    ParamsOption,
+    Scalar,
+    ScalarOption,
+)
 from awiwi_gen.interchange.command import export, import_
 
 app = typer.Typer(
@@ -44,38 +57,6 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-
-
-class Scalar(StrEnum):
-    """Scalar type of the generated C."""
-
-    f64 = "f64"
-    f32 = "f32"
-
-
-class Params(StrEnum):
-    """Where the hand's numbers are: constants in the code, or fields of a struct."""
-
-    baked = "baked"
-    runtime = "runtime"
-
-
-class Math(StrEnum):
-    """Whose sine, arcus tangent and exponential function the C calls."""
-
-    own = "own"
-    libm = "libm"
-
-
-HandFile = Annotated[Path | None, typer.Option("--hand", help="Hand file; the Awiwi hand if left out.")]
-Output = Annotated[Path, typer.Option("--output", "-o", help="Directory of the generated C.")]
-Json = Annotated[bool, typer.Option("--json", help="Print JSON for programs.")]
-Only = Annotated[str, typer.Option("--only", metavar="GLOB", help="Only kernels whose name matches.")]
-ScalarOption = Annotated[Scalar, typer.Option("--scalar", help="Scalar type of the C.")]
-MathOption = Annotated[Math, typer.Option("--math", help="Own sine, arcus tangent, ..., or the C library's.")]
-ParamsOption = Annotated[Params, typer.Option("--params", help="Numbers as constants or in a struct.")]
-GENERATED = Path("generated")
-PAGE = Path("build/report/index.html")
 
 
 def command(*needs: str) -> Callable[[Callable[..., int | None]], Callable[..., None]]:
