@@ -16,7 +16,7 @@ from sympy import Expr, Matrix
 
 from awiwi_gen.definitions.four_bar import four_bar_angles
 from awiwi_gen.definitions.naming import Derivation
-from awiwi_gen.structure import Finger, coordinates, leaders, quarter_turns, radius
+from awiwi_gen.structure import Finger, coordinates, leaders, motion, quarter_turns
 
 
 @dataclass(frozen=True)
@@ -40,8 +40,8 @@ def joint_angles(finger: Finger, q: Matrix) -> dict[str, Expr]:
     position = coordinates(finger)
     angles = {link.joint: q[position[link.joint]] for link in finger.links}
     for follower, leader in leaders(finger).items():
-        # The coupling tendon keeps its length: r_leader q_leader = r_follower q_follower.
-        angles[follower] = angles[leader] * radius(finger, leader) / radius(finger, follower)
+        ratio, offset = motion(finger, follower)
+        angles[follower] = angles[leader] * ratio + offset
     return angles
 
 

@@ -45,11 +45,10 @@ class Chain:
         self.low = [float(link.low or 0) for link in free]
         self.high = [float(link.high or 0) for link in free]
         radii = {joint: float(radius) for joint, radius in finger.radii.items()}
-        self._angles = []  # of every link: column in q, and its angle per angle in that column
+        self._angles = []  # of every link: column in q, its angle per angle in that column, and its angle at zero
         for link in finger.links:
             leader = finger.leaders.get(link.joint, link.joint)
-            factor = radii[leader] / radii[link.joint] if leader != link.joint else 1.0
-            self._angles.append((self.joints.index(leader), factor))
+            self._angles.append((self.joints.index(leader), *finger.motion(link.joint)))
         self._links = [(link.turn, _floats(link.offset), link.four_bar) for link in finger.links]
         self._order = {link.joint: index for index, link in enumerate(finger.links)}
         self._radii = radii
@@ -72,7 +71,7 @@ class Chain:
         for tendon, lines in zip(self.finger.tendons, self.lines, strict=True):
             row = [0.0] * len(self.joints)
             for joint, arm in self._arms(tendon):
-                column, factor = self._angles[self._order[joint]]
+                column, factor, _ = self._angles[self._order[joint]]
                 row[column] += arm * factor
             if lines:
                 for column in range(len(row)):
@@ -109,8 +108,8 @@ class Chain:
         tendon = self.finger.tendons[number]
         length = float(tendon.rest) + sum(self.distance(q, line) for line in self.lines[number])
         for joint, arm in self._arms(tendon):
-            column, factor = self._angles[self._order[joint]]
-            length += arm * factor * q[column]
+            column, factor, offset = self._angles[self._order[joint]]
+            length += arm * (factor * q[column] + offset)
         return length
 
     def _arms(self, tendon: Tendon) -> list[tuple[str, float]]:
@@ -141,8 +140,8 @@ class Chain:
             origin, axes = _point(axes, origin, offset), _turned(axes, turn)
             if number == joint and not rotated:
                 break
-            column, factor = self._angles[number]
-            angle = q[column] * factor
+            column, factor, offset_angle = self._angles[number]
+            angle = q[column] * factor + offset_angle
             if bar:
                 reference = float(bar.reference)
                 origin = _point(_rotated(axes, angle + reference), origin, (float(bar.crank), 0.0, 0.0))

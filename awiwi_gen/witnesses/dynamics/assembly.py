@@ -21,7 +21,7 @@ from typing import Any
 import casadi as ca
 from casadi import SX
 
-from awiwi_gen.structure import Finger, coordinates, leaders, quarter_turns, radius
+from awiwi_gen.structure import Finger, coordinates, leaders, motion, quarter_turns
 from awiwi_gen.witnesses.four_bar import FourBar, Vector
 
 _ZERO, _Z = SX(0), SX([0, 0, 1])
@@ -218,10 +218,8 @@ def _parts(finger: Finger, q: SX) -> Iterator[_Part]:
         coordinate = position[link.joint]
         angle, fixed, offset, body = q[coordinate], _fixed_rotation(link.turn), ca.vertcat(*link.offset), _body(link)
         if link.four_bar is None:
-            ratio = SX(1)
-            if link.joint in follows:
-                ratio = SX(radius(finger, follows[link.joint])) / radius(finger, link.joint)
-            yield _Part(coordinate, fixed, ratio * angle, None, ratio, SX(0), offset, body, index)
+            ratio, rest = (SX(each) for each in (motion(finger, link.joint) if link.joint in follows else (1, 0)))
+            yield _Part(coordinate, fixed, ratio * angle + rest, None, ratio, SX(0), offset, body, index)
         else:
             crank = angle + link.four_bar.reference
             start = SX(link.start + link.four_bar.reference)
