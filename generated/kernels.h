@@ -11,7 +11,7 @@
  *
  * Link the mathematical library (-lm). Beside each other, these files and csrc call at most, of <math.h>:
  *   fabs, fmax, frexp, ldexp, sqrt.
- * and compilers may call memcpy, memmove and memset. */
+ * of <string.h>, memcmp and memcpy; and compilers may call memmove and memset. */
 
 /* For toolchains that use only 31 characters of a name: define AWIWI_SHORT_NAMES in every file. */
 #ifdef AWIWI_SHORT_NAMES
@@ -43,12 +43,20 @@
 #define awiwi_optimal_backstepping_weights awiwi_optimal_backstep_7cbdc680
 #endif
 
+/* An attribute by which the compiler lists calls that drop a status, see docs/c_api.md; none if you define none. */
+#ifndef AWIWI_MUST_CHECK
+#define AWIWI_MUST_CHECK
+#endif
+
 #ifdef __cplusplus
 extern "C" {
 #endif
 
 /* SHA-256 of the hand's numbers these kernels were made from. */
 extern const char awiwi_model_digest[65];
+
+/* AWIWI_API_VERSION (awiwi_version.h) of the compiled library; another one in your headers means that they are not its own. */
+extern const int awiwi_api_version;
 
 /*
  * Stiffness of every tendon at its tension, spring and fibre in series, and its derivatives. slope and
@@ -62,7 +70,7 @@ extern const char awiwi_model_digest[65];
  * margin of 0.4 %; else 1, and outputs without a value are NaN.
  * Cost: 198 add, 198 mul, 7 calls.
  */
-int awiwi_thumb_tendon_stiffness(const double tension_in[8], double k_out[8], double slope_out[8], double curvature_out[8]);
+AWIWI_MUST_CHECK int awiwi_thumb_tendon_stiffness(const double tension_in[8], double k_out[8], double slope_out[8], double curvature_out[8]);
 
 /*
  * Pose of the fingertip: maps fingertip coordinates into the finger's base frame.
@@ -275,7 +283,7 @@ void awiwi_thumb_joint_torque_and_stiffness(const double q_in[4], const double f
  * always defined.
  * Cost: the solver's own work and calls, at most: 24 of thumb_tendon_lengths, 24 of thumb_coupling.
  */
-int awiwi_thumb_joint_estimate(const double h_in[8], const double start_in[4], double q_out[4]);
+AWIWI_MUST_CHECK int awiwi_thumb_joint_estimate(const double h_in[8], const double start_in[4], double q_out[4]);
 
 /*
  * Errors of the joint estimate: covariance for lengths with standard deviation noise, worst for errors
@@ -305,7 +313,7 @@ void awiwi_thumb_joint_estimate_error(const double q_in[4], const double noise_i
  * always defined.
  * Cost: the solver's own work and calls, at most: 1 of thumb_coupling, 357 of thumb_tendon_stiffness, 1 of thumb_coupling_derivative.
  */
-int awiwi_thumb_tendon_distribution(const double q_in[4], const double tau_in[4], const double K_in[16], const double f_min_in[1], const double f_max_in[1], double f_out[8]);
+AWIWI_MUST_CHECK int awiwi_thumb_tendon_distribution(const double q_in[4], const double tau_in[4], const double K_in[16], const double f_min_in[1], const double f_max_in[1], double f_out[8]);
 
 /*
  * Base joint angles whose span lengths are nearest to the measured h, by gradient search from start.
@@ -317,7 +325,7 @@ int awiwi_thumb_tendon_distribution(const double q_in[4], const double tau_in[4]
  * always defined.
  * Cost: the solver's own work and calls, at most: 51 of thumb_tendon_lengths, 51 of thumb_coupling.
  */
-int awiwi_thumb_base_estimate_by_gradient(const double h_in[4], const double start_in[2], double q_out[2]);
+AWIWI_MUST_CHECK int awiwi_thumb_base_estimate_by_gradient(const double h_in[4], const double start_in[2], double q_out[2]);
 
 /*
  * Stiffness of every tendon at its tension, spring and fibre in series, and its derivatives. slope and
@@ -331,7 +339,7 @@ int awiwi_thumb_base_estimate_by_gradient(const double h_in[4], const double sta
  * margin of 0.4 %; else 1, and outputs without a value are NaN.
  * Cost: 198 add, 198 mul, 7 calls.
  */
-int awiwi_index_tendon_stiffness(const double tension_in[8], double k_out[8], double slope_out[8], double curvature_out[8]);
+AWIWI_MUST_CHECK int awiwi_index_tendon_stiffness(const double tension_in[8], double k_out[8], double slope_out[8], double curvature_out[8]);
 
 /*
  * Pose of the fingertip: maps fingertip coordinates into the finger's base frame.
@@ -572,7 +580,7 @@ void awiwi_index_joint_estimate_error(const double q_in[4], const double noise_i
  * always defined.
  * Cost: the solver's own work and calls, at most: 1 of index_coupling, 66 of index_tendon_stiffness.
  */
-int awiwi_index_tendon_distribution(const double q_in[4], const double tau_in[4], const double K_in[16], const double f_min_in[1], const double f_max_in[1], double f_out[8]);
+AWIWI_MUST_CHECK int awiwi_index_tendon_distribution(const double q_in[4], const double tau_in[4], const double K_in[16], const double f_min_in[1], const double f_max_in[1], double f_out[8]);
 
 /*
  * Stiffness of every tendon at its tension, spring and fibre in series, and its derivatives. slope and
@@ -586,7 +594,7 @@ int awiwi_index_tendon_distribution(const double q_in[4], const double tau_in[4]
  * margin of 0.4 %; else 1, and outputs without a value are NaN.
  * Cost: 198 add, 198 mul, 7 calls.
  */
-int awiwi_middle_tendon_stiffness(const double tension_in[8], double k_out[8], double slope_out[8], double curvature_out[8]);
+AWIWI_MUST_CHECK int awiwi_middle_tendon_stiffness(const double tension_in[8], double k_out[8], double slope_out[8], double curvature_out[8]);
 
 /*
  * Pose of the fingertip: maps fingertip coordinates into the finger's base frame.
@@ -827,7 +835,7 @@ void awiwi_middle_joint_estimate_error(const double q_in[4], const double noise_
  * always defined.
  * Cost: the solver's own work and calls, at most: 1 of middle_coupling, 66 of middle_tendon_stiffness.
  */
-int awiwi_middle_tendon_distribution(const double q_in[4], const double tau_in[4], const double K_in[16], const double f_min_in[1], const double f_max_in[1], double f_out[8]);
+AWIWI_MUST_CHECK int awiwi_middle_tendon_distribution(const double q_in[4], const double tau_in[4], const double K_in[16], const double f_min_in[1], const double f_max_in[1], double f_out[8]);
 
 /*
  * Stiffness of every tendon at its tension, spring and fibre in series, and its derivatives. slope and
@@ -841,7 +849,7 @@ int awiwi_middle_tendon_distribution(const double q_in[4], const double tau_in[4
  * margin of 0.4 %; else 1, and outputs without a value are NaN.
  * Cost: 148 add, 148 mul, 5 calls.
  */
-int awiwi_ring_tendon_stiffness(const double tension_in[6], double k_out[6], double slope_out[6], double curvature_out[6]);
+AWIWI_MUST_CHECK int awiwi_ring_tendon_stiffness(const double tension_in[6], double k_out[6], double slope_out[6], double curvature_out[6]);
 
 /*
  * Pose of the fingertip: maps fingertip coordinates into the finger's base frame.
@@ -1082,7 +1090,7 @@ void awiwi_ring_joint_estimate_error(const double q_in[3], const double noise_in
  * always defined.
  * Cost: the solver's own work and calls, at most: 1 of ring_coupling, 66 of ring_tendon_stiffness.
  */
-int awiwi_ring_tendon_distribution(const double q_in[3], const double tau_in[3], const double K_in[9], const double f_min_in[1], const double f_max_in[1], double f_out[6]);
+AWIWI_MUST_CHECK int awiwi_ring_tendon_distribution(const double q_in[3], const double tau_in[3], const double K_in[9], const double f_min_in[1], const double f_max_in[1], double f_out[6]);
 
 /*
  * Stiffness of every tendon at its tension, spring and fibre in series, and its derivatives. slope and
@@ -1096,7 +1104,7 @@ int awiwi_ring_tendon_distribution(const double q_in[3], const double tau_in[3],
  * margin of 0.4 %; else 1, and outputs without a value are NaN.
  * Cost: 198 add, 198 mul, 7 calls.
  */
-int awiwi_fifth_tendon_stiffness(const double tension_in[8], double k_out[8], double slope_out[8], double curvature_out[8]);
+AWIWI_MUST_CHECK int awiwi_fifth_tendon_stiffness(const double tension_in[8], double k_out[8], double slope_out[8], double curvature_out[8]);
 
 /*
  * Pose of the fingertip: maps fingertip coordinates into the finger's base frame.
@@ -1107,7 +1115,7 @@ int awiwi_fifth_tendon_stiffness(const double tension_in[8], double k_out[8], do
  * outputs without a value are NaN.
  * Cost: 31 add, 49 mul, 1 div, 3 neg, 1 sqrt, 5 sincos.
  */
-int awiwi_fifth_fingertip_pose(const double q_in[4], double T_out[16]);
+AWIWI_MUST_CHECK int awiwi_fifth_fingertip_pose(const double q_in[4], double T_out[16]);
 
 /*
  * Pose of every link frame (origin at its joint, fixed to the link) in the finger's base frame.
@@ -1118,7 +1126,7 @@ int awiwi_fifth_fingertip_pose(const double q_in[4], double T_out[16]);
  * outputs without a value are NaN.
  * Cost: 41 add, 74 mul, 1 div, 13 neg, 1 sqrt, 5 sincos.
  */
-int awiwi_fifth_link_poses(const double q_in[4], double T_out[80]);
+AWIWI_MUST_CHECK int awiwi_fifth_link_poses(const double q_in[4], double T_out[80]);
 
 /*
  * Fingertip Jacobian in base axes: velocity of the tip (rows 0-2) and angular velocity (rows 3-5).
@@ -1129,7 +1137,7 @@ int awiwi_fifth_link_poses(const double q_in[4], double T_out[80]);
  * outputs without a value are NaN.
  * Cost: 36 add, 64 mul, 2 div, 4 neg, 1 sqrt, 5 sincos.
  */
-int awiwi_fifth_jacobian(const double q_in[4], double J_out[24]);
+AWIWI_MUST_CHECK int awiwi_fifth_jacobian(const double q_in[4], double J_out[24]);
 
 /*
  * Pose of the fingertip and its Jacobian, both in base axes, in one call with fewer operations.
@@ -1141,7 +1149,7 @@ int awiwi_fifth_jacobian(const double q_in[4], double J_out[24]);
  * outputs without a value are NaN.
  * Cost: 44 add, 75 mul, 2 div, 8 neg, 1 sqrt, 5 sincos.
  */
-int awiwi_fifth_pose_and_jacobian(const double q_in[4], double T_out[16], double J_out[24]);
+AWIWI_MUST_CHECK int awiwi_fifth_pose_and_jacobian(const double q_in[4], double T_out[16], double J_out[24]);
 
 /*
  * Mass matrix: the kinetic energy is half qd' M qd.
@@ -1152,7 +1160,7 @@ int awiwi_fifth_pose_and_jacobian(const double q_in[4], double T_out[16], double
  * outputs without a value are NaN.
  * Cost: 116 add, 130 mul, 2 div, 1 sqrt, 5 sincos.
  */
-int awiwi_fifth_mass_matrix(const double q_in[4], double M_out[16]);
+AWIWI_MUST_CHECK int awiwi_fifth_mass_matrix(const double q_in[4], double M_out[16]);
 
 /*
  * Coriolis matrix by Christoffel symbols, so that dM/dt - 2 C is skew-symmetric.
@@ -1164,7 +1172,7 @@ int awiwi_fifth_mass_matrix(const double q_in[4], double M_out[16]);
  * outputs without a value are NaN.
  * Cost: 312 add, 364 mul, 2 div, 2 neg, 1 sqrt, 5 sincos.
  */
-int awiwi_fifth_coriolis_matrix(const double q_in[4], const double qd_in[4], double C_out[16]);
+AWIWI_MUST_CHECK int awiwi_fifth_coriolis_matrix(const double q_in[4], const double qd_in[4], double C_out[16]);
 
 /*
  * Joint torques that hold the finger at rest against gravity g (in base axes).
@@ -1176,7 +1184,7 @@ int awiwi_fifth_coriolis_matrix(const double q_in[4], const double qd_in[4], dou
  * outputs without a value are NaN.
  * Cost: 44 add, 59 mul, 2 div, 1 sqrt, 5 sincos.
  */
-int awiwi_fifth_gravity(const double q_in[4], const double g_in[3], double gravity_out[4]);
+AWIWI_MUST_CHECK int awiwi_fifth_gravity(const double q_in[4], const double g_in[3], double gravity_out[4]);
 
 /*
  * Coriolis, centrifugal and gravity torques together: C qd + gravity.
@@ -1189,7 +1197,7 @@ int awiwi_fifth_gravity(const double q_in[4], const double g_in[3], double gravi
  * outputs without a value are NaN.
  * Cost: 226 add, 255 mul, 2 div, 1 sqrt, 5 sincos.
  */
-int awiwi_fifth_bias(const double q_in[4], const double qd_in[4], const double g_in[3], double bias_out[4]);
+AWIWI_MUST_CHECK int awiwi_fifth_bias(const double q_in[4], const double qd_in[4], const double g_in[3], double bias_out[4]);
 
 /*
  * Joint torques that produce the accelerations qdd: M qdd + C qd + gravity.
@@ -1203,7 +1211,7 @@ int awiwi_fifth_bias(const double q_in[4], const double qd_in[4], const double g
  * outputs without a value are NaN.
  * Cost: 241 add, 267 mul, 2 div, 1 sqrt, 5 sincos.
  */
-int awiwi_fifth_inverse_dynamics(const double q_in[4], const double qd_in[4], const double qdd_in[4], const double g_in[3], double tau_out[4]);
+AWIWI_MUST_CHECK int awiwi_fifth_inverse_dynamics(const double q_in[4], const double qd_in[4], const double qdd_in[4], const double g_in[3], double tau_out[4]);
 
 /*
  * Partial derivatives of the inverse dynamics with respect to the positions and the velocities.
@@ -1218,7 +1226,7 @@ int awiwi_fifth_inverse_dynamics(const double q_in[4], const double qd_in[4], co
  * outputs without a value are NaN.
  * Cost: 960 add, 1079 mul, 2 div, 1 sqrt, 5 sincos.
  */
-int awiwi_fifth_inverse_dynamics_derivatives(const double q_in[4], const double qd_in[4], const double qdd_in[4], const double g_in[3], double dtau_dq_out[16], double dtau_dqd_out[16]);
+AWIWI_MUST_CHECK int awiwi_fifth_inverse_dynamics_derivatives(const double q_in[4], const double qd_in[4], const double qdd_in[4], const double g_in[3], double dtau_dq_out[16], double dtau_dqd_out[16]);
 
 /*
  * Joint accelerations under the joint torques tau.
@@ -1232,7 +1240,7 @@ int awiwi_fifth_inverse_dynamics_derivatives(const double q_in[4], const double 
  * outputs without a value are NaN.
  * Cost: 332 add, 357 mul, 6 div, 1 neg, 1 sqrt, 5 sincos.
  */
-int awiwi_fifth_forward_dynamics(const double q_in[4], const double qd_in[4], const double tau_in[4], const double g_in[3], double qdd_out[4]);
+AWIWI_MUST_CHECK int awiwi_fifth_forward_dynamics(const double q_in[4], const double qd_in[4], const double tau_in[4], const double g_in[3], double qdd_out[4]);
 
 /*
  * Mass matrix, Coriolis matrix and gravity torques in one call with fewer operations.
@@ -1247,7 +1255,7 @@ int awiwi_fifth_forward_dynamics(const double q_in[4], const double qd_in[4], co
  * outputs without a value are NaN.
  * Cost: 342 add, 406 mul, 2 div, 2 neg, 1 sqrt, 5 sincos.
  */
-int awiwi_fifth_dynamics(const double q_in[4], const double qd_in[4], const double g_in[3], double M_out[16], double C_out[16], double gravity_out[4]);
+AWIWI_MUST_CHECK int awiwi_fifth_dynamics(const double q_in[4], const double qd_in[4], const double g_in[3], double M_out[16], double C_out[16], double gravity_out[4]);
 
 /*
  * Kinetic energy and potential energy in the gravity field g (zero at the base frame's origin).
@@ -1261,7 +1269,7 @@ int awiwi_fifth_dynamics(const double q_in[4], const double qd_in[4], const doub
  * outputs without a value are NaN.
  * Cost: 136 add, 171 mul, 2 div, 1 sqrt, 5 sincos.
  */
-int awiwi_fifth_energy(const double q_in[4], const double qd_in[4], const double g_in[3], double kinetic_out[1], double potential_out[1]);
+AWIWI_MUST_CHECK int awiwi_fifth_energy(const double q_in[4], const double qd_in[4], const double g_in[3], double kinetic_out[1], double potential_out[1]);
 
 /*
  * Path length of every tendon in the finger, by its routing.
@@ -1363,7 +1371,7 @@ void awiwi_fifth_joint_estimate_error(const double q_in[4], const double noise_i
  * always defined.
  * Cost: the solver's own work and calls, at most: 1 of fifth_coupling, 66 of fifth_tendon_stiffness.
  */
-int awiwi_fifth_tendon_distribution(const double q_in[4], const double tau_in[4], const double K_in[16], const double f_min_in[1], const double f_max_in[1], double f_out[8]);
+AWIWI_MUST_CHECK int awiwi_fifth_tendon_distribution(const double q_in[4], const double tau_in[4], const double K_in[16], const double f_min_in[1], const double f_max_in[1], double f_out[8]);
 
 /*
  * Angles of coupler and rocker at a joint angle, and their derivatives by it, the ratios. The
@@ -1379,7 +1387,7 @@ int awiwi_fifth_tendon_distribution(const double q_in[4], const double tau_in[4]
  * value are NaN.
  * Cost: 15 add, 25 mul, 2 div, 1 sqrt, 1 sincos, 2 calls.
  */
-int awiwi_fifth_hmc_four_bar(const double q_in[1], double coupler_out[1], double rocker_out[1], double coupler_ratio_out[1], double rocker_ratio_out[1], double transmission_out[1]);
+AWIWI_MUST_CHECK int awiwi_fifth_hmc_four_bar(const double q_in[1], double coupler_out[1], double rocker_out[1], double coupler_ratio_out[1], double rocker_ratio_out[1], double transmission_out[1]);
 
 /*
  * The palm's points A, B and C in frame {0} of the forearm.
@@ -1394,7 +1402,7 @@ int awiwi_fifth_hmc_four_bar(const double q_in[1], double coupler_out[1], double
  * NaN.
  * Cost: 20 add, 39 mul, 2 div, 1 neg, 1 sqrt, 2 sincos.
  */
-int awiwi_wrist_points(const double q71_in[1], const double q73_in[1], double A_out[3], double B_out[3], double C_out[3]);
+AWIWI_MUST_CHECK int awiwi_wrist_points(const double q71_in[1], const double q73_in[1], double A_out[3], double B_out[3], double C_out[3]);
 
 /*
  * Pose of the palm: maps palm coordinates into frame {0} of the forearm.
@@ -1407,7 +1415,7 @@ int awiwi_wrist_points(const double q71_in[1], const double q73_in[1], double A_
  * NaN.
  * Cost: 24 add, 48 mul, 2 div, 1 neg, 1 sqrt, 2 sincos.
  */
-int awiwi_wrist_palm_pose(const double q71_in[1], const double q73_in[1], double T_out[16]);
+AWIWI_MUST_CHECK int awiwi_wrist_palm_pose(const double q71_in[1], const double q73_in[1], double T_out[16]);
 
 /*
  * Length of every tendon's straight path through the wrist.
@@ -1420,7 +1428,7 @@ int awiwi_wrist_palm_pose(const double q71_in[1], const double q73_in[1], double
  * NaN.
  * Cost: 180 add, 143 mul, 2 div, 39 sqrt, 2 sincos.
  */
-int awiwi_wrist_tendon_lengths(const double q71_in[1], const double q73_in[1], double h_out[38]);
+AWIWI_MUST_CHECK int awiwi_wrist_tendon_lengths(const double q71_in[1], const double q73_in[1], double h_out[38]);
 
 /*
  * Derivatives of the tendons' lengths in the wrist with respect to q71 and q73.
@@ -1433,7 +1441,7 @@ int awiwi_wrist_tendon_lengths(const double q71_in[1], const double q73_in[1], d
  * NaN.
  * Cost: 436 add, 478 mul, 41 div, 39 sqrt, 2 sincos.
  */
-int awiwi_wrist_coupling(const double q71_in[1], const double q73_in[1], double dh_out[76]);
+AWIWI_MUST_CHECK int awiwi_wrist_coupling(const double q71_in[1], const double q73_in[1], double dh_out[76]);
 
 /*
  * Path length of every tendon in its finger and in the wrist, at its internal angles wrist = (q71,
@@ -1447,7 +1455,7 @@ int awiwi_wrist_coupling(const double q71_in[1], const double q73_in[1], double 
  * NaN.
  * Cost: 254 add, 180 mul, 2 div, 43 sqrt, 4 sincos.
  */
-int awiwi_hand_tendon_lengths(const double q_in[19], const double wrist_in[2], double h_out[38]);
+AWIWI_MUST_CHECK int awiwi_hand_tendon_lengths(const double q_in[19], const double wrist_in[2], double h_out[38]);
 
 /*
  * Coupling matrix P = dh/dq of all tendons and joints; zero outside the blocks of the fingers.
@@ -1576,7 +1584,7 @@ void awiwi_motor_damping(const double thd_in[1], double damping_out[1]);
  * margin of 0.4 %; else 1, and outputs without a value are NaN.
  * Cost: 13 add, 14 mul, 2 sincos.
  */
-int awiwi_motor_ripple(const double theta_in[1], double tau_out[1]);
+AWIWI_MUST_CHECK int awiwi_motor_ripple(const double theta_in[1], double tau_out[1]);
 
 /*
  * Motor torque to feed forward against friction and ripple: the share `compensation` of both.
@@ -1588,7 +1596,7 @@ int awiwi_motor_ripple(const double theta_in[1], double tau_out[1]);
  * margin of 0.4 %; else 1, and outputs without a value are NaN.
  * Cost: 15 add, 17 mul, 2 sincos, 1 calls.
  */
-int awiwi_motor_compensation(const double theta_in[1], const double thd_in[1], double tau_out[1]);
+AWIWI_MUST_CHECK int awiwi_motor_compensation(const double theta_in[1], const double thd_in[1], double tau_out[1]);
 
 /*
  * Acceleration under the motor torque tau and the tendon force f: (tau - friction - ripple - r f) / B.
@@ -1602,7 +1610,7 @@ int awiwi_motor_compensation(const double theta_in[1], const double thd_in[1], d
  * margin of 0.4 %; else 1, and outputs without a value are NaN.
  * Cost: 17 add, 18 mul, 2 sincos, 1 calls.
  */
-int awiwi_motor_acceleration(const double theta_in[1], const double thd_in[1], const double tau_in[1], const double f_in[1], double thdd_out[1]);
+AWIWI_MUST_CHECK int awiwi_motor_acceleration(const double theta_in[1], const double thd_in[1], const double tau_in[1], const double f_in[1], double thdd_out[1]);
 
 /*
  * Motor torque of a motion under the tendon force f: B thdd + friction + ripple + r f.
@@ -1616,7 +1624,7 @@ int awiwi_motor_acceleration(const double theta_in[1], const double thd_in[1], c
  * margin of 0.4 %; else 1, and outputs without a value are NaN.
  * Cost: 17 add, 19 mul, 2 sincos, 1 calls.
  */
-int awiwi_motor_torque(const double theta_in[1], const double thd_in[1], const double thdd_in[1], const double f_in[1], double tau_out[1]);
+AWIWI_MUST_CHECK int awiwi_motor_torque(const double theta_in[1], const double thd_in[1], const double thdd_in[1], const double f_in[1], double tau_out[1]);
 
 /*
  * Length dL of tendon in the mechanism, force and stiffness of the tendon at the lever angle theta.
@@ -1630,7 +1638,7 @@ int awiwi_motor_torque(const double theta_in[1], const double thd_in[1], const d
  * spring is stretched; else 1, and outputs without a value are NaN.
  * Cost: 38 add, 54 mul, 7 div, 3 sqrt, 1 sincos, 2 calls.
  */
-int awiwi_spring_lever(const double theta_in[1], double dL_out[1], double force_out[1], double stiffness_out[1]);
+AWIWI_MUST_CHECK int awiwi_spring_lever(const double theta_in[1], double dL_out[1], double force_out[1], double stiffness_out[1]);
 
 /*
  * Tendon force at the elongation x, counted from the slack end of the lever's travel. A polynomial;
@@ -1643,7 +1651,7 @@ int awiwi_spring_lever(const double theta_in[1], double dL_out[1], double force_
  * with a margin of 0.4 %; else 1, and outputs without a value are NaN.
  * Cost: 18 add, 18 mul.
  */
-int awiwi_spring_force(const double x_in[1], double f_out[1]);
+AWIWI_MUST_CHECK int awiwi_spring_force(const double x_in[1], double f_out[1]);
 
 /*
  * Tendon stiffness at the elongation x, counted from the slack end of the lever's travel.
@@ -1654,7 +1662,7 @@ int awiwi_spring_force(const double x_in[1], double f_out[1]);
  * with a margin of 0.4 %; else 1, and outputs without a value are NaN.
  * Cost: 18 add, 18 mul.
  */
-int awiwi_spring_stiffness(const double x_in[1], double k_out[1]);
+AWIWI_MUST_CHECK int awiwi_spring_stiffness(const double x_in[1], double k_out[1]);
 
 /*
  * Elongation at which the tendon's force is f.
@@ -1665,7 +1673,7 @@ int awiwi_spring_stiffness(const double x_in[1], double k_out[1]);
  * with a margin of 0.4 %; else 1, and outputs without a value are NaN.
  * Cost: 18 add, 18 mul.
  */
-int awiwi_spring_elongation(const double f_in[1], double x_out[1]);
+AWIWI_MUST_CHECK int awiwi_spring_elongation(const double f_in[1], double x_out[1]);
 
 /*
  * dL, force and stiffness of every tendon from its sensor, by the design or by the tendon's own
@@ -1679,7 +1687,7 @@ int awiwi_spring_elongation(const double f_in[1], double x_out[1]);
  * with a margin of 0.4 %; else 1, and outputs without a value are NaN.
  * Cost: 1062 add, 1062 mul, 37 calls.
  */
-int awiwi_calibration_readings(const double readings_in[38], double dL_out[38], double force_out[38], double stiffness_out[38]);
+AWIWI_MUST_CHECK int awiwi_calibration_readings(const double readings_in[38], double dL_out[38], double force_out[38], double stiffness_out[38]);
 
 /*
  * dL, force and stiffness at one sensor's counts by polynomials from the bench, constant coefficient
@@ -1698,7 +1706,7 @@ int awiwi_calibration_readings(const double readings_in[38], double dL_out[38], 
  * with a margin of 0.4 %; else 1, and outputs without a value are NaN.
  * Cost: 23 add, 19 mul, 1 div.
  */
-int awiwi_calibration_polynomials(const double counts_in[1], const double ends_in[2], const double length_powers_in[7], const double force_powers_in[7], const double stiffness_powers_in[7], double dL_out[1], double force_out[1], double stiffness_out[1]);
+AWIWI_MUST_CHECK int awiwi_calibration_polynomials(const double counts_in[1], const double ends_in[2], const double length_powers_in[7], const double force_powers_in[7], const double stiffness_powers_in[7], double dL_out[1], double force_out[1], double stiffness_out[1]);
 
 /*
  * Elongation of the fibre under the force f.
@@ -1743,7 +1751,7 @@ void awiwi_guiding_friction(const double f_in[1], const double bend_in[1], doubl
  * is positive and pivot 3 of K_mech - K_eff is positive; else 1, and outputs without a value are NaN.
  * Cost: 91 add, 111 mul, 7 div, 5 neg.
  */
-int awiwi_stiffness_correction(const double K_eff_in[16], const double K_mech_in[16], double K_imp_out[16]);
+AWIWI_MUST_CHECK int awiwi_stiffness_correction(const double K_eff_in[16], const double K_mech_in[16], double K_imp_out[16]);
 
 /*
  * Controller stiffness k_imp of one joint, and its sensitivity dk_imp/dk_mech to errors of the
@@ -1757,7 +1765,7 @@ int awiwi_stiffness_correction(const double K_eff_in[16], const double K_mech_in
  * positive; else 1, and outputs without a value are NaN.
  * Cost: 1 add, 4 mul, 2 div, 3 neg.
  */
-int awiwi_stiffness_correction_scalar(const double k_eff_in[1], const double k_mech_in[1], double k_imp_out[1], double sensitivity_out[1]);
+AWIWI_MUST_CHECK int awiwi_stiffness_correction_scalar(const double k_eff_in[1], const double k_mech_in[1], double k_imp_out[1], double sensitivity_out[1]);
 
 /*
  * Friction torque of a motor under the torque u and the load tau during the sample that just ended.
@@ -1778,7 +1786,7 @@ int awiwi_stiffness_correction_scalar(const double k_eff_in[1], const double k_m
  * is positive and the period is positive; else 1, and outputs without a value are NaN.
  * Cost: 5 add, 5 mul, 1 div, 1 neg.
  */
-int awiwi_friction_observer(const double momentum_in[1], const double u_in[1], const double tau_in[1], const double thd_in[1], const double B_in[1], const double gain_in[1], const double period_in[1], double momentum_next_out[1], double friction_out[1]);
+AWIWI_MUST_CHECK int awiwi_friction_observer(const double momentum_in[1], const double u_in[1], const double tau_in[1], const double thd_in[1], const double B_in[1], const double gain_in[1], const double period_in[1], double momentum_next_out[1], double friction_out[1]);
 
 /*
  * Joint torques that make the joints behave as a spring K and a damper D about the desired motion. M,
@@ -1819,7 +1827,7 @@ void awiwi_joint_impedance(const double M_in[16], const double C_in[16], const d
  * value are NaN.
  * Cost: 4 add, 3 mul.
  */
-int awiwi_motor_impedance(const double theta_in[1], const double thd_in[1], const double theta_des_in[1], const double f_des_in[1], const double friction_in[1], const double r_in[1], const double motor_kp_in[1], const double motor_kd_in[1], double tau_out[1]);
+AWIWI_MUST_CHECK int awiwi_motor_impedance(const double theta_in[1], const double thd_in[1], const double theta_des_in[1], const double f_des_in[1], const double friction_in[1], const double r_in[1], const double motor_kp_in[1], const double motor_kd_in[1], double tau_out[1]);
 
 /*
  * Motor torque that makes the force error of a tendon decay as e'' + kd e' + kp e = 0, for any motion
@@ -1846,7 +1854,7 @@ int awiwi_motor_impedance(const double theta_in[1], const double thd_in[1], cons
  * gain kd is positive; else 1, and outputs without a value are NaN.
  * Cost: 8 add, 8 mul, 2 div.
  */
-int awiwi_cascade(const double f_in[1], const double xd_in[1], const double stiffness_in[1], const double slope_in[1], const double hdd_in[1], const double f_des_in[1], const double fd_des_in[1], const double fdd_des_in[1], const double friction_in[1], const double r_in[1], const double B_in[1], const double force_kp_in[1], const double force_kd_in[1], double tau_out[1]);
+AWIWI_MUST_CHECK int awiwi_cascade(const double f_in[1], const double xd_in[1], const double stiffness_in[1], const double slope_in[1], const double hdd_in[1], const double f_des_in[1], const double fd_des_in[1], const double fdd_des_in[1], const double friction_in[1], const double r_in[1], const double B_in[1], const double force_kp_in[1], const double force_kd_in[1], double tau_out[1]);
 
 /*
  * Stability of the cascade with joint damping D and force loops kp, kd: proved if the margin is
@@ -1866,7 +1874,7 @@ int awiwi_cascade(const double f_in[1], const double xd_in[1], const double stif
  * is positive; else 1, and outputs without a value are NaN.
  * Cost: 166 add, 210 mul, 23 div, 20 calls.
  */
-int awiwi_cascade_certificate(const double D_in[16], const double P_in[32], const double kp_in[8], const double kd_in[8], const double weight_in[1], const double omega_in[1], double margin_out[1], double S_out[24]);
+AWIWI_MUST_CHECK int awiwi_cascade_certificate(const double D_in[16], const double P_in[32], const double kp_in[8], const double kd_in[8], const double weight_in[1], const double omega_in[1], double margin_out[1], double S_out[24]);
 
 /*
  * Motor torque that controls the tendon force f to f_des with gains kp and kd; friction and force are
@@ -1888,7 +1896,7 @@ int awiwi_cascade_certificate(const double D_in[16], const double P_in[32], cons
  * value are NaN.
  * Cost: 5 add, 3 mul.
  */
-int awiwi_tendon_force_pd(const double f_in[1], const double fd_in[1], const double f_des_in[1], const double fd_des_in[1], const double f_hat_in[1], const double friction_in[1], const double r_in[1], const double kp_in[1], const double kd_in[1], double tau_out[1]);
+AWIWI_MUST_CHECK int awiwi_tendon_force_pd(const double f_in[1], const double fd_in[1], const double f_des_in[1], const double fd_des_in[1], const double f_hat_in[1], const double friction_in[1], const double r_in[1], const double kp_in[1], const double kd_in[1], double tau_out[1]);
 
 /*
  * Motor torque that controls the tendon force to f_des with the frequency omega0 and the damping ratio
@@ -1915,7 +1923,7 @@ int awiwi_tendon_force_pd(const double f_in[1], const double fd_in[1], const dou
  * and outputs without a value are NaN.
  * Cost: 6 add, 15 mul, 1 div.
  */
-int awiwi_tendon_force_scheduled(const double f_in[1], const double fd_in[1], const double f_des_in[1], const double fd_des_in[1], const double f_hat_in[1], const double friction_in[1], const double r_in[1], const double b_in[1], const double stiffness_in[1], const double stiffness_rate_in[1], const double omega0_in[1], const double xi0_in[1], double tau_out[1], double gains_out[2]);
+AWIWI_MUST_CHECK int awiwi_tendon_force_scheduled(const double f_in[1], const double fd_in[1], const double f_des_in[1], const double fd_des_in[1], const double f_hat_in[1], const double friction_in[1], const double r_in[1], const double b_in[1], const double stiffness_in[1], const double stiffness_rate_in[1], const double omega0_in[1], const double xi0_in[1], double tau_out[1], double gains_out[2]);
 
 /*
  * Gains of a motor on a grounded spring k for poles of frequency omega0 and damping ratio xi0.
@@ -1931,7 +1939,7 @@ int awiwi_tendon_force_scheduled(const double f_in[1], const double fd_in[1], co
  * without a value are NaN.
  * Cost: 2 add, 4 mul.
  */
-int awiwi_pole_placement_motor(const double b_in[1], const double dtheta_in[1], const double k_in[1], const double omega0_in[1], const double xi0_in[1], double K_out[2]);
+AWIWI_MUST_CHECK int awiwi_pole_placement_motor(const double b_in[1], const double dtheta_in[1], const double k_in[1], const double omega0_in[1], const double xi0_in[1], double K_out[2]);
 
 /*
  * Optimal gains and torque of a motor on a tendon, by the secant between theta and theta_des, in
@@ -1952,7 +1960,7 @@ int awiwi_pole_placement_motor(const double b_in[1], const double dtheta_in[1], 
  * else 1, and outputs without a value are NaN.
  * Cost: 12 add, 18 mul, 2 div, 2 neg, 2 sqrt.
  */
-int awiwi_sdre_tendon(const double theta_in[1], const double thd_in[1], const double theta_des_in[1], const double b_in[1], const double dtheta_in[1], const double spring_in[3], const double weights_in[2], const double R_in[1], double K_out[2], double u_out[1]);
+AWIWI_MUST_CHECK int awiwi_sdre_tendon(const double theta_in[1], const double thd_in[1], const double theta_des_in[1], const double b_in[1], const double dtheta_in[1], const double spring_in[3], const double weights_in[2], const double R_in[1], double K_out[2], double u_out[1]);
 
 /*
  * Gains on (q, dq/dt, theta, dtheta/dt) of a joint with a spring k for two pole pairs of omega and xi.
@@ -1971,7 +1979,7 @@ int awiwi_sdre_tendon(const double theta_in[1], const double thd_in[1], const do
  * positive; else 1, and outputs without a value are NaN.
  * Cost: 14 add, 26 mul, 2 div.
  */
-int awiwi_pole_placement(const double m_in[1], const double b_in[1], const double k_in[1], const double dq_in[1], const double dtheta_in[1], const double omega_in[2], const double xi_in[2], double K_out[4]);
+AWIWI_MUST_CHECK int awiwi_pole_placement(const double m_in[1], const double b_in[1], const double k_in[1], const double dq_in[1], const double dtheta_in[1], const double omega_in[2], const double xi_in[2], double K_out[4]);
 
 /*
  * Motor torque u_des - K (x - x_des), where u_des holds the desired state; for placed and optimal
@@ -2019,7 +2027,7 @@ void awiwi_secant_stiffness(const double spring_in[3], const double deflexion_in
  * always defined.
  * Cost: the solver's own work and calls, at most: 1 of secant_stiffness, 1 of pole_placement_law.
  */
-int awiwi_sdre_joint(const double m_in[1], const double b_in[1], const double dq_in[1], const double dtheta_in[1], const double spring_in[3], const double weights_in[4], const double R_in[1], const double K_last_in[4], const double x_in[4], const double x_des_in[4], double K_out[4], double u_out[1]);
+AWIWI_MUST_CHECK int awiwi_sdre_joint(const double m_in[1], const double b_in[1], const double dq_in[1], const double dtheta_in[1], const double spring_in[3], const double weights_in[4], const double R_in[1], const double K_last_in[4], const double x_in[4], const double x_des_in[4], double K_out[4], double u_out[1]);
 
 /*
  * Gains of u = -K x that minimise the integral of x'Q x + R u^2, and the least cost x'S x; in coherent
@@ -2038,7 +2046,7 @@ int awiwi_sdre_joint(const double m_in[1], const double b_in[1], const double dq
  * always defined.
  * Cost: the solver's own work.
  */
-int awiwi_lqr(const double A_in[16], const double B_in[4], const double Q_in[16], const double R_in[1], double K_out[4], double S_out[16], double residual_out[1]);
+AWIWI_MUST_CHECK int awiwi_lqr(const double A_in[16], const double B_in[4], const double Q_in[16], const double R_in[1], double K_out[4], double S_out[16], double residual_out[1]);
 
 /*
  * Control of the example x1' = -x1^3 + x1^2 + x2, x2' = u.
@@ -2050,7 +2058,7 @@ int awiwi_lqr(const double A_in[16], const double B_in[4], const double Q_in[16]
  * outputs without a value are NaN.
  * Cost: 6 add, 7 mul.
  */
-int awiwi_backstepping_academic(const double x_in[2], const double k_in[2], double u_out[1]);
+AWIWI_MUST_CHECK int awiwi_backstepping_academic(const double x_in[2], const double k_in[2], double u_out[1]);
 
 /*
  * Lyapunov function of the example, its rate under the law, and the virtual control of x2.
@@ -2080,7 +2088,7 @@ void awiwi_backstepping_academic_lyapunov(const double x_in[2], const double k_i
  * outputs without a value are NaN.
  * Cost: 22 add, 16 mul, 4 div.
  */
-int awiwi_backstepping_position(const double motion_in[4], const double desired_in[5], const double plant_in[3], const double rates_in[4], const double scales_in[3], double tau_m_out[1]);
+AWIWI_MUST_CHECK int awiwi_backstepping_position(const double motion_in[4], const double desired_in[5], const double plant_in[3], const double rates_in[4], const double scales_in[3], double tau_m_out[1]);
 
 /*
  * Lyapunov function of the position law, its rate under the law, and the virtual controls of q', q''
@@ -2118,7 +2126,7 @@ void awiwi_backstepping_position_lyapunov(const double motion_in[4], const doubl
  * value are NaN.
  * Cost: 22 add, 16 mul, 4 div.
  */
-int awiwi_backstepping_impedance(const double state_in[4], const double desired_in[5], const double external_in[2], const double plant_in[3], const double gains_in[4], const double weights_in[2], double tau_m_out[1]);
+AWIWI_MUST_CHECK int awiwi_backstepping_impedance(const double state_in[4], const double desired_in[5], const double external_in[2], const double plant_in[3], const double gains_in[4], const double weights_in[2], double tau_m_out[1]);
 
 /*
  * Lyapunov function of the impedance law, its rate under the law, and the virtual controls of tau and
@@ -2155,7 +2163,7 @@ void awiwi_backstepping_impedance_lyapunov(const double state_in[4], const doubl
  * without a value are NaN.
  * Cost: 23 add, 20 mul, 4 div.
  */
-int awiwi_backstepping_nonlinear(const double state_in[4], const double desired_in[5], const double external_in[2], const double bodies_in[2], const double spring_in[2], const double gains_in[4], const double weights_in[2], double tau_m_out[1]);
+AWIWI_MUST_CHECK int awiwi_backstepping_nonlinear(const double state_in[4], const double desired_in[5], const double external_in[2], const double bodies_in[2], const double spring_in[2], const double gains_in[4], const double weights_in[2], double tau_m_out[1]);
 
 /*
  * Torques of both motors for an impedance of the link and a common torque of the springs, exact for
@@ -2181,7 +2189,7 @@ int awiwi_backstepping_nonlinear(const double state_in[4], const double desired_
  * positive; else 1, and outputs without a value are NaN.
  * Cost: 42 add, 32 mul, 7 div.
  */
-int awiwi_backstepping_antagonistic(const double joint_in[2], const double torques_in[4], const double desired_in[5], const double pretension_in[3], const double external_in[2], const double inertias_in[3], const double springs_in[4], const double impedance_in[2], const double tunings_in[8], double tau_m_out[2]);
+AWIWI_MUST_CHECK int awiwi_backstepping_antagonistic(const double joint_in[2], const double torques_in[4], const double desired_in[5], const double pretension_in[3], const double external_in[2], const double inertias_in[3], const double springs_in[4], const double impedance_in[2], const double tunings_in[8], double tau_m_out[2]);
 
 /*
  * Lyapunov function of the antagonistic law, its rate, and the virtual controls of each spring's
@@ -2225,7 +2233,7 @@ void awiwi_backstepping_antagonistic_lyapunov(const double joint_in[2], const do
  * positive; else 1, and outputs without a value are NaN.
  * Cost: 48 add, 40 mul, 7 div.
  */
-int awiwi_backstepping_antagonistic_decoupled(const double joint_in[2], const double torques_in[4], const double desired_in[5], const double pretension_in[3], const double external_in[2], const double inertias_in[3], const double springs_in[4], const double impedance_in[2], const double tunings_in[8], double tau_m_out[2]);
+AWIWI_MUST_CHECK int awiwi_backstepping_antagonistic_decoupled(const double joint_in[2], const double torques_in[4], const double desired_in[5], const double pretension_in[3], const double external_in[2], const double inertias_in[3], const double springs_in[4], const double impedance_in[2], const double tunings_in[8], double tau_m_out[2]);
 
 /*
  * Gains of the impedance law written as tau_m = -K (q, q', tau, tau') + h (tau_ext, tau_ext'), for q_d
@@ -2267,7 +2275,7 @@ void awiwi_backstepping_state_gains_derivatives(const double plant_in[3], const 
  * product is positive; else 1, and outputs without a value are NaN.
  * Cost: 7 add, 8 mul, 5 div, 3 neg, 1 sqrt.
  */
-int awiwi_optimal_backstepping_rates(const double K_opt_in[4], const double plant_in[3], const double impedance_in[2], const double weights_in[2], double rates_out[2]);
+AWIWI_MUST_CHECK int awiwi_optimal_backstepping_rates(const double K_opt_in[4], const double plant_in[3], const double impedance_in[2], const double weights_in[2], double rates_out[2]);
 
 /*
  * (K_3, K_4) and weights (C_t, C_s) for which all four feedback gains are exactly K_opt, for given
@@ -2285,7 +2293,7 @@ int awiwi_optimal_backstepping_rates(const double K_opt_in[4], const double plan
  * value are NaN.
  * Cost: 8 add, 10 mul, 5 div, 3 neg.
  */
-int awiwi_optimal_backstepping_weights(const double K_opt_in[4], const double plant_in[3], const double impedance_in[2], double rates_out[2], double weights_out[2]);
+AWIWI_MUST_CHECK int awiwi_optimal_backstepping_weights(const double K_opt_in[4], const double plant_in[3], const double impedance_in[2], double rates_out[2], double weights_out[2]);
 
 /*
  * (K_p, K_d) and (K_3, K_4) whose feedback gains are nearest to K_opt, by relative errors; start is a
@@ -2303,7 +2311,7 @@ int awiwi_optimal_backstepping_weights(const double K_opt_in[4], const double pl
  * always defined.
  * Cost: the solver's own work and calls, at most: 40 of backstepping_state_gains, 40 of backstepping_state_gains_derivatives.
  */
-int awiwi_optimal_backstepping(const double K_opt_in[4], const double plant_in[3], const double weights_in[2], const double start_in[4], double impedance_out[2], double rates_out[2]);
+AWIWI_MUST_CHECK int awiwi_optimal_backstepping(const double K_opt_in[4], const double plant_in[3], const double weights_in[2], const double start_in[4], double impedance_out[2], double rates_out[2]);
 
 /*
  * Filtered motion (position and four derivatives) one sample later, moving to the desired motion. A
@@ -2320,7 +2328,7 @@ int awiwi_optimal_backstepping(const double K_opt_in[4], const double plant_in[3
  * positive; else 1, and outputs without a value are NaN.
  * Cost: 45 add, 50 mul, 5 div.
  */
-int awiwi_reference_filter(const double motion_in[5], const double desired_in[5], const double delay_in[1], const double period_in[1], double motion_next_out[5]);
+AWIWI_MUST_CHECK int awiwi_reference_filter(const double motion_in[5], const double desired_in[5], const double delay_in[1], const double period_in[1], double motion_next_out[5]);
 
 /*
  * State of an antagonistic joint one sample ahead, from motor angles thetas, elongations stretches and
@@ -2354,7 +2362,7 @@ int awiwi_reference_filter(const double motion_in[5], const double desired_in[5]
  * without a value are NaN.
  * Cost: 119 add, 132 mul, 13 div, 4 neg, 12 calls.
  */
-int awiwi_antagonistic_observer(const double memory_in[13], const double thetas_in[2], const double stretches_in[2], const double measured_in[2], const double acted_in[2], const double acting_in[2], const double inertias_in[3], const double tendons_in[6], const double damping_in[1], const double friction_in[3], const double bandwidths_in[4], const double period_in[1], double memory_next_out[13], double joint_out[2], double motors_out[4], double torques_out[4], double springs_out[4], double load_out[1], double modelled_out[2], double resistance_out[2]);
+AWIWI_MUST_CHECK int awiwi_antagonistic_observer(const double memory_in[13], const double thetas_in[2], const double stretches_in[2], const double measured_in[2], const double acted_in[2], const double acting_in[2], const double inertias_in[3], const double tendons_in[6], const double damping_in[1], const double friction_in[3], const double bandwidths_in[4], const double period_in[1], double memory_next_out[13], double joint_out[2], double motors_out[4], double torques_out[4], double springs_out[4], double load_out[1], double modelled_out[2], double resistance_out[2]);
 
 /*
  * State and motor torques for a desired motion, with springs that are linear about their elongations.
@@ -2371,7 +2379,7 @@ int awiwi_antagonistic_observer(const double memory_in[13], const double thetas_
  * else 1, and outputs without a value are NaN.
  * Cost: 15 add, 15 mul, 2 div.
  */
-int awiwi_antagonistic_setpoint(const double desired_in[5], const double pretension_in[3], const double elongations_in[2], const double slopes_in[2], const double inertias_in[3], const double damping_in[1], double x_des_out[6], double u_des_out[2]);
+AWIWI_MUST_CHECK int awiwi_antagonistic_setpoint(const double desired_in[5], const double pretension_in[3], const double elongations_in[2], const double slopes_in[2], const double inertias_in[3], const double damping_in[1], double x_des_out[6], double u_des_out[2]);
 
 /*
  * Motor torques u_des - K (x - x_des), with the gains K = feedback, plus the resistance to compensate.
@@ -2431,7 +2439,7 @@ void awiwi_antagonistic_sharing(const double torque_in[1], const double pretensi
  * positive; else 1, and outputs without a value are NaN.
  * Cost: 49 add, 37 mul, 7 div.
  */
-int awiwi_backstepping_adaptive(const double joint_in[2], const double torques_in[4], const double desired_in[5], const double pretension_in[3], const double external_in[2], const double inertias_in[3], const double springs_in[4], const double damping_in[1], const double impedance_in[2], const double tunings_in[8], const double resistance_in[2], double tau_m_out[2]);
+AWIWI_MUST_CHECK int awiwi_backstepping_adaptive(const double joint_in[2], const double torques_in[4], const double desired_in[5], const double pretension_in[3], const double external_in[2], const double inertias_in[3], const double springs_in[4], const double damping_in[1], const double impedance_in[2], const double tunings_in[8], const double resistance_in[2], double tau_m_out[2]);
 
 /*
  * A motor that winds up a tendon with a spring, at a fixed joint: rates of x = (theta, theta'), and

@@ -3,6 +3,8 @@
 #ifndef AWIWI_SELF_TEST_H
 #define AWIWI_SELF_TEST_H
 
+#include "kernels.h"
+
 #ifdef __cplusplus
 extern "C" {
 #endif

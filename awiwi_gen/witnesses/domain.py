@@ -5,7 +5,7 @@ from typing import Any
 import casadi as ca
 from casadi import SX
 
-from awiwi_gen.structure import coordinates, leaders, radius
+from awiwi_gen.structure import coordinates, leaders, motion
 
 
 def loops_close(finger: Any, q: SX, *_: SX) -> list[SX]:
@@ -16,7 +16,8 @@ def loops_close(finger: Any, q: SX, *_: SX) -> list[SX]:
         if bar is not None:
             angle = q[place[link.joint]]
             if link.joint in leader:
-                angle = angle * radius(finger, leader[link.joint]) / radius(finger, link.joint)
+                ratio, rest = motion(finger, link.joint)
+                angle = angle * ratio + rest
             end = bar.crank * ca.cos(angle + bar.reference), bar.crank * ca.sin(angle + bar.reference)
             squared = (bar.ground - end[0]) ** 2 + end[1] ** 2
             longest, shortest = (bar.coupler + bar.rocker) ** 2, (bar.coupler - bar.rocker) ** 2
