@@ -63,7 +63,14 @@ def _of_finger(finger: Finger) -> tuple[tuple[str, str], ...]:
     if not finger.pulled:
         return tuple((family, _none(finger)) for family in (*_NEED_TENDONS, *_NEED_LENGTHS, *_NEED_TORQUES))
     rows = [row for row, tendon in enumerate(finger.tendons) if tendon.spring is None]
-    couplings = [[coupling[row] for row in rows] for coupling in Chain(finger).couplings()]
+    couplings = ([coupling[row] for row in rows] for coupling in Chain(finger).couplings())
+    first = next(couplings)
+    # What one pose allows is no longer in question; most fingers need no second one.
+    return _reasons(finger, [first]) and _reasons(finger, [first, *couplings])
+
+
+def _reasons(finger: Finger, couplings: Sequence[Any]) -> tuple[tuple[str, str], ...]:
+    """(Kernel family, reason) for every kernel that none of the couplings of some poses allows."""
     found: list[tuple[str, str]] = []
     lengths = _indistinct(couplings, finger.joints)
     one_sided = _one_sided(couplings, finger.joints)
