@@ -4,8 +4,8 @@
     float(hand.fingers["index"].radii["pip"])     # 0.006, in metres
     hand.symbolic(lambda path, _: Symbol(path))   # the same tree, with symbols for numbers
 
-The parts of a hand are in `parts`, reading a file is in `file`, what no hand can have is in `lint`, warnings are in
-`plausibility`, and what the tendons of a hand make impossible is in `capability`.
+The parts of a hand are in `parts`, reading a file is in `file`, what no hand can have is in `lint` and `tensors`,
+warnings are in `plausibility`, and what the tendons of a hand make impossible is in `capability`.
 """
 
 from __future__ import annotations
