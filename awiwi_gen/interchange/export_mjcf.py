@@ -58,7 +58,7 @@ class _Writer:
 
     def write(self, palm: Element) -> None:
         """Add the finger below the palm, and its tendons, couplings and motors."""
-        base = SubElement(palm, "body", name=f"{self.name}_base")
+        base = SubElement(palm, "body", name=f"{self.name}.base")
         if self.finger.base is not None:
             _place(base, vector(self.finger.base.position), rpy_matrix(self.finger.base.rpy))
         self.bodies[PALM] = base
@@ -66,12 +66,12 @@ class _Writer:
         for follower, leader in self.finger.leaders.items():
             self._coupling(follower, leader)
         for number, tendon in enumerate(self.finger.tendons):
-            self._tendon(f"{self.name}_tendon{number}", tendon)
+            self._tendon(f"{self.name}.tendon{number}", tendon)
         if not self.finger.tendons:
             torque = float(self.hand.limits.joint_torque)
             for joint in self.finger.joints:
                 full = f"{self.name}_{joint}"
-                SubElement(self.sections["actuator"], "motor", name=f"{full}_motor", joint=full,
+                SubElement(self.sections["actuator"], "motor", name=f"{full}.motor", joint=full,
                            ctrlrange=text((-torque, torque)))  # fmt: skip
 
     def _lose(self, what: str, place: str) -> None:
@@ -92,7 +92,7 @@ class _Writer:
             for each in waiting:
                 self.bodies[each.link.joint] = parent
             waiting = []
-        SubElement(parent, "site", name=f"{self.name}_tip", pos=text(vector(self.parts[-1].link.offset)))
+        SubElement(parent, "site", name=f"{self.name}.tip", pos=text(vector(self.parts[-1].link.offset)))
 
     def _before(self, joint: str) -> str:
         order = [PALM, *(link.joint for link in self.finger.links)]
@@ -157,11 +157,11 @@ class _Writer:
             for joint, coefficient in arms.items():
                 SubElement(written[-1], "joint", joint=f"{self.name}_{joint}", coef=text(coefficient))
         for number, points in enumerate(self._lines(tendon)):
-            full = name if not written else f"{name}_line{number}"
+            full = name if not written else f"{name}.line{number}"
             written.append(SubElement(self.sections["tendon"], "spatial", name=full))
             for place, (link, at) in enumerate(points):
-                SubElement(self.bodies[link], "site", name=f"{full}_site{place}", pos=text(at))
-                SubElement(written[-1], "site", site=f"{full}_site{place}")
+                SubElement(self.bodies[link], "site", name=f"{full}.site{place}", pos=text(at))
+                SubElement(written[-1], "site", site=f"{full}.site{place}")
         if len(written) > 1:
             self._lose("tendons of arcs and lines: one tendon of MuJoCo for each, and their forces are equal", name)
         if tendon.rest.value:
@@ -184,7 +184,7 @@ class _Writer:
     def _pull(self, element: Element, tendon: Tendon, alone: bool) -> None:
         name = element.get("name", "")
         if tendon.spring is None:
-            SubElement(self.sections["actuator"], "motor", name=f"{name}_motor", tendon=name, gear="-1",
+            SubElement(self.sections["actuator"], "motor", name=f"{name}.motor", tendon=name, gear="-1",
                        ctrlrange=text((0, float(self.hand.limits.tendon_force))))  # fmt: skip
             return
         slack = float(tendon.spring.rest.value - tendon.rest.value)

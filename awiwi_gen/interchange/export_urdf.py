@@ -43,19 +43,19 @@ def text_and_losses(hand: Hand) -> tuple[str, list[Loss]]:
 def _finger(root: Element, hand: Hand, name: str, finger: Finger) -> None:
     base = finger.base
     position = vector(base.position) if base else np.zeros(3)
-    _fixed(root, "palm", f"{name}_base", position, rpy_matrix(base.rpy if base else None))
-    parent = f"{name}_base"
+    _fixed(root, "palm", f"{name}.base", position, rpy_matrix(base.rpy if base else None))
+    parent = f"{name}.base"
     for part in parts(finger):
         child = f"{name}_{part.link.joint}"
         _link(root, child, part)
         _joint(root, hand, name, finger, part, parent)
         parent = child
-    _fixed(root, parent, f"{name}_tip", vector(finger.links[-1].offset), np.eye(3))
+    _fixed(root, parent, f"{name}.tip", vector(finger.links[-1].offset), np.eye(3))
 
 
 def _fixed(root: Element, parent: str, child: str, position: Array, axes: Array) -> None:
     SubElement(root, "link", name=child)
-    joint = SubElement(root, "joint", name=f"{child}_fixed", type="fixed")
+    joint = SubElement(root, "joint", name=f"{child}.fixed", type="fixed")
     SubElement(joint, "parent", link=parent)
     SubElement(joint, "child", link=child)
     SubElement(joint, "origin", xyz=text(position), rpy=text(rpy_of(axes)))

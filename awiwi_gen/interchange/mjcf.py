@@ -196,6 +196,8 @@ def prepare(spec: Any, without: set[str]) -> list[Loss]:
     for mesh in list(spec.meshes):
         if mesh.name not in used:
             spec.delete(mesh)
+    for colored in (*spec.sites, *spec.tendons):
+        colored.material = ""
     for kind in ("materials", "textures"):
         for each in list(getattr(spec, kind)):
             spec.delete(each)

@@ -87,14 +87,14 @@ def _unique(names: Mapping[str, str]) -> dict[str, str]:
 def finger_names(chains: Iterable[tuple[str, list[str]]]) -> list[str]:
     """A name for each finger, from the body that carries it and the names of its bodies and joints.
 
-    That is index for index_base, else a word such as thumb that the names use, or what they begin with.
+    That is index for index.base, else a word such as thumb that the names use, or what they begin with.
     """
     found: list[str] = []
     for number, (carrier, names) in enumerate(chains, start=1):
         words = [word for name in names for word in re.split(r"[^a-z]+", _split(name))]
         known = [_FINGERS[word] for word in words if word in _FINGERS]
         begin = re.sub(r"[^a-z0-9]", "", shared_start([plain(name) for name in names]))[:_LONGEST_FINGER]
-        candidates = [carrier.removesuffix("_base")] if carrier.endswith("_base") else []
+        candidates = [carrier.removesuffix(".base")] if carrier.endswith(".base") else []
         candidates += [max(known, key=known.count)] if known else []
         candidates += [begin, f"finger{number}"]
         found.append(next(name for name in candidates if name not in found and _usable(_FINGER, name)))

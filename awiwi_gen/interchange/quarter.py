@@ -30,7 +30,7 @@ def quarter_angle(text: str) -> float | None:
     meant = quarters * (math.pi / 2)
     exponent = published.as_tuple().exponent
     if quarters == 0 or not isinstance(exponent, int) or exponent > -2:
-        return 0.0 if abs(angle) < 1e-9 else None
+        return None
     # Some files cut digits off instead of rounding them.
     return meant if abs(angle - meant) <= max(1.001 * 10.0**exponent, 1e-14) and exponent <= -2 else None
 
