@@ -27,6 +27,44 @@ def fixed_turn(turn):
     return matrix
 
 
+def roll_pitch_yaw(rpy):
+    """The rotation of URDF's fixed angles, written out."""
+    (cr, cp, cy), (sr, sp, sy) = np.cos(rpy), np.sin(rpy)
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
+
+
+def rotations(finger, angles):
+    """From coordinates of each link to those of the one before, at the angles (links) of all joints."""
+    fixed = [fixed_turn(link.turn) @ roll_pitch_yaw(vector(link.rpy or (0, 0, 0))) for link in finger.links]
+    drawn = [float(link.reference or 0) for link in finger.links]
+    return [F @ rotation_z(angle - zero) for F, angle, zero in zip(fixed, angles, drawn, strict=True)]
+
+
+def passive_torques(finger, q, qd):
+    """Torques (n) [N m] of springs, damping and friction in the joints."""
+    W, torques = coordinates(finger), []
+    for link, angle, speed in zip(finger.links, W @ q, W @ qd, strict=True):
+        torque = float(link.damping or 0) * speed
+        if link.friction:
+            torque += float(link.friction.torque) * 2 / np.pi * np.arctan(speed / float(link.friction.velocity))
+        if link.spring:
+            torque += float(link.spring.stiffness) * (angle - float(link.spring.reference))
+        torques.append(torque)
+    return W.T @ torques
+
+
+def armature(finger):
+    """What rotors add to the mass matrix (n x n) [kg m^2]."""
+    W = coordinates(finger)
+    return W.T @ np.diag([float(link.armature or 0) for link in finger.links]) @ W
+
+
 def vector(quantities):
     return np.array([float(x) for x in quantities])
 
@@ -48,11 +86,10 @@ def coordinates(finger):
 
 
 def joint_torques(finger, q, qd, qdd, g, *misprints):
-    """Joint torques (n) [N m] of a motion of the finger; ``misprints`` are equation numbers to take literally."""
+    """Joint torques (n) [N m] of a motion of the links; ``misprints`` are equation numbers to take literally."""
     W = coordinates(finger)
     q, qd, qdd = W @ q, W @ qd, W @ qdd
-    # from coordinates of link i + 1 to those of link i
-    turns = [fixed_turn(link.turn) @ rotation_z(angle) for link, angle in zip(finger.links, q, strict=True)]
+    turns = rotations(finger, q)
     offsets = [vector(link.offset) for link in finger.links]
     spin, turning = np.zeros(3, q.dtype), np.zeros(3, q.dtype)
     acceleration = np.zeros(3) if "2.5" in misprints else -np.asarray(g)  # 2.5 does not tell where gravity enters
@@ -66,7 +103,9 @@ def joint_torques(finger, q, qd, qdd, g, *misprints):
             swept = turn.T @ np.cross(spin, velocity * Z)
         turning = turn.T @ turning + swept + rate * Z
         spin = turn.T @ spin + velocity * Z
-        mass, com, inertia = float(link.mass), vector(link.com), tensor(link.inertia)
+        mass, com, inertia = float(link.mass or 0), vector(link.com or (0, 0, 0)), np.zeros((3, 3))
+        if link.inertia:
+            inertia = tensor(link.inertia)
         centripetal = np.cross(spin, np.cross(spin, com))
         if "2.10" in misprints:  # from left to right
             centripetal = np.cross(np.cross(spin, spin), com)

@@ -12,6 +12,9 @@ AT_ZERO = {"sin": 0, "cos": 1, "tan": 0, "asin": 0, "atan": 0, "exp": 1, "sqrt":
 
 ONE = Fraction(1)
 
+# Sums of numbers that cancel to this many bits are zero: what is left of sin^2 + cos^2 - 1, with sines of 400 bits.
+CANCELLED_BITS = 350
+
 # Longer fractions are rounded to this many bits: far beyond the 200 bits at which passes are compared.
 FRACTION_BITS = 512
 
@@ -68,9 +71,9 @@ class Builder:
         for ref in refs:
             coefficient, base = self.split(ref)
             if base is None:
-                constant += coefficient
+                constant = _sum(constant, coefficient)
             else:
-                coefficients[base] = coefficients.get(base, Fraction(0)) + coefficient
+                coefficients[base] = _sum(coefficients[base], coefficient) if base in coefficients else coefficient
         terms = [self.scaled(c, base) for base, c in coefficients.items() if c]
         terms.sort(key=node_of)
         if constant:
@@ -238,6 +241,16 @@ class Builder:
     def graph(self, outputs: Iterable[Output]) -> Graph:
         """The graph of these outputs: unreachable nodes dropped, the rest in canonical order."""
         return canonical(Graph(tuple(self.nodes), tuple(outputs)))
+
+
+def _sum(a: Fraction, b: Fraction) -> Fraction:
+    total = a + b
+    return total if _exponent(total) > _exponent(b) - CANCELLED_BITS else Fraction(0)
+
+
+def _exponent(value: Fraction) -> int:
+    """About the binary logarithm."""
+    return value.numerator.bit_length() - value.denominator.bit_length()
 
 
 def shorten(value: Fraction) -> Fraction:

@@ -155,8 +155,9 @@ class Joint:
     the joint, and `next_rotation` is None.
 
     In working axes, `axis` (3) is the joint's axis, `offset` (3) [m] leads to the next joint, and `rotation` (3 x 3)
-    takes the link's own axes to the working axes. `link_offset` and `link_body` are offset and body in the link's own
-    axes. The body is link number `link`, or its crank. The link's frame lies on the axis, `shift` [m] beyond the joint.
+    takes the link's own axes to the working axes. `link_body` is the body in the link's own axes, and so is the offset,
+    `link_offset`, if the next joint is parallel. The body is link number `link`, or its crank. The link's frame lies on
+    the axis, `shift` [m] beyond the joint.
     """
 
     coordinate: int
@@ -221,7 +222,8 @@ class Assembly:
 class _Part:
     """A joint of the chain as the hand file gives it: its fixed rotations, then a rotation about z.
 
-    The angle about z is `angle`, or for the coupler of a four-bar the angle with cosine and sine `cos_sin`.
+    The angle about z is `angle`, or for the coupler of a four-bar the angle with cosine and sine `cos_sin`. `offset` leads
+    to the next joint, in the link's axes, or once joints are shifted in those in front of the next joint.
     """
 
     coordinate: int
@@ -271,7 +273,7 @@ def assemble(finger: Finger, q: SX) -> Assembly:
                 to_next.T @ _Z,
                 body.rotated(to_next.T),
             )
-        offset = rotation @ part.offset
+        offset = part.offset if to_next is not None else rotation @ part.offset
         joints.append(
             Joint(
                 part.coordinate,
@@ -320,9 +322,9 @@ def _shifted(parts: Sequence[_Part]) -> Iterator[_Part]:
         offset, body = part.offset + _Z * shift, part.body.moved(_Z * shift)
         before = shift
         if following is not None:
-            axis = _Z if following.fixed_rotation is None else following.fixed_rotation @ _Z
-            shift = ca.dot(axis, offset)
-            offset = offset - axis * shift
+            if following.fixed_rotation is not None:
+                offset = following.fixed_rotation.T @ offset
+            shift, offset = offset[2], ca.vertcat(offset[:2], 0)
         yield replace(part, offset=offset, body=body, shift=before)
 
 
@@ -332,10 +334,10 @@ def _masses_moved_inward(parts: Sequence[_Part]) -> tuple[list[Moments], SX]:
     for part, before in zip(reversed(parts), [*reversed(parts[:-1]), None], strict=True):
         moved, rest = (part.body + moved).split()
         bodies.append(rest)
-        if part.fixed_rotation is not None:
-            moved = moved.rotated(part.fixed_rotation)
         if before is not None:
             moved = moved.moved(before.offset)
+        if part.fixed_rotation is not None:
+            moved = moved.rotated(part.fixed_rotation)
     return bodies[::-1], moved.first
 
 
