@@ -32,10 +32,11 @@ def read(path: Path, exact: bool = False, without: Iterable[str] = ()) -> Model:
     are left out.
     """
     spec, notes = parse(path, exact)
+    driven = {each.target for each in spec.actuators if each.trntype == mujoco.mjtTrn.mjTRN_TENDON}
     losses = prepare(spec, set(without))
     massless = {body.name for body in spec.bodies[1:] if body.explicitinertial and body.mass <= SPECK}
     compiled = compile_spec(spec, path)
-    tendons, lost = _tendons(compiled)
+    tendons, lost = _tendons(compiled, driven)
     return Model(
         name=spec.modelname or path.stem,
         file=path.name,
@@ -239,6 +240,11 @@ def _refused(path: Path, error: Exception) -> InputError:
     return InputError(Fault(file=str(path), message=f"is refused by MuJoCo {mujoco.__version__}: {reason}{missing}"))
 
 
+def _is_polynomial(compiled: Any, joint: int) -> bool:
+    dof = int(compiled.jnt_dofadr[joint])
+    return bool(np.any(compiled.jnt_stiffnesspoly[joint]) or np.any(compiled.dof_dampingpoly[dof]))
+
+
 def rotation(quat: Any) -> Array:
     """The matrix (3 x 3) of a unit quaternion (w, x, y, z); quarter turns are exact."""
     matrix = np.zeros(9)
@@ -296,8 +302,8 @@ def _locks(compiled: Any) -> tuple[Lock, ...]:
     return tuple(found)
 
 
-def _tendons(compiled: Any) -> tuple[tuple[Tendon, ...], list[Loss]]:
-    found, wraps, pushed, poly = [], [], [], []
+def _tendons(compiled: Any, driven: set[str]) -> tuple[tuple[Tendon, ...], list[Loss]]:
+    found, wraps, pushed, poly, both = [], [], [], [], []
     joint_wrap, site_wrap = mujoco.mjtWrap.mjWRAP_JOINT, mujoco.mjtWrap.mjWRAP_SITE
     for index in range(compiled.ntendon):
         name = compiled.tendon(index).name or f"tendon{index}"
@@ -306,6 +312,9 @@ def _tendons(compiled: Any) -> tuple[tuple[Tendon, ...], list[Loss]]:
         kinds = {int(compiled.wrap_type[k]) for k in places}
         stiffness = float(compiled.tendon_stiffness[index])
         low, rest = map(float, compiled.tendon_lengthspring[index])
+        if stiffness and name in driven:
+            both.append(name)
+            stiffness = 0.0
         spring: dict[str, Any] = {"stiffness": stiffness, "rest": rest if stiffness else 0.0}
         if stiffness and low > 0:
             pushed.append(name)
@@ -323,6 +332,11 @@ def _tendons(compiled: Any) -> tuple[tuple[Tendon, ...], list[Loss]]:
     losses = [
         Loss("tendons that wrap around geoms or branch at pulleys: left out", tuple(wraps)),
         Loss("springs of tendons that also push: the hand's springs only pull", tuple(pushed)),
+        Loss("springs of tendons that a motor pulls: the hand's tendons have one or the other", tuple(both)),
+        Loss(
+            "polynomial stiffness or damping of joints: only the linear term is kept",
+            tuple(compiled.joint(i).name for i in range(compiled.njnt) if _is_polynomial(compiled, i)),
+        ),
         Loss("polynomial stiffness of tendons: only its linear term is kept", tuple(poly)),
         Loss(
             "damping, armature or friction of tendons",

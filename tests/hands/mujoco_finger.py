@@ -37,7 +37,18 @@ class MujocoFinger:
             lock = locks.get(name)
             self.matrix[row, free.index(lock.leader if lock else names[name])] = lock.sign * lock.ratio if lock else 1.0
             self.offset[row] = lock.offset if lock else 0.0
+        self.last = [self._is_last(link.published.name) for link in self.finger.links]
+        mujoco.mj_resetData(self.compiled, self.data)
+        self.data.qpos[:] = self.compiled.qpos0
+        mujoco.mj_kinematics(self.compiled, self.data)
+        self.drawn = self.data.xmat.reshape(-1, 3, 3).copy()
         self.tendons = [self.compiled.tendon(tendon.name).id for tendon in self.finger.tendons]
+
+    def _is_last(self, name: str) -> bool:
+        """Whether a joint is the last one of its body, which carries the frame of its link."""
+        joint = self.compiled.joint(name).id
+        body = int(self.compiled.jnt_bodyid[joint])
+        return joint == self.compiled.body_jntadr[body] + self.compiled.body_jntnum[body] - 1
 
     def set(self, q: np.ndarray, qd: np.ndarray) -> None:
         """Move the finger; everything else stands as drawn."""
@@ -84,8 +95,21 @@ class MujocoFinger:
         axes = self.data.xmat[palm].reshape(3, 3)
         return axes @ self.finger.axes, self.data.xpos[palm] + axes @ self.finger.position
 
-    def anchors(self) -> tuple[np.ndarray, np.ndarray]:
-        """Axis and anchor of each joint, in the base frame."""
-        axes, origin = self.base()
-        ids = [self.compiled.joint(link.published.name).id for link in self.finger.links]
-        return self.data.xaxis[ids] @ axes, (self.data.xanchor[ids] - origin) @ axes
+    def link_frames(self) -> list[np.ndarray]:
+        """The frame (4 x 4) of each link in the base frame; of a joint with others after it in its body only z."""
+        base_axes, base_origin = self.base()
+        found = []
+        signs = {lock.follower: lock.sign for lock in self.finger.followed}
+        for link, last in zip(self.finger.links, self.last, strict=True):
+            sign = signs.get(link.joint, 1)
+            joint = self.compiled.joint(link.published.name)
+            body = int(self.compiled.jnt_bodyid[joint.id])
+            frame = np.eye(4)
+            axes = self.data.xmat[body].reshape(3, 3) @ self.drawn[body].T @ link.frame.axes
+            frame[:3, :3] = base_axes.T @ axes
+            if not last:
+                frame[:3, :2] = np.nan
+                frame[:3, 2] = base_axes.T @ self.data.xaxis[joint.id] * sign
+            frame[:3, 3] = base_axes.T @ (self.data.xanchor[joint.id] - base_origin)
+            found.append(frame)
+        return found

