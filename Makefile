@@ -6,6 +6,7 @@
 # make firmware  every kernel on every target: equal bits, committed figures (ACCEPT=1 writes them, ALL=1: more)
 # make analysis  gcc -fanalyzer, clang-tidy and cppcheck: no finding without a reason
 # make mutants  change one operator or constant of csrc/ at a time (COUNT=60: some of them); hours for all
+# make test-hands  published hands: imported, one finger of each proved and compared with MuJoCo (ACCEPT=1: new table)
 # make clean  remove what make made (generated/ stays: it is checked in)
 
 PYTHON ?= python3
@@ -54,6 +55,14 @@ analysis: .venv/installed
 mutants: .venv/installed
 	@$(BIN)/python -m tests.targets.mutants $(if $(COUNT),--count $(COUNT))
 
+test-hands: .venv/installed .venv-hands/installed
+	@PYTHONPATH=.venv-hands $(BIN)/python -m tests.hands $(if $(ONLY),--only "$(ONLY)") $(if $(ACCEPT),--accept)
+
+# MuJoCo beside .venv, whose libraries it uses: nothing else of its requirements is needed to compile a model.
+.venv-hands/installed: tests/hands/requirements.lock .venv/installed
+	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --upgrade --target .venv-hands --requirement $<
+	@touch $@
+
 # The peers live in an environment of their own. Where one cannot be installed, the others are compared.
 .venv-bench/installed: bench/requirements.lock
 	$(PYTHON) -m venv .venv-bench
@@ -63,7 +72,7 @@ mutants: .venv/installed
 	@touch $@
 
 clean:
-	rm -rf .venv .venv-bench .cache build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf .venv .venv-bench .venv-hands .cache build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
-.PHONY: all test lint torture check report bench firmware analysis mutants clean
+.PHONY: all test test-hands lint torture check report bench firmware analysis mutants clean

@@ -9,7 +9,8 @@ from importlib.util import find_spec
 
 from awiwi_gen.errors import MissingExtraError
 
-ORDER = ("cli", "generate", "studies", "interchange")  # each but the last includes those before it
+ORDER = ("cli", "generate", "studies")  # each includes those before it
+INTERCHANGE = "interchange"  # beside studies, includes generate
 # The module, the package that has it, and the extra that installs it.
 EXTRAS = {
     "casadi": ("casadi", "generate"),
@@ -21,7 +22,7 @@ EXTRAS = {
     "tree_sitter_toml": ("tree-sitter-toml", "generate"),
     "typer": ("typer", "cli"),
     "matplotlib": ("matplotlib", "studies"),
-    "mujoco": ("mujoco", "interchange"),
+    "mujoco": ("mujoco", INTERCHANGE),
     "scipy": ("scipy", "studies"),
 }
 COMMAND_LINE = ("typer", "pydantic")  # Typer imports pydantic
@@ -39,7 +40,7 @@ def missing(purpose: str, *modules: str) -> str:
     """The sentence about those modules that are not installed, or nothing."""
     absent = [EXTRAS[module] for module in modules if find_spec(module) is None]
     packages = [package for package, _ in absent]
-    extra = max((extra for _, extra in absent), key=ORDER.index, default="")
+    extra = max((extra for _, extra in absent), key=(*ORDER, INTERCHANGE).index, default="")
     listed = " and ".join([", ".join(packages[:-1])] * (len(packages) > 1) + packages[-1:])
     them = "it" if len(packages) == 1 else "them"
     return f"{purpose} needs {listed}; install {them}: pip install 'awiwi_gen[{extra}]'" if absent else ""

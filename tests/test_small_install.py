@@ -14,7 +14,7 @@ import pytest
 from commands import ONE_FINGER, small  # noqa: F401 a fixture
 
 import awiwi_gen
-from awiwi_gen.extras import COMMAND_LINE, EXTRAS, GENERATE, HAND, ORDER
+from awiwi_gen.extras import COMMAND_LINE, EXTRAS, GENERATE, HAND, INTERCHANGE, ORDER
 
 BEYOND_CLI = sorted(EXTRAS.keys() - COMMAND_LINE)
 HIDE = "import sys; sys.modules.update(dict.fromkeys({!r}))\n"  # None there is a module that cannot be found
@@ -135,5 +135,6 @@ def test_the_extras_are_those_of_the_project(root):
     for before, extra in pairwise(ORDER):
         assert f"awiwi_gen[{before}]" in own[extra]
         own[extra].remove(f"awiwi_gen[{before}]")
+    own[INTERCHANGE] = set(project["optional-dependencies"][INTERCHANGE]) - {"awiwi_gen[generate]"}
     for extra, packages in own.items():
         assert packages == {package for package, of in EXTRAS.values() if of == extra}

@@ -96,7 +96,7 @@ def finger_names(chains: Iterable[tuple[str, list[str]]]) -> list[str]:
         begin = re.sub(r"[^a-z0-9]", "", shared_start([plain(name) for name in names]))[:_LONGEST_FINGER]
         candidates = [carrier.removesuffix(".base")] if carrier.endswith(".base") else []
         candidates += [max(known, key=known.count)] if known else []
-        candidates += [begin, f"finger{number}"]
+        candidates += [begin if len(begin) > 1 else "", f"finger{number}"]
         found.append(next(name for name in candidates if name not in found and _usable(_FINGER, name)))
     return found
 

@@ -131,9 +131,8 @@ def prove(file: Path, finger: str, generated: Path) -> list[str]:
         return []
     try:
         proof = json.loads(done.stdout)
-        return [f"{kernel['name']} is not proved" for kernel in proof["kernels"] if not kernel["passed"]] or [
-            done.stdout[:500]
-        ]
+        refused = [f"{kernel['name']} is not proved" for kernel in proof["kernels"] if not kernel["passed"]]
+        return refused or [done.stdout[:500]]
     except (ValueError, KeyError, TypeError):
         return [(done.stderr or done.stdout).strip()[:500]]
 
@@ -172,10 +171,12 @@ def judge_table(found: str, accept: bool) -> list[str]:
         DOCS.write_text(f"{before}{BEGIN}{found}{END}{after}", encoding="utf-8")
         return []
     known = rest.partition(END)[0]
-    same = [_without_difference(line) for line in known.splitlines()] == [
-        _without_difference(line) for line in found.splitlines()
-    ]
-    return [] if same else [f"{DOCS.name}: its table of hands is another one; write it with make test-hands ACCEPT=1"]
+    old, new = ([_without_difference(line) for line in text.splitlines()] for text in (known, found))
+    return (
+        []
+        if old == new
+        else [f"{DOCS.name}: its table of hands is another one; write it with make test-hands ACCEPT=1"]
+    )
 
 
 def _without_difference(line: str) -> list[str]:

@@ -1,0 +1,246 @@
+"""Import: fingers, frames, names and couplings from a tree of bodies, and the hand file that is written of them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from bodies import body, finger, joint, pose, spun, two_fingers
+from hand_numbers import coordinates, fingers_of, poses, rpy_matrix, tendon_lengths
+
+from awiwi_gen.errors import InputError
+from awiwi_gen.hand import Hand
+from awiwi_gen.interchange.draft import draft
+from awiwi_gen.interchange.model import Lock, Loss, Model, Tendon
+from awiwi_gen.interchange.names import finger_names, joint_names, plain
+from awiwi_gen.interchange.quarter import quarter_angle, quarter_axis, quarter_rotation
+from awiwi_gen.interchange.toml import angle, cite, hand_text, length, quantity, tidy
+
+POINTS = {1: np.array([0.0, 0.01, 0.0]), 2: np.array([0.01, 0.0, 0.004]), 4: np.array([0.0, 0.0, 0.002])}
+PATH = Tendon("string", path=tuple(POINTS.items()))
+
+
+def imported(model: Model, **options) -> tuple[Hand, dict]:
+    text = hand_text(draft(model, **options))
+    return Hand.parse(text), fingers_of(text)
+
+
+def states(model: Model):
+    random = np.random.default_rng(4)
+    for _ in range(20):
+        yield {each.name: random.uniform(-1, 1) for each in model.joints}
+
+
+# -- frames ----------------------------------------------------------------------------------------------------------
+
+
+def test_links_stand_where_the_tree_has_them():
+    model = finger()
+    _, tables = imported(model)
+    (written,) = tables.values()
+    for angles in states(model):
+        base = rpy_matrix(written["base"]["rpy"])
+        palm_axes, palm = pose(model, {}, 1)
+        frames = poses(written, np.array(list(angles.values())))
+        pad_axes, pad = pose(model, angles, 4)
+        tip = pad + pad_axes @ np.array([0.005, 0.0, 0.0])
+        ours = palm + palm_axes @ (np.array(written["base"]["position"]) + base @ frames[-1][1])
+        assert ours == pytest.approx(tip, abs=1e-15)
+        axis = pose(model, angles, 3)[0] @ model.joints[2].axis
+        assert palm_axes @ base @ frames[2][0][:, 2] == pytest.approx(axis, abs=1e-14)
+
+
+def test_two_joints_in_one_body_are_a_link_without_mass_and_one_with_the_mass():
+    hand, _ = imported(finger())
+    (links,) = (each.links for each in hand.fingers.values())
+
+    assert [link.mass is None for link in links] == [True, False, False]
+    assert float(links[2].mass) == 0.008  # the pad is welded to the last link
+
+
+def test_links_need_a_roll_about_x_at_most():
+    hand, _ = imported(finger())
+    for link in next(iter(hand.fingers.values())).links:
+        assert [float(each) for each in link.rpy or (0, 0, 0)][1:] == [0, 0]
+
+
+def test_axes_at_right_angles_need_no_number_at_all():
+    hand, _ = imported(two_fingers())
+
+    assert [f.links[0].turn for f in hand.fingers.values()] == ["x-90", "y+90"]
+    assert all(f.links[0].rpy is None and f.links[0].reference is None for f in hand.fingers.values())
+
+
+def test_tendons_through_points_are_as_long_as_in_the_tree():
+    model = finger(tendons=(PATH,))
+    _, tables = imported(model)
+    (written,) = tables.values()
+    for angles in states(model):
+        points = []
+        for index, local in PATH.path:
+            axes, origin = pose(model, angles, index)
+            points.append(origin + axes @ local)
+        expected = sum(np.linalg.norm(b - a) for a, b in pairwise(points))
+        assert tendon_lengths(written, np.array(list(angles.values()))) == pytest.approx([expected], abs=1e-15)
+
+
+# -- couplings -------------------------------------------------------------------------------------------------------
+
+
+def test_a_follower_that_turns_the_other_way_is_counted_anew():
+    lock = Lock("IF:Tip", "IF:Bend", -0.5, 0.1)
+    arms = Tendon("arms", arms={"IF:Bend": 0.01, "IF:Tip": 0.03})
+    model = finger(tendons=(arms,), locks=(lock,))
+    _, tables = imported(model)
+    (written,) = tables.values()
+    for spread, bend in ((0.1, 0.3), (-0.4, 1.1)):
+        follower = lock.ratio * bend + lock.offset
+        free, matrix = coordinates(written)
+        q = np.array([spread, bend])
+        axes = poses(written, matrix @ q)[-1][0]
+        first = poses(written, matrix @ np.zeros(2))[-1][0]
+        angles = {"IF:Spread": spread, "IF:Bend": bend, "IF:Tip": follower}
+        zero = {"IF:Spread": 0.0, "IF:Bend": 0.0, "IF:Tip": lock.offset}
+        turned = pose(model, zero, 3)[0].T @ pose(model, angles, 3)[0]
+        assert np.trace(first.T @ axes) == pytest.approx(np.trace(turned), abs=1e-14)
+        assert free == ["spread", "bend"]
+        assert tendon_lengths(written, q)[0] == pytest.approx(0.01 * bend + 0.03 * follower, abs=1e-15)
+
+
+def test_a_chain_of_followers_follows_the_independent_joint():
+    locks = (Lock("IF:Tip", "IF:Bend", 2.0, 0.1), Lock("IF:Bend", "IF:Spread", 0.5, 0.2))
+    found = {lock.follower: lock for each in draft(finger(locks=locks)).fingers for lock in each.followed}
+
+    assert (found["tip"].leader, found["tip"].ratio, found["tip"].offset) == ("spread", 1.0, 0.5)
+
+
+def test_a_coupling_in_a_loop_or_to_another_finger_is_a_loss():
+    loop = (Lock("IF:Tip", "IF:Bend", 1.0), Lock("IF:Bend", "IF:Tip", 1.0))
+    apart = two_fingers(locks=(Lock("index_bend", "thumb_bend", 1.0),))
+    for model, places in ((finger(locks=loop), ("IF:Bend to IF:Tip",)), (apart, ("index_bend to thumb_bend",))):
+        (loss,) = (loss for loss in draft(model).losses if loss.what.startswith("couplings"))
+        assert loss.places == places
+
+
+# -- what a hand file cannot hold ------------------------------------------------------------------------------------
+
+
+def test_a_tendon_over_two_fingers_is_refused_by_its_name():
+    with pytest.raises(InputError) as caught:
+        draft(two_fingers(tendons=(Tendon("long", arms={"index_bend": 0.01, "thumb_bend": 0.01}),)))
+
+    assert str(caught.value) == (
+        "pair.xml tendon long runs over the fingers index and thumb; a tendon of the hand file is of one finger; "
+        "leave it out with --without long"
+    )
+
+
+def test_the_wrist_and_its_tendons_are_reported():
+    losses = draft(two_fingers(tendons=(Tendon("flexor", arms={"wrist": 0.01}),))).losses
+
+    assert Loss("joints above the palm: the palm is held as drawn", ("wrist",)) in losses
+    assert Loss("tendons of no finger", ("flexor",)) in losses
+
+
+@pytest.mark.parametrize("kind", ["slide", "ball"])
+def test_a_finger_with_another_joint_than_a_hinge_is_refused_by_its_name(kind):
+    model = two_fingers()
+    changed = Model("Pair", "pair.xml", model.bodies, (*model.joints, joint("pad", 2, kind=kind)))
+
+    with pytest.raises(InputError, match=f"pair.xml joint pad is a {kind} joint"):
+        draft(changed)
+
+
+def test_a_finger_that_branches_is_refused_with_both_branches():
+    model = finger()
+    fork = body("fork", 2)
+    changed = Model("Fork", "fork.xml", (*model.bodies, fork), (*model.joints, joint("other", 5)))
+
+    with pytest.raises(InputError, match=r"body knuckle carries 2 moving bodies \(distal, fork\)"):
+        draft(changed, palm="palm")
+
+
+def test_fingers_can_be_named_and_the_others_left_out():
+    hand, _ = imported(two_fingers(), named={"pointer": "index_link"})
+
+    assert list(hand.fingers) == ["pointer"]
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"palm": "plam"}, "no body 'plam'; did you mean palm"),
+        ({"named": {"index": "index_lnk"}}, "no body 'index_lnk'; did you mean index_link"),
+        ({"named": {"Index": "index_link"}}, "--finger Index=...: is not a usable name"),
+        ({"palm": "index_link", "named": {"a": "thumb_link"}}, "is not below the palm index_link"),
+    ],
+)
+def test_what_the_flags_name_must_exist(options, message):
+    with pytest.raises(InputError) as caught:
+        draft(two_fingers(), **options)
+
+    assert message in str(caught.value)
+
+
+# -- names and numbers -----------------------------------------------------------------------------------------------
+
+
+def test_names_become_names_of_c_and_stay_apart():
+    found = joint_names({"index": ["rh:IF J1", "rh:IF-J1", "rh:2nd", "rh:palm", "rh:double"]})
+
+    assert list(found.values()) == ["if_j1", "if_j1_2", "n2nd", "palm_j", "double_j"]
+    assert plain("FFJ3") == "ffj3"
+    assert len(joint_names({"a": ["l_hand_index_proximal_phalanx_joint"]})["l_hand_index_proximal_phalanx_joint"]) <= 24
+
+
+def test_the_finger_is_not_in_the_names_of_its_joints_twice():
+    assert joint_names({"index": ["r_index_mcp", "r_index_pip"], "thumb": ["r_thumb_ip"]}) == {
+        "r_index_mcp": "mcp", "r_index_pip": "pip", "r_thumb_ip": "ip",
+    }  # fmt: skip
+
+
+def test_fingers_are_called_by_the_word_that_their_bodies_use():
+    chains = [("palm", ["LFmetacarpal", "LFJ4"]), ("palm", ["r_index_tip", "r_index_mcp"]), ("palm", ["x1", "x2"]),
+              ("claw.base", ["claw_a"]), ("palm", ["2a", "3b"])]  # fmt: skip
+
+    assert finger_names(chains) == ["lf", "index", "finger3", "claw", "finger5"]
+
+
+def test_published_roundings_of_quarter_turns_are_known():
+    assert [quarter_angle(text) for text in ("1.57", "1.5708", "-3.1416", "1.6", "0.3", "1.55", "0")] == [
+        math.pi / 2, math.pi / 2, -math.pi, None, None, None, None,
+    ]  # fmt: skip
+    assert quarter_axis(np.array([-1.3e-8, -1.0000003, 0])).tolist() == [0, -1, 0]
+    assert quarter_axis(np.array([0.01, 1, 0])) is None
+    assert quarter_rotation(np.array([0.707107, 0.707107, 0, 0])) == pytest.approx(
+        [math.sqrt(0.5)] * 2 + [0, 0], abs=1e-16
+    )
+    assert quarter_rotation(np.array([0.9, 0.1, 0, 0])) is None
+
+
+def test_numbers_are_written_to_the_last_digit_in_the_unit_of_designers():
+    assert length(0.0062) == "6.2 mm"
+    assert quantity(1.5e-7, "g mm^2", 9) == "150 g mm^2"
+    assert quantity(1e-9, "kg m^2") == "1e-9 kg m^2"
+    assert (angle(math.pi / 2), angle(-math.pi), angle(1.571)) == ("90 deg", "-180 deg", "1.571 rad")
+    assert tidy([0.045, -3e-18, 0.045000000000000005, 1 / 3]) == [0.045, 0.0, 0.045, 1 / 3]
+
+
+def test_a_source_fits_into_a_comment_of_c():
+    assert cite("a*/b\\c" + "x" * 100).startswith("a* /b/cxxx")
+    assert len(cite("x" * 100)) == 80
+
+
+def test_the_file_says_what_is_lost_and_how_names_were_mapped():
+    text = hand_text(draft(replace(finger(), losses=(Loss("meshes", ("a", "b")),))))
+
+    assert "# name: joint IF:Spread -> spread\n" in text
+    assert "# lost: meshes (2)\n" in text
+    assert 'default = "test.xml joint IF:Tip"' in text
+
+
+def test_the_tree_of_the_tests_turns_as_it_should():
+    assert spun(np.array([0.0, 0.0, 1.0]), math.pi / 2) @ [1, 0, 0] == pytest.approx([0, 1, 0])
