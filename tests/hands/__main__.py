@@ -27,6 +27,7 @@ from awiwi_gen.interchange.draft import DraftHand, draft
 from awiwi_gen.interchange.mjcf import read
 from awiwi_gen.interchange.toml import hand_text
 
+from .behaviours import changed
 from .catalog import HANDS, Published
 from .compare import LIMIT, compiled_model, worst_differences
 
@@ -58,7 +59,7 @@ def main() -> int:
         if chosen.only in published.name:
             results.append(examine(published, folder))
             print(" | ".join(results[-1].row), flush=True)
-    faults = [fault for result in results for fault in result.faults]
+    faults = [*changed(), *(fault for result in results for fault in result.faults)]
     if not chosen.only:
         faults += judge_table(table([result.row for result in results]), chosen.accept)
     for fault in faults:

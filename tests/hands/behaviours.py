@@ -1,0 +1,113 @@
+"""What MuJoCo does that people who exchange models do not expect; docs/interchange.md has a row for each.
+
+An entry that no longer holds means that the row, and what the import and export do about it, must be looked at again.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+
+import mujoco
+import numpy as np
+
+_BODY = '<inertial mass="1" pos="0 0 0.1" diaginertia="1 1 1"/>'
+
+
+def _compiled(inside: str, after: str = "", before: str = "") -> tuple[mujoco.MjModel, mujoco.MjData]:
+    model = mujoco.MjModel.from_xml_string(f"<mujoco>{before}<worldbody>{inside}</worldbody>{after}</mujoco>")
+    return model, mujoco.MjData(model)
+
+
+def stiffness_polynomials_are_not_odd_and_damping_polynomials_are() -> bool:
+    model, data = _compiled(f'<body>{_BODY}<joint stiffness="1 2 3" damping="1 2 3"/></body>')
+    found = []
+    for sign in (1, -1):
+        data.qpos[0] = data.qvel[0] = sign * 0.5
+        mujoco.mj_forward(model, data)
+        found.append((data.qfrc_spring[0], data.qfrc_damper[0]))
+    return bool(found[0][0] != -found[1][0] and found[0][1] == -found[1][1])
+
+
+def ranges_of_tendons_and_controls_stay_in_degrees() -> bool:
+    model, _ = _compiled(
+        f'<body>{_BODY}<joint name="j" range="-90 90"/></body>',
+        '<tendon><fixed name="t" range="-90 90"><joint joint="j" coef="1"/></fixed></tendon>'
+        '<actuator><position joint="j" ctrlrange="-90 90"/></actuator>',
+        '<compiler angle="degree"/>',
+    )
+    return bool(model.jnt_range[0, 1] < 2 and model.tendon_range[0, 1] == 90 and model.actuator_ctrlrange[0, 1] == 90)
+
+
+def to_xml_writes_six_digits() -> bool:
+    spec = mujoco.MjSpec.from_string(
+        f'<mujoco><worldbody><body pos="0.123456789 0 0">{_BODY}<joint/></body></worldbody></mujoco>'
+    )
+    spec.compile()
+    return re.search(r'pos="(0\.12\d*)', spec.to_xml())[1] == "0.123457"
+
+
+def armature_of_a_tendon_over_siblings_does_not_couple_them() -> bool:
+    model, data = _compiled(
+        f'<body><body>{_BODY}<joint name="a"/></body><body>{_BODY}<joint name="b"/></body></body>',
+        '<tendon><fixed armature="2"><joint joint="a" coef="1"/><joint joint="b" coef="1"/></fixed></tendon>',
+    )
+    mujoco.mj_forward(model, data)
+    mass = np.zeros((2, 2))
+    mujoco.mj_fullM(model, data, mass)
+    return bool(mass[0, 1] == 0 and mass[0, 0] == 3)
+
+
+def the_force_range_of_a_tendon_limits_the_sum_before_the_gear() -> bool:
+    model, data = _compiled(
+        f'<body>{_BODY}<joint name="a"/></body>',
+        '<tendon><fixed name="t" actuatorfrcrange="-4 4"><joint joint="a" coef="1"/></fixed></tendon>'
+        '<actuator><motor tendon="t" gear="3"/></actuator>',
+    )
+    data.ctrl[0] = 100
+    mujoco.mj_forward(model, data)
+    return bool(data.qfrc_actuator[0] == 12)
+
+
+def damping_of_a_tendon_diverges_with_euler_and_not_with_implicitfast() -> bool:
+    speeds = []
+    for integrator in ("Euler", "implicitfast"):
+        model, data = _compiled(
+            '<body><inertial mass="0.01" pos="0 0 0" diaginertia="1e-6 1e-6 1e-6"/><joint name="a"/></body>',
+            '<tendon><fixed damping="100"><joint joint="a" coef="0.01"/></fixed></tendon>',
+            f'<option integrator="{integrator}" timestep="0.002"/>',
+        )
+        data.qvel[0] = 1
+        for _ in range(4):
+            mujoco.mj_step(model, data)
+        speeds.append(abs(data.qvel[0]))
+    return bool(speeds[0] > 1 and speeds[1] < 1)
+
+
+def a_mimic_joint_is_a_soft_equality() -> bool:
+    inertial = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+    links = "".join(f'<link name="{name}">{inertial}</link>' for name in "abc")
+    limit = '<limit lower="-1" upper="1" effort="1" velocity="1"/><axis xyz="0 0 1"/>'
+    spec = mujoco.MjSpec.from_string(
+        f'<robot name="r">{links}'
+        f'<joint name="p" type="revolute"><parent link="a"/><child link="b"/>{limit}</joint>'
+        f'<joint name="d" type="revolute"><parent link="b"/><child link="c"/>{limit}<mimic joint="p"/></joint></robot>'
+    )
+    model = spec.compile()
+    return bool(model.neq == 1 and model.nv == 2)
+
+
+BEHAVIOURS: tuple[Callable[[], bool], ...] = (
+    stiffness_polynomials_are_not_odd_and_damping_polynomials_are,
+    ranges_of_tendons_and_controls_stay_in_degrees,
+    to_xml_writes_six_digits,
+    armature_of_a_tendon_over_siblings_does_not_couple_them,
+    the_force_range_of_a_tendon_limits_the_sum_before_the_gear,
+    damping_of_a_tendon_diverges_with_euler_and_not_with_implicitfast,
+    a_mimic_joint_is_a_soft_equality,
+)
+
+
+def changed() -> list[str]:
+    """The behaviours that this MuJoCo does not have."""
+    return [f"MuJoCo {mujoco.__version__}: not so any more: {each.__name__}" for each in BEHAVIOURS if not each()]
