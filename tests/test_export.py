@@ -1,0 +1,186 @@
+"""Export to MJCF and URDF, read back without either program; what is lost, and files that are never half-written."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from commands import answer, complaint, told
+from hand_numbers import coordinates, fingers_of, poses, rpy_matrix, tendon_lengths
+
+from awiwi_gen.hand import Hand
+from awiwi_gen.interchange import export_mjcf, export_urdf
+from awiwi_gen.interchange.draft import draft
+from awiwi_gen.interchange.export_mjcf import quaternion
+from awiwi_gen.interchange.model import Body, Joint, Lock, Model, Site, Tendon
+from awiwi_gen.interchange.toml import hand_text
+
+HERE = Path(__file__).parent
+HANDS = ["skew_finger.toml", "../examples/claw.toml", "../awiwi_gen/hand.toml"]
+
+
+def numbers(text: str | None, default: str = "0 0 0") -> np.ndarray:
+    return np.array([float(word) for word in (text or default).split()])
+
+
+def rotation(quat: np.ndarray) -> np.ndarray:
+    w, v = quat[0], quat[1:]
+    skew = np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
+    return np.eye(3) + 2 * w * skew + 2 * skew @ skew
+
+
+def read_mjcf(text: str) -> Model:
+    """The part of MJCF that the export writes."""
+    root = ElementTree.fromstring(text)
+    zero = np.zeros(3)
+    bodies, joints, sites = [Body("world", 0, zero, np.eye(3), 0.0, zero, np.zeros((3, 3)))], [], []
+
+    def visit(element: ElementTree.Element, parent: int) -> None:
+        inertial, index = element.find("inertial"), len(bodies)
+        mass, com, tensor = 0.0, zero, np.zeros((3, 3))
+        if inertial is not None:
+            mass, com = float(inertial.get("mass")), numbers(inertial.get("pos"))
+            x, y, z, xy, xz, yz = numbers(inertial.get("fullinertia"), f"{inertial.get('diaginertia')} 0 0 0")
+            tensor = np.array([[x, xy, xz], [xy, y, yz], [xz, yz, z]])
+            mass, tensor = (0.0, 0 * tensor) if mass <= export_mjcf.SPECK else (mass, tensor)
+        axes = rotation(numbers(element.get("quat"), "1 0 0 0"))
+        exact = np.rint(axes)
+        axes = np.where(np.abs(axes - exact) < 1e-15, exact, axes)
+        bodies.append(Body(element.get("name"), parent, numbers(element.get("pos")), axes, mass, com, tensor))
+        for each in element.findall("joint"):
+            low, high = numbers(each.get("range"), "0 0")
+            own = {key: float(each.get(name, 0)) for key, name in
+                   (("reference", "ref"), ("armature", "armature"), ("damping", "damping"), ("friction", "frictionloss"),
+                    ("stiffness", "stiffness"), ("spring_reference", "springref"))}  # fmt: skip
+            joints.append(
+                Joint(
+                    each.get("name"),
+                    index,
+                    "hinge",
+                    numbers(each.get("axis")),
+                    numbers(each.get("pos")),
+                    low,
+                    high,
+                    **own,
+                )
+            )
+        sites.extend(Site(each.get("name"), index, numbers(each.get("pos"))) for each in element.findall("site"))
+        for child in element.findall("body"):
+            visit(child, index)
+
+    visit(root.find("worldbody/body"), 0)
+    places = {site.name: (site.body, site.position) for site in sites}
+    references = {joint.name: joint.reference for joint in joints}
+    tendons, locks = [], []
+    for each in root.findall("tendon/*"):
+        low, slack = numbers(each.get("springlength"), "0 0")
+        spring = {"stiffness": float(each.get("stiffness", 0)), "rest": slack}
+        arms = {joint.get("joint"): float(joint.get("coef")) for joint in each.findall("joint")}
+        tendons.append(
+            Tendon(each.get("name"), arms, tuple(places[s.get("site")] for s in each.findall("site")), **spring)
+        )
+    for each in root.findall("equality/joint"):
+        constant, ratio = numbers(each.get("polycoef"))[:2]
+        follower, leader = each.get("joint1"), each.get("joint2")
+        locks.append(Lock(follower, leader, ratio, references[follower] + constant - ratio * references[leader]))
+    return Model(
+        root.get("model"), "export.xml", tuple(bodies), tuple(joints), tuple(tendons), tuple(locks), tuple(sites)
+    )
+
+
+@pytest.mark.parametrize("name", HANDS)
+def test_an_exported_hand_moves_as_the_hand_file_says(name):
+    hand = Hand.load(HERE / name)
+    before = fingers_of((HERE / name).read_text(encoding="utf-8"))
+    after = fingers_of(hand_text(draft(read_mjcf(export_mjcf.text_and_losses(hand)[0]))))
+    assert set(after) == {finger for finger in before if not any("four_bar" in x for x in before[finger]["links"])}
+    random = np.random.default_rng(1)
+    for finger, written in after.items():
+        assert coordinates(written)[0] == coordinates(before[finger])[0]
+        for _ in range(5):
+            q = random.uniform(-1, 1, len(coordinates(written)[0]))
+            ours, theirs = (poses(each, coordinates(each)[1] @ q) for each in (before[finger], written))
+            turned = base_of(before[finger])[0].T @ base_of(written)[0]
+            assert turned @ theirs[-1][1] == pytest.approx(ours[-1][1], abs=1e-14)
+
+
+def base_of(finger) -> tuple[np.ndarray, np.ndarray]:
+    base = finger.get("base", {"rpy": [0, 0, 0], "position": [0, 0, 0]})
+    return rpy_matrix(base["rpy"]), np.array(base["position"])
+
+
+def test_the_import_of_an_export_is_the_same_hand_again():
+    first = hand_text(draft(read_mjcf(export_mjcf.text_and_losses(Hand.load(HERE / "skew_finger.toml"))[0])))
+    once = Hand.parse(first)
+    twice = Hand.parse(hand_text(draft(read_mjcf(export_mjcf.text_and_losses(once)[0]))))
+
+    assert once.fingers["claw"].structure() == twice.fingers["claw"].structure()
+    ours, theirs = (hand.fingers["claw"].quantities() for hand in (once, twice))
+    for place, number in ours.items():
+        assert float(theirs[place]) == pytest.approx(float(number), rel=1e-12, abs=1e-15), place
+
+
+def test_tendons_of_pulleys_are_as_long_as_the_hand_file_says():
+    text = (HERE / "skew_finger.toml").read_text(encoding="utf-8")
+    hand = Hand.parse(text)
+    written = fingers_of(hand_text(draft(read_mjcf(export_mjcf.text_and_losses(hand)[0]))))["claw"]
+    finger = hand.fingers["claw"]
+    q = np.array([0.2, 0.4, -0.3])
+    angles = dict(zip([link.joint for link in finger.links], coordinates(written)[1] @ q, strict=True))
+    expected = [
+        sum(float(f"{over[0]}1") * float(finger.radii[over[1:]]) * angles[over[1:]] for over in tendon.over)
+        for tendon in finger.tendons
+        if not tendon.path and not tendon.span and not tendon.arms
+    ]
+    assert tendon_lengths(written, q)[: len(expected)] == pytest.approx(expected, abs=1e-16)
+
+
+def test_a_urdf_has_mimic_joints_and_loses_tendons():
+    text, losses = export_urdf.text_and_losses(Hand.load(HERE / "skew_finger.toml"))
+    root = ElementTree.fromstring(text)
+    (mimic,) = root.iter("mimic")
+    pulleys = Hand.load(HERE / "skew_finger.toml").fingers["claw"].radii
+
+    assert float(mimic.get("multiplier")) == float(pulleys["mid"]) / float(pulleys["end"])
+    assert {"tendons", "armature", "springs of joints"} <= {loss.what for loss in losses}
+
+
+def test_the_wrist_and_fingers_with_a_four_bar_are_reported():
+    for writer in (export_mjcf, export_urdf):
+        losses = {loss.what: loss.places for loss in writer.text_and_losses(Hand.load())[1]}
+        assert losses["fingers with a four-bar: left out"] == ("fifth",)
+        assert losses["the wrist: the palm is the root"] == ("wrist",)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_quaternion_is_that_of_its_rotation(seed):
+    quat = np.random.default_rng(seed).normal(size=4) * ([1, 1e-9, 1, 1] if seed % 2 else [1e-9, 1, 1e-3, 1])
+    quat /= np.linalg.norm(quat)
+
+    assert rotation(quaternion(rotation(quat))) == pytest.approx(rotation(quat), abs=1e-15)
+
+
+# -- the command -----------------------------------------------------------------------------------------------------
+
+
+def test_export_writes_a_file_and_says_what_is_lost(tmp_path):
+    shown = told("export", "urdf", "--hand", HERE / "one_finger.toml", "-o", tmp_path / "claw.urdf")
+
+    assert shown.splitlines()[1] == "not held:"
+    assert "fingers with a four-bar: left out (jaw)" in shown
+    assert (tmp_path / "claw.urdf").read_text(encoding="utf-8").startswith("<!-- One finger")
+
+
+def test_export_replaces_a_file_only_if_asked(tmp_path):
+    (tmp_path / "mine.xml").write_text("mine", encoding="utf-8")
+    words = ["export", "mjcf", "--hand", HERE / "skew_finger.toml", "-o", tmp_path / "mine.xml"]
+
+    assert "exists; choose another name with -o" in complaint(*words)
+    assert (tmp_path / "mine.xml").read_text(encoding="utf-8") == "mine"
+    assert answer(*words, "--replace")["file"] == str(tmp_path / "mine.xml")
+
+
+def test_an_unknown_format_is_refused():
+    assert complaint("export", "sdf") == "sdf is no format of export; expected mjcf or urdf"
