@@ -62,18 +62,13 @@ def palm_of(model: Model, name: str = "") -> int:
 
 
 def _branching(model: Model, top: int) -> int:
-    """The first body below `top` that carries several moving parts; in a single chain the one that carries it."""
-    at, chain = top, []
-    while True:
-        moving = [child for child in model.children[at] if _hinges(model, child)]
-        if len(moving) != 1:
-            break
-        chain.append(at)
+    """The first body below `top` that carries several moving parts; in a single chain `top`, or what carries it."""
+    at = top
+    while len(moving := [child for child in model.children[at] if _hinges(model, child)]) == 1:
         at = moving[0]
     if moving:
         return at
-    carriers = [body for body in (*chain, at) if model.joints_of[body]]
-    return model.bodies[carriers[0]].parent
+    return model.bodies[top].parent if model.joints_of[top] else top
 
 
 def _hinges(model: Model, body: int) -> int:
