@@ -17,6 +17,7 @@ import numpy as np
 from awiwi_gen.errors import Fault, InputError
 from awiwi_gen.interchange.model import Array, Body, Joint, Lock, Loss, Model, Site, Tendon
 from awiwi_gen.interchange.quarter import quarter_angle, quarter_axis, quarter_rotation
+from awiwi_gen.interchange.urdf import require_tree
 
 SPECK = 1e-9
 """Mass [kg] that a moving body gets which has none, because MuJoCo refuses those; no more counts as a mass."""
@@ -61,8 +62,11 @@ def parse(path: Path, exact: bool) -> tuple[Any, list[str]]:
         reason = (error.strerror if isinstance(error, OSError) else None) or "is not UTF-8 text"
         raise InputError(Fault(file=str(path), message=f"cannot be read: {reason}")) from None
     notes: list[str] = []
+    is_urdf = re.search(r"<robot\b", text) is not None
+    if is_urdf:
+        require_tree(text, path.name)
     try:
-        if re.search(r"<robot\b", text):
+        if is_urdf:
             spec = mujoco.MjSpec.from_string(text if exact else _RPY.sub(lambda m: _quarter_rpy(m, notes), text))
         elif path.suffix == ".xml":
             spec = mujoco.MjSpec.from_file(str(path))
@@ -71,7 +75,7 @@ def parse(path: Path, exact: bool) -> tuple[Any, list[str]]:
     except (ValueError, mujoco.FatalError) as error:
         raise _refused(path, error) from None
     spec.compiler.fusestatic = False
-    if re.search(r"<robot\b", text):
+    if is_urdf:
         _weigh(spec)
     if not exact:
         notes += _quarter_turns(spec)
@@ -236,7 +240,8 @@ def compile_spec(spec: Any, path: Path) -> Any:
 
 def _refused(path: Path, error: Exception) -> InputError:
     reason = " ".join(str(error).split())
-    missing = "; the mass of a body is computed from it, so give the body an inertial" if "mesh" in reason else ""
+    needed = "Error opening file" in reason and "include" not in reason
+    missing = "; the mass of a body is computed from it: get the file, or give the body an inertial" if needed else ""
     return InputError(Fault(file=str(path), message=f"is refused by MuJoCo {mujoco.__version__}: {reason}{missing}"))
 
 
