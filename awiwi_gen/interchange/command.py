@@ -23,6 +23,7 @@ def import_(
     finger: Annotated[list[str] | None, typer.Option("--finger", metavar="NAME=BODY", help="Only these fingers.")] = None,
     without: Annotated[list[str] | None, typer.Option("--without", help="Tendon to leave out.")] = None,
     exact: Annotated[bool, typer.Option("--exact", help="Keep published roundings of quarter turns.")] = False,
+    fit: Annotated[bool, typer.Option("--fit-wraps", help="Constant arms for tendons that wrap around geoms.")] = False,
     replace: Replace = False, as_json: Json = False,
 ) -> int:  # fmt: skip
     """Make a hand file of an MJCF or URDF model, or update a hand file's masses from a table in CSV."""
@@ -37,7 +38,7 @@ def import_(
     from awiwi_gen.interchange.toml import hand_text
 
     target = output or Path(f"{file.stem}.toml")
-    hand = draft(read(file, exact, without or ()), palm, _named(finger or []))
+    hand = draft(read(file, exact, without or (), fit), palm, _named(finger or []))
     text = hand_text(hand, " ".join(["awiwi-gen import", *(["--exact"] if exact else [])]))
     faults = _faults(text, str(target))
     write_whole(target, text, replace)

@@ -235,7 +235,7 @@ def _tendon(
     model: Model, tendon: Tendon, names: dict[str, str], locks: Mapping[str, Followed],
     places: Mapping[int, DraftLink], base: tuple[Array, Array],
 ) -> DraftTendon:  # fmt: skip
-    rest, arms = 0.0, {}
+    rest, arms = tendon.constant, {}
     reference = {joint.name: joint.reference for joint in model.joints}
     for joint, arm in tendon.arms.items():
         lock = locks.get(joint)

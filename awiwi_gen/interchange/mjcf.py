@@ -18,6 +18,7 @@ from awiwi_gen.errors import Fault, InputError
 from awiwi_gen.interchange.model import Array, Body, Joint, Lock, Loss, Model, Site, Tendon
 from awiwi_gen.interchange.quarter import quarter_angle, quarter_axis, quarter_rotation
 from awiwi_gen.interchange.urdf import require_tree
+from awiwi_gen.interchange.wraps import fitted
 
 SPECK = 1e-9
 """Mass [kg] that a moving body gets which has none, because MuJoCo refuses those; no more counts as a mass."""
@@ -26,18 +27,18 @@ _INCLUDE = re.compile(r'<include\s[^>]*?file\s*=\s*"([^"]+)"')
 _RPY = re.compile(r'(\brpy\s*=\s*")([^"]*)(")')
 
 
-def read(path: Path, exact: bool = False, without: Iterable[str] = ()) -> Model:
+def read(path: Path, exact: bool = False, without: Iterable[str] = (), fit: bool = False) -> Model:
     """Read a file. Raises `InputError` where MuJoCo refuses it.
 
     Unless `exact`, published roundings of quarter turns (1.5708) become quarter turns. The tendons named in `without`
-    are left out.
+    are left out. With `fit`, tendons that wrap around geoms get constant arms; else they are lost.
     """
     spec, notes = parse(path, exact)
     driven = {each.target for each in spec.actuators if each.trntype == mujoco.mjtTrn.mjTRN_TENDON}
     losses = prepare(spec, set(without))
     massless = {body.name for body in spec.bodies[1:] if body.explicitinertial and body.mass <= SPECK}
     compiled = compile_spec(spec, path)
-    tendons, lost = _tendons(compiled, driven)
+    tendons, lost = _tendons(compiled, driven, fit)
     return Model(
         name=spec.modelname or path.stem,
         file=path.name,
@@ -307,8 +308,8 @@ def _locks(compiled: Any) -> tuple[Lock, ...]:
     return tuple(found)
 
 
-def _tendons(compiled: Any, driven: set[str]) -> tuple[tuple[Tendon, ...], list[Loss]]:
-    found, wraps, pushed, poly, both = [], [], [], [], []
+def _tendons(compiled: Any, driven: set[str], fit: bool) -> tuple[tuple[Tendon, ...], list[Loss]]:
+    found, wraps, fits, pushed, poly, both = [], [], [], [], [], []
     joint_wrap, site_wrap = mujoco.mjtWrap.mjWRAP_JOINT, mujoco.mjtWrap.mjWRAP_SITE
     for index in range(compiled.ntendon):
         name = compiled.tendon(index).name or f"tendon{index}"
@@ -332,10 +333,15 @@ def _tendons(compiled: Any, driven: set[str]) -> tuple[tuple[Tendon, ...], list[
             sites = [int(compiled.wrap_objid[k]) for k in places]
             path = tuple((int(compiled.site_bodyid[s]), compiled.site_pos[s].copy()) for s in sites)
             found.append(Tendon(name, path=path, **spring))
+        elif fit:
+            tendon, error = fitted(compiled, Tendon(name, **spring), _locks(compiled))
+            found.append(tendon)
+            fits.append(f"{name} by {error * 1e3:.2g} mm")
         else:
             wraps.append(name)
     losses = [
-        Loss("tendons that wrap around geoms or branch at pulleys: left out", tuple(wraps)),
+        Loss("tendons that wrap around geoms or branch at pulleys: left out (--fit-wraps)", tuple(wraps)),
+        Loss("wraps of tendons: constant arms fitted, lengths differ at most", tuple(fits)),
         Loss("springs of tendons that also push: the hand's springs only pull", tuple(pushed)),
         Loss("springs of tendons that a motor pulls: the hand's tendons have one or the other", tuple(both)),
         Loss(

@@ -61,7 +61,8 @@ class Joint:
 class Tendon:
     """A tendon: either `arms`, length per angle by joint, or a `path` through points (body, position in its frame).
 
-    An elastic string has a `stiffness` [N/m] and is as long as `rest` where it has no force.
+    Its length also has a `constant` part [m]. An elastic string has a `stiffness` [N/m] and no force where it is as long
+    as `rest`.
     """
 
     name: str
@@ -69,6 +70,7 @@ class Tendon:
     path: tuple[tuple[int, Array], ...] = ()
     stiffness: float = 0.0
     rest: float = 0.0
+    constant: float = 0.0
 
 
 @dataclass(frozen=True)
