@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -49,11 +50,12 @@ def fitted(compiled: Any, tendon: Tendon, locks: tuple[Lock, ...]) -> tuple[Tend
     return replace(tendon, arms=dict(zip(names, map(float, arms), strict=True)), constant=float(rest)), error
 
 
-def _moves(length: Any, drawn: Array, ends: Array, joint: int) -> bool:
+def _moves(length: Callable[[Array], float], drawn: Array, ends: Array, joint: int) -> bool:
     """Whether the length changes with a joint, the others standing as drawn."""
-    found = []
-    for angle in np.linspace(*ends[joint], 7):
+    low, high = map(float, ends[joint])
+    found: list[float] = []
+    for angle in np.linspace(low, high, 7):
         state = drawn.copy()
         state[joint] = angle
         found.append(length(state))
-    return max(found) - min(found) > _LEAST_ARM * (ends[joint, 1] - ends[joint, 0])
+    return max(found) - min(found) > _LEAST_ARM * (high - low)
