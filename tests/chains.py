@@ -1,8 +1,14 @@
-"""Hand files of one finger, "arm", whose links are given by what is special about them."""
+"""Hand files of one finger, "arm", whose links are given by what is special about them; and kernels before they are C."""
 
 from __future__ import annotations
 
 from pathlib import Path
+
+from awiwi_gen.derive import Deriver
+from awiwi_gen.emit.options import Options
+from awiwi_gen.hand import Hand
+from awiwi_gen.kernels import catalog
+from awiwi_gen.records import Record, make_records
 
 HEAD = Path(__file__).with_name("one_finger.toml").read_text(encoding="utf-8").partition("[fingers.jaw]")[0]
 BODY = {
@@ -37,3 +43,11 @@ def rpy(roll: float = 0, pitch: float = 0, yaw: float = 0) -> dict[str, str | No
 
 
 MASSLESS: dict[str, str | None] = dict.fromkeys(BODY)
+
+
+def records(hand: Hand, families: tuple[str, ...], options: Options | None = None) -> dict[str, Record]:
+    """Records of kernels by family. Raises VerificationError where their derivations differ."""
+    kernels = [kernel for kernel in catalog(hand) if kernel.family in families]
+    derivers = Deriver(kernels[0].part)
+    tasks = [(k, {route: derivers.derive(k, route) for route in k.routes}, k.name) for k in kernels]
+    return dict(zip([k.family for k in kernels], make_records(tasks, hand.prefix, options or Options()), strict=True))

@@ -91,7 +91,7 @@ def keys_of(schema: type[BaseModel], seen: dict[str, set[str]]) -> dict[str, set
     """The keys of a table and of all tables below it, by the name of their model."""
     for name, definition in schema.model_json_schema(by_alias=True)["$defs"].items():
         seen[name] = set(definition.get("properties", {}))
-    return seen | {schema.__name__: set(schema.model_fields)}
+    return seen | {schema.__name__: {field.alias or name for name, field in schema.model_fields.items()}}
 
 
 def test_every_key_of_the_hand_file_is_explained():

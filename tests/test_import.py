@@ -194,7 +194,7 @@ def test_names_become_names_of_c_and_stay_apart():
 
     assert list(found.values()) == ["if_j1", "if_j1_2", "n2nd", "palm_j", "double_j"]
     assert plain("FFJ3") == "ffj3"
-    assert len(joint_names({"a": ["l_hand_index_proximal_phalanx_joint"]})["l_hand_index_proximal_phalanx_joint"]) <= 24
+    assert joint_names({"a": ["x" * 80]}) == {"x" * 80: "x" * 63}
 
 
 def test_the_finger_is_not_in_the_names_of_its_joints_twice():

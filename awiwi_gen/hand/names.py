@@ -73,7 +73,7 @@ def _over(text: str) -> str:
 
 Prefix = Annotated[str, AfterValidator(partial(_identifier, longest=16)), Field(examples=['"awiwi"'])]
 FingerName = Annotated[str, AfterValidator(partial(_identifier, longest=16, underscores=False, taken=_TAKEN))]
-JointName = Annotated[str, AfterValidator(partial(_identifier, longest=24)), Field(examples=['"flexion"'])]
+JointName = Annotated[str, AfterValidator(partial(_identifier, longest=63)), Field(examples=['"flexion"'])]
 Title = Annotated[str, AfterValidator(_one_line), Field(examples=['"Awiwi hand"'])]
 Source = Annotated[
     str | dict[str, str],

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from awiwi_gen.hand.parts import Finger, Keys, Link
+from awiwi_gen.hand.pose import Chain, point
 
 __all__ = ["Remark", "remarks"]
 
@@ -21,6 +22,7 @@ _DENSEST, _LIGHTEST = 12e3, 5.0  # [kg/m^3]: lead, and less than any foam
 _ALONG_JOINT, _ALONG_COM = 0.28, 0.2  # second moment along the bone, in squares of its length: rods have 1/3 and 1/12
 _LARGEST_PULLEY, _SMALLEST_PULLEY = 1.0, 0.02  # radius in lengths of the finger's longest bone
 _SMALLEST_RANGE, _LARGEST_RANGE = 5.0, 270.0  # of a joint [deg]
+_HEAVIEST_ROTOR = 1000.0  # armature over the inertia of all links that the joint moves
 _SLIPS = [
     (key, factor) for key in ("offset", "com", "mass", "inertia") for factor in (0.001, 0.01, 0.1, 10.0, 100.0, 1000.0)
 ]
@@ -55,7 +57,7 @@ def remarks(fingers: Mapping[str, Finger]) -> Iterator[Remark]:
             cause = f"; {alike} of {len(found)} links are like this: {shared}" if alike >= _MANY else slip
             yield Remark((*keys, *remark.keys), remark.message + cause, remark.ratio)
     for name, finger in fingers.items():
-        for each in (*_pulleys(finger), *_ranges(finger)):
+        for each in (*_pulleys(finger), *_ranges(finger), *_rotors(finger)):
             yield Remark(("fingers", name, *each.keys), each.message, each.ratio)
 
 
@@ -226,3 +228,26 @@ def _ranges(finger: Finger) -> Iterator[Remark]:
             continue
         found = f'= "{link.low}" leaves a range of {width:.3g} deg up to high = "{link.high}"{hint}'
         yield Remark(("links", index, "low"), found, ratio)
+
+
+def _rotors(finger: Finger) -> Iterator[Remark]:
+    """Rotors that outweigh all that their joint moves, in the middle of the range."""
+    if not finger.has_armature:
+        return
+    chain = Chain(finger)
+    frames = list(chain.frames(chain.poses()[0]))
+    for index, link in enumerate(finger.links):
+        (_, _, axis), joint = frames[index][0]
+        moved = 0.0
+        for other, (_, (axes, origin)) in zip(finger.links[index:], frames[index:], strict=True):
+            if other.mass is None or other.com is None or other.inertia is None:
+                continue
+            x, y, z = (float(value) for value in other.com)
+            arm = [a - b for a, b in zip(point(axes, origin, (x, y, z)), joint, strict=True)]
+            along = sum(a * b for a, b in zip(arm, axis, strict=True))
+            spread = float(other.inertia.xx.value + other.inertia.yy.value + other.inertia.zz.value) / 3
+            moved += spread + float(other.mass) * (sum(a * a for a in arm) - along**2)
+        ratio = float(link.armature or 0) / moved if moved else 0.0
+        if ratio > _HEAVIEST_ROTOR:
+            found = f'= "{link.armature}" is {ratio:.3g} times the inertia of all links that this joint moves'
+            yield Remark(("links", index, "armature"), found, ratio)

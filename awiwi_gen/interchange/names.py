@@ -11,7 +11,7 @@ from awiwi_gen.hand.names import FingerName, JointName, Prefix
 from awiwi_gen.hand.parts import PALM
 
 _FINGER, _JOINT, _PREFIX = TypeAdapter(FingerName), TypeAdapter(JointName), TypeAdapter(Prefix)
-_LONGEST_JOINT, _LONGEST_FINGER = 24, 16
+_LONGEST_JOINT, _LONGEST_FINGER = 63, 16
 _FINGERS = {  # words that models use, and the finger they mean
     "thumb": "thumb", "index": "index", "middle": "middle", "ring": "ring", "pinky": "pinky", "little": "little",
     "medium": "middle",
