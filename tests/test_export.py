@@ -18,7 +18,7 @@ from awiwi_gen.interchange.model import Body, Joint, Lock, Model, Site, Tendon
 from awiwi_gen.interchange.toml import hand_text
 
 HERE = Path(__file__).parent
-HANDS = ["skew_finger.toml", "../examples/claw.toml", "../awiwi_gen/hand.toml"]
+HANDS = ["exported_finger.toml", "../examples/claw.toml", "../awiwi_gen/hand.toml"]
 
 ATTRIBUTES = {"reference": "ref", "armature": "armature", "damping": "damping", "friction": "frictionloss",
               "stiffness": "stiffness", "spring_reference": "springref"}  # fmt: skip
@@ -106,7 +106,7 @@ def base_of(finger) -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_the_import_of_an_export_is_the_same_hand_again():
-    first = hand_text(draft(read_mjcf(export_mjcf.text_and_losses(Hand.load(HERE / "skew_finger.toml"))[0])))
+    first = hand_text(draft(read_mjcf(export_mjcf.text_and_losses(Hand.load(HERE / "exported_finger.toml"))[0])))
     once = Hand.parse(first)
     twice = Hand.parse(hand_text(draft(read_mjcf(export_mjcf.text_and_losses(once)[0]))))
 
@@ -117,7 +117,7 @@ def test_the_import_of_an_export_is_the_same_hand_again():
 
 
 def test_tendons_of_pulleys_are_as_long_as_the_hand_file_says():
-    text = (HERE / "skew_finger.toml").read_text(encoding="utf-8")
+    text = (HERE / "exported_finger.toml").read_text(encoding="utf-8")
     hand = Hand.parse(text)
     written = fingers_of(hand_text(draft(read_mjcf(export_mjcf.text_and_losses(hand)[0]))))["claw"]
     finger = hand.fingers["claw"]
@@ -126,16 +126,25 @@ def test_tendons_of_pulleys_are_as_long_as_the_hand_file_says():
     expected = [
         sum(float(f"{over[0]}1") * float(finger.radii[over[1:]]) * angles[over[1:]] for over in tendon.over)
         for tendon in finger.tendons
-        if not tendon.path and not tendon.span and not tendon.arms
+        if tendon.over
     ]
     assert tendon_lengths(written, q)[: len(expected)] == pytest.approx(expected, abs=1e-16)
 
 
+def test_tendons_of_arms_and_through_points_are_as_long_as_before():
+    text = (HERE / "exported_finger.toml").read_text(encoding="utf-8")
+    before = fingers_of(text)["claw"]
+    after = fingers_of(hand_text(draft(read_mjcf(export_mjcf.text_and_losses(Hand.parse(text))[0]))))["claw"]
+    for q in np.random.default_rng(3).uniform(-0.4, 0.4, (5, 3)):
+        assert tendon_lengths(after, q)[5:] == pytest.approx(tendon_lengths(before, q)[5:], abs=1e-15)
+    assert after["tendons"][-1]["spring"] == before["tendons"][-1]["spring"]
+
+
 def test_a_urdf_has_mimic_joints_and_loses_tendons():
-    text, losses = export_urdf.text_and_losses(Hand.load(HERE / "skew_finger.toml"))
+    text, losses = export_urdf.text_and_losses(Hand.load(HERE / "exported_finger.toml"))
     root = ElementTree.fromstring(text)  # noqa: S314 our own
     (mimic,) = root.iter("mimic")
-    pulleys = Hand.load(HERE / "skew_finger.toml").fingers["claw"].radii
+    pulleys = Hand.load(HERE / "exported_finger.toml").fingers["claw"].radii
 
     assert float(mimic.get("multiplier")) == float(pulleys["mid"]) / float(pulleys["end"])
     assert {"tendons", "armature", "springs of joints"} <= {loss.what for loss in losses}
@@ -169,7 +178,7 @@ def test_export_writes_a_file_and_says_what_is_lost(tmp_path):
 
 def test_export_replaces_a_file_only_if_asked(tmp_path):
     (tmp_path / "mine.xml").write_text("mine", encoding="utf-8")
-    words = ["export", "mjcf", "--hand", HERE / "skew_finger.toml", "-o", tmp_path / "mine.xml"]
+    words = ["export", "mjcf", "--hand", HERE / "exported_finger.toml", "-o", tmp_path / "mine.xml"]
 
     assert "exists; choose another name with -o" in complaint(*words)
     assert (tmp_path / "mine.xml").read_text(encoding="utf-8") == "mine"
