@@ -239,7 +239,7 @@ def test_the_file_says_what_is_lost_and_how_names_were_mapped():
     text = hand_text(draft(replace(finger(), losses=(Loss("meshes", ("a", "b")),))))
 
     assert "# name: joint IF:Spread -> spread\n" in text
-    assert "# lost: meshes (2)\n" in text
+    assert "# not held:\n#     2  meshes (a, b)\n" in text
     assert 'default = "test.xml joint IF:Tip"' in text
 
 

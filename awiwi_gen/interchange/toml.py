@@ -10,6 +10,7 @@ from decimal import Decimal
 from awiwi_gen.interchange.draft import DraftFinger, DraftHand, DraftLink, DraftTendon
 from awiwi_gen.interchange.frames import rpy_of
 from awiwi_gen.interchange.locks import Followed
+from awiwi_gen.interchange.loss import loss_lines
 from awiwi_gen.interchange.model import Array
 
 NOISE = 2e-15
@@ -34,7 +35,7 @@ def hand_text(hand: DraftHand, command: str = "") -> str:
     lines += [f"# The palm is the body {hand.palm}; each finger's base frame is given in the palm's frame.", "#"]
     lines += [f"# name: {old} -> {new}" for old, new in hand.names.items()]
     lines += [f"# taken: {note}" for note in hand.notes]
-    lines += [f"# lost: {loss.what} ({len(loss.places)})" for loss in hand.losses]
+    lines += [f"# {line}" for line in loss_lines(hand.losses)]
     lines += ["", f"prefix = {_text(hand.prefix)}", f"name = {_text(cite(hand.name))}", "", "[limits]"]
     lines += [f"{key} = {_text(value)}" for key, value in _LIMITS.items()]
     lines += ['source = "assumed"']
