@@ -8,7 +8,7 @@ A finger is anything with these attributes (the hand file's `Finger` and its sym
     tendons[i]    rest, over (senses and joints: "+flexion", "-pip"), arms (joint -> arm), span (None or from_[3], to[3],
                   joint), path (points: link, at[3]), spring (None or stiffness, rest)
     pulled, strings   the tendons without a spring, and those with one
-    couplings[i]  follower, leader
+    couplings[i]  follower, leader, ratio (or None), offset (or None)
     base          None or position[3], turn, quarters[3], rpy[3]
 
 The numbers may be symbols of either library. Independent joints are counted along the chain, base to tip.
@@ -39,6 +39,23 @@ def link_number(finger: Finger, name: str) -> int:
 def radius(finger: Finger, joint: str) -> Any:
     """Radius of the pulley around a joint [m]."""
     return next(pulley.radius for pulley in finger.pulleys if pulley.joint == joint)
+
+
+def motion(finger: Finger, follower: str) -> tuple[Any, Any]:
+    """(ratio, offset) of a joint that follows another: its angle is ratio * angle of the leader + offset [rad].
+
+    A coupling tendon on pulleys keeps its length: r_leader q_leader = r_follower q_follower.
+    """
+    coupling = next(coupling for coupling in finger.couplings if coupling.follower == follower)
+    offset = 0 if coupling.offset is None else coupling.offset
+    if coupling.ratio is not None:
+        return coupling.ratio, offset
+    return radius(finger, coupling.leader) / radius(finger, follower), offset
+
+
+def rolls(finger: Finger, joint: str) -> bool:
+    """Whether the arc on a joint's pulley is that on its leader's, so that the leader's stands for it."""
+    return any(c.follower == joint and c.ratio is None and c.offset is None for c in finger.couplings)
 
 
 def quarter_turns(turn: str) -> tuple[int, int]:

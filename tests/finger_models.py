@@ -21,7 +21,8 @@ SAMPLES = 3
 BASE = [[f"{a}abduction", f"{b}flexion"] for a, b in ("++", "+-", "-+", "--")]
 SINGLE = [["+pip"], ["-pip"]]
 
-# Joints with their turns, couplings (follower -> leader), the joint of a four-bar, tendons (routes, joints of spans).
+# Joints with their turns, couplings (follower -> leader), the joint of a four-bar, tendons (routes, joints of spans, links
+# of paths; a tendon with a path has an arm of its own at the last joint).
 STRUCTURES: dict[str, dict[str, Any]] = {
     "index": {
         "joints": {"abduction": "none", "flexion": "x+90", "pip": "none", "dip": "none"},
@@ -58,6 +59,7 @@ STRUCTURES: dict[str, dict[str, Any]] = {
         "four_bar": "loop",
         "routes": [["+d"], ["-loop", "+a"]],
         "spans": ["loop", "b", "d"],
+        "paths": [["palm", "b", "b", "d"], ["d", "a"]],
     },
 }
 KINDS = list(STRUCTURES)
@@ -100,17 +102,29 @@ def make(kind: str, leaf: Leaf, **special: float) -> Tree:
     def span(index: int, joint: str) -> Tree:
         return Tree(from_=point(f"from{index}", -0.03, 0.03), to=point(f"to{index}", -0.03, 0.03), joint=joint)
 
-    routes = [Tree(rest=number(f"rest{i}", 0, 0.1), over=over, span=None) for i, over in enumerate(structure["routes"])]
-    spans = [
-        Tree(rest=leaf(f"slack{i}", 0.0), over=[], span=span(i, joint))
-        for i, joint in enumerate(structure.get("spans", []))
-    ]
-    return Tree(
+    def tendon(rest: Any, **given: Any) -> Tree:
+        return Tree(**{"rest": rest, "over": [], "arms": {}, "span": None, "path": [], "spring": None, **given})
+
+    routes = [tendon(number(f"rest{i}", 0, 0.1), over=over) for i, over in enumerate(structure["routes"])]
+    spans = [tendon(leaf(f"slack{i}", 0.0), span=span(i, joint)) for i, joint in enumerate(structure.get("spans", []))]
+    finger = Tree(
         links=[link(joint, turn) for joint, turn in structure["joints"].items()],
         pulleys=[Tree(joint=joint, radius=number(f"{joint}_radius", 0.004, 0.009)) for joint in structure["joints"]],
-        tendons=routes + spans,
-        couplings=[Tree(follower=one, leader=other) for one, other in structure.get("couplings", {}).items()],
+        couplings=[
+            Tree(follower=one, leader=other, ratio=None, offset=None)
+            for one, other in structure.get("couplings", {}).items()
+        ],
     )
+    paths = [
+        tendon(
+            leaf(f"path{i}", 0.0),
+            path=[Tree(link=link, at=point(f"at{i}{k}", -0.03, 0.03)) for k, link in enumerate(links)],
+            arms={finger.links[-1].joint: number(f"arm{i}", 0.004, 0.009)},
+        )
+        for i, links in enumerate(structure.get("paths", []))
+    ]
+    finger.pulled, finger.strings = routes + spans + paths, []
+    return finger
 
 
 def plain(name: str, number: float) -> float:
@@ -140,7 +154,7 @@ QUANTITIES: dict[str, tuple[str, str]] = {
 def sizes(kind: str) -> dict[str, int]:
     """Length of each argument."""
     finger = make(kind, plain)
-    n, m = len(finger.links) - len(finger.couplings), len(finger.tendons)
+    n, m = len(finger.links) - len(finger.couplings), len(finger.pulled)
     return {"q": n, "qd": n, "qdd": n, "tau": n, "g": 3, "f": m, "k": m}
 
 

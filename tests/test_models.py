@@ -310,7 +310,7 @@ def test_stiffness_of_taut_antagonists_is_positive_definite():
 
 def test_span_is_the_distance_of_its_ends():
     finger = make("thumb", plain)
-    in_the_base_frame_of_pip, in_the_base = finger.tendons[3].span, finger.tendons[7].span
+    in_the_base_frame_of_pip, in_the_base = finger.pulled[3].span, finger.pulled[7].span
     for state in states("thumb"):
         lengths = witness("thumb", "tendon_lengths", state)
         metacarpal = witness("thumb", "link_poses", state).reshape(-1, 4, 4)[1]

@@ -9,14 +9,14 @@ from typing import Any
 import sympy
 from sympy import Expr, Matrix
 
-from awiwi_gen.definitions.kinematics import joint_angles
+from awiwi_gen.definitions.kinematics import joint_angles, joint_rates
 from awiwi_gen.definitions.naming import Derivation
 from awiwi_gen.structure import Finger
 
 
 def rotor_energy(finger: Finger, qd: Matrix) -> Expr:
     """Kinetic energy [J] of the rotors that joints see as their armature."""
-    rates = joint_angles(finger, qd)  # angles are proportional to q, so rates are to qd
+    rates = joint_rates(finger, qd)
     return sum((k.armature * rates[k.joint] ** 2 / 2 for k in finger.links if k.armature is not None), sympy.S.Zero)
 
 
@@ -29,7 +29,7 @@ def spring_energy(finger: Finger, q: Matrix) -> Expr:
 
 def dissipation(finger: Finger, qd: Matrix) -> Expr:
     """Rayleigh's function [W], whose gradient by qd are the torques of damping and friction."""
-    rates, total = joint_angles(finger, qd), sympy.S.Zero
+    rates, total = joint_rates(finger, qd), sympy.S.Zero
     for link in finger.links:
         if link.damping is not None:
             total += link.damping * rates[link.joint] ** 2 / 2

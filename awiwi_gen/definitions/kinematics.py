@@ -18,7 +18,7 @@ from sympy import Expr, Matrix
 
 from awiwi_gen.definitions.four_bar import four_bar_angles
 from awiwi_gen.definitions.naming import Derivation
-from awiwi_gen.structure import Finger, coordinates, fixed_turns, leaders, radius
+from awiwi_gen.structure import Finger, coordinates, fixed_turns, leaders, motion
 
 
 @dataclass(frozen=True)
@@ -42,9 +42,15 @@ def joint_angles(finger: Finger, q: Matrix) -> dict[str, Expr]:
     position = coordinates(finger)
     angles = {link.joint: q[position[link.joint]] for link in finger.links}
     for follower, leader in leaders(finger).items():
-        # The coupling tendon keeps its length: r_leader q_leader = r_follower q_follower.
-        angles[follower] = angles[leader] * radius(finger, leader) / radius(finger, follower)
+        ratio, offset = motion(finger, follower)
+        angles[follower] = angles[leader] * ratio + offset
     return angles
+
+
+def joint_rates(finger: Finger, qd: Matrix) -> dict[str, Expr]:
+    """Velocity [rad/s] of every joint by name: angles are linear in q, so a follower's offset drops out."""
+    at_rest = joint_angles(finger, sympy.zeros(*qd.shape))
+    return {joint: angle - at_rest[joint] for joint, angle in joint_angles(finger, qd).items()}
 
 
 def link_poses(finger: Finger, q: Matrix) -> list[Matrix]:

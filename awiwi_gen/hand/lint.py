@@ -149,8 +149,10 @@ def _couplings(finger: Finger, joints: list[str], pulleys: list[str]) -> Iterato
         for role, joint in (("follower", coupling.follower), ("leader", coupling.leader)):
             keys: Keys = ("couplings", index, role)
             yield from _known(keys, joint, joint, joints, "joint")
-            if joint in joints:
+            if joint in joints and coupling.ratio is None:
                 yield from _known(keys, joint, joint, pulleys, "pulley")
+        if coupling.ratio is not None and coupling.ratio.value == 0:
+            yield ("couplings", index, "ratio"), f'= "{coupling.ratio}" holds the follower; expected another number'
         if coupling.follower in followers[:index]:
             yield ("couplings", index, "follower"), f'= "{coupling.follower}" follows another joint already'
         if coupling.leader == coupling.follower:

@@ -90,10 +90,19 @@ class Tendon(Part):
 
 
 class Coupling(Part):
-    """A passive tendon rolling on two pulleys: r_leader q_leader = r_follower q_follower."""
+    """A joint that follows another: q_follower = ratio q_leader + offset.
+
+    Without a ratio, a passive tendon rolls on two pulleys: the ratio is r_leader / r_follower.
+    """
 
     follower: JointName
     leader: JointName
+    ratio: Annotated[Quantity, Measure("0.8", "-100", "100")] | None = None
+    offset: Angle | None = None
+
+    def structure(self) -> list[str]:
+        """Everything but the numbers."""
+        return [self.follower, self.leader, *(key for key in ("ratio", "offset") if getattr(self, key) is not None)]
 
 
 class Finger(Part):
@@ -114,6 +123,16 @@ class Finger(Part):
     def joints(self) -> tuple[str, ...]:
         """The n independent joints, base to tip: those that follow no other joint. Their angles are the finger's q."""
         return tuple(link.joint for link in self.links if link.joint not in self.leaders)
+
+    def motion(self, joint: str) -> tuple[float, float]:
+        """(ratio, offset [rad]) of a joint: its angle is ratio times its leader's, or its own, + offset."""
+        for coupling in self.couplings:
+            if coupling.follower == joint:
+                offset = float(coupling.offset or 0)
+                if coupling.ratio is not None:
+                    return float(coupling.ratio), offset
+                return float(self.radii[coupling.leader]) / float(self.radii[joint]), offset
+        return 1.0, 0.0
 
     @property
     def has_armature(self) -> bool:
@@ -146,7 +165,7 @@ class Finger(Part):
             "links": [link.structure() for link in self.links],
             "pulleys": [pulley.joint for pulley in self.pulleys],
             "tendons": [tendon.structure() for tendon in self.tendons],
-            "couplings": [[coupling.follower, coupling.leader] for coupling in self.couplings],
+            "couplings": [coupling.structure() for coupling in self.couplings],
             **({"base": self.base.quarters} if self.base else {}),
         }
 

@@ -46,11 +46,10 @@ class Chain:
         self.low = [float(link.low or 0) for link in free]
         self.high = [float(link.high or 0) for link in free]
         radii = {joint: float(radius) for joint, radius in finger.radii.items()}
-        self._angles = []  # of every link: column in q, and its angle per angle in that column
+        self._angles = []  # of every link: column in q, its angle per angle in that column, and its angle at zero
         for link in finger.links:
             leader = finger.leaders.get(link.joint, link.joint)
-            factor = radii[leader] / radii[link.joint] if leader != link.joint else 1.0
-            self._angles.append((self.joints.index(leader), factor))
+            self._angles.append((self.joints.index(leader), *finger.motion(link.joint)))
         self._links = [
             (_elementary(link), _floats(link.offset), float(link.reference or 0), float(link.start), link.four_bar)
             for link in finger.links
@@ -76,7 +75,7 @@ class Chain:
         for tendon, lines in zip(self.finger.tendons, self.lines, strict=True):
             row = [0.0] * len(self.joints)
             for joint, arm in self._arms(tendon):
-                column, factor = self._angles[self._order[joint]]
+                column, factor, _ = self._angles[self._order[joint]]
                 row[column] += arm * factor
             if lines:
                 for column in range(len(row)):
@@ -113,8 +112,8 @@ class Chain:
         tendon = self.finger.tendons[number]
         length = float(tendon.rest) + sum(self.distance(q, line) for line in self.lines[number])
         for joint, arm in self._arms(tendon):
-            column, factor = self._angles[self._order[joint]]
-            length += arm * factor * q[column]
+            column, factor, offset = self._angles[self._order[joint]]
+            length += arm * (factor * q[column] + offset)
         return length
 
     def _arms(self, tendon: Tendon) -> list[tuple[str, float]]:
@@ -147,11 +146,13 @@ class Chain:
         axes: Axes = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
         origin: Vector = (0.0, 0.0, 0.0)
         offset: Vector = (0.0, 0.0, 0.0)
-        for (turns, following, drawn, start, bar), (column, factor) in zip(self._links, self._angles, strict=True):
+        for (turns, following, drawn, start, bar), (column, factor, rest) in zip(
+            self._links, self._angles, strict=True
+        ):
             origin = point(axes, origin, offset)
             for axis, angle in turns:
                 axes = _rotated(axes, angle, axis)
-            seat, angle = (axes, origin), q[column] * factor
+            seat, angle = (axes, origin), q[column] * factor + rest
             if bar:
                 reference = float(bar.reference)
                 origin = point(_rotated(axes, angle + reference), origin, (float(bar.crank), 0.0, 0.0))

@@ -12,7 +12,7 @@ from awiwi_gen.hand.lever import Lever
 from awiwi_gen.hand.parts import Finger, PathPoint, Tendon
 from awiwi_gen.kernel import Kernel, Port, Solver
 from awiwi_gen.kernels.declare import Family, within
-from awiwi_gen.structure import link_number
+from awiwi_gen.structure import link_number, rolls
 from awiwi_gen.units import J, N, Unit, kg, m, one, rad, s
 
 
@@ -102,14 +102,19 @@ def length_range(finger: Finger, tendon: Tendon) -> tuple[float, float]:
     """Bounds of a tendon's length over all poses [m]: joints at their limits, straight lines from zero to their longest."""
     rest, reach = float(tendon.rest), 0.0
     limits = dict(zip(finger.joints, zip(*joint_limits(finger), strict=True), strict=True))
+
+    def farthest(joint: str) -> float:
+        ratio, offset = finger.motion(joint)
+        return max(abs(ratio * limit + offset) for limit in limits[finger.leaders.get(joint, joint)])
+
     for over in tendon.over:
         joint = over[1:]
-        leader = finger.leaders.get(joint, joint)  # the arcs on the pulleys of follower and leader are equal
-        reach += float(finger.radii[leader]) * max(map(abs, limits[leader]))
-    for joint, arm in tendon.arms.items():
         leader = finger.leaders.get(joint, joint)
-        ratio = float(finger.radii[leader]) / float(finger.radii[joint]) if leader != joint else 1.0
-        reach += abs(float(arm)) * ratio * max(map(abs, limits[leader]))
+        if rolls(finger, joint):  # the arcs on the pulleys of follower and leader are equal
+            reach += float(finger.radii[leader]) * max(map(abs, limits[leader]))
+        else:
+            reach += float(finger.radii[joint]) * farthest(joint)
+    reach += sum(abs(float(arm)) * farthest(joint) for joint, arm in tendon.arms.items())
     low, high = rest - reach, rest + reach + sum(longest(finger, a, b) for a, b in pairwise(tendon.path))
     if tendon.span is None:
         return low, high

@@ -13,7 +13,7 @@ from awiwi_gen.hand.parts import Tendon
 from awiwi_gen.kernel import Kernel, Port, Solver
 from awiwi_gen.kernels.declare import Family
 from awiwi_gen.kernels.fingers import force_range, is_curved, per_finger
-from awiwi_gen.structure import link_number
+from awiwi_gen.structure import link_number, rolls
 from awiwi_gen.units import N, m, one
 
 SEARCHES, INVERSIONS = 3 * 97, 66  # evaluations of the curve in the worst case, see csrc/awiwi_distribution.h
@@ -119,7 +119,9 @@ def moved(finger: Finger, tendon: Tendon) -> set[str]:
     for ends in pairwise(tendon.path):
         first, last = sorted(link_number(finger, point.link) for point in ends)
         between += order[first + 1 : last + 1]
-    return {finger.leaders.get(joint, joint) for joint in (*between, *tendon.arms)} | set(senses(finger, tendon))
+    return {finger.leaders.get(joint, joint) for joint in (*between, *tendon.arms, *_geared(finger, tendon))} | set(
+        senses(finger, tendon)
+    )
 
 
 def groups(finger: Finger) -> list[list[int]]:
@@ -142,7 +144,7 @@ def antagonists(finger: Finger, group: list[int]) -> list[tuple[int, int]]:
         signs = senses(finger, finger.pulled[first])
         second = next((i for i in rest if _opposite(signs, senses(finger, finger.pulled[i]))), None)
         pair = [finger.pulled[i] for i in (first, second) if i is not None]
-        if second is None or not signs or any(tendon.span or tendon.path or tendon.arms for tendon in pair):
+        if second is None or not signs or not all(_counts(finger, tendon) for tendon in pair):
             return []
         rest.remove(second)
         pairs.append((first, second))
@@ -151,6 +153,16 @@ def antagonists(finger: Finger, group: list[int]) -> list[tuple[int, int]]:
         if all(a[x] * b[y] == a[y] * b[x] for x in {*a, *b} for y in {*a, *b}):
             return []
     return pairs if len(pairs) <= 2 else []
+
+
+def _counts(finger: Finger, tendon: Tendon) -> bool:
+    """Whether a tendon's coupling follows from its `senses`: from pulleys of leaders, and of joints that roll on these."""
+    return not (_geared(finger, tendon) or tendon.span or tendon.path or tendon.arms)
+
+
+def _geared(finger: Finger, tendon: Tendon) -> list[str]:
+    """The joints under a tendon that follow others by a ratio or with an offset, not by rolling on pulleys."""
+    return [over[1:] for over in tendon.over if over[1:] in finger.leaders and not rolls(finger, over[1:])]
 
 
 def _opposite(a: Counter[str], b: Counter[str]) -> bool:

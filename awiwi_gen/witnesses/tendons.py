@@ -12,7 +12,7 @@ from typing import Any
 import casadi as ca
 from casadi import SX
 
-from awiwi_gen.structure import Finger, coordinates, leaders, link_number, radius, sense
+from awiwi_gen.structure import Finger, coordinates, leaders, link_number, motion, radius, rolls, sense
 from awiwi_gen.witnesses.kinematics import point_before_joint, point_of_link
 
 Tendon = Any
@@ -26,18 +26,23 @@ def tendon_lengths(finger: Finger, q: SX) -> SX:
 def _lengths(finger: Finger, tendons: Iterable[Tendon], q: SX, paths: bool = True) -> list[SX]:
     """Lengths [m] of some tendons, with or without their paths from point to point."""
     position, follows = coordinates(finger), leaders(finger)
+
+    def angle(joint: str) -> SX:
+        ratio, offset = motion(finger, joint) if joint in follows else (1, 0)
+        return ratio * q[position[joint]] + offset
+
     lengths = []
     for tendon in tendons:
         length = SX(tendon.rest)
         for over in tendon.over:
             sign, joint = sense(over)
-            # The coupling tendon makes the arcs on the follower's and the leader's pulley equal.
-            length += sign * radius(finger, follows.get(joint, joint)) * q[position[joint]]
-        for joint, arm in tendon.arms.items():
-            leader = follows.get(joint, joint)
-            length += (
-                arm * q[position[joint]] * (1 if leader == joint else radius(finger, leader) / radius(finger, joint))
-            )
+            if rolls(
+                finger, joint
+            ):  # the coupling tendon makes the arcs on the follower's and the leader's pulley equal
+                length += sign * radius(finger, follows[joint]) * q[position[joint]]
+            else:
+                length += sign * radius(finger, joint) * angle(joint)
+        length += sum(arm * angle(joint) for joint, arm in tendon.arms.items())
         if tendon.span is not None:
             end = point_before_joint(finger, q, tendon.span.joint, ca.vertcat(*tendon.span.to))
             length += ca.norm_2(end - ca.vertcat(*tendon.span.from_))

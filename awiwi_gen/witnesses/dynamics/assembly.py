@@ -21,7 +21,7 @@ from typing import Any
 import casadi as ca
 from casadi import SX
 
-from awiwi_gen.structure import Finger, coordinates, fixed_turns, leaders, radius
+from awiwi_gen.structure import Finger, coordinates, fixed_turns, leaders, motion
 from awiwi_gen.witnesses.four_bar import FourBar, Vector
 
 _ZERO, _Z = SX(0), SX([0, 0, 1])
@@ -300,10 +300,8 @@ def _parts(finger: Finger, q: SX) -> Iterator[_Part]:
         angle, offset, body = q[coordinate], ca.vertcat(*link.offset), _body(link)
         turns, yaw = turns_of(link)
         if link.four_bar is None:
-            ratio = SX(1)
-            if link.joint in follows:
-                ratio = SX(radius(finger, follows[link.joint])) / radius(finger, link.joint)
-            angle = ratio * angle + yaw - (0 if link.reference is None else link.reference)
+            ratio, rest = (SX(each) for each in (motion(finger, link.joint) if link.joint in follows else (1, 0)))
+            angle = ratio * angle + rest + yaw - (0 if link.reference is None else link.reference)
             yield _Part(coordinate, turns, angle, None, ratio, SX(0), offset, body, index)
         else:
             crank = angle + link.four_bar.reference
