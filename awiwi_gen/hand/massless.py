@@ -73,6 +73,6 @@ def _rotors(finger: Finger) -> Any:
     rows = np.zeros((len(finger.links), len(finger.joints)))
     for row, link in enumerate(finger.links):
         leader = finger.leaders.get(link.joint, link.joint)
-        ratio = 1.0 if leader == link.joint else float(finger.radii[leader]) / float(finger.radii[link.joint])
+        ratio, _ = finger.motion(link.joint)
         rows[row, finger.joints.index(leader)] = ratio * math.sqrt(float(link.armature or 0))
     return rows

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from decimal import Decimal
 
 from awiwi_gen.interchange.draft import DraftFinger, DraftHand, DraftLink, DraftTendon
@@ -25,7 +25,6 @@ _LIMITS = {
     "gravity": "9.81 m/s^2",
 }
 _FRICTION_VELOCITY = "0.05 rad/s"
-_LEADER_RADIUS = 0.01
 _RULE = "# " + "-" * 100
 
 
@@ -56,15 +55,7 @@ def _finger_lines(finger: DraftFinger, file: str) -> list[str]:
     head = f"fingers.{finger.name}"
     lines = [f"# {finger.name}: {len(finger.links)} links, {len(finger.tendons)} tendons", "", f"[{head}]"]
     if finger.followed:
-        lines += [
-            "# Only the ratio of these two radii counts: the couplings have no pulleys in the source.",
-            "pulleys = [",
-        ]
-        lines += [f"    {row}," for row in _pulleys(finger.followed)]
-        lines += ["]", "couplings = ["]
-        lines += [f'    {{ follower = "{f.follower}", leader = "{f.leader}" }},' for f in finger.followed]
-        lines += ["]"]
-        lines += [f"# {f.follower} = {f.sign} * ({f.published} - {f.offset!r} rad)" for f in finger.followed if f.moved]
+        lines += ["couplings = [", *(f"    {{ {_coupling(each)} }}," for each in finger.followed), "]"]
     lines += ["", f"[{head}.base]", f"position = {_lengths(finger.position)}"]
     lines += [f"rpy = {_listed(map(angle, tidy(rpy_of(finger.axes), 1.0)))}"]
     lines += [f"source = {_text(cite(f'{file} body {finger.carrier}'))}"]
@@ -75,10 +66,10 @@ def _finger_lines(finger: DraftFinger, file: str) -> list[str]:
     return lines
 
 
-def _pulleys(followed: Sequence[Followed]) -> Iterable[str]:
-    radii = {f.leader: _LEADER_RADIUS for f in followed} | {f.follower: _LEADER_RADIUS / f.ratio for f in followed}
-    for joint, radius in radii.items():
-        yield f'{{ joint = "{joint}", radius = {_text(length(radius))}, source = "assumed; only the ratio counts" }}'
+def _coupling(lock: Followed) -> str:
+    ratio = quantity(lock.ratio, "").strip()
+    offset = f', offset = "{angle(lock.offset)}"' if lock.offset else ""
+    return f'follower = "{lock.follower}", leader = "{lock.leader}", ratio = "{ratio}"{offset}'
 
 
 def _link_lines(link: DraftLink, file: str) -> list[str]:
