@@ -46,13 +46,22 @@ def turn_matrix(turn: str) -> np.ndarray:
 def coordinates(finger: dict[str, Any]) -> tuple[list[str], np.ndarray]:
     """Independent joints, and the matrix (links x joints) from their angles to those of all links."""
     radii = {pulley["joint"]: pulley["radius"] for pulley in finger.get("pulleys", [])}
-    leaders = {each["follower"]: each["leader"] for each in finger.get("couplings", [])}
-    free = [link["joint"] for link in finger["links"] if link["joint"] not in leaders]
+    couplings = {each["follower"]: each for each in finger.get("couplings", [])}
+    free = [link["joint"] for link in finger["links"] if link["joint"] not in couplings]
     matrix = np.zeros((len(finger["links"]), len(free)))
     for row, link in enumerate(finger["links"]):
-        leader = leaders.get(link["joint"], link["joint"])
-        matrix[row, free.index(leader)] = radii[leader] / radii[link["joint"]] if link["joint"] in leaders else 1.0
+        coupling = couplings.get(link["joint"])
+        ratio = 1.0
+        if coupling:
+            ratio = coupling["ratio"] if "ratio" in coupling else radii[coupling["leader"]] / radii[link["joint"]]
+        matrix[row, free.index(coupling["leader"] if coupling else link["joint"])] = ratio
     return free, matrix
+
+
+def link_angles(finger: dict[str, Any], q: np.ndarray) -> np.ndarray:
+    """The angles of all joints from those of the independent ones."""
+    offsets = {each["follower"]: each.get("offset", 0.0) for each in finger.get("couplings", [])}
+    return coordinates(finger)[1] @ q + np.array([offsets.get(link["joint"], 0.0) for link in finger["links"]])
 
 
 def poses(finger: dict[str, Any], angles: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -69,7 +78,7 @@ def poses(finger: dict[str, Any], angles: np.ndarray) -> list[tuple[np.ndarray, 
 def mass_matrix(finger: dict[str, Any], q: np.ndarray) -> np.ndarray:
     """By the velocities of the bodies: sum of m v v + w I w, and the armatures."""
     matrix = coordinates(finger)[1]
-    frames = poses(finger, matrix @ q)
+    frames = poses(finger, link_angles(finger, q))
     total = np.zeros((len(finger["links"]),) * 2)
     for i, link in enumerate(finger["links"]):
         total[i, i] += link.get("armature", 0.0)
@@ -94,7 +103,7 @@ def mass_matrix(finger: dict[str, Any], q: np.ndarray) -> np.ndarray:
 def gravity_torque(finger: dict[str, Any], q: np.ndarray, g: np.ndarray) -> np.ndarray:
     """What holds the finger against gravity g in the base frame."""
     matrix = coordinates(finger)[1]
-    frames = poses(finger, matrix @ q)
+    frames = poses(finger, link_angles(finger, q))
     torque = np.zeros(len(finger["links"]))
     for i, link in enumerate(finger["links"]):
         if "mass" in link:
@@ -105,7 +114,7 @@ def gravity_torque(finger: dict[str, Any], q: np.ndarray, g: np.ndarray) -> np.n
 
 
 def tendon_lengths(finger: dict[str, Any], q: np.ndarray) -> np.ndarray:
-    angles = dict(zip([link["joint"] for link in finger["links"]], coordinates(finger)[1] @ q, strict=True))
+    angles = dict(zip([link["joint"] for link in finger["links"]], link_angles(finger, q), strict=True))
     frames = dict(zip(angles, poses(finger, np.array(list(angles.values())))[:-1], strict=True))
     frames["palm"] = (np.eye(3), np.zeros(3))
     lengths = []

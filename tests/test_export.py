@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from commands import answer, complaint, told
-from hand_numbers import coordinates, fingers_of, poses, rpy_matrix, tendon_lengths
+from hand_numbers import coordinates, fingers_of, link_angles, poses, rpy_matrix, tendon_lengths
 
 from awiwi_gen.hand import Hand
 from awiwi_gen.interchange import export_mjcf, export_urdf
@@ -92,7 +92,7 @@ def test_an_exported_hand_moves_as_the_hand_file_says(name):
         assert coordinates(written)[0] == coordinates(before[finger])[0]
         for _ in range(5):
             q = random.uniform(-1, 1, len(coordinates(written)[0]))
-            ours, theirs = (poses(each, coordinates(each)[1] @ q) for each in (before[finger], written))
+            ours, theirs = (poses(each, link_angles(each, q)) for each in (before[finger], written))
             tips = [
                 position + axes @ frames[-1][1]
                 for (axes, position), frames in ((base_of(before[finger]), ours), (base_of(written), theirs))

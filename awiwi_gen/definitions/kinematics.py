@@ -48,10 +48,9 @@ def joint_angles(finger: Finger, q: Matrix) -> dict[str, Expr]:
 
 
 def joint_rates(finger: Finger, qd: Matrix) -> dict[str, Expr]:
-    """Velocity [rad/s] of every joint by name: that of `joint_angles`."""
-    position, follows = coordinates(finger), leaders(finger)
-    own = {link.joint: qd[position[link.joint]] for link in finger.links}
-    return {name: rate * motion(finger, name)[0] if name in follows else rate for name, rate in own.items()}
+    """Velocity [rad/s] of every joint by name: angles are linear in q, so a follower's offset drops out."""
+    at_rest = joint_angles(finger, sympy.zeros(*qd.shape))
+    return {joint: angle - at_rest[joint] for joint, angle in joint_angles(finger, qd).items()}
 
 
 def link_poses(finger: Finger, q: Matrix) -> list[Matrix]:

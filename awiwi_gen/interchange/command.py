@@ -39,7 +39,9 @@ def import_(
 
     target = output or Path(f"{file.stem}.toml")
     hand = draft(read(file, exact, without or (), fit), palm, _named(finger or []))
-    text = hand_text(hand, " ".join(["awiwi-gen import", *(["--exact"] if exact else [])]))
+    text = hand_text(
+        hand, " ".join(["awiwi-gen import", *(["--exact"] if exact else []), *(["--fit-wraps"] if fit else [])])
+    )
     faults = _faults(text, str(target))
     write_whole(target, text, replace)
     joints = sum(len(each.links) - len(each.followed) for each in hand.fingers)

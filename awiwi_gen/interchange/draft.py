@@ -130,7 +130,7 @@ def _finger(
 ) -> DraftFinger:
     carrier = model.bodies[chain.segments[0].body].parent
     pose_axes, pose_origin = model.poses[palm]
-    axes = [_axis(model, joint, locks.get(joint.name)) for joint in chain.joints]
+    axes = [_axis(model, joint) for joint in chain.joints]
     base = base_frame(model.poses[carrier][0], axes[0])
     frames = link_frames(base, axes)
     tip, assumed = _tip(model, chain.segments[-1], frames[-1])
@@ -160,9 +160,9 @@ def _last(chain: Chain, segment: Segment) -> int:
     return joints.index(segment.joints[-1].name)
 
 
-def _axis(model: Model, joint: Joint, lock: Followed | None) -> Axis:
+def _axis(model: Model, joint: Joint) -> Axis:
     axes, position = model.poses[joint.body]
-    return Axis(axes @ joint.axis * (lock.sign if lock else 1), position + axes @ joint.anchor)
+    return Axis(axes @ joint.axis, position + axes @ joint.anchor)
 
 
 def _link(
@@ -171,15 +171,14 @@ def _link(
 ) -> DraftLink:  # fmt: skip
     mass, com, inertia = composite(model, segment) if holds else (0.0, np.zeros(3), np.zeros((3, 3)))
     limits = (joint.low, joint.high) if joint.low is not None and joint.high is not None else (-np.pi, np.pi)
-    angle = lock.angle if lock else lambda published: published
     return DraftLink(
         joint=name,
         published=joint,
         body=model.bodies[segment.body].name,
         frame=frame,
-        reference=angle(joint.reference) - frame.angle,
+        reference=joint.reference - frame.angle,
         limits=None if lock else limits,
-        spring_reference=angle(joint.spring_reference),
+        spring_reference=joint.spring_reference,
         offset=frame.axes.T @ (end - frame.origin),
         mass=mass if mass else None,
         com=frame.axes.T @ (com - frame.origin),
@@ -238,12 +237,10 @@ def _tendon(
     rest, arms = tendon.constant, {}
     reference = {joint.name: joint.reference for joint in model.joints}
     for joint, arm in tendon.arms.items():
-        lock = locks.get(joint)
-        if joint not in names:
-            rest += arm * reference[joint]
+        if joint in names:
+            arms[names[joint]] = arm
         else:
-            rest += arm * lock.offset if lock else 0.0
-            arms[names[joint]] = arm * (lock.sign if lock else 1)
+            rest += arm * reference[joint]
     path = []
     for body, local in tendon.path:
         axes, position = model.poses[body]

@@ -47,12 +47,6 @@ def parts(finger: Finger) -> list[Part]:
     return found
 
 
-def ratio(finger: Finger, follower: str) -> float:
-    """Angle of a joint that follows another, per angle of its leader."""
-    radii = finger.radii
-    return float(radii[finger.leaders[follower]].value / radii[follower].value)
-
-
 def rpy_matrix(rpy: Any) -> Array:
     """Rz(yaw) Ry(pitch) Rx(roll) (3 x 3); quarter turns are exact."""
     total = np.eye(3)

@@ -18,7 +18,6 @@ from awiwi_gen.interchange.export import (
     document,
     has_four_bar,
     parts,
-    ratio,
     rpy_matrix,
     text,
     value,
@@ -137,8 +136,8 @@ class _Writer:
 
     def _coupling(self, follower: str, leader: str) -> None:
         references = {part.link.joint: part.reference for part in self.parts}
-        slope = ratio(self.finger, follower)
-        constant = slope * references[leader] - references[follower]
+        slope, offset = self.finger.motion(follower)
+        constant = slope * references[leader] + offset - references[follower]
         SubElement(self.sections["equality"], "joint", joint1=f"{self.name}_{follower}", joint2=f"{self.name}_{leader}",
                    polycoef=text((constant, slope, 0, 0, 0)))  # fmt: skip
         self._lose("couplings of joints: soft constraints in MuJoCo", f"{self.name} {follower}")

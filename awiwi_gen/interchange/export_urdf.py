@@ -13,7 +13,6 @@ from awiwi_gen.interchange.export import (
     document,
     has_four_bar,
     parts,
-    ratio,
     rpy_matrix,
     text,
     value,
@@ -91,12 +90,14 @@ def _joint(root: Element, hand: Hand, name: str, finger: Finger, part: Part, par
         SubElement(joint, "dynamics", damping=text(value(link.damping)), friction=text(friction))
     if link.joint in finger.leaders:
         leader = f"{name}_{finger.leaders[link.joint]}"
-        SubElement(joint, "mimic", joint=leader, multiplier=text(ratio(finger, link.joint)), offset="0")
+        ratio, offset = finger.motion(link.joint)
+        SubElement(joint, "mimic", joint=leader, multiplier=text(ratio), offset=text(offset))
 
 
 def _range(finger: Finger, joint: str) -> tuple[float, float]:
-    """Limits of a joint [rad]; those of a follower are its leader's, times the ratio."""
-    factor = ratio(finger, joint) if joint in finger.leaders else 1.0
+    """Limits of a joint [rad]; those of a follower are where its leader's limits take it."""
+    ratio, offset = finger.motion(joint)
     leader = finger.leaders.get(joint, joint)
     link = next(link for link in finger.links if link.joint == leader)
-    return factor * value(link.low), factor * value(link.high)
+    low, high = sorted(ratio * value(end) + offset for end in (link.low, link.high))
+    return low, high

@@ -1,8 +1,4 @@
-"""Joints that follow others. A hand file's follower turns to the same side as its leader, both from zero.
-
-So the angle of a follower that turns to the other side, or with an offset, is counted anew:
-new angle = sign * (published angle - offset), which is |ratio| times the leader's angle.
-"""
+"""Joints that follow others: the couplings of a hand file from those of a model."""
 
 from __future__ import annotations
 
@@ -14,23 +10,13 @@ from awiwi_gen.interchange.model import Lock, Loss
 
 @dataclass(frozen=True)
 class Followed:
-    """A follower by its published name, both names in the hand file, and how its angle is counted."""
+    """A follower by its published name and both names in the hand file: its angle is ratio * leader + offset [rad]."""
 
     published: str
     follower: str
     leader: str
     ratio: float
-    sign: int
     offset: float
-
-    @property
-    def moved(self) -> bool:
-        """Whether the angle is counted in another way than published."""
-        return self.sign < 0 or self.offset != 0
-
-    def angle(self, published: float) -> float:
-        """The hand file's angle [rad] of a published one."""
-        return self.sign * (published - self.offset)
 
 
 def followed(
@@ -51,8 +37,7 @@ def followed(
         while leader in direct:
             further = direct[leader]
             ratio, offset, leader = ratio * further.ratio, offset + ratio * further.offset, further.leader
-        sign = 1 if ratio > 0 else -1
-        found.append(Followed(name, names[name], names[leader], abs(ratio), sign, offset))
+        found.append(Followed(name, names[name], names[leader], ratio, offset))
     what = "couplings of joints that are in two fingers, in none, or in a loop"
     return found, [Loss(what, tuple(lost))] if lost else []
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from decimal import Decimal
 
 from awiwi_gen.interchange.draft import DraftFinger, DraftHand, DraftLink, DraftTendon
 from awiwi_gen.interchange.frames import rpy_of
 from awiwi_gen.interchange.locks import Followed
+from awiwi_gen.interchange.loss import loss_lines
 from awiwi_gen.interchange.model import Array
 
 NOISE = 2e-15
@@ -24,7 +25,6 @@ _LIMITS = {
     "gravity": "9.81 m/s^2",
 }
 _FRICTION_VELOCITY = "0.05 rad/s"
-_LEADER_RADIUS = 0.01
 _RULE = "# " + "-" * 100
 
 
@@ -34,7 +34,7 @@ def hand_text(hand: DraftHand, command: str = "") -> str:
     lines += [f"# The palm is the body {hand.palm}; each finger's base frame is given in the palm's frame.", "#"]
     lines += [f"# name: {old} -> {new}" for old, new in hand.names.items()]
     lines += [f"# taken: {note}" for note in hand.notes]
-    lines += [f"# lost: {loss.what} ({len(loss.places)})" for loss in hand.losses]
+    lines += [f"# {line}" for line in loss_lines(hand.losses)]
     lines += ["", f"prefix = {_text(hand.prefix)}", f"name = {_text(cite(hand.name))}", "", "[limits]"]
     lines += [f"{key} = {_text(value)}" for key, value in _LIMITS.items()]
     lines += ['source = "assumed"']
@@ -55,15 +55,7 @@ def _finger_lines(finger: DraftFinger, file: str) -> list[str]:
     head = f"fingers.{finger.name}"
     lines = [f"# {finger.name}: {len(finger.links)} links, {len(finger.tendons)} tendons", "", f"[{head}]"]
     if finger.followed:
-        lines += [
-            "# Only the ratio of these two radii counts: the couplings have no pulleys in the source.",
-            "pulleys = [",
-        ]
-        lines += [f"    {row}," for row in _pulleys(finger.followed)]
-        lines += ["]", "couplings = ["]
-        lines += [f'    {{ follower = "{f.follower}", leader = "{f.leader}" }},' for f in finger.followed]
-        lines += ["]"]
-        lines += [f"# {f.follower} = {f.sign} * ({f.published} - {f.offset!r} rad)" for f in finger.followed if f.moved]
+        lines += ["couplings = [", *(f"    {{ {_coupling(each)} }}," for each in finger.followed), "]"]
     lines += ["", f"[{head}.base]", f"position = {_lengths(finger.position)}"]
     lines += [f"rpy = {_listed(map(angle, tidy(rpy_of(finger.axes), 1.0)))}"]
     lines += [f"source = {_text(cite(f'{file} body {finger.carrier}'))}"]
@@ -74,10 +66,10 @@ def _finger_lines(finger: DraftFinger, file: str) -> list[str]:
     return lines
 
 
-def _pulleys(followed: Sequence[Followed]) -> Iterable[str]:
-    radii = {f.leader: _LEADER_RADIUS for f in followed} | {f.follower: _LEADER_RADIUS / f.ratio for f in followed}
-    for joint, radius in radii.items():
-        yield f'{{ joint = "{joint}", radius = {_text(length(radius))}, source = "assumed; only the ratio counts" }}'
+def _coupling(lock: Followed) -> str:
+    ratio = quantity(lock.ratio, "").strip()
+    offset = f', offset = "{angle(lock.offset)}"' if lock.offset else ""
+    return f'follower = "{lock.follower}", leader = "{lock.leader}", ratio = "{ratio}"{offset}'
 
 
 def _link_lines(link: DraftLink, file: str) -> list[str]:

@@ -44,10 +44,10 @@ def fitted(compiled: Any, tendon: Tendon, locks: tuple[Lock, ...]) -> tuple[Tend
     angles[:, crossed] = random.uniform(ends[crossed, 0], ends[crossed, 1], (_STATES, len(crossed)))
     lengths = np.array([length(state) for state in angles])
     table = np.column_stack([np.ones(_STATES), angles[:, crossed]])
-    (rest, *arms), *_ = np.linalg.lstsq(table, lengths, rcond=None)
-    error = float(np.abs(table @ [rest, *arms] - lengths).max())
+    best: Array = np.asarray(np.linalg.lstsq(table, lengths, rcond=None)[0]).round(6)  # the fit is good to millimetres
+    error = float(np.abs(table @ best - lengths).max())
     names = [compiled.joint(hinges[k]).name for k in crossed]
-    return replace(tendon, arms=dict(zip(names, map(float, arms), strict=True)), constant=float(rest)), error
+    return replace(tendon, arms=dict(zip(names, map(float, best[1:]), strict=True)), constant=float(best[0])), error
 
 
 def _moves(length: Callable[[Array], float], drawn: Array, ends: Array, joint: int) -> bool:

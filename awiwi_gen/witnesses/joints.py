@@ -49,7 +49,7 @@ def passive_torque(finger: Finger, q: SX, qd: SX) -> SX:
 
 
 def _joints(finger: Finger) -> Iterator[tuple[Any, int, SX, SX]]:
-    """Every link, the coordinate of its joint, and the joint's angle: per unit of that coordinate, and at zero."""
+    """Every link, the coordinate of its joint, the joint's angle per unit of that coordinate, and its angle at zero."""
     position, follows = coordinates(finger), leaders(finger)
     for link in finger.links:
         ratio, rest = motion(finger, link.joint) if link.joint in follows else (1, 0)

@@ -35,7 +35,7 @@ class MujocoFinger:
         free = [names[name] for name in self.free]
         for row, name in enumerate(joints):
             lock = locks.get(name)
-            self.matrix[row, free.index(lock.leader if lock else names[name])] = lock.sign * lock.ratio if lock else 1.0
+            self.matrix[row, free.index(lock.leader if lock else names[name])] = lock.ratio if lock else 1.0
             self.offset[row] = lock.offset if lock else 0.0
         self.last = [self._is_last(link.published.name) for link in self.finger.links]
         mujoco.mj_resetData(self.compiled, self.data)
@@ -99,9 +99,7 @@ class MujocoFinger:
         """The frame (4 x 4) of each link in the base frame; of a joint with others after it in its body only z."""
         base_axes, base_origin = self.base()
         found = []
-        signs = {lock.follower: lock.sign for lock in self.finger.followed}
         for link, last in zip(self.finger.links, self.last, strict=True):
-            sign = signs.get(link.joint, 1)
             joint = self.compiled.joint(link.published.name)
             body = int(self.compiled.jnt_bodyid[joint.id])
             frame = np.eye(4)
@@ -109,7 +107,7 @@ class MujocoFinger:
             frame[:3, :3] = base_axes.T @ axes
             if not last:
                 frame[:3, :2] = np.nan
-                frame[:3, 2] = base_axes.T @ self.data.xaxis[joint.id] * sign
+                frame[:3, 2] = base_axes.T @ self.data.xaxis[joint.id]
             frame[:3, 3] = base_axes.T @ (self.data.xanchor[joint.id] - base_origin)
             found.append(frame)
         return found
