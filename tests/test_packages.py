@@ -123,6 +123,28 @@ def test_a_part_of_the_kernels_is_a_firmware_of_its_own(job, tmp_path):
     run_tool(tmp_path / "main")
 
 
+def test_the_compiler_lists_calls_that_drop_a_status_where_it_is_asked_to(tree, tmp_path):
+    (tmp_path / "main.c").write_text(
+        '#include "kernels.h"\nvoid tick(const double *q, const double *g, double *out)\n'
+        "{\n    claw_jaw_tendon_lengths(q, out);\n    claw_jaw_gravity(q, g, out);\n}\n"
+    )
+    asked = ["-DAWIWI_MUST_CHECK=__attribute__((warn_unused_result))", "-Werror=unused-result"]
+    command = [
+        "gcc",
+        "-std=c99",
+        *asked,
+        f"-I{tree}",
+        f"-I{CSRC}",
+        "-c",
+        tmp_path / "main.c",
+        "-o",
+        tmp_path / "main.o",
+    ]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+
+    assert re.findall(r"return value of .(\w+).", done.stderr) == ["claw_jaw_gravity"]
+
+
 def test_local_names_get_the_name_of_their_file_and_members_of_public_structs_stay(tree):
     text = amalgamate(tree)["awiwi.c"]
 

@@ -70,6 +70,10 @@ static void tendons(int number)
         P[j * n] = 0;
     if (number % 13 == 0)
         tau[0] = number % 2 ? NAN : 1e3;
+    if (number % 17 == 5)
+        K[n * n - 1] = NAN;
+    if (number % 19 == 6)
+        P[m * n - 1] = INFINITY;
     print("distribute", awiwi_distribute(&t, tau, K, 1e-11, f), f, m);
     fill(f, m, 0, 90);
     print("search", awiwi_search_forces(&t, tau, K, 1e-11, f), f, m);
