@@ -11,12 +11,16 @@ A finger is anything with these attributes (the hand file's `Finger` and its sym
     couplings[i]  follower, leader, ratio (or None), offset (or None)
     base          None or position[3], turn, quarters[3], rpy[3]
 
+A palm on joints in series has `joints` (also called `links`) with joint, turn, quarters[3], rpy[3], reference and
+offset[3]; `base`; and `turn`, `quarters[3]` and `rpy[3]` of its own.
+
 The numbers may be symbols of either library. Independent joints are counted along the chain, base to tip.
 """
 
 from typing import Any
 
 Finger = Any
+Palm = Any
 
 
 def leaders(finger: Finger) -> dict[str, str]:
