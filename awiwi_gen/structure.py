@@ -35,6 +35,15 @@ def coordinates(finger: Finger) -> dict[str, int]:
     return {link.joint: free.index(follows.get(link.joint, link.joint)) for link in finger.links}
 
 
+def straight(finger: Finger) -> list[Any]:
+    """The independent joint angles [rad] of the straight finger: zero, but for four-bars that cannot close there.
+
+    These stand where their couplers start, at the end of the joint's range that is nearest to zero.
+    """
+    follows = leaders(finger)
+    return [link.start if link.four_bar else 0 for link in finger.links if link.joint not in follows]
+
+
 def link_number(finger: Finger, name: str) -> int:
     """Index of the link that a joint moves; -1 for "palm", the base frame."""
     return -1 if name == "palm" else next(i for i, link in enumerate(finger.links) if link.joint == name)

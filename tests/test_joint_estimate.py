@@ -274,3 +274,12 @@ def test_a_hand_file_without_motors_measures_nothing():
 
     assert "thumb_joint_estimate" in names
     assert not [name for name in names if "measured" in name]
+
+
+def test_lengths_of_some_fingers_can_be_generated_without_the_others(tmp_path):
+    job = Job(awiwi_gen.Hand.load(), only="[ir]*_measured_lengths", store=Cache(tmp_path))
+
+    assert {name: record.passes < 1e-50 for name, record in job.records.items()} == {
+        "index_measured_lengths": True,
+        "ring_measured_lengths": True,
+    }

@@ -45,6 +45,13 @@ def test_kernels_of_a_finger_with_eight_links_are_proved(only, tmp_path):
     assert proof(text, tmp_path / "generated", only).passed
 
 
+def test_lengths_are_measured_from_where_a_four_bar_closes(tmp_path):
+    text = random_hands.hand(3, 2, {"four-bar without zero", "paths", "motor"})
+
+    assert "four_bar" in text
+    assert proof(text, tmp_path / "generated", "one_measured_lengths").passed
+
+
 def test_equal_seeds_give_equal_hands_and_others_differ():
     texts = [random_hands.hand(seed) for seed in (5, 5, 6)]
 

@@ -12,9 +12,9 @@ from awiwi_gen.hand.links import Base, JointAngle, Quarters, Rpy, Turn, quarters
 from awiwi_gen.hand.names import JointName, Source
 from awiwi_gen.hand.part import Keys, Part, Point
 
-__all__ = ["Palm", "PalmJoint", "palm_complaints"]
+__all__ = ["MOST_AXES", "Palm", "PalmJoint", "palm_complaints"]
 
-_MOST_AXES = 3
+MOST_AXES = 3
 _NARROWEST_RANGE = 0.01  # deg, as of a finger's joint
 
 
@@ -58,7 +58,7 @@ class Palm(Part):
 
     joints: Annotated[
         tuple[PalmJoint, ...],
-        Field(strict=False, min_length=1, max_length=_MOST_AXES, examples=["[[palm.joints]]"]),
+        Field(strict=False, min_length=1, max_length=MOST_AXES, examples=["[[palm.joints]]"]),
     ]
     rpy: Rpy | None = None
     base: Base | None = None
