@@ -17,7 +17,7 @@ FEATURES = (
     "wrist", "motor", "ripple", "spring", "units", "fibre", "gains",  # of the hand
     "four-bar", "four-bar without zero", "spans", "tensegrity", "couplings", "alike", "fewest", "crossed",  # of a finger
     "narrow range", "range without zero", "axial mass", "second finger", "skew axes", "references", "massless links",
-    "rotors", "passive joints", "arms", "paths", "return strings", "ratios", "few tendons", "base",
+    "rotors", "passive joints", "arms", "paths", "return strings", "ratios", "few tendons", "base", "palm",
 )  # fmt: skip
 TURNS = ("none", "none", "x+90", "x-90", "y+90", "y-90", "z+90", "z-90")
 LINKS = (1, 2, 1, 3, 2, 4, 3, 5, 2, 4, 6, 8)  # most hands are small: eight links take a minute to derive
@@ -86,7 +86,7 @@ tendon_stiffness_high = "{low * b(3, 60):.4g} N/m"
 gravity = "{self.random.choice([9.81, 1.62])} m/s^2"
 source = "assumed"
 """
-        parts = "".join(text for text, _ in fingers) + self.wrist(tendons) + self.actuators(tendons)
+        parts = "".join(text for text, _ in fingers) + (self.wrist(tendons) or self.palm()) + self.actuators(tendons)
         head = 'prefix = "claw"\nname = "Random hand"\n'
         return f"# {', '.join(sorted(self.used))}\n{head}{limits}{parts}"
 
@@ -111,6 +111,22 @@ source = "assumed"
 tendons = [
 {"".join(rows)}]
 """
+
+    def palm(self) -> str:
+        if not self.wants("palm"):
+            return ""
+        text = f'\n[palm]\nrpy = {self.turned()}\nsource = "assumed"\n'
+        for number in range(int(self.random.integers(1, 4))):
+            text += f"""
+[[palm.joints]]
+joint = "w{number}"
+rpy = {self.turned()}
+low = "{self.between(-60, -5):.4g} deg"
+high = "{self.between(5, 60):.4g} deg"
+offset = {self.point((5, 30), (-4, 4), (-4, 4))}
+source = "assumed"
+"""
+        return text
 
     def actuators(self, tendons: int) -> str:
         b, text = self.between, ""
