@@ -141,7 +141,7 @@ def turns_of(link: Any) -> tuple[list[Turn], Any]:
 def _turn(axis: int, y: SX, x: SX) -> Turn:
     """The rotation by atan2(y, x). Numbers come from quarter turns, and stay such: CasADi would round the angle."""
     if y.is_constant() and x.is_constant():
-        return Turn(axis, [(0, 1), (1, 0), (0, -1), (-1, 0)].index((float(y), float(x))), None)
+        return Turn(axis, [(0, 1), (1, 0), (0, -1), (-1, 0)].index((int(y), int(x))), None)
     return Turn(axis, None, ca.atan2(y, x))
 
 
