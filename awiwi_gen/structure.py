@@ -11,12 +11,16 @@ A finger is anything with these attributes (the hand file's `Finger` and its sym
     couplings[i]  follower, leader, ratio (or None), offset (or None)
     base          None or position[3], turn, quarters[3], rpy[3]
 
+A palm on joints in series has `joints` (also called `links`) with joint, turn, quarters[3], rpy[3], reference and
+offset[3]; `base`; and `turn`, `quarters[3]` and `rpy[3]` of its own.
+
 The numbers may be symbols of either library. Independent joints are counted along the chain, base to tip.
 """
 
 from typing import Any
 
 Finger = Any
+Palm = Any
 
 
 def leaders(finger: Finger) -> dict[str, str]:
@@ -29,6 +33,15 @@ def coordinates(finger: Finger) -> dict[str, int]:
     follows = leaders(finger)
     free = [link.joint for link in finger.links if link.joint not in follows]
     return {link.joint: free.index(follows.get(link.joint, link.joint)) for link in finger.links}
+
+
+def straight(finger: Finger) -> list[Any]:
+    """The independent joint angles [rad] of the straight finger: zero, but for four-bars that cannot close there.
+
+    These stand where their couplers start, at the end of the joint's range that is nearest to zero.
+    """
+    follows = leaders(finger)
+    return [link.start if link.four_bar else 0 for link in finger.links if link.joint not in follows]
 
 
 def link_number(finger: Finger, name: str) -> int:

@@ -36,9 +36,11 @@ def derive(piece: tuple[str, Mapping[str, Any], Cache]) -> None:
 
 def ordered(tasks: Collection[Task]) -> tuple[list[list[Task]], list[set[int]]]:
     """Tasks in pieces of one part each, those that others wait for first; and for each the pieces it waits for."""
-    parts: dict[str, list[Task]] = {}
+    parts: dict[tuple[str, str], list[Task]] = {}
     for task in tasks:
-        parts.setdefault(task[0].path if task[0].solver is None else task[0].name, []).append(task)
+        # The whole hand and a hand of one finger, for its measured lengths, have the same path.
+        part = (task[0].path, task[0].structure) if task[0].solver is None else (task[0].name, "")
+        parts.setdefault(part, []).append(task)
     pieces = split(list(parts.values()), _size)
     awaited = {digest for members in pieces for task in members for digest in _needs(task)}
     pieces.sort(key=lambda members: (awaited.isdisjoint(task[2] for task in members), -sum(map(_size, members))))

@@ -16,7 +16,8 @@ from awiwi_gen.hand import Hand
 FEATURES = (
     "wrist", "motor", "ripple", "spring", "units", "fibre", "gains",  # of the hand
     "four-bar", "four-bar without zero", "spans", "tensegrity", "couplings", "alike", "fewest", "crossed",  # of a finger
-    "narrow range", "range without zero", "axial mass", "second finger",
+    "narrow range", "range without zero", "axial mass", "second finger", "skew axes", "references", "massless links",
+    "rotors", "passive joints", "arms", "paths", "return strings", "ratios", "few tendons", "base", "palm",
 )  # fmt: skip
 TURNS = ("none", "none", "x+90", "x-90", "y+90", "y-90", "z+90", "z-90")
 LINKS = (1, 2, 1, 3, 2, 4, 3, 5, 2, 4, 6, 8)  # most hands are small: eight links take a minute to derive
@@ -85,7 +86,7 @@ tendon_stiffness_high = "{low * b(3, 60):.4g} N/m"
 gravity = "{self.random.choice([9.81, 1.62])} m/s^2"
 source = "assumed"
 """
-        parts = "".join(text for text, _ in fingers) + self.wrist(tendons) + self.actuators(tendons)
+        parts = "".join(text for text, _ in fingers) + (self.wrist(tendons) or self.palm()) + self.actuators(tendons)
         head = 'prefix = "claw"\nname = "Random hand"\n'
         return f"# {', '.join(sorted(self.used))}\n{head}{limits}{parts}"
 
@@ -110,6 +111,22 @@ source = "assumed"
 tendons = [
 {"".join(rows)}]
 """
+
+    def palm(self) -> str:
+        if not self.wants("palm"):
+            return ""
+        text = f'\n[palm]\nrpy = {self.turned()}\nsource = "assumed"\n'
+        for number in range(int(self.random.integers(1, 4))):
+            text += f"""
+[[palm.joints]]
+joint = "w{number}"
+rpy = {self.turned()}
+low = "{self.between(-60, -5):.4g} deg"
+high = "{self.between(5, 60):.4g} deg"
+offset = {self.point((5, 30), (-4, 4), (-4, 4))}
+source = "assumed"
+"""
+        return text
 
     def actuators(self, tendons: int) -> str:
         b, text = self.between, ""
@@ -212,16 +229,60 @@ source = "assumed"
                     f'{{ rest = "0 mm"{over}, span = {{ from = {start}, to = {end}, joint = "{joint}" }}, '
                     'source = "assumed" }'
                 )
+        spans += self.paths(joints)
         pulleys = [f'{{ joint = "{joint}", radius = {self.mm(4, 10)}, source = "drawing" }}' for joint in joints]
+        if self.wants("few tendons"):
+            rows = rows[: int(self.random.integers(1, len(rows) + 1))]
         tendons = spans + [
-            f'{{ rest = {self.mm(0, 50)}, over = [{", ".join(row)}], source = "assumed" }}' for row in rows
+            f'{{ rest = {self.mm(0, 50)}, over = [{", ".join(row)}]{self.arms(free)}, source = "assumed" }}'
+            for row in rows
         ]
-        couplings = [f'{{ follower = "{one}", leader = "{other}" }}' for one, other in leaders.items()]
+        strings = self.strings(joints)
+        couplings = [f'{{ follower = "{one}", leader = "{other}"{self.ratio()} }}' for one, other in leaders.items()]
         text = f"\n[fingers.{name}]\npulleys = [{', '.join(pulleys)}]\ntendons = [\n    "
-        text += ",\n    ".join(tendons) + f"\n]\ncouplings = [{', '.join(couplings)}]\n"
+        text += ",\n    ".join(tendons + strings) + f"\n]\ncouplings = [{', '.join(couplings)}]\n"
+        if self.wants("base"):
+            text += f"base = {{ position = {self.point((-20, 20), (-40, 40), (-10, 10))}, rpy = {self.turned()}, "
+            text += 'source = "assumed" }\n'
         for joint, turn in zip(joints, turns, strict=True):
-            text += self.link(name, joint, turn, joint in leaders, joint == bar, tensegrity and joint in joints[:2])
+            base = tensegrity and joint in joints[:2]
+            text += self.link(name, joint, turn, joint in leaders, joint == bar, base, joint == joints[-1])
         return text, len(tendons)
+
+    def turned(self) -> str:
+        """Roll, pitch and yaw; some are quarter turns."""
+        angles = [90 * int(self.random.integers(-1, 3)) if self.random.random() < 0.3 else self.between(-170, 170)
+                  for _ in range(3)]  # fmt: skip
+        return "[" + ", ".join(f'"{angle:.6g} deg"' for angle in angles) + "]"
+
+    def arms(self, joints: list[str]) -> str:
+        if not self.wants("arms"):
+            return ""
+        return f", arms = {{ {self.random.choice(joints)} = {self.mm(-6, 6)} }}"
+
+    def ratio(self) -> str:
+        if not self.wants("ratios"):
+            return ""
+        offset = f', offset = "{self.between(-20, 20):.4g} deg"' if self.random.random() < 0.5 else ""
+        return f', ratio = "{self.random.choice([-1, 1]) * self.between(0.3, 1.5):.4g}"{offset}'
+
+    def path(self, joints: list[str]) -> str:
+        """Points of the palm and of some links, with straight lines between."""
+        count = int(self.random.integers(1, min(3, len(joints)) + 1))
+        links = ["palm", *(joints[i] for i in sorted(self.random.choice(len(joints), count, False)))]
+        points = [f'{{ link = "{x}", at = {self.point((3, 12), (-9, 9), (-9, 9))} }}' for x in links]
+        return f"path = [{', '.join(points)}]"
+
+    def paths(self, joints: list[str]) -> list[str]:
+        if not self.wants("paths"):
+            return []
+        return [f'{{ rest = {self.mm(0, 5)}, {self.path(joints)}, source = "assumed" }}']
+
+    def strings(self, joints: list[str]) -> list[str]:
+        if not self.wants("return strings"):
+            return []
+        spring = f'spring = {{ stiffness = "{self.between(100, 3000):.4g} N/m", rest = {self.mm(1, 20)} }}'
+        return [f'{{ rest = "0 mm", {self.path(joints)}, {spring}, source = "assumed" }}']
 
     def leaders(self, joints: list[str]) -> dict[str, str]:
         """Follower -> leader for some joints."""
@@ -254,7 +315,7 @@ source = "assumed"
             rows += [rows[i] for i in self.random.choice(len(rows), int(self.random.integers(1, 3)), False)]
         return [[name(joint, sense) for joint, sense in zip(joints, row, strict=True) if sense] for row in rows]
 
-    def link(self, finger: str, joint: str, turn: str, follows: bool, bar: bool, base: bool) -> str:
+    def link(self, finger: str, joint: str, turn: str, follows: bool, bar: bool, base: bool, last: bool) -> str:
         low, high, four_bar = self.between(-80, -5), self.between(5, 90), ""
         if base:
             low, high = self.between(-35, -10), self.between(10, 35)
@@ -268,17 +329,39 @@ source = "assumed"
         limits = "" if follows else f'low = "{low:.4f} deg"\nhigh = "{high:.4f} deg"\n'
         axial = self.random.random() < 0.5 and self.wants("axial mass")
         com = '["0 mm", "0 mm", "0 mm"]' if axial else self.point((5, 20), (-2, 2), (-2, 2))
+        offset = self.point((15, 40), (-4, 4), (-4, 4))
+        body = f"""mass = "{self.scale**3 * self.between(1, 15):.4g} g"
+com = {com}
+inertia = {self.inertia()}
+"""
+        if not last and not four_bar and "massless links" in self.features and self.random.random() < 0.5:
+            self.used.add("massless links")
+            body = ""
         text = f"""
 [[fingers.{finger}.links]]
 joint = "{joint}"
 turn = "{turn}"
-{limits}offset = {self.point((15, 40), (-4, 4), (-4, 4))}
-mass = "{self.scale**3 * self.between(1, 15):.4g} g"
-com = {com}
-inertia = {self.inertia()}
-source = "assumed"
+{limits}offset = {offset}
+{body}{self.joint(bool(four_bar) or base)}source = "assumed"
 """
         return text + (f"\n[fingers.{finger}.links.four_bar]\n{four_bar}" if four_bar else "")
+
+    def joint(self, planar: bool) -> str:
+        """The optional keys of a joint; without rotations for a `planar` one."""
+        b, text = self.between, ""
+        if not planar and self.wants("skew axes"):
+            text += f"rpy = {self.turned()}\n"
+        if not planar and self.wants("references"):
+            text += f'reference = "{b(-60, 60):.4g} deg"\n'
+        if self.wants("rotors"):
+            text += f'armature = "{b(1e-8, 1e-4):.3g} kg m^2"\n'
+        for key in self.random.choice(3, 2, False) if self.wants("passive joints") else ():
+            text += (
+                f'damping = "{b(1e-4, 1e-2):.3g} N m s/rad"\n',
+                f'friction = {{ torque = "{b(1e-3, 0.05):.3g} N m", velocity = "{b(0.02, 1):.3g} rad/s" }}\n',
+                f'spring = {{ stiffness = "{b(0.01, 0.5):.3g} N m/rad", reference = "{b(-40, 40):.4g} deg" }}\n',
+            )[key]
+        return text
 
     def inertia(self) -> str:
         """The inertia tensor of some body."""

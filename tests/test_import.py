@@ -11,6 +11,7 @@ import pytest
 from bodies import body, finger, joint, pose, spun, two_fingers
 from hand_numbers import fingers_of, link_angles, poses, rpy_matrix, tendon_lengths
 
+import awiwi_gen
 from awiwi_gen.errors import InputError
 from awiwi_gen.hand import Hand
 from awiwi_gen.interchange.draft import draft
@@ -136,11 +137,59 @@ def test_a_tendon_over_two_fingers_is_refused_by_its_name():
     )
 
 
-def test_the_wrist_and_its_tendons_are_reported():
+def test_tendons_of_the_wrist_are_reported():
     losses = draft(two_fingers(tendons=(Tendon("flexor", arms={"wrist": 0.01}),))).losses
 
-    assert Loss("joints above the palm: the palm is held as drawn", ("wrist",)) in losses
-    assert Loss("tendons of no finger", ("flexor",)) in losses
+    assert [loss.places for loss in losses if loss.what == "tendons of no finger"] == [("flexor",)]
+    assert not [loss for loss in losses if loss.what.startswith("joints above")]
+
+
+def wrist(**more) -> Model:
+    """A forearm, a wrist of two skew axes with a body between, and a palm that is welded askew, with two fingers."""
+    model = two_fingers()
+    _, palm, *fingers = model.bodies
+    tilted = replace(palm, parent=2, position=np.array([0.02, 0.01, -0.03]), axes=spun(np.array([0.6, 0.0, 0.8]), 0.7))
+    bodies = (
+        body("world", 0, mass=0.0),
+        body("forearm", 0, (0.1, 0.2, 0.3), spun(np.array([0.0, 0.6, 0.8]), 0.4)),
+        body("carpus", 1, (0.01, 0.02, 0.25)),
+        tilted,
+        *(replace(each, parent=3) for each in fingers),
+    )
+    joints = (
+        joint("W:Deviation", 2, (0.1, 0.0, 1.0), (0.001, 0.002, 0.003), reference=0.1),
+        joint("W:Flexion", 3, (0.2, 1.0, 0.1), (-0.002, 0.001, 0.0), **more),
+        *(replace(each, body=each.body + 2) for each in model.joints[1:]),
+    )
+    return Model("Wrist", "wrist.xml", bodies, joints)
+
+
+def test_a_wrist_of_joints_in_series_moves_the_palm_as_in_the_tree():
+    model = wrist()
+    hand, _ = imported(model)
+    assert hand.palm is not None
+    assert [each.joint for each in hand.palm.joints] == ["deviation", "flexion"]
+    lib = awiwi_gen.build(hand, only="palm_pose")
+    for angles in ((0.1, 0.0), (0.4, -0.3), (-0.2, 1.1)):
+        named = dict(zip(("W:Deviation", "W:Flexion"), angles, strict=True))
+        (axes, origin), (carrier, start) = pose(model, named, 3), pose(model, {}, 1)
+        found = lib.palm_pose(angles)
+
+        assert found[:3, :3] == pytest.approx(carrier.T @ axes, abs=1e-14)
+        assert found[:3, 3] == pytest.approx(carrier.T @ (origin - start), abs=1e-15)
+
+
+def test_more_joints_than_a_wrist_has_and_those_that_are_no_hinges_are_a_loss():
+    model = wrist()
+    arm = Model("Arm", "arm.xml", model.bodies, (joint("shoulder", 1), joint("elbow", 1), *model.joints))
+    for changed, places in (
+        (arm, ("shoulder", "elbow", "W:Deviation", "W:Flexion")),
+        (wrist(kind="slide"), ("W:Deviation", "W:Flexion")),
+    ):
+        found = draft(changed)
+
+        assert found.wrist is None
+        assert Loss("joints above the palm: the palm is held as drawn", places) in found.losses
 
 
 @pytest.mark.parametrize("kind", ["slide", "ball"])

@@ -13,6 +13,7 @@ from awiwi_gen.build import load
 from awiwi_gen.hand import Hand
 from awiwi_gen.pipeline import Job, cached_tree
 from awiwi_gen.reproduce.base_search import BaseSearch
+from awiwi_gen.tasks import ordered
 
 OK, NOT_CONVERGED, NOT_FINITE = 0, 2, 3  # of awiwi_status
 STRAIGHT = ("index", "middle", "ring", "fifth")  # fingers with constant couplings
@@ -274,3 +275,13 @@ def test_a_hand_file_without_motors_measures_nothing():
 
     assert "thumb_joint_estimate" in names
     assert not [name for name in names if "measured" in name]
+
+
+def test_kernels_of_one_piece_of_work_read_the_numbers_of_one_part():
+    """Those of the whole hand and those of each finger's measured lengths have the same path, but other parts."""
+    kernels = [kernel for kernel in Job(Hand.load()).kernels if not kernel.path and kernel.routes]
+    pieces, _ = ordered([(kernel, {}, kernel.name) for kernel in kernels])
+
+    assert len(kernels) > 5
+    for members in pieces:
+        assert len({tuple(kernel.part.quantities()) for kernel, _, _ in members}) == 1

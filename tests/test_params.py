@@ -21,8 +21,10 @@ from awiwi_gen.emit.options import Options
 from awiwi_gen.emit.params_file import pack
 from awiwi_gen.emit.tree import read_manifest
 from awiwi_gen.errors import InputError
+from awiwi_gen.ir.exact import exact_values
 from awiwi_gen.parameters import numbers_file
-from awiwi_gen.pipeline import Job, cached_tree, verify
+from awiwi_gen.pipeline import Job, cached_tree, derive, verify
+from awiwi_gen.records import load_graphs, prepare, values_of
 from awiwi_gen.resources import DEFAULT_HAND
 
 RUNTIME = Options(params="runtime")
@@ -220,6 +222,25 @@ def test_runtime_kernels_cost_what_baked_ones_cost_where_no_numbers_are_equal():
             Job(hand, options, name).records[name].function.cost.operations for options in (Options(), RUNTIME)
         )
         assert runtime <= 1.02 * baked
+
+
+@pytest.mark.parametrize("at", ["4 mm", "0 mm"])
+def test_what_is_zero_whatever_the_numbers_are_is_no_number_to_divide_by(at):
+    """The frame beyond a four-bar has coefficients such as 2 a b/(2 b) - a, from a straight line that ends there."""
+    ends = f'{{ link = "palm", at = ["5 mm", "6 mm", "0 mm"] }}, {{ link = "end", at = ["3 mm", "4 mm", "{at}"] }}'
+    rolled = '{ rest = "0 mm", over = ["-mid"], source = "assumed" }'
+    hand = calibrated((rolled, f'{rolled}, {{ rest = "0 mm", path = [{ends}], source = "assumed" }}'))
+    job = Job(hand, RUNTIME, "jaw_coupling_derivative")
+    derive(job)
+    (kernel,) = job.kernels
+    for route, graph in load_graphs(kernel, job.store).items():
+        derivation = prepare({route: graph}, values_of(kernel), RUNTIME).derivation
+        assert derivation is not None
+
+        derived = exact_values(derivation, values_of(kernel))
+
+        assert len(derived) > 10
+        assert [path for path, value in derived.items() if abs(value) < 1e-30] == []
 
 
 def test_the_struct_has_only_numbers_that_are_read(tree):

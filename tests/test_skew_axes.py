@@ -189,3 +189,12 @@ def test_names_of_joints_may_have_63_characters():
     assert [*map(len, awiwi_gen.Hand.parse(text).fingers["arm"].joints)] == [63]
     with pytest.raises(InputError, match="at most 63 in all"):
         awiwi_gen.Hand.parse(text.replace(name[:62] + "z", name[:62] + "zz"))
+
+
+@pytest.mark.parametrize("pitch", [90, -90])
+@pytest.mark.parametrize("turn", ["none", "x+90"])
+def test_both_derivations_agree_on_a_quarter_turn_between_two_other_angles(pitch, turn):
+    hand = awiwi_gen.Hand.parse(chain({}, {**rpy(5, pitch, -7), "turn": f'"{turn}"'}, {}))
+    found = records(hand, ("fingertip_pose", "mass_matrix"))
+
+    assert max(record.agreement for record in found.values()) < 1e-60

@@ -10,19 +10,19 @@ from sympy import Matrix
 from awiwi_gen.definitions.dynamics.lagrange import cofactor_matrix
 from awiwi_gen.definitions.naming import Derivation
 from awiwi_gen.definitions.tendons import coupling, tendon_lengths
-from awiwi_gen.structure import Finger
+from awiwi_gen.structure import Finger, straight
 
 Hand = Any
 
 
 def measured_lengths(hand: Hand, theta: Matrix, x: Matrix, w: Matrix | None = None) -> Matrix:
-    """Lengths h (m) [m] in the fingers, h(0) + x - r theta - w: minus what pulleys and wrist take up.
+    """Lengths h (m) [m] in the fingers, h0 + x - r theta - w: minus what pulleys and wrist take up.
 
     Motor angles theta (m) [rad], elongations x (m) [m] and wrist sections w (m) [m] count from the straight fingers.
     """
     fingers = hand.fingers.values()
-    straight = Matrix.vstack(*(tendon_lengths(finger, sympy.zeros(len(finger.joints), 1)) for finger in fingers))
-    lengths = straight + x - hand.motor.pulley * theta
+    at_start = Matrix.vstack(*(tendon_lengths(finger, Matrix(straight(finger))) for finger in fingers))
+    lengths = at_start + x - hand.motor.pulley * theta
     return lengths if w is None else lengths - w
 
 

@@ -11,6 +11,7 @@ warnings are in `plausibility`, and what the tendons of a hand make impossible i
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from typing import Annotated, Any, Literal
 
 from pydantic import Field
@@ -19,15 +20,16 @@ from awiwi_gen.errors import Fault
 from awiwi_gen.hand.actuation import Fibre, Motor, Spring
 from awiwi_gen.hand.file import HandFile
 from awiwi_gen.hand.gains import Gains, gains_complaints, with_gains
-from awiwi_gen.hand.lint import complaints
+from awiwi_gen.hand.lint import Complaint, below, complaints, sources
 from awiwi_gen.hand.lint_actuation import actuator_complaints
 from awiwi_gen.hand.names import FingerName, Prefix, Title
+from awiwi_gen.hand.palm import Palm, palm_complaints
 from awiwi_gen.hand.parts import MOST, Finger, Limits, Link, Part
 from awiwi_gen.hand.plausibility import remarks
 from awiwi_gen.hand.wrist import Wrist
 from awiwi_gen.resources import DEFAULT_HAND
 
-__all__ = ["Fibre", "Finger", "Hand", "Limits", "Link", "Motor", "Spring", "Wrist"]
+__all__ = ["Fibre", "Finger", "Hand", "Limits", "Link", "Motor", "Palm", "Spring", "Wrist"]
 
 
 class Hand(Part):
@@ -41,6 +43,7 @@ class Hand(Part):
         dict[FingerName, Finger], Field(min_length=1, max_length=MOST, examples=["[[fingers.index.links]]"])
     ]
     wrist: Wrist | None = None
+    palm: Palm | None = None
     motor: Motor | None = None
     spring: Spring | None = None
     tendon: Fibre | None = None
@@ -91,11 +94,24 @@ class Hand(Part):
 def _checked(file: HandFile) -> Hand:
     hand = file.validated(Hand)
     found = list(complaints(hand.limits, hand.fingers, hand.wrist))
+    found += _palm(hand)
     found += actuator_complaints(hand.motor, hand.spring, hand.tendon, hand.tendons)
     found += gains_complaints(hand.gains, hand.tendons)
     if found:
         raise file.error(found)
     return hand
+
+
+def _palm(hand: Hand) -> Iterator[Complaint]:
+    if hand.palm is None:
+        return
+    if hand.wrist:
+        yield ("palm",), "has joints, but the hand has a wrist that moves its palm; leave out [palm] or [wrist]"
+    yield from below(("palm",), [*sources(hand.palm), *palm_complaints(hand.palm)])
+    for index, joint in enumerate(hand.palm.joints):
+        yield from below(("palm", "joints", index), sources(joint))
+    if hand.palm.base:
+        yield from below(("palm", "base"), sources(hand.palm.base))
 
 
 def _read(path: str | os.PathLike[str] | None) -> HandFile:

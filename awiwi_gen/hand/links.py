@@ -22,7 +22,7 @@ _QUARTER = parse_quantity("90 deg").value
 _OPTIONAL = ("reference", "armature", "damping", "friction", "spring")  # numbers whose presence is structure
 
 
-def _quarters(rpy: tuple[Quantity, Quantity, Quantity] | None) -> Quarters:
+def quarters_of(rpy: tuple[Quantity, Quantity, Quantity] | None) -> Quarters:
     """Which of the angles are quarter turns, and how many."""
     turns = [angle.value / _QUARTER for angle in rpy or ()]
     roll, pitch, yaw = [int(turn) % 4 if turn.denominator == 1 else None for turn in turns] or (0, 0, 0)
@@ -101,7 +101,7 @@ class Link(Part):
         """Note which limit is nearest to zero, if the range leaves zero out, and which fixed angles are quarter turns."""
         above, below = (self.low and self.low.value > 0), (self.high and self.high.value < 0)
         self._limit_next_to_zero = "low" if above else "high" if below else ""
-        self._quarters = _quarters(self.rpy)
+        self._quarters = quarters_of(self.rpy)
 
     @property
     def quarters(self) -> Quarters:
@@ -143,7 +143,7 @@ class Base(Part):
 
     def model_post_init(self, context: Any, /) -> None:
         """Note which angles are quarter turns."""
-        self._quarters = _quarters(self.rpy)
+        self._quarters = quarters_of(self.rpy)
 
     @property
     def quarters(self) -> Quarters:

@@ -8,13 +8,14 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from awiwi_gen.errors import Fault, InputError
-from awiwi_gen.interchange.fingers import Chain, Segment, composite, find, palm_of
+from awiwi_gen.hand.parts import PALM
+from awiwi_gen.interchange.fingers import Chain, Segment, composite, find, palm_of, wrist_joints
 from awiwi_gen.interchange.frames import Axis, Frame, base_frame, link_frames
 from awiwi_gen.interchange.locks import Followed, followed
 from awiwi_gen.interchange.model import Array, Joint, Loss, Model, Tendon
 from awiwi_gen.interchange.names import check_finger, finger_names, joint_names, prefix_of
 
-__all__ = ["DraftFinger", "DraftHand", "DraftLink", "DraftTendon", "draft"]
+__all__ = ["DraftFinger", "DraftHand", "DraftLink", "DraftPalm", "DraftTendon", "draft"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,6 +62,20 @@ class DraftFinger:
 
 
 @dataclass(frozen=True, eq=False)
+class DraftPalm:
+    """A wrist of the hand file: the body that carries it, where its first joint stands there, and its joints.
+
+    `end` (3 x 3) has the palm's axes in those of the last joint's frame.
+    """
+
+    carrier: str
+    position: Array
+    axes: Array
+    joints: tuple[DraftLink, ...]
+    end: Array
+
+
+@dataclass(frozen=True, eq=False)
 class DraftHand:
     """A hand file before it is written, with the table of names and the losses."""
 
@@ -68,6 +83,7 @@ class DraftHand:
     name: str
     file: str
     palm: str
+    wrist: DraftPalm | None
     fingers: tuple[DraftFinger, ...]
     names: dict[str, str]
     losses: tuple[Loss, ...]
@@ -90,11 +106,15 @@ def draft(model: Model, palm: str = "", named: Mapping[str, str] | None = None) 
     fingers = tuple(
         _finger(model, root, chain, names, {f.published: f for f in locks}, routed[chain.name]) for chain in chains
     )
+    wrist = _wrist(model, root)
+    if wrist is not None:
+        names |= {each.published.name: each.joint for each in wrist.joints}
     return DraftHand(
         prefix=prefix_of(model.name),
         name=model.name,
         file=model.file,
         palm=model.bodies[root].name,
+        wrist=wrist,
         fingers=fingers,
         names={"joint " + old: new for old, new in names.items() if old != new},
         losses=(*model.losses, *losses, *lost, *left, *_approximated(chains, fingers)),
@@ -152,6 +172,31 @@ def _finger(
         links=tuple(links),
         tendons=tuple(_tendon(model, tendon, names, locks, places, (base, axes[0].anchor)) for tendon in tendons),
         followed=tuple(locks[joint.name] for joint in chain.joints if joint.name in locks),
+    )
+
+
+def _wrist(model: Model, palm: int) -> DraftPalm | None:
+    """The joints that move the palm; None where there are none, or more or others than a hand file can hold."""
+    joints = wrist_joints(model, palm)
+    if not joints:
+        return None
+    pose_axes, pose_origin = model.poses[palm]
+    carrier = model.bodies[joints[0].body].parent
+    carrier_axes, carrier_origin = model.poses[carrier]
+    axes = [_axis(model, joint) for joint in joints]
+    base = base_frame(carrier_axes, axes[0])
+    frames = link_frames(base, axes)
+    ends = [*(frame.origin for frame in frames[1:]), pose_origin]
+    names = joint_names({PALM: [joint.name for joint in joints]})
+    return DraftPalm(
+        carrier=model.bodies[carrier].name,
+        position=carrier_axes.T @ (axes[0].anchor - carrier_origin),
+        axes=carrier_axes.T @ base,
+        joints=tuple(
+            _link(model, Segment(joint.body, (), ()), joint, names[joint.name], frame, end, False, None, ())
+            for joint, frame, end in zip(joints, frames, ends, strict=True)
+        ),
+        end=frames[-1].axes.T @ pose_axes,
     )
 
 

@@ -93,6 +93,10 @@ def common_losses(hand: Hand) -> list[Loss]:
     return [
         Loss("fingers with a four-bar: left out", tuple(four_bars)),
         Loss("the wrist: the palm is the root", ("wrist",) if hand.wrist else ()),
+        Loss(
+            "joints of the wrist: the palm is the root",
+            tuple(joint.joint for joint in hand.palm.joints) if hand.palm else (),
+        ),
         Loss("mechanisms between motor and tendon: friction, ripple, lever springs, fibres", tuple(whole)),
         Loss(FRICTION, tuple(rough)),
     ]

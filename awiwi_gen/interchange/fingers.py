@@ -12,9 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from awiwi_gen.errors import Fault, InputError, unknown
+from awiwi_gen.hand.palm import MOST_AXES
 from awiwi_gen.interchange.model import Array, Joint, Loss, Model
 
-__all__ = ["Chain", "Segment", "find", "palm_of"]
+__all__ = ["Chain", "Segment", "find", "palm_of", "wrist_joints"]
 
 
 @dataclass(frozen=True)
@@ -96,12 +97,20 @@ def find(model: Model, palm: int, named: Mapping[str, str]) -> tuple[list[Chain]
                 raise _fault(model, f"joint {joint.name}", f"{message}; leave the finger out by naming the others")
     held = {joint.name for chain in chains for joint in chain.joints}
     above = set(model.above(palm))
+    held |= {joint.name for joint in wrist_joints(model, palm)}
     others = [joint for joint in model.joints if joint.name not in held]
     losses = [
         Loss("joints above the palm: the palm is held as drawn", _names(j for j in others if j.body in above)),
         Loss("joints that are not of the fingers: held as drawn", _names(j for j in others if j.body not in above)),
     ]
     return chains, [loss for loss in losses if loss.places]
+
+
+def wrist_joints(model: Model, palm: int) -> list[Joint]:
+    """The joints that move the palm, from the outermost on; none where they are more than a wrist has, or no hinges."""
+    joints = [joint for body in reversed(model.above(palm)) for joint in model.joints_of[body]]
+    wrist = len(joints) <= MOST_AXES and all(joint.kind == "hinge" for joint in joints)
+    return joints if wrist else []
 
 
 def _names(joints: Iterator[Joint]) -> tuple[str, ...]:

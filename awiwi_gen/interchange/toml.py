@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterable
 from decimal import Decimal
 
-from awiwi_gen.interchange.draft import DraftFinger, DraftHand, DraftLink, DraftTendon
+from awiwi_gen.interchange.draft import DraftFinger, DraftHand, DraftLink, DraftPalm, DraftTendon
 from awiwi_gen.interchange.frames import rpy_of
 from awiwi_gen.interchange.locks import Followed
 from awiwi_gen.interchange.loss import loss_lines
@@ -38,6 +38,8 @@ def hand_text(hand: DraftHand, command: str = "") -> str:
     lines += ["", f"prefix = {_text(hand.prefix)}", f"name = {_text(cite(hand.name))}", "", "[limits]"]
     lines += [f"{key} = {_text(value)}" for key, value in _LIMITS.items()]
     lines += ['source = "assumed"']
+    if hand.wrist is not None:
+        lines += ["", _RULE, *_palm_lines(hand.wrist, hand)]
     for finger in hand.fingers:
         lines += ["", _RULE, *_finger_lines(finger, hand.file)]
     return "\n".join(line.rstrip() for line in lines) + "\n"
@@ -51,13 +53,30 @@ def cite(text: str) -> str:
     return (shown if len(shown) <= 80 else shown[:77] + "...") or "unnamed"
 
 
+def _palm_lines(palm: DraftPalm, hand: DraftHand) -> list[str]:
+    source = _text(cite(f"{hand.file} body {palm.carrier}"))
+    lines = [f"# the wrist: {len(palm.joints)} joints between the body {palm.carrier} and the palm", "", "[palm]"]
+    lines += [f"rpy = {_rpy(palm.end)}", f"source = {_text(cite(f'{hand.file} body {hand.palm}'))}"]
+    lines += ["", "[palm.base]", f"position = {_lengths(palm.position)}", f"rpy = {_rpy(palm.axes)}"]
+    lines += [f"source = {source}"]
+    for joint in palm.joints:
+        sources = dict.fromkeys(joint.assumed, "assumed")
+        lines += ["", "[[palm.joints]]", *_place_lines(joint)]
+        lines += [f"source = {_sources(sources, cite(f'{hand.file} joint {joint.published.name}'))}"]
+    return lines
+
+
+def _rpy(axes: Array) -> str:
+    return _listed(map(angle, tidy(rpy_of(axes), 1.0)))
+
+
 def _finger_lines(finger: DraftFinger, file: str) -> list[str]:
     head = f"fingers.{finger.name}"
     lines = [f"# {finger.name}: {len(finger.links)} links, {len(finger.tendons)} tendons", "", f"[{head}]"]
     if finger.followed:
         lines += ["couplings = [", *(f"    {{ {_coupling(each)} }}," for each in finger.followed), "]"]
     lines += ["", f"[{head}.base]", f"position = {_lengths(finger.position)}"]
-    lines += [f"rpy = {_listed(map(angle, tidy(rpy_of(finger.axes), 1.0)))}"]
+    lines += [f"rpy = {_rpy(finger.axes)}"]
     lines += [f"source = {_text(cite(f'{file} body {finger.carrier}'))}"]
     for link in finger.links:
         lines += ["", f"[[{head}.links]]", *_link_lines(link, file)]
@@ -72,8 +91,8 @@ def _coupling(lock: Followed) -> str:
     return f'follower = "{lock.follower}", leader = "{lock.leader}", ratio = "{ratio}"{offset}'
 
 
-def _link_lines(link: DraftLink, file: str) -> list[str]:
-    joint, body = link.published, cite(f"{file} body {link.body}")
+def _place_lines(link: DraftLink) -> list[str]:
+    """The joint of a link: its name, what leads to its frame, its limits, and its offset."""
     lines = [f"joint = {_text(link.joint)}"]
     if link.frame.turn != "none" or not link.frame.roll:
         lines += [f"turn = {_text(link.frame.turn)}"]
@@ -84,7 +103,12 @@ def _link_lines(link: DraftLink, file: str) -> list[str]:
         lines += [f"reference = {_text(angle(reference))}"]
     if link.limits:
         lines += [f"{key} = {_text(angle(x))}" for key, x in zip(("low", "high"), link.limits, strict=True)]
-    lines += [f"offset = {_lengths(link.offset)}"]
+    return [*lines, f"offset = {_lengths(link.offset)}"]
+
+
+def _link_lines(link: DraftLink, file: str) -> list[str]:
+    joint, body = link.published, cite(f"{file} body {link.body}")
+    lines = _place_lines(link)
     sources = dict.fromkeys(link.assumed, "assumed")
     if link.mass is not None:
         lines += [f"{key} = {each}" for key, each in mass_and_inertia(link.mass, link.com, link.inertia).items()]

@@ -30,7 +30,10 @@ class _Balls:
 
 
 def exact_values(graph: Graph, values: Mapping[str, Fraction]) -> dict[str, Fraction]:
-    """The first element of each output, to 400 bits. Raises ZeroDivisionError where one is no finite number."""
+    """The first element of each output, to 400 bits; zero where these leave nothing of it.
+
+    Raises ZeroDivisionError where one is no finite number.
+    """
 
     def leaf(node: Node) -> Any:
         return ball(values[node[1]])
@@ -43,5 +46,7 @@ def exact_values(graph: Graph, values: Mapping[str, Fraction]) -> dict[str, Frac
 def _fraction(name: str, value: arb) -> Fraction:
     if not value.is_finite():
         raise ZeroDivisionError(f"{name} is not a number")
+    if value.contains(0):
+        return Fraction(0)
     mantissa, exponent = value.mid().man_exp()
     return Fraction(int(mantissa)) * Fraction(2) ** int(exponent)

@@ -18,6 +18,7 @@ from awiwi_gen.kernels.four_bars import four_bar_kernels
 from awiwi_gen.kernels.joints import documented, optional_kernels
 from awiwi_gen.kernels.measured import measured_kernels
 from awiwi_gen.kernels.motors import motor_kernels
+from awiwi_gen.kernels.palm import palm_kernels
 from awiwi_gen.kernels.plants import plant_kernels
 from awiwi_gen.kernels.springs import spring_kernels
 from awiwi_gen.kernels.whole_hand import hand_kernels
@@ -44,10 +45,11 @@ def declared(hand: Hand) -> list[Kernel]:
         ]
     ]
     wrist = wrist_kernels(hand.wrist) if hand.wrist else []
+    palm = palm_kernels(hand, hand.palm) if hand.palm else []
     actuators = [
         *(motor_kernels(hand, hand.motor) if hand.motor else []),
         *(spring_kernels(hand, hand.spring) if hand.spring else []),
         *(fibre_kernels(hand, hand.tendon) if hand.tendon else []),
     ]
     laws = [*joint_laws(hand), *linear_laws(), *backstepping_laws(), *optimal_laws(), *antagonistic_laws()]
-    return fingers + wrist + hand_kernels(hand) + measured_kernels(hand) + actuators + laws + plant_kernels()
+    return fingers + wrist + palm + hand_kernels(hand) + measured_kernels(hand) + actuators + laws + plant_kernels()

@@ -44,5 +44,6 @@ def measured_ports(hand: Hand) -> dict[str, Port]:
 def measured_lengths(hand: Any, theta: Any, x: Any, w: Any = None) -> Any:
     """Tendon lengths in the finger from motor angles theta, elongations x and changes w of the lengths in the wrist.
 
-    All three are zero at the straight finger. A positive theta winds the tendon up.
+    All three are zero at the straight finger; a four-bar that does not close there stands at the end of its range that
+    is nearest. A positive theta winds the tendon up.
     """

@@ -277,6 +277,25 @@ def the_wrist_rotates_the_palm(x: Motion, wrist_palm_pose: Any) -> Residual:
     return np.concatenate([R @ _transposed(R) - np.eye(3, dtype=int), right_handed[..., None]], axis=2), ONE
 
 
+def the_wrist_moves_the_palm_by_its_jacobian(x: Motion, palm_pose: Any, palm_jacobian: Any) -> Residual:
+    T, J = palm_pose["T"], palm_jacobian["J"]
+    residuals = []
+    for joint in range(J.shape[2]):
+        unit = np.full(x.inputs["q"].shape, arb(0), dtype=object)
+        unit[:, joint] = arb(1)
+        rate = x.rate("palm_pose", "T", q=unit)
+        spin = rate[:, :3, :3] @ _transposed(T[:, :3, :3])
+        omega = np.stack([spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0]], axis=1)
+        residuals.append(np.concatenate([rate[:, :3, 3], omega], axis=1) - J[:, :, joint])
+    return np.stack(residuals), ONE
+
+
+def gravity_turns_with_the_palm(x: Motion, palm_pose: Any, palm_gravity: Any, palm_jacobian: Any) -> Residual:
+    """Also asks for the Jacobian, which tells the palm's own kernels from those of fingers in the palm."""
+    R, g = palm_pose["T"][:, :3, :3], x.inputs["g_forearm"]
+    return _times(R, palm_gravity["g"]) - g, g
+
+
 def the_wrist_coupling_is_the_derivative_of_the_lengths(
     x: Motion, wrist_coupling: Any, wrist_tendon_lengths: Any
 ) -> Residual:
@@ -329,6 +348,8 @@ LAWS: tuple[Callable[..., Residual], ...] = (
     the_power_of_return_strings_is_taken_from_their_energy,
     the_bars_of_the_wrist_keep_their_lengths,
     the_wrist_rotates_the_palm,
+    the_wrist_moves_the_palm_by_its_jacobian,
+    gravity_turns_with_the_palm,
     the_wrist_coupling_is_the_derivative_of_the_lengths,
     the_whole_coupling_is_the_derivative_of_the_lengths,
     the_whole_hand_takes_its_power_from_the_tendons,

@@ -7,7 +7,7 @@ from typing import Any
 import casadi as ca
 from casadi import SX
 
-from awiwi_gen.structure import Finger
+from awiwi_gen.structure import Finger, straight
 from awiwi_gen.witnesses.tendons import coupling, tendon_lengths
 
 Hand = Any
@@ -17,7 +17,7 @@ def measured_lengths(hand: Hand, theta: SX, x: SX, w: SX | None = None) -> SX:
     """Lengths h (m) [m] for which the elongation h + w + r theta - l0 is x (eq. 5.1): one step of Newton's method
     from zero, exact as the equation is linear."""
     fingers = hand.fingers.values()
-    slack = ca.vertcat(*(tendon_lengths(finger, SX.zeros(len(finger.joints))) for finger in fingers))
+    slack = ca.vertcat(*(tendon_lengths(finger, ca.vertcat(*map(SX, straight(finger)))) for finger in fingers))
     h = SX.sym("h", slack.numel())
     wound = hand.motor.pulley * theta
     excess = h + wound - slack - x + (0 if w is None else w)

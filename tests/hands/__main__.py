@@ -30,7 +30,7 @@ from awiwi_gen.interchange.toml import hand_text
 
 from .behaviours import changed
 from .catalog import HANDS, Published
-from .compare import LIMIT, compiled_model, worst_differences
+from .compare import LIMIT, compiled_model, palm_differences, worst_differences
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 DOCS = ROOT / "docs" / "interchange.md"
@@ -107,9 +107,14 @@ def examine(published: Published, folder: Path) -> Result:
         except AwiwiError as error:
             text = str(error).splitlines()[0].split("; ")[0].replace(str(path), path.name).replace(str(file), path.name)
             text = re.sub(r"^(\S+):\d+ ", r"\1 ", text)  # lines move with every sentence of the importer
-            return Result((published.name, published.package, "-", "-", "-", f"refused: {text}", "-"), [])
+            return Result((published.name, published.package, "-", "-", "-", "-", f"refused: {text}", "-"), [])
         faults = [f"{published.name}: {fault}" for fault in prove(file, published.finger, generated)]
-        found = worst_differences(compiled_model(path, exact=False), drafted, hand, published.finger, generated)
+        compiled = compiled_model(path, exact=False)
+        found = worst_differences(compiled, drafted, hand, published.finger, generated)
+        if drafted.wrist is not None:
+            wrist = Path(scratch) / "wrist"
+            faults += [f"{published.name}: {fault}" for fault in prove(file, "palm", wrist, "{}_*")]
+            found |= palm_differences(compiled, drafted, drafted.wrist, wrist)
         faults += [f"{published.name}: {kernel} differs by {x:.1e}" for kernel, x in found.items() if x > LIMIT]
         faults += [f"{published.name}: {fault}" for fault in round_trip(hand, Path(scratch))]
         kernels = sum(1 for _ in generated.glob(f"{published.finger}_*.c"))
@@ -121,14 +126,15 @@ def row(published: Published, drafted: DraftHand, kernels: int, worst: float) ->
     joints = sum(len(finger.links) - len(finger.followed) for finger in drafted.fingers)
     tendons = sum(len(finger.tendons) for finger in drafted.fingers)
     lost = "; ".join(f"{len(loss.places)} {loss.what.split(':')[0]}" for loss in drafted.losses)
-    return (published.name, published.package, f"{joints} in {len(drafted.fingers)}", str(tendons),
+    wrist = str(len(drafted.wrist.joints)) if drafted.wrist else "-"
+    return (published.name, published.package, f"{joints} in {len(drafted.fingers)}", wrist, str(tendons),
             f"{kernels} of `{published.finger}`", f"{worst:.0e}", lost or "nothing")  # fmt: skip
 
 
-def prove(file: Path, finger: str, generated: Path) -> list[str]:
-    """Generate the kernels of a finger and verify them, as the command line does; what is wrong."""
+def prove(file: Path, part: str, generated: Path, kernels: str = KERNELS) -> list[str]:
+    """Generate the kernels of a part and verify them, as the command line does; what is wrong."""
     command = [sys.executable, "-m", "awiwi_gen", "generate", "--hand", str(file), "-o", str(generated),
-               "--only", KERNELS.format(finger), "--verify", "--json"]  # fmt: skip
+               "--only", kernels.format(part), "--verify", "--json"]  # fmt: skip
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode == 0:
         return []
@@ -161,7 +167,16 @@ def round_trip(hand: Hand, scratch: Path) -> list[str]:
 
 def table(rows: list[tuple[str, ...]]) -> str:
     """The table of hands for the docs."""
-    head = ("hand", "package", "joints in fingers", "tendons", "kernels proved", "worst difference", "not held")
+    head = (
+        "hand",
+        "package",
+        "joints in fingers",
+        "of the wrist",
+        "tendons",
+        "kernels proved",
+        "worst difference",
+        "not held",
+    )
     return "".join(f"| {' | '.join(cells)} |\n" for cells in [head, ("---",) * len(head), *rows])
 
 
@@ -184,7 +199,7 @@ def judge_table(found: str, accept: bool) -> list[str]:
 
 def _without_difference(line: str) -> list[str]:
     cells = line.split(" | ")
-    return cells[:5] + cells[6:] if "e-" in "".join(cells[5:6]) else cells
+    return cells[:6] + cells[7:] if "e-" in "".join(cells[6:7]) else cells
 
 
 if __name__ == "__main__":

@@ -5,12 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import mujoco
 import numpy as np
 
 import awiwi_gen
 from awiwi_gen.hand import Hand
 from awiwi_gen.interchange import mjcf
-from awiwi_gen.interchange.draft import DraftHand
+from awiwi_gen.interchange.draft import DraftHand, DraftPalm
 
 from .mujoco_finger import MujocoFinger
 
@@ -18,7 +19,7 @@ STATES = 200
 LIMIT = 1e-12
 """Largest difference, relative to the largest entry of the result (or 1 mm, 1 mN m, ... where all are small)."""
 _SCALES = {"link_poses": 1.0, "bias": 1e-3, "inverse_dynamics": 1e-3, "mass_matrix": 1e-9, "tendon_lengths": 1e-3,
-           "coupling": 1e-3, "fingertip_pose": 1.0}  # fmt: skip
+           "coupling": 1e-3, "fingertip_pose": 1.0, "palm_pose": 1.0, "palm_jacobian": 1.0, "palm_gravity": 1.0}  # fmt: skip
 
 
 def compiled_model(path: Path, exact: bool, without: frozenset[str] = frozenset()) -> Any:
@@ -42,13 +43,8 @@ def worst_differences(compiled: Any, draft: DraftHand, hand: Hand, finger: str, 
     links = {link.joint: link for link in hand.fingers[finger].links}
     ends = np.array([[float(links[j].low), float(links[j].high)] for j in hand.fingers[finger].joints])
     random = np.random.default_rng(13)
-    found: dict[str, float] = {}
-
-    def compare(kernel: str, ours: Any, theirs: Any) -> None:
-        scale = max(_SCALES[kernel], float(np.abs(theirs).max(initial=0.0)))
-        worst = float(np.abs(np.asarray(ours) - theirs).max(initial=0.0)) / scale
-        found[kernel] = max(found.get(kernel, 0.0), worst)
-
+    worst = Worst()
+    compare = worst.compare
     for _ in range(STATES):
         q = random.uniform(ends[:, 0], ends[:, 1])
         qd, qdd = random.uniform(-5, 5, len(q)), random.uniform(-100, 100, len(q))
@@ -70,7 +66,47 @@ def worst_differences(compiled: Any, draft: DraftHand, hand: Hand, finger: str, 
             pulled = [number for number, tendon in enumerate(hand.fingers[finger].tendons) if tendon.spring is None]
             compare("tendon_lengths", library[f"{finger}_tendon_lengths"](q), simulated.lengths()[pulled])
             compare("coupling", library[f"{finger}_coupling"](q), simulated.arms()[pulled])
-    return found
+    return worst.found
+
+
+class Worst:
+    """The worst difference of each kernel so far."""
+
+    def __init__(self) -> None:
+        self.found: dict[str, float] = {}
+
+    def compare(self, kernel: str, ours: Any, theirs: Any) -> None:
+        """Note the difference of one result, relative to its size."""
+        scale = max(_SCALES[kernel], float(np.abs(theirs).max(initial=0.0)))
+        worst = float(np.abs(np.asarray(ours) - theirs).max(initial=0.0)) / scale
+        self.found[kernel] = max(self.found.get(kernel, 0.0), worst)
+
+
+def palm_differences(compiled: Any, draft: DraftHand, wrist: DraftPalm, generated: Path) -> dict[str, float]:
+    """Kernel of the palm -> its worst difference from MuJoCo, in the axes of the body that carries the wrist."""
+    library, worst = awiwi_gen.load(generated), Worst()
+    data, palm, carrier = mujoco.MjData(compiled), compiled.body(draft.palm).id, compiled.body(wrist.carrier).id
+    joints = [compiled.joint(each.published.name) for each in wrist.joints]
+    ends = np.array([each.limits for each in wrist.joints])
+    random = np.random.default_rng(14)
+    linear, angular = np.zeros((3, compiled.nv)), np.zeros((3, compiled.nv))
+    for _ in range(STATES):
+        q = random.uniform(ends[:, 0], ends[:, 1])
+        data.qpos[:] = compiled.qpos0
+        data.qpos[[int(joint.qposadr[0]) for joint in joints]] = q
+        mujoco.mj_forward(compiled, data)
+        mujoco.mj_jacBody(compiled, data, linear, angular, palm)
+        axes, pose = data.xmat[carrier].reshape(3, 3), np.eye(4)
+        pose[:3, :3] = axes.T @ data.xmat[palm].reshape(3, 3)
+        pose[:3, 3] = axes.T @ (data.xpos[palm] - data.xpos[carrier])
+        columns = [int(joint.dofadr[0]) for joint in joints]
+        g = axes.T @ compiled.opt.gravity
+        worst.compare("palm_pose", library.palm_pose(q), pose)
+        worst.compare(
+            "palm_jacobian", library.palm_jacobian(q), np.vstack([axes.T @ linear, axes.T @ angular])[:, columns]
+        )
+        worst.compare("palm_gravity", library.palm_gravity(q, g), pose[:3, :3].T @ g)
+    return worst.found
 
 
 def dry_friction(hand: Hand, finger: str, rates: np.ndarray) -> np.ndarray:

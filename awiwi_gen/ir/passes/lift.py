@@ -13,7 +13,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from fractions import Fraction
 from functools import cache
-from math import frexp
 
 from awiwi_gen.ir.builder import ONE, Builder, copy_node
 from awiwi_gen.ir.exact import exact_values
@@ -26,7 +25,7 @@ from awiwi_gen.ir.passes.signs import signs
 from awiwi_gen.ir.traced import Traced
 
 DERIVED = "derived."  # begins the path of a derived number
-PRIME_BITS = 17
+PRIME_BITS = 20  # 38635 primes: more than a hand file has room for numbers
 
 Term = tuple[Ref, Ref | None]  # a coefficient, and what it multiplies; None for one
 
@@ -113,14 +112,17 @@ class _Lifting:
         return number if base is None else self.rest.mul((number, base))
 
     def traced(self, rest: Graph) -> Graph:
-        """The rest with a traced constant for each coefficient; one that is zero stays a name, for no pass divides by it."""
+        """The rest with traced constants for the coefficients, and zero for those that are zero whatever the numbers are.
+
+        One that is zero only with the hand's numbers stays a name, for no pass divides by a name.
+        """
         found = [node[1] for node in rest.nodes if node[0] == "param"]
-        outputs = [Output(name, (1,), (int(name),)) for name in found]
-        sizes = exact_values(Graph(tuple(self.numbers.nodes), tuple(outputs)), self.values)
+        coefficients = Graph(tuple(self.numbers.nodes), tuple(Output(name, (1,), (int(name),)) for name in found))
+        here, elsewhere = (exact_values(coefficients, values) for values in (self.values, generic(self.values)))
         constants = {
-            name: Traced.of(generic(index, sizes[name]), self.numbers, int(name))
-            for index, name in enumerate(found)
-            if sizes[name]
+            name: Traced.of(value, self.numbers, int(name)) if value else Fraction(0)
+            for name, value in elsewhere.items()
+            if here[name] or not value
         }
         nodes = tuple(
             ("const", constants[node[1]]) if node[0] == "param" and node[1] in constants else node
@@ -129,14 +131,21 @@ class _Lifting:
         return canonical(Graph(nodes, rest.outputs))
 
 
-def generic(index: int, near: Fraction) -> Fraction:
-    """A number of about the size of another that has no relation to those of other indices: a prime over a power of two."""
-    return Fraction(primes()[index]) * Fraction(2) ** (frexp(float(abs(near)))[1] - PRIME_BITS)
+def generic(values: Mapping[str, Fraction]) -> dict[str, Fraction]:
+    """Numbers up to a thousandth larger that have no relation to each other: each has a prime of its own.
+
+    An expression of them is zero only if it is so for all numbers. Values of coefficients must come from such numbers:
+    unrelated ones for (2 a b) and 1/(2 b) would hide that their product less a is zero, and a pass would divide by it.
+    """
+    return {
+        path: value * (1 + Fraction(prime, 1 << (PRIME_BITS + 10)))
+        for (path, value), prime in zip(sorted(values.items()), primes(), strict=False)
+    }
 
 
 @cache
 def primes() -> tuple[int, ...]:
-    """The primes of 17 bits."""
+    """The primes of 20 bits."""
     top = 1 << PRIME_BITS
     sieve = bytearray([1]) * top
     for number in range(2, int(top**0.5) + 1):

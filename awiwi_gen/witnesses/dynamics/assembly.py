@@ -130,11 +130,19 @@ def turns_of(link: Any) -> tuple[list[Turn], Any]:
     if sum(turn.quarters is None for turn in turns) > 1:
         rotation = _product(turns)
         across = ca.sqrt(rotation[0, 2] ** 2 + rotation[1, 2] ** 2)
-        first, last = ca.atan2(rotation[0, 2], -rotation[1, 2]), ca.atan2(rotation[2, 0], rotation[2, 1])
-        return [Turn(2, None, first), Turn(0, None, ca.atan2(across, rotation[2, 2]))], last
+        first, last = _turn(2, rotation[0, 2], -rotation[1, 2]), _turn(2, rotation[2, 0], rotation[2, 1])
+        both = [first, _turn(0, across, rotation[2, 2])]
+        return (both, last.angle) if last.quarters is None else ([*both, last], 0)
     if turns and turns[-1].axis == 2 and turns[-1].quarters is None:
         return turns[:-1], turns[-1].angle
     return turns, 0
+
+
+def _turn(axis: int, y: SX, x: SX) -> Turn:
+    """The rotation by atan2(y, x). Numbers come from quarter turns, and stay such: CasADi would round the angle."""
+    if y.is_constant() and x.is_constant():
+        return Turn(axis, [(0, 1), (1, 0), (0, -1), (-1, 0)].index((int(y), int(x))), None)
+    return Turn(axis, None, ca.atan2(y, x))
 
 
 def _product(turns: Sequence[Turn]) -> SX:
