@@ -1490,7 +1490,8 @@ void awiwi_hand_joint_stiffness(const double q_in[19], const double f_in[38], co
 
 /*
  * Tendon lengths in the finger from motor angles theta, elongations x and changes w of the lengths in
- * the wrist. All three are zero at the straight finger. A positive theta winds the tendon up.
+ * the wrist. All three are zero at the straight finger; a four-bar that does not close there stands at
+ * the end of its range that is nearest. A positive theta winds the tendon up.
  * Source: eq. 5.1.
  *   in   theta[8] in rad, -5 to 5
  *   in   x[8] in m, 0 to 0.1
@@ -1502,7 +1503,8 @@ void awiwi_thumb_measured_lengths(const double theta_in[8], const double x_in[8]
 
 /*
  * Tendon lengths in the finger from motor angles theta, elongations x and changes w of the lengths in
- * the wrist. All three are zero at the straight finger. A positive theta winds the tendon up.
+ * the wrist. All three are zero at the straight finger; a four-bar that does not close there stands at
+ * the end of its range that is nearest. A positive theta winds the tendon up.
  * Source: eq. 5.1.
  *   in   theta[8] in rad, -5 to 5
  *   in   x[8] in m, 0 to 0.1
@@ -1514,7 +1516,8 @@ void awiwi_index_measured_lengths(const double theta_in[8], const double x_in[8]
 
 /*
  * Tendon lengths in the finger from motor angles theta, elongations x and changes w of the lengths in
- * the wrist. All three are zero at the straight finger. A positive theta winds the tendon up.
+ * the wrist. All three are zero at the straight finger; a four-bar that does not close there stands at
+ * the end of its range that is nearest. A positive theta winds the tendon up.
  * Source: eq. 5.1.
  *   in   theta[8] in rad, -5 to 5
  *   in   x[8] in m, 0 to 0.1
@@ -1526,7 +1529,8 @@ void awiwi_middle_measured_lengths(const double theta_in[8], const double x_in[8
 
 /*
  * Tendon lengths in the finger from motor angles theta, elongations x and changes w of the lengths in
- * the wrist. All three are zero at the straight finger. A positive theta winds the tendon up.
+ * the wrist. All three are zero at the straight finger; a four-bar that does not close there stands at
+ * the end of its range that is nearest. A positive theta winds the tendon up.
  * Source: eq. 5.1.
  *   in   theta[6] in rad, -5 to 5
  *   in   x[6] in m, 0 to 0.1
@@ -1538,7 +1542,8 @@ void awiwi_ring_measured_lengths(const double theta_in[6], const double x_in[6],
 
 /*
  * Tendon lengths in the finger from motor angles theta, elongations x and changes w of the lengths in
- * the wrist. All three are zero at the straight finger. A positive theta winds the tendon up.
+ * the wrist. All three are zero at the straight finger; a four-bar that does not close there stands at
+ * the end of its range that is nearest. A positive theta winds the tendon up.
  * Source: eq. 5.1.
  *   in   theta[8] in rad, -5 to 5
  *   in   x[8] in m, 0 to 0.1

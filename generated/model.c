@@ -4,5 +4,5 @@
 #include "awiwi_version.h"
 #include "kernels.h"
 
-const char awiwi_model_digest[65] = "6a4dc2428965ef68c2587eec632b7504fa839e9ec5801511afed8295f3f75dac";
+const char awiwi_model_digest[65] = "e36685c11a8bee9620f93e97f96255277ffdd237f2b005f8fc72568fbc0b1494";
 const int awiwi_api_version = AWIWI_API_VERSION;
