@@ -7,221 +7,262 @@
 #include "awiwi_distribution.h"
 #include "dense.h"
 
+enum { MOST_ENTRIES = AWIWI_MOST_JOINTS * (AWIWI_MOST_JOINTS + 1) / 2 };
+
 typedef awiwi_real vector[AWIWI_MOST_TENDONS];
 typedef awiwi_real matrix[AWIWI_MOST_TENDONS][AWIWI_MOST_TENDONS];
 
-/* What is to be minimised over the searched tendons, of which p[i] is the coupling. */
+/* What is to be minimised over the searched tendons: half the squared miss of the torque or, keeping that, of the
+   stiffness. Joints are those that the searched tendons move: no other torque or stiffness is theirs. */
 typedef struct task {
     const awiwi_tendons *t;
     const awiwi_real *tau, *K;
-    const awiwi_real *p[AWIWI_MOST_TENDONS];
-    int touched[AWIWI_MOST_JOINTS]; /* joints that the searched tendons move: no other torque or stiffness is theirs */
-    int count;
+    int count, joints;
+    int joint[AWIWI_MOST_JOINTS];
+    awiwi_real p[AWIWI_MOST_TENDONS][AWIWI_MOST_JOINTS]; /* couplings [count][joints] */
     int keep_torque;
     awiwi_real tolerance;
     awiwi_real *f; /* of all tendons */
 } task;
 
-/* Cost, its gradient and its Hessian: that of Gauss and Newton plus a diagonal, at forces f[count]. Costs that differ
-   by less than the blur are equal. */
+/* The cost and what its derivatives are made of: by how much each entry of the torque, or of the lower half of the
+   stiffness, exceeds the wanted one. Costs that differ by less than the blur are equal. */
 typedef struct model {
-    awiwi_real cost, blur;
-    vector gradient, curvature;
-    matrix hessian;
+    awiwi_real cost, blur, excess[MOST_ENTRIES];
+    vector k, slope, curvature; /* of all tendons */
 } model;
 
-/* Orthogonal moves of the free tendons: the first `rank` change the torque, the others do not. The torque of joint
-   joint[k] is changed by moves 0 to k, in proportion to lower[k]. */
+/* The moves of the free tendons that keep the torque: each of the loose tendons by itself, while the basic tendons make
+   up for its torque, basic[r] by -share[r][loose] of the move. Without a torque to keep all free tendons are loose. */
 typedef struct moves {
     int rank, count;
-    int joint[AWIWI_MOST_JOINTS];
-    awiwi_real lower[AWIWI_MOST_JOINTS][AWIWI_MOST_JOINTS];
-    vector along[AWIWI_MOST_TENDONS];
-    awiwi_real square[AWIWI_MOST_TENDONS];
+    int basic[AWIWI_MOST_JOINTS], loose[AWIWI_MOST_TENDONS];
+    awiwi_real share[AWIWI_MOST_JOINTS][AWIWI_MOST_TENDONS];
 } moves;
 
-static const awiwi_real LEAST_SHARE = (awiwi_real)1 / 32;     /* of a unit move that is worth a direction: below 1 / 16 */
 static const awiwi_real DAMPING = (awiwi_real)1 / 4096;       /* of steps where the Hessian is not positive */
 static const awiwi_real BENT = 4096 * AWIWI_REAL_EPSILON;     /* negative curvature, relative to the trace */
 static const awiwi_real LITTLE = (awiwi_real)1 / 16;          /* gain by a step, relative to the cost */
 enum { BENDS = 8 };                                           /* trials along a direction of negative curvature */
 enum { AT_LOW = -1, FREE = 0, AT_HIGH = 1 };
 
-/* Half of |tau + P' f|^2. */
-static int torque_cost(const task *s, const vector f, model *c)
+/* -- cost ---------------------------------------------------------------------------------------------------------- */
+
+/* Add one entry that misses by `excess`, a sum of terms of that total size, and counts `times`. */
+static void add_entry(model *c, int entry, int times, awiwi_real excess, awiwi_real terms)
 {
-    awiwi_real missing[AWIWI_MOST_JOINTS], trace = 0;
-    c->cost = c->blur = 0;
-    for (int j = 0; j < s->t->joints; j++) {
-        awiwi_real terms = awiwi_size(s->tau[j]);
-        missing[j] = s->touched[j] ? s->tau[j] : 0;
-        for (int i = 0; i < s->count; i++) {
-            missing[j] += s->p[i][j] * f[i];
-            terms += awiwi_size(s->p[i][j] * f[i]);
-        }
-        if (awiwi_size(missing[j]) <= 4 * AWIWI_REAL_EPSILON * terms)
-            missing[j] = 0;
-        c->cost += missing[j] * missing[j] / 2;
-        c->blur += 4 * AWIWI_REAL_EPSILON * awiwi_size(missing[j]) * terms;
-    }
-    for (int i = 0; i < s->count; i++) {
-        c->gradient[i] = awiwi_dot(s->p[i], missing, s->t->joints);
-        for (int l = 0; l <= i; l++)
-            c->hessian[i][l] = c->hessian[l][i] = awiwi_dot(s->p[i], s->p[l], s->t->joints);
-        trace += c->hessian[i][i];
-    }
-    for (int i = 0; i < s->count; i++)
-        c->curvature[i] = 1024 * AWIWI_REAL_EPSILON * trace; /* of moves that do the same, the shortest */
-    return 0;
+    const awiwi_real rounding = 4 * AWIWI_REAL_EPSILON * terms;
+    c->excess[entry] = excess;
+    c->cost += (awiwi_real)times * excess * excess / 2;
+    c->blur += (awiwi_real)times * rounding * (awiwi_size(excess) + rounding);
 }
 
-/* Half of |K_q - K|^2, over the joints that are touched. */
-static int stiffness_cost(const task *s, const vector f, model *c)
+/* tau + P' f; what is within rounding counts as zero. */
+static void torque_cost(const task *s, const vector f, model *c)
+{
+    for (int a = 0; a < s->joints; a++) {
+        awiwi_real missing = s->tau[s->joint[a]], terms = awiwi_size(missing);
+        for (int i = 0; i < s->count; i++) {
+            const awiwi_real part = s->p[i][a] * f[i];
+            missing += part;
+            terms += awiwi_size(part);
+        }
+        add_entry(c, a, 1, awiwi_size(missing) <= 4 * AWIWI_REAL_EPSILON * terms ? 0 : missing, terms);
+    }
+}
+
+/* dP of a searched tendon in entry (a, b). */
+static awiwi_real change(const task *s, int i, int a, int b)
 {
     const int n = s->t->joints;
-    vector k, slope, curvature;
-    for (int i = 0; i < s->count; i++)
-        s->f[s->t->searched_tendons[i]] = f[i];
-    if (s->t->curve(s->t->context, s->f, k, slope, curvature))
-        return AWIWI_OUT_OF_DOMAIN;
-    c->cost = c->blur = 0;
-    for (int i = 0; i < s->count; i++) {
-        c->gradient[i] = c->curvature[i] = 0;
-        for (int l = 0; l <= i; l++)
-            c->hessian[i][l] = 0;
-    }
-    for (int a = 0; a < n; a++) {
+    return s->t->slope ? s->t->slope[(s->t->searched_tendons[i] * n + s->joint[a]) * n + s->joint[b]] : 0;
+}
+
+/* The lower half of K_q - K. */
+static void stiffness_cost(const task *s, const vector f, model *c)
+{
+    const int n = s->t->joints;
+    for (int a = 0, entry = 0; a < s->joints; a++) {
         for (int b = 0; b <= a; b++) {
-            const awiwi_real both = a == b ? 1 : 2;
-            awiwi_real excess = -(s->K[a * n + b] + s->K[b * n + a]) / 2, growth[AWIWI_MOST_TENDONS];
-            if (!s->touched[a] || !s->touched[b])
-                continue;
-            awiwi_real terms = awiwi_size(excess);
+            const int row = s->joint[a], column = s->joint[b];
+            awiwi_real excess = -(s->K[row * n + column] + s->K[column * n + row]) / 2, terms = awiwi_size(excess);
             for (int i = 0; i < s->count; i++) {
-                const int tendon = s->t->searched_tendons[i];
-                const awiwi_real pp = s->p[i][a] * s->p[i][b];
-                const awiwi_real change = s->t->slope ? s->t->slope[(tendon * n + a) * n + b] : 0;
-                excess += k[tendon] * pp + f[i] * change;
-                growth[i] = slope[tendon] * pp + change;
-                terms += awiwi_size(k[tendon] * pp) + awiwi_size(f[i] * change);
+                const awiwi_real elastic = c->k[s->t->searched_tendons[i]] * s->p[i][a] * s->p[i][b];
+                const awiwi_real bent = f[i] * change(s, i, a, b);
+                excess += elastic + bent;
+                terms += awiwi_size(elastic) + awiwi_size(bent);
             }
-            const awiwi_real rounding = 4 * AWIWI_REAL_EPSILON * terms;
-            c->cost += both * excess * excess / 2;
-            c->blur += both * rounding * (awiwi_size(excess) + rounding);
-            for (int i = 0; i < s->count; i++) {
-                c->gradient[i] += both * excess * growth[i];
-                c->curvature[i] += both * excess * curvature[s->t->searched_tendons[i]] * s->p[i][a] * s->p[i][b];
-                for (int l = 0; l <= i; l++)
-                    c->hessian[i][l] += both * growth[i] * growth[l];
-            }
+            add_entry(c, entry++, a == b ? 1 : 2, excess, terms);
         }
     }
-    for (int i = 0; i < s->count; i++)
-        for (int l = 0; l < i; l++)
-            c->hessian[l][i] = c->hessian[i][l];
-    return 0;
 }
 
 static int cost(const task *s, const vector f, model *c)
 {
-    return s->keep_torque ? stiffness_cost(s, f, c) : torque_cost(s, f, c);
+    c->cost = c->blur = 0;
+    if (!s->keep_torque) {
+        torque_cost(s, f, c);
+        return 0;
+    }
+    for (int i = 0; i < s->count; i++)
+        s->f[s->t->searched_tendons[i]] = f[i];
+    if (s->t->curve(s->t->context, s->f, c->k, c->slope, c->curvature))
+        return AWIWI_OUT_OF_DOMAIN;
+    stiffness_cost(s, f, c);
+    return 0;
 }
 
-/* Take from v what lies along the moves found so far, twice for the sake of rounding; sum what was taken. */
-static void project(const task *s, const moves *m, vector v, awiwi_real *taken)
+/* How entry (a, b) of the stiffness, or a of the torque, grows with each force. */
+static void grow(const task *s, const model *c, int a, int b, vector growth)
 {
-    for (int again = 0; again < 2; again++) {
-        for (int k = 0; k < m->count; k++) {
-            const awiwi_real share = awiwi_dot(v, m->along[k], s->count) / m->square[k];
+    for (int i = 0; i < s->count; i++)
+        growth[i] = s->keep_torque ? c->slope[s->t->searched_tendons[i]] * s->p[i][a] * s->p[i][b] + change(s, i, a, b)
+                                   : s->p[i][a];
+}
+
+/* Slopes of the cost by each force, with all others at rest. */
+static void slopes(const task *s, const model *c, vector gradient)
+{
+    vector growth;
+    for (int i = 0; i < s->count; i++)
+        gradient[i] = 0;
+    for (int a = 0, entry = 0; a < s->joints; a++) {
+        for (int b = s->keep_torque ? 0 : a; b <= a; b++) {
+            const awiwi_real excess = a == b ? c->excess[entry++] : 2 * c->excess[entry++];
+            grow(s, c, a, b, growth);
             for (int i = 0; i < s->count; i++)
-                v[i] -= share * m->along[k][i];
-            if (taken)
-                taken[k] += share;
+                gradient[i] += excess * growth[i];
         }
     }
 }
 
-static void keep(const task *s, moves *m, const vector v, awiwi_real square)
-{
-    for (int i = 0; i < s->count; i++)
-        m->along[m->count][i] = v[i];
-    m->square[m->count++] = square;
-}
+/* -- moves --------------------------------------------------------------------------------------------------------- */
 
-/* Split what the free tendons can do. The unit moves' remainders always add up to what is missing, in squares. */
+/* Find the moves by elimination: every joint gets the free tendon that is left with the largest coupling. */
 static void split(const task *s, const int *held, moves *m)
 {
-    int free = 0;
-    m->count = 0;
-    for (int j = 0; s->keep_torque && j < s->t->joints; j++) {
-        awiwi_real taken[AWIWI_MOST_TENDONS] = {0}, before;
-        vector row;
-        for (int i = 0; i < s->count; i++)
-            row[i] = held[i] == FREE ? s->p[i][j] : 0;
-        before = awiwi_dot(row, row, s->count);
-        project(s, m, row, taken);
-        const awiwi_real after = awiwi_dot(row, row, s->count);
-        if (after > 64 * AWIWI_REAL_EPSILON * before) {
-            for (int k = 0; k < m->count; k++)
-                m->lower[m->count][k] = taken[k];
-            m->lower[m->count][m->count] = 1;
-            m->joint[m->count] = j;
-            keep(s, m, row, after);
+    int taken[AWIWI_MOST_TENDONS] = {0};
+    m->rank = m->count = 0;
+    for (int a = 0; s->keep_torque && a < s->joints; a++) {
+        awiwi_real *row = m->share[m->rank], before = 0, most = 0;
+        int pivot = 0;
+        for (int i = 0; i < s->count; i++) {
+            row[i] = s->p[i][a];
+            before = held[i] == FREE && awiwi_size(row[i]) > before ? awiwi_size(row[i]) : before;
         }
-    }
-    m->rank = m->count;
-    for (int i = 0; i < s->count; i++)
-        free += held[i] == FREE;
-    for (int i = 0; i < s->count && m->count < free; i++) {
-        vector unit = {0};
-        unit[i] = 1;
-        if (held[i] != FREE)
+        for (int r = 0; r < m->rank; r++) {
+            const awiwi_real part = row[m->basic[r]];
+            for (int i = 0; i < s->count; i++)
+                row[i] -= part * m->share[r][i];
+        }
+        for (int i = 0; i < s->count; i++) {
+            if (held[i] == FREE && !taken[i] && awiwi_size(row[i]) > most) {
+                most = awiwi_size(row[i]);
+                pivot = i;
+            }
+        }
+        if (!(most * most > 64 * AWIWI_REAL_EPSILON * before * before))
             continue;
-        project(s, m, unit, 0);
-        if (awiwi_dot(unit, unit, s->count) > LEAST_SHARE)
-            keep(s, m, unit, awiwi_dot(unit, unit, s->count));
+        const awiwi_real scale = 1 / row[pivot];
+        for (int i = 0; i < s->count; i++)
+            row[i] *= scale;
+        for (int r = 0; r < m->rank; r++) {
+            const awiwi_real part = m->share[r][pivot];
+            for (int i = 0; i < s->count; i++)
+                m->share[r][i] -= part * row[i];
+        }
+        taken[pivot] = 1;
+        m->basic[m->rank++] = pivot;
     }
+    for (int i = 0; i < s->count; i++)
+        if (held[i] == FREE && !taken[i])
+            m->loose[m->count++] = i;
 }
 
-/* The sum of the moves that keep the torque, x times each; its largest entry is `size` if that is not 0. */
+/* How something that grows with each force by v changes as tendon i moves. */
+static awiwi_real along(const moves *m, int i, const vector v)
+{
+    awiwi_real sum = v[i];
+    for (int r = 0; r < m->rank; r++)
+        sum -= m->share[r][i] * v[m->basic[r]];
+    return sum;
+}
+
+/* The change of all forces as the loose tendons move by x; its largest is `size` if that is not 0. */
 static void combine(const task *s, const moves *m, const vector x, awiwi_real size, vector sum)
 {
-    for (int i = 0; i < s->count; i++) {
+    for (int i = 0; i < s->count; i++)
         sum[i] = 0;
-        for (int j = m->rank; j < m->count; j++)
-            sum[i] += x[j - m->rank] * m->along[j][i];
+    for (int j = 0; j < m->count; j++) {
+        sum[m->loose[j]] = x[j];
+        for (int r = 0; r < m->rank; r++)
+            sum[m->basic[r]] -= m->share[r][m->loose[j]] * x[j];
     }
-    const awiwi_real largest = awiwi_largest(sum, s->count);
-    for (int i = 0; awiwi_size(size) > 0 && i < s->count; i++)
-        sum[i] *= size / largest;
+    if (!(awiwi_size(size) > 0))
+        return;
+    const awiwi_real scale = size / awiwi_largest(sum, s->count);
+    for (int i = 0; i < s->count; i++)
+        sum[i] *= scale;
 }
+
+/* Gradient and Hessian of the cost by the moves: that of Gauss and Newton, and a diagonal by the forces. */
+static void derive(const task *s, const model *c, const moves *m, vector gradient, matrix H, vector diagonal)
+{
+    vector growth, by;
+    awiwi_real trace = 0;
+    for (int j = 0; j < m->count; j++) {
+        gradient[j] = 0;
+        for (int l = 0; l <= j; l++)
+            H[j][l] = 0;
+    }
+    for (int i = 0; i < s->count; i++)
+        diagonal[i] = 0;
+    for (int a = 0, entry = 0; a < s->joints; a++) {
+        for (int b = s->keep_torque ? 0 : a; b <= a; b++) {
+            const awiwi_real times = a == b ? 1 : 2, excess = times * c->excess[entry++];
+            grow(s, c, a, b, growth);
+            for (int j = 0; j < m->count; j++) {
+                by[j] = along(m, m->loose[j], growth);
+                gradient[j] += excess * by[j];
+                for (int l = 0; l <= j; l++)
+                    H[j][l] += times * by[j] * by[l];
+            }
+            for (int i = 0; s->keep_torque && i < s->count; i++)
+                diagonal[i] += excess * c->curvature[s->t->searched_tendons[i]] * s->p[i][a] * s->p[i][b];
+        }
+    }
+    if (s->keep_torque)
+        return;
+    for (int j = 0; j < m->count; j++)
+        trace += H[j][j];
+    for (int i = 0; i < s->count; i++)
+        diagonal[i] = 1024 * AWIWI_REAL_EPSILON * trace; /* of moves that do the same, the shortest */
+}
+
+/* -- search -------------------------------------------------------------------------------------------------------- */
 
 /* Newton's step of the free tendons along the moves that are allowed; where the Hessian is not positive, a damped
    Gauss-Newton step. Returns the predicted decrease. `bend` becomes a downhill direction along which the cost curves
    down, as long as the range of forces. Both are zero before, and stay so where there is none. */
 static awiwi_real newton(const task *s, const model *c, const moves *m, vector step, vector bend)
 {
-    const int n = m->count - m->rank;
+    const int n = m->count;
     const awiwi_real range = s->t->high - s->t->low, near = c->cost / (range * range);
     matrix H, full;
-    vector b, x, product;
+    vector b, x, diagonal;
     awiwi_real trace = 0, pivot, shift = 0;
+    derive(s, c, m, b, H, diagonal);
     for (int j = 0; j < n; j++) {
-        const awiwi_real *v = m->along[m->rank + j];
-        b[j] = -awiwi_dot(v, c->gradient, s->count);
-        for (int i = 0; i < s->count; i++)
-            product[i] = awiwi_dot(c->hessian[i], v, s->count);
-        for (int l = 0; l <= j; l++)
-            H[j][l] = awiwi_dot(m->along[m->rank + l], product, s->count);
+        b[j] = -b[j];
         trace += H[j][j];
     }
     const awiwi_real least = 64 * AWIWI_REAL_EPSILON * trace, flat = awiwi_sqrt(AWIWI_REAL_EPSILON) * trace;
     do { /* little damping near the demand: where tendons do the same, the cost is flat along exchanges between them */
         for (int j = 0; j < n; j++) {
             for (int l = 0; l <= j; l++) {
-                full[j][l] = l == j ? H[j][l] + shift : H[j][l];
-                for (int i = 0; i < s->count; i++)
-                    full[j][l] += m->along[m->rank + j][i] * c->curvature[i] * m->along[m->rank + l][i];
+                full[j][l] = l == j ? H[j][l] + shift + diagonal[m->loose[j]] : H[j][l];
+                for (int r = 0; r < m->rank; r++)
+                    full[j][l] += m->share[r][m->loose[j]] * diagonal[m->basic[r]] * m->share[r][m->loose[l]];
             }
         }
         pivot = awiwi_solve_positive(n, AWIWI_MOST_TENDONS, full[0], least, b, x);
@@ -243,17 +284,12 @@ static awiwi_real newton(const task *s, const model *c, const moves *m, vector s
    there is none. Slopes within rounding of their terms count as level. */
 static int leaving(const task *s, const model *c, const moves *m, const int *held)
 {
-    awiwi_real price[AWIWI_MOST_JOINTS] = {0};
-    awiwi_real most = 256 * AWIWI_REAL_EPSILON * awiwi_largest(c->gradient, s->count);
+    vector gradient;
     int found = -1;
-    for (int k = m->rank - 1; k >= 0; k--) {
-        awiwi_real sum = -awiwi_dot(m->along[k], c->gradient, s->count) / m->square[k];
-        for (int l = k + 1; l < m->rank; l++)
-            sum -= m->lower[l][k] * price[m->joint[l]];
-        price[m->joint[k]] = sum;
-    }
+    slopes(s, c, gradient);
+    awiwi_real most = 256 * AWIWI_REAL_EPSILON * awiwi_largest(gradient, s->count);
     for (int i = 0; i < s->count; i++) {
-        const awiwi_real gain = (awiwi_real)held[i] * (c->gradient[i] + awiwi_dot(s->p[i], price, s->t->joints));
+        const awiwi_real gain = held[i] == FREE ? 0 : (awiwi_real)held[i] * along(m, i, gradient);
         if (gain > most) {
             most = gain;
             found = i;
@@ -367,15 +403,19 @@ int awiwi_search_forces(const awiwi_tendons *t, const awiwi_real *tau, const awi
                         awiwi_real *f)
 {
     const awiwi_real starts[3] = {t->low + (t->high - t->low) / 2, t->low, t->high};
-    task s = {t, tau, K, {0}, {0}, t->searched, 1, tolerance, f};
+    task s = {t, tau, K, t->searched, 0, {0}, {{0}}, 1, tolerance, f};
     awiwi_real least = 0;
     vector best, trial;
     model found;
     int status = AWIWI_NOT_CONVERGED;
-    for (int i = 0; i < s.count; i++) {
-        s.p[i] = t->coupling + t->searched_tendons[i] * t->joints;
-        for (int j = 0; j < t->joints; j++)
-            s.touched[j] = s.touched[j] || awiwi_size(s.p[i][j]) > 0;
+    for (int j = 0; j < t->joints; j++) {
+        int touched = 0;
+        for (int i = 0; i < s.count; i++) {
+            s.p[i][s.joints] = t->coupling[t->searched_tendons[i] * t->joints + j];
+            touched = touched || awiwi_size(s.p[i][s.joints]) > 0;
+        }
+        if (touched)
+            s.joint[s.joints++] = j;
     }
     for (int start = 0; start < 3; start++) {
         for (int i = 0; i < s.count; i++)
