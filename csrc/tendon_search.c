@@ -33,15 +33,17 @@ typedef struct model {
 } model;
 
 /* The moves of the free tendons that keep the torque: each of the loose tendons by itself, while the basic tendons make
-   up for its torque, basic[r] by -share[r][loose] of the move. Without a torque to keep all free tendons are loose. */
+   up for its torque, basic[r] by -share[r][loose] of the move. Forces give the torque where each row of shares times
+   forces is the last number of the row. Without a torque to keep all free tendons are loose. */
 typedef struct moves {
     int rank, count;
     int basic[AWIWI_MOST_JOINTS], loose[AWIWI_MOST_TENDONS];
-    awiwi_real share[AWIWI_MOST_JOINTS][AWIWI_MOST_TENDONS];
+    awiwi_real share[AWIWI_MOST_JOINTS][AWIWI_MOST_TENDONS + 1];
 } moves;
 
 static const awiwi_real DAMPING = (awiwi_real)1 / 4096;       /* of steps where the Hessian is not positive */
 static const awiwi_real BENT = 4096 * AWIWI_REAL_EPSILON;     /* negative curvature, relative to the trace */
+static const awiwi_real MARGIN = 4;                            /* over the curvatures of springs where a search ends */
 static const awiwi_real LITTLE = (awiwi_real)1 / 16;          /* gain by a step, relative to the cost */
 enum { BENDS = 8 };                                           /* trials along a direction of negative curvature */
 enum { AT_LOW = -1, FREE = 0, AT_HIGH = 1 };
@@ -146,13 +148,14 @@ static void split(const task *s, const int *held, moves *m)
     for (int a = 0; s->keep_torque && a < s->joints; a++) {
         awiwi_real *row = m->share[m->rank], before = 0, most = 0;
         int pivot = 0;
+        row[s->count] = -s->tau[s->joint[a]];
         for (int i = 0; i < s->count; i++) {
             row[i] = s->p[i][a];
             before = held[i] == FREE && awiwi_size(row[i]) > before ? awiwi_size(row[i]) : before;
         }
         for (int r = 0; r < m->rank; r++) {
             const awiwi_real part = row[m->basic[r]];
-            for (int i = 0; i < s->count; i++)
+            for (int i = 0; i <= s->count; i++)
                 row[i] -= part * m->share[r][i];
         }
         for (int i = 0; i < s->count; i++) {
@@ -164,11 +167,11 @@ static void split(const task *s, const int *held, moves *m)
         if (!(most * most > 64 * AWIWI_REAL_EPSILON * before * before))
             continue;
         const awiwi_real scale = 1 / row[pivot];
-        for (int i = 0; i < s->count; i++)
+        for (int i = 0; i <= s->count; i++)
             row[i] *= scale;
         for (int r = 0; r < m->rank; r++) {
             const awiwi_real part = m->share[r][pivot];
-            for (int i = 0; i < s->count; i++)
+            for (int i = 0; i <= s->count; i++)
                 m->share[r][i] -= part * row[i];
         }
         taken[pivot] = 1;
@@ -205,18 +208,18 @@ static void combine(const task *s, const moves *m, const vector x, awiwi_real si
         sum[i] *= scale;
 }
 
-/* Gradient and Hessian of the cost by the moves: that of Gauss and Newton, and a diagonal by the forces. */
-static void derive(const task *s, const model *c, const moves *m, vector gradient, matrix H, vector diagonal)
+/* Gradient of the cost by the moves and Hessian as of Gauss and Newton; by how much more stiffness of each tendon raises
+   the cost. */
+static void derive(const task *s, const model *c, const moves *m, vector gradient, matrix H, vector stiffer)
 {
     vector growth, by;
-    awiwi_real trace = 0;
     for (int j = 0; j < m->count; j++) {
         gradient[j] = 0;
         for (int l = 0; l <= j; l++)
             H[j][l] = 0;
     }
     for (int i = 0; i < s->count; i++)
-        diagonal[i] = 0;
+        stiffer[i] = 0;
     for (int a = 0, entry = 0; a < s->joints; a++) {
         for (int b = s->keep_torque ? 0 : a; b <= a; b++) {
             const awiwi_real times = a == b ? 1 : 2, excess = times * c->excess[entry++];
@@ -227,16 +230,22 @@ static void derive(const task *s, const model *c, const moves *m, vector gradien
                 for (int l = 0; l <= j; l++)
                     H[j][l] += times * by[j] * by[l];
             }
-            for (int i = 0; s->keep_torque && i < s->count; i++)
-                diagonal[i] += excess * c->curvature[s->t->searched_tendons[i]] * s->p[i][a] * s->p[i][b];
+            for (int i = 0; i < s->count; i++)
+                stiffer[i] += excess * s->p[i][a] * s->p[i][b];
         }
     }
-    if (s->keep_torque)
-        return;
-    for (int j = 0; j < m->count; j++)
-        trace += H[j][j];
-    for (int i = 0; i < s->count; i++)
-        diagonal[i] = 1024 * AWIWI_REAL_EPSILON * trace; /* of moves that do the same, the shortest */
+}
+
+/* H, with a diagonal by the forces and a shift along the moves. */
+static void add_diagonal(const moves *m, matrix H, const vector diagonal, awiwi_real shift, matrix sum)
+{
+    for (int j = 0; j < m->count; j++) {
+        for (int l = 0; l <= j; l++) {
+            sum[j][l] = l == j ? H[j][l] + shift + diagonal[m->loose[j]] : H[j][l];
+            for (int r = 0; r < m->rank; r++)
+                sum[j][l] += m->share[r][m->loose[j]] * diagonal[m->basic[r]] * m->share[r][m->loose[l]];
+        }
+    }
 }
 
 /* -- search -------------------------------------------------------------------------------------------------------- */
@@ -256,15 +265,12 @@ static awiwi_real newton(const task *s, const model *c, const moves *m, vector s
         b[j] = -b[j];
         trace += H[j][j];
     }
+    for (int i = 0; i < s->count; i++) /* of moves that give the same torque, the shortest */
+        diagonal[i] = s->keep_torque ? diagonal[i] * c->curvature[s->t->searched_tendons[i]]
+                                     : 1024 * AWIWI_REAL_EPSILON * trace;
     const awiwi_real least = 64 * AWIWI_REAL_EPSILON * trace, flat = awiwi_sqrt(AWIWI_REAL_EPSILON) * trace;
     do { /* little damping near the demand: where tendons do the same, the cost is flat along exchanges between them */
-        for (int j = 0; j < n; j++) {
-            for (int l = 0; l <= j; l++) {
-                full[j][l] = l == j ? H[j][l] + shift + diagonal[m->loose[j]] : H[j][l];
-                for (int r = 0; r < m->rank; r++)
-                    full[j][l] += m->share[r][m->loose[j]] * diagonal[m->basic[r]] * m->share[r][m->loose[l]];
-            }
-        }
+        add_diagonal(m, H, diagonal, shift, full);
         pivot = awiwi_solve_positive(n, AWIWI_MOST_TENDONS, full[0], least, b, x);
         if (!(shift > 0) && pivot < -BENT * trace)
             combine(s, m, x, awiwi_dot(b, x, n) < 0 ? -range : range, bend);
@@ -399,31 +405,115 @@ static int descend(const task *s, int steps, vector f, model *here)
     return AWIWI_NOT_CONVERGED;
 }
 
+/* -- starts -------------------------------------------------------------------------------------------------------- */
+
+/* The least change of forces after which they give the torque; all tendons are free. */
+static void correct(const task *s, const moves *m, vector v)
+{
+    awiwi_real G[AWIWI_MOST_JOINTS][AWIWI_MOST_JOINTS], missing[AWIWI_MOST_JOINTS], x[AWIWI_MOST_JOINTS];
+    for (int r = 0; r < m->rank; r++) {
+        missing[r] = m->share[r][s->count] - awiwi_dot(m->share[r], v, s->count);
+        for (int l = 0; l <= r; l++)
+            G[r][l] = awiwi_dot(m->share[r], m->share[l], s->count);
+    }
+    (void)awiwi_solve_positive(m->rank, AWIWI_MOST_JOINTS, G[0], 0, missing, x);
+    for (int r = 0; r < m->rank; r++)
+        for (int i = 0; i < s->count; i++)
+            v[i] += m->share[r][i] * x[r];
+}
+
+/* Forces within the limits that give the torque, or the nearest one: those nearest to the middle of the limits, if these
+   are within them. */
+static int begin(task *s, const moves *m, vector f)
+{
+    const awiwi_real middle = s->t->low + (s->t->high - s->t->low) / 2, tolerance = s->tolerance;
+    int inside = 1, status = AWIWI_OK;
+    model found;
+    for (int i = 0; i < s->count; i++)
+        f[i] = middle;
+    correct(s, m, f);
+    for (int i = 0; i < s->count; i++)
+        inside = inside && f[i] >= s->t->low && f[i] <= s->t->high;
+    s->keep_torque = 0;
+    (void)cost(s, f, &found);
+    if (!inside || !(found.cost <= found.blur)) {
+        for (int i = 0; i < s->count; i++)
+            f[i] = middle;
+        s->tolerance = 4 * AWIWI_REAL_EPSILON;
+        status = descend(s, AWIWI_MOST_TORQUE_STEPS, f, &found);
+        s->tolerance = tolerance;
+    }
+    s->keep_torque = 1;
+    return status;
+}
+
+/* Move f to where one limit after the other stops the sum of forces from growing by `sense`, at the same torque. */
+static void drive(const task *s, awiwi_real sense, vector f)
+{
+    int held[AWIWI_MOST_TENDONS] = {0}, stopped = 0;
+    const awiwi_real range = s->t->high - s->t->low;
+    while (stopped >= 0) {
+        vector one, x, step;
+        moves m;
+        split(s, held, &m);
+        for (int i = 0; i < s->count; i++)
+            one[i] = 1;
+        for (int j = 0; j < m.count; j++)
+            x[j] = along(&m, m.loose[j], one);
+        combine(s, &m, x, 2 * sense * range, step);
+        const awiwi_real share = awiwi_largest(x, m.count) > 0 ? reach(s, f, step, &stopped) : 0;
+        if (!(awiwi_largest(x, m.count) > 0) || stopped < 0)
+            return;
+        for (int i = 0; i < s->count; i++)
+            f[i] = awiwi_clamp(f[i] + share * step[i], s->t->low, s->t->high);
+        held[stopped] = AT_LOW;
+    }
+}
+
+/* Whether no other forces come as near, as far as the slopes and curvatures at these tell. The cost of others exceeds
+   that of these by half the square of what all entries change by, less what tendons gain that are asked to be stiffer. */
+static int is_nearest_of_all(const task *s, const model *c, const moves *m)
+{
+    vector gradient, wanted, x;
+    matrix H, sum;
+    awiwi_real most = 0;
+    derive(s, c, m, gradient, H, wanted);
+    for (int i = 0; i < s->count; i++)
+        most = awiwi_fmax(most, c->curvature[s->t->searched_tendons[i]]);
+    for (int i = 0; i < s->count; i++)
+        wanted[i] = wanted[i] < 0 ? MARGIN * most * wanted[i] : 0;
+    add_diagonal(m, H, wanted, 0, sum);
+    return awiwi_solve_positive(m->count, AWIWI_MOST_TENDONS, sum[0], 0, gradient, x) > 0;
+}
+
 int awiwi_search_forces(const awiwi_tendons *t, const awiwi_real *tau, const awiwi_real *K, awiwi_real tolerance,
                         awiwi_real *f)
 {
-    const awiwi_real starts[3] = {t->low + (t->high - t->low) / 2, t->low, t->high};
+    const int held[AWIWI_MOST_TENDONS] = {0};
     task s = {t, tau, K, t->searched, 0, {0}, {{0}}, 1, tolerance, f};
     awiwi_real least = 0;
-    vector best, trial;
-    model found;
-    int status = AWIWI_NOT_CONVERGED;
+    vector first, best;
+    moves all;
     for (int j = 0; j < t->joints; j++) {
         int touched = 0;
         for (int i = 0; i < s.count; i++) {
             s.p[i][s.joints] = t->coupling[t->searched_tendons[i] * t->joints + j];
             touched = touched || awiwi_size(s.p[i][s.joints]) > 0;
         }
-        if (touched)
-            s.joint[s.joints++] = j;
+        s.joint[s.joints] = j;
+        s.joints += touched;
     }
-    for (int start = 0; start < 3; start++) {
+    split(&s, held, &all);
+    const int begun = begin(&s, &all, first);
+    int status = AWIWI_NOT_CONVERGED;
+    for (int start = 0; start < 3; start++) { /* from there, then from as low and as high as the torque permits */
+        vector trial;
+        model found;
+        int ended = begun;
         for (int i = 0; i < s.count; i++)
-            trial[i] = starts[start];
-        task torque = s;
-        torque.keep_torque = 0;
-        torque.tolerance = 4 * AWIWI_REAL_EPSILON;
-        int ended = descend(&torque, AWIWI_MOST_TORQUE_STEPS, trial, &found);
+            trial[i] = first[i];
+        if (start > 0)
+            drive(&s, start == 1 ? -1 : 1, trial);
         if (ended == AWIWI_OK)
             ended = descend(&s, AWIWI_MOST_STIFFNESS_STEPS, trial, &found);
         if (ended != AWIWI_OK && ended != AWIWI_NOT_CONVERGED)
@@ -434,8 +524,10 @@ int awiwi_search_forces(const awiwi_tendons *t, const awiwi_real *tau, const awi
             for (int i = 0; i < s.count; i++)
                 best[i] = trial[i];
         }
-        if (status == AWIWI_OK && least <= found.blur)
-            break; /* exactly what was asked for */
+        if (status == AWIWI_OK && (least <= found.blur || (start == 0 && is_nearest_of_all(&s, &found, &all))))
+            break;
+        if (begun != AWIWI_OK)
+            break;
     }
     for (int i = 0; i < s.count; i++)
         f[t->searched_tendons[i]] = best[i];
