@@ -113,7 +113,7 @@ static int descend(const task *s, int steps, vector f, model *here, rates *d)
     moves m;
     if (cost(s, f, here))
         return AWIWI_OUT_OF_DOMAIN;
-    while (steps-- > 0) {
+    while (steps-- > 0 && (s->keep_torque || here->cost > here->blur)) {
         vector step = {0}, bend = {0};
         if (changed) {
             split(s, s->keep_torque, held, &m);
@@ -124,7 +124,9 @@ static int descend(const task *s, int steps, vector f, model *here, rates *d)
         if (!(longest <= AWIWI_REAL_MAX))
             return AWIWI_NOT_FINITE;
         const int rounding = gain <= here->blur && 2 * longest >= last; /* nothing to gain, and no nearer */
-        const int ended = longest <= s->tolerance * s->t->high || rounding;
+        const awiwi_real near = s->tolerance * s->t->high;
+        const int none_held = m.rank + m.count == s->count; /* slopes that decide about a held tendon need the last step */
+        const int ended = longest <= near || (none_held && awiwi_ends_with(longest, last, near)) || rounding;
         const awiwi_real *way = step;
         last = longest;
         if ((ended || (!straight && gain <= LITTLE * here->cost)) && here->cost > here->blur && steps > BENDS
@@ -162,7 +164,7 @@ static int descend(const task *s, int steps, vector f, model *here, rates *d)
             changed = 1;
         }
     }
-    return AWIWI_NOT_CONVERGED;
+    return s->keep_torque || here->cost > here->blur ? AWIWI_NOT_CONVERGED : AWIWI_OK;
 }
 
 /* -- starts -------------------------------------------------------------------------------------------------------- */
