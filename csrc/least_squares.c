@@ -6,7 +6,16 @@
 typedef awiwi_real vector[AWIWI_MOST_UNKNOWNS];
 typedef awiwi_real matrix[AWIWI_MOST_UNKNOWNS][AWIWI_MOST_UNKNOWNS];
 
-/* Half the squared residual, its gradient, and J'J, at q; also how far rounding may move the result. */
+/* The part of a row of the Jacobian outside which it is zero: most equations depend on few unknowns. */
+static void find_nonzero(const awiwi_real *row, int *first, int *end)
+{
+    while (*end > *first && awiwi_size(row[*end - 1]) <= 0)
+        --*end;
+    while (*first < *end && awiwi_size(row[*first]) <= 0)
+        ++*first;
+}
+
+/* Half the squared residual, its gradient, and the lower half of J'J, at q; also how far rounding may move the result. */
 static awiwi_real cost(const awiwi_problem *p, const awiwi_real *measured, const awiwi_real *q, vector gradient,
                        matrix normal, awiwi_real *blur)
 {
@@ -15,7 +24,7 @@ static awiwi_real cost(const awiwi_problem *p, const awiwi_real *measured, const
     p->model(p->context, q, h, P);
     for (int j = 0; j < p->unknowns; j++) {
         gradient[j] = 0;
-        for (int k = 0; k < p->unknowns; k++)
+        for (int k = 0; k <= j; k++)
             normal[j][k] = 0;
     }
     for (int i = 0; i < p->equations; i++) {
@@ -23,9 +32,11 @@ static awiwi_real cost(const awiwi_problem *p, const awiwi_real *measured, const
         const awiwi_real residual = h[i] - measured[i];
         total += residual * residual;
         terms += awiwi_size(residual) * (awiwi_size(h[i]) + awiwi_size(measured[i]));
-        for (int j = 0; j < p->unknowns; j++) {
+        int first = 0, end = p->unknowns;
+        find_nonzero(row, &first, &end);
+        for (int j = first; j < end; j++) {
             gradient[j] += row[j] * residual;
-            for (int k = 0; k <= j; k++)
+            for (int k = first; k <= j; k++)
                 normal[j][k] += row[j] * row[k];
         }
     }
@@ -70,42 +81,41 @@ static int begin(const awiwi_problem *p, const awiwi_real *measured, const awiwi
 int awiwi_least_squares(const awiwi_problem *p, const awiwi_real *measured, const awiwi_real *start, int iterations,
                         awiwi_real tolerance, awiwi_real *q)
 {
-    vector gradient, trial_gradient, step, trial;
-    matrix normal, trial_normal;
+    vector gradient[2], step, trial;
+    matrix normal[2];
+    int here = 0; /* which of the two belongs to q; the other is that of the trial */
     awiwi_real damping = 0, blur;
     if (!begin(p, measured, start, q))
         return AWIWI_NOT_FINITE;
-    awiwi_real best = cost(p, measured, q, gradient, normal, &blur);
+    awiwi_real best = cost(p, measured, q, gradient[here], normal[here], &blur);
     if (!(best <= AWIWI_REAL_MAX))
         return AWIWI_NOT_FINITE;
     for (int i = 1; i < iterations; i++) {
         int held[AWIWI_MOST_UNKNOWNS];
         awiwi_real longest = 0;
         for (int j = 0; j < p->unknowns; j++) /* at a limit and pushed against it */
-            held[j] = (q[j] <= p->low[j] && gradient[j] >= 0) || (q[j] >= p->high[j] && gradient[j] <= 0);
-        damped_step(p->unknowns, normal, gradient, held, damping, step);
+            held[j] = (q[j] <= p->low[j] && gradient[here][j] >= 0) || (q[j] >= p->high[j] && gradient[here][j] <= 0);
+        damped_step(p->unknowns, normal[here], gradient[here], held, damping, step);
         for (int j = 0; j < p->unknowns; j++) {
             trial[j] = awiwi_clamp(q[j] + step[j], p->low[j], p->high[j]);
             longest = awiwi_size(trial[j] - q[j]) > longest ? awiwi_size(trial[j] - q[j]) : longest;
         }
         if (!awiwi_all_finite(trial, p->unknowns))
             return AWIWI_NOT_FINITE;
-        const awiwi_real found = cost(p, measured, trial, trial_gradient, trial_normal, &blur);
         /* near the bottom rounding decides which cost is lower, and the step is still right */
-        if (found <= best + blur || longest <= tolerance) {
-            best = found;
-            damping = damping / 10;
-            for (int j = 0; j < p->unknowns; j++) {
-                q[j] = trial[j];
-                gradient[j] = trial_gradient[j];
-                for (int k = 0; k < p->unknowns; k++)
-                    normal[j][k] = trial_normal[j][k];
-            }
-            if (longest <= tolerance)
-                return AWIWI_OK;
-        } else {
+        const int last = longest <= tolerance;
+        const awiwi_real found = last ? best : cost(p, measured, trial, gradient[!here], normal[!here], &blur);
+        if (!(found <= best + blur)) {
             damping = damping > 0 ? damping * 10 : (awiwi_real)0.001;
+            continue;
         }
+        for (int j = 0; j < p->unknowns; j++)
+            q[j] = trial[j];
+        if (last)
+            return AWIWI_OK;
+        best = found;
+        damping = damping / 10;
+        here = !here;
     }
     return AWIWI_NOT_CONVERGED;
 }
