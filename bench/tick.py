@@ -1,7 +1,7 @@
-"""What the solvers of a tick execute: instructions of one call, counted by callgrind, beside those that are committed.
+"""What the solvers of a tick execute: instructions of one call, counted by callgrind, beside the committed ones.
 
-Run by `make bench`. The counts are the compiler's, so they are compared only with those of the same compiler and flags;
-with `--accept` the counted ones become the committed ones. The first counts, of `baseline`, stay.
+Run by `make bench`. Counts are the compiler's, so they are compared only with those of the same compiler and flags; with
+`--accept` the counted ones become the committed ones. The first counts, the column `before`, stay.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from awiwi_gen.build import FLAGS, compile_objects, compiler, load
 from awiwi_gen.cache import Cache
-from awiwi_gen.verify.problems_riccati import chain, joint
+from awiwi_gen.verify.problems_riccati import joint
 from bench.measure import called_costs
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -55,7 +55,7 @@ def cases(lib: Any) -> Iterator[Case]:
     for finger in ("index", "middle", "ring", "fifth"):
         yield from list(distributions(lib, finger))[1:]
     yield from estimates(lib)
-    yield from laws()
+    yield from laws(lib)
 
 
 def distributions(lib: Any, finger: str) -> Iterator[Case]:
@@ -106,17 +106,24 @@ def estimates(lib: Any) -> Iterator[Case]:
         yield Case(f"{kernel}, {name}", kernel, {"h": lengths, "start": start})
 
 
-def laws() -> Iterator[Case]:
-    """Optimal gains of plausible joints."""
+def laws(lib: Any) -> Iterator[Case]:
+    """Optimal gains of plausible joints, and gains of the impedance law from the feedback gains of known ones."""
     random = np.random.default_rng(2)
-    plants, gains = [], []
-    for _ in range(TICKS):
-        m, b, k = 10 ** random.uniform([-6.5, -3.5, -0.5], [-5, -2, 0.3])
-        plants.append(joint(m, b, k, random.uniform(1e-4, 5e-3), random.uniform(0, 0.1)))
-        gains.append((m, b, k))
+    joints = 10 ** random.uniform([-6.5, -3.5, -0.5], [-5, -2, 0.3], (TICKS, 3))
+    plants = [joint(m, b, k, random.uniform(1e-4, 5e-3), random.uniform(0, 0.1)) for m, b, k in joints]
     A, B = (np.array(parts) for parts in zip(*plants, strict=True))
-    Q = np.array([np.diag(w) for w in 10 ** random.uniform([0, -3, -1, -3], [2, 0, 1, 0], (TICKS, 4))])
+    Q = np.array([np.diag(weights) for weights in 10 ** random.uniform([0, -3, -1, -3], [2, 0, 1, 0], (TICKS, 4))])
     yield Case("lqr, plausible joints", "lqr", {"A": A, "B": B, "Q": Q, "R": 10 ** random.uniform(-4, 0, (TICKS, 1))})
+    m, _, k = joints.T
+    stiffness = k * random.uniform(0.2, 2, TICKS)
+    pace = np.sqrt(stiffness / m)
+    damping, fast, slow = m * pace, pace * random.uniform(1, 2, TICKS), pace * random.uniform(0.1, 0.4, TICKS)
+    weight = random.uniform(2, 8, TICKS) / stiffness
+    gains, weights = np.stack([stiffness, damping, fast, slow], 1), np.stack([weight, weight / fast / slow * 2], 1)
+    K = lib.backstepping_state_gains(joints, gains, weights).K_cancelled
+    start = gains * random.uniform(0.95, 1.05, gains.shape)
+    inputs = {"K_opt": K, "plant": joints, "weights": weights, "start": start}
+    yield Case("optimal_backstepping, nearby start", "optimal_backstepping", inputs)
 
 
 # -- counts --------------------------------------------------------------------------------------------------
@@ -163,16 +170,39 @@ def _driver(lib: Any, chosen: list[Case]) -> str:
     return opening + "\n".join(functions) + "\n" + main
 
 
+def committed() -> tuple[str, dict[str, tuple[float, float]]]:
+    """The compiler of the committed counts, and the counts before and now by case."""
+    first, _, *rows = COMMITTED.read_text(encoding="utf-8").splitlines()
+    cells = [row.split("\t") for row in rows]
+    return first.removeprefix("# "), {name: (float(before), float(now)) for name, before, now in cells}
+
+
 def main() -> None:
-    """Count, compare, print."""
+    """Count, compare, print; exit 1 where a case executes more than is committed."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("directory", nargs="?", type=Path, default=ROOT / "generated")
     parser.add_argument("--only", default="", help="cases whose name contains this")
+    parser.add_argument("--accept", action="store_true", help="commit to what is counted")
     chosen = parser.parse_args()
+    made_with, (made_before, known) = f"{compiler().version} {' '.join(FLAGS)}", committed()
     lib = load(chosen.directory, Cache())
-    some = [case for case in cases(lib) if chosen.only in case.name]
-    for name, number in count(lib, some, chosen.directory).items():
-        print(f"{name:50}{number:10.0f}")
+    counts = count(lib, [case for case in cases(lib) if chosen.only in case.name], chosen.directory)
+    print(f"instructions of one call, {made_with}\n{'':50}{'before':>10}{'committed':>10}{'now':>10}  before/now")
+    for name, now in counts.items():
+        before, accepted = known.get(name, (now, now))
+        print(f"{name:50}{before:10.0f}{accepted:10.0f}{now:10.0f}{before / now:10.1f}")
+    if chosen.accept:
+        known |= {name: (known.get(name, (now, now))[0], now) for name, now in counts.items()}
+        rows = [f"{name}\t{before:.0f}\t{now:.0f}" for name, (before, now) in known.items()]
+        COMMITTED.write_text("\n".join([f"# {made_with}", "# case\tbefore\tnow", *rows, ""]), encoding="utf-8")
+        return
+    if made_with != made_before:
+        print("committed counts are another compiler's: not compared")
+        return
+    worse = [f"{name} executes {now:.0f} instructions, committed are {known[name][1]:.0f}"
+             for name, now in counts.items() if name in known and now > known[name][1] * (1 + SLACK)]
+    if worse:
+        sys.exit("\n".join([*worse, "mend it, or accept it with --accept"]))
 
 
 if __name__ == "__main__":
