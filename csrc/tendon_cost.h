@@ -45,10 +45,10 @@ typedef struct moves {
 } moves;
 
 /* By the moves: the downhill slope of the cost and its Hessian as of Gauss and Newton. By the tendons: by how much more
-   stiffness raises the cost. */
+   stiffness raises the cost, and by how much leaving its limit. */
 typedef struct rates {
     int count; /* of moves */
-    vector downhill, stiffer;
+    vector downhill, stiffer, price;
     matrix hessian;
 } rates;
 

@@ -48,7 +48,7 @@ static awiwi_real newton(const task *s, const model *c, const moves *m, rates *d
 
 /* The held tendon that most lowers the cost by leaving its limit, with the free ones making up for its torque; -1 if
    there is none. Slopes within rounding of their terms count as level. */
-static int leaving(const task *s, const model *c, const moves *m, const int *held)
+static int leaving(const task *s, const model *c, const moves *m, const int *held, rates *d)
 {
     vector gradient;
     int found = -1;
@@ -56,6 +56,7 @@ static int leaving(const task *s, const model *c, const moves *m, const int *hel
     awiwi_real most = 256 * AWIWI_REAL_EPSILON * awiwi_largest(gradient, s->count);
     for (int i = 0; i < s->count; i++) {
         const awiwi_real gain = held[i] == FREE ? 0 : (awiwi_real)held[i] * along(m, i, gradient);
+        d->price[i] = gain < 0 ? -gain : 0;
         if (gain > most) {
             most = gain;
             found = i;
@@ -143,7 +144,7 @@ static int descend(const task *s, int steps, vector f, model *here, rates *d)
             const awiwi_real share = reach(s, f, step, &stopped);
             for (int i = 0; i < s->count; i++)
                 f[i] = awiwi_clamp(f[i] + share * step[i], s->t->low, s->t->high);
-            left = leaving(s, here, &m, held);
+            left = leaving(s, here, &m, held, d);
             if (left < 0)
                 return AWIWI_OK;
             held[left] = FREE;
@@ -229,10 +230,11 @@ static void drive(const task *s, awiwi_real sense, vector f)
 }
 
 /* Whether no other forces come as near, as far as the slopes and curvatures at these tell. The cost of others exceeds
-   that of these by half the square of what all entries change by, less what tendons gain that are asked to be stiffer. */
+   that of these by half the square of what all entries change by, and by the prices of leaving limits, less what tendons
+   gain that are asked to be stiffer. A price is paid for at least the share of the range that is left. */
 static int is_nearest_of_all(const task *s, const model *c, const moves *m, rates *d)
 {
-    vector wanted, x;
+    vector extra, x;
     matrix sum;
     awiwi_real most = 0;
     if (d->count < m->count)
@@ -240,8 +242,8 @@ static int is_nearest_of_all(const task *s, const model *c, const moves *m, rate
     for (int i = 0; i < s->count; i++)
         most = c->curvature[i] > most ? c->curvature[i] : most;
     for (int i = 0; i < s->count; i++)
-        wanted[i] = d->stiffer[i] < 0 ? MARGIN * most * d->stiffer[i] : 0;
-    add_diagonal(m, d, wanted, 0, sum);
+        extra[i] = 2 * d->price[i] / (s->t->high - s->t->low) + (d->stiffer[i] < 0 ? MARGIN * most * d->stiffer[i] : 0);
+    add_diagonal(m, d, extra, 0, sum);
     return awiwi_solve_positive(m->count, AWIWI_MOST_TENDONS, sum[0], 0, d->downhill, x) > 0;
 }
 
