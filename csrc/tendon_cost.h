@@ -45,9 +45,10 @@ typedef struct moves {
 } moves;
 
 /* By the moves: the downhill slope of the cost and its Hessian as of Gauss and Newton. By the tendons: by how much more
-   stiffness raises the cost, and by how much leaving its limit. */
+   stiffness raises the cost, and by how much leaving its limit. `bent` is the greatest curvature met so far. */
 typedef struct rates {
     int count; /* of moves */
+    awiwi_real bent;
     vector downhill, stiffer, price;
     matrix hessian;
 } rates;
@@ -252,8 +253,10 @@ static void derive(const task *s, const model *c, const moves *m, rates *d)
         for (int l = 0; l <= j; l++)
             d->hessian[j][l] = 0;
     }
-    for (int i = 0; i < s->count; i++)
+    for (int i = 0; i < s->count; i++) {
         d->stiffer[i] = 0;
+        d->bent = c->curvature[i] > d->bent ? c->curvature[i] : d->bent;
+    }
     for (int e = 0; e < s->entries; e++) {
         const awiwi_real excess = s->times[e] * c->excess[e];
         grow(s, c, e, growth);

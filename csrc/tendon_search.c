@@ -106,12 +106,12 @@ static int take(const task *s, const vector step, awiwi_real most, int *steps, v
     return AWIWI_NOT_CONVERGED;
 }
 
-/* From f down to where no free move and no leaving tendon lowers the cost. */
-static int descend(const task *s, int steps, vector f, model *here, rates *d)
+/* From f down to where no free move and no leaving tendon lowers the cost. `all` are the moves while no tendon is held. */
+static int descend(const task *s, const moves *all, int steps, vector f, model *here, rates *d)
 {
-    int held[AWIWI_MOST_TENDONS] = {0}, left = -1, stopped, straight = 0, changed = 1;
-    awiwi_real last = 0;
-    moves m;
+    int held[AWIWI_MOST_TENDONS] = {0}, left = -1, stopped, straight = 0, changed = 0;
+    awiwi_real last = AWIWI_REAL_MAX;
+    moves m = *all;
     if (cost(s, f, here))
         return AWIWI_OUT_OF_DOMAIN;
     while (steps-- > 0 && (s->keep_torque || here->cost > here->blur)) {
@@ -190,9 +190,12 @@ static void correct(const task *s, const moves *m, vector v)
 static int begin(task *s, const moves *m, vector f)
 {
     const awiwi_real middle = s->t->low + (s->t->high - s->t->low) / 2;
+    const int held[AWIWI_MOST_TENDONS] = {0};
     int inside = 1;
+    moves each;
     model found;
     rates d;
+    d.bent = 0;
     for (int i = 0; i < s->count; i++)
         f[i] = middle;
     correct(s, m, f);
@@ -203,7 +206,8 @@ static int begin(task *s, const moves *m, vector f)
         return AWIWI_OK;
     for (int i = 0; i < s->count; i++)
         f[i] = middle;
-    return descend(s, AWIWI_MOST_TORQUE_STEPS, f, &found, &d);
+    split(s, 0, held, &each);
+    return descend(s, &each, AWIWI_MOST_TORQUE_STEPS, f, &found, &d);
 }
 
 /* Move f to where one limit after the other stops the sum of forces from growing by `sense`, at the same torque. */
@@ -229,6 +233,15 @@ static void drive(const task *s, awiwi_real sense, vector f)
     }
 }
 
+/* Whether forces differ by no more than the tolerance. */
+static int is_near(const task *s, const vector f, const vector other)
+{
+    for (int i = 0; i < s->count; i++)
+        if (!(awiwi_size(f[i] - other[i]) <= s->tolerance * s->t->high))
+            return 0;
+    return 1;
+}
+
 /* Whether no other forces come as near, as far as the slopes and curvatures at these tell. The cost of others exceeds
    that of these by half the square of what all entries change by, and by the prices of leaving limits, less what tendons
    gain that are asked to be stiffer. A price is paid for at least the share of the range that is left. */
@@ -236,13 +249,10 @@ static int is_nearest_of_all(const task *s, const model *c, const moves *m, rate
 {
     vector extra, x;
     matrix sum;
-    awiwi_real most = 0;
     if (d->count < m->count)
         derive(s, c, m, d);
     for (int i = 0; i < s->count; i++)
-        most = c->curvature[i] > most ? c->curvature[i] : most;
-    for (int i = 0; i < s->count; i++)
-        extra[i] = 2 * d->price[i] / (s->t->high - s->t->low) + (d->stiffer[i] < 0 ? MARGIN * most * d->stiffer[i] : 0);
+        extra[i] = 2 * d->price[i] / (s->t->high - s->t->low) + (d->stiffer[i] < 0 ? MARGIN * d->bent * d->stiffer[i] : 0);
     add_diagonal(m, d, extra, 0, sum);
     return awiwi_solve_positive(m->count, AWIWI_MOST_TENDONS, sum[0], 0, d->downhill, x) > 0;
 }
@@ -256,6 +266,7 @@ int awiwi_search_forces(const awiwi_tendons *t, const awiwi_real *tau, const awi
     moves all;
     rates d;
     task s;
+    d.bent = 0;
     start_task(&s, t, tau, f);
     want_torque(&s, 4 * AWIWI_REAL_EPSILON);
     split(&s, 1, held, &all);
@@ -271,7 +282,9 @@ int awiwi_search_forces(const awiwi_tendons *t, const awiwi_real *tau, const awi
             trial[i] = first[i];
         if (start > 0)
             drive(&s, start == 1 ? -1 : 1, trial);
-        const int ended = descend(&s, AWIWI_MOST_STIFFNESS_STEPS, trial, &found, &d);
+        if (start > 0 && status == AWIWI_OK && is_near(&s, trial, best))
+            continue;
+        const int ended = descend(&s, &all, AWIWI_MOST_STIFFNESS_STEPS, trial, &found, &d);
         if (ended != AWIWI_OK && ended != AWIWI_NOT_CONVERGED)
             return ended;
         if (start == 0 || (ended == AWIWI_OK && (status != AWIWI_OK || found.cost < least - found.blur))) {
