@@ -162,7 +162,7 @@ def _driver(lib: Any, chosen: list[Case]) -> str:
         calls.append(f"x = case_{i}(x);")
     opening = '#include <stdio.h>\n#include <stdlib.h>\n#include "kernels.h"\nstatic double y[128];\n'
     reading = (
-        "double *data = malloc(1 << 24); FILE *file = fopen(words[1], \"rb\");\n"
+        'double *data = malloc(1 << 24); FILE *file = fopen(words[1], "rb");\n'
         "if (!data || !file || !fread(data, 1, 1 << 24, file)) return 1;\n"
         "const double *x = data;\n"
     )
@@ -199,8 +199,11 @@ def main() -> None:
     if made_with != made_before:
         print("committed counts are another compiler's: not compared")
         return
-    worse = [f"{name} executes {now:.0f} instructions, committed are {known[name][1]:.0f}"
-             for name, now in counts.items() if name in known and now > known[name][1] * (1 + SLACK)]
+    worse = [
+        f"{name} executes {now:.0f} instructions, committed are {known[name][1]:.0f}"
+        for name, now in counts.items()
+        if name in known and now > known[name][1] * (1 + SLACK)
+    ]
     if worse:
         sys.exit("\n".join([*worse, "mend it, or accept it with --accept"]))
 

@@ -8,7 +8,8 @@ import scipy.optimize
 from tendon_demands import HIGH, LOW, Demands
 from tendon_solvers import INFEASIBLE, NOT_FINITE, OK, OUT_OF_DOMAIN
 
-from awiwi_gen.kernels.fingers_control import antagonists, groups
+from awiwi_gen.kernels.fingers_control import antagonists
+from awiwi_gen.kernels.routing import groups
 
 FINGERS = ["thumb", "index", "middle", "ring", "fifth"]
 SHAPES = ["thumb", "index", "ring"]  # of routing: the others are like the index

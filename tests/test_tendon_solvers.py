@@ -20,7 +20,8 @@ from tendon_solvers import (
 )
 
 import awiwi_gen
-from awiwi_gen.kernels.fingers_control import INVERSIONS, SEARCHES, antagonists, distribution, groups
+from awiwi_gen.kernels.fingers_control import INVERSIONS, SEARCHES, antagonists, distribution
+from awiwi_gen.kernels.routing import groups
 from awiwi_gen.resources import CSRC
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
