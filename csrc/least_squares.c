@@ -30,14 +30,14 @@ static void add_up(const awiwi_problem *p, const awiwi_part *b, const awiwi_real
     for (int i = 0; i < b->equations; i++) {
         const int e = b->equation[i];
         const awiwi_real residual = v->h[e] - measured[e];
-        vector row;
+        const awiwi_real *row = v->P + e * p->unknowns;
         total += residual * residual;
         terms += awiwi_size(residual) * (awiwi_size(v->h[e]) + awiwi_size(measured[e]));
         for (int j = 0; j < b->unknowns; j++) {
-            row[j] = v->P[e * p->unknowns + b->unknown[j]];
-            s->gradient[j] += row[j] * residual;
+            const awiwi_real slope = row[b->unknown[j]];
+            s->gradient[j] += slope * residual;
             for (int k = 0; k <= j; k++)
-                s->normal[j][k] += row[j] * row[k];
+                s->normal[j][k] += slope * row[b->unknown[k]];
         }
     }
     s->blur = 4 * AWIWI_REAL_EPSILON * terms;
@@ -111,22 +111,26 @@ static int descend(const awiwi_problem *p, const awiwi_part *b, const awiwi_real
         sums *here = &two[now];
         int held[AWIWI_MOST_UNKNOWNS];
         awiwi_real longest = 0;
+        int free = b->linear && !(damping > 0); /* whether the first step ends at the minimum */
         for (int j = 0; j < b->unknowns; j++) { /* at a limit and pushed against it */
             const int u = b->unknown[j];
             held[j] = (q[u] <= p->low[u] && here->gradient[j] >= 0) || (q[u] >= p->high[u] && here->gradient[j] <= 0);
+            free = free && !held[j];
         }
         damped_step(b->unknowns, here->normal, here->gradient, held, damping, step);
         for (int j = 0; j < p->unknowns; j++)
             trial[j] = q[j];
         for (int j = 0; j < b->unknowns; j++) {
             const int u = b->unknown[j];
-            trial[u] = awiwi_clamp(q[u] + step[j], p->low[u], p->high[u]);
+            const awiwi_real aim = q[u] + step[j];
+            trial[u] = awiwi_clamp(aim, p->low[u], p->high[u]);
+            free = free && aim >= p->low[u] && aim <= p->high[u];
             step[j] = trial[u] - q[u];
             longest = awiwi_size(step[j]) > longest ? awiwi_size(step[j]) : longest;
         }
         if (!awiwi_all_finite(trial, p->unknowns))
             return AWIWI_NOT_FINITE;
-        const int ended = longest <= tolerance;
+        const int ended = longest <= tolerance || free;
         if (!ended) {
             if (b->linear)
                 shift(p, b, step, &last, &there);
