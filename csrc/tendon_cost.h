@@ -12,9 +12,14 @@ enum { AT_LOW = -1, FREE = 0, AT_HIGH = 1 };
 typedef awiwi_real vector[AWIWI_MOST_TENDONS];
 typedef awiwi_real matrix[AWIWI_MOST_TENDONS][AWIWI_MOST_TENDONS];
 
-/* The least squares of some entries, each sum k_i product_i + f_i constant_i - wanted over the searched tendons: first
-   those of the torque, then those of the lower half of the stiffness, where the torque is kept. Joints are those that
-   the searched tendons move: no other torque or stiffness is theirs. */
+/* The place of an entry: of joints a and b in the task's order; `offset` is that in the constants of every tendon. */
+typedef struct place {
+    int a, b, offset;
+} place;
+
+/* The least squares of some entries, each sum k_i p_ia p_ib + f_i constant_i - wanted over the searched tendons: first
+   those of the torque, where k is zero, then those of the lower half of the stiffness, where the torque is kept. Joints
+   are those that the searched tendons move: no other torque or stiffness is theirs. */
 typedef struct task {
     const awiwi_tendons *t;
     int count, joints, entries;
@@ -25,7 +30,8 @@ typedef struct task {
     awiwi_real tolerance;
     awiwi_real *f; /* of all tendons */
     awiwi_real times[MOST_ENTRIES], wanted[MOST_ENTRIES];
-    vector product[MOST_ENTRIES], constant[MOST_ENTRIES];
+    place at[MOST_ENTRIES];
+    const awiwi_real *constant[AWIWI_MOST_TENDONS];
 } task;
 
 /* The cost, half the sum of squares, and what its derivatives are made of. Costs that differ by less than the blur are
@@ -50,7 +56,7 @@ typedef struct rates {
     int count; /* of moves */
     awiwi_real bent;
     vector downhill, stiffer, price;
-    matrix hessian;
+    matrix hessian, work; /* the second to solve with */
 } rates;
 
 /* -- entries ------------------------------------------------------------------------------------------------------- */
@@ -83,16 +89,16 @@ static void want_torque(task *s, awiwi_real tolerance)
     for (int a = 0; a < s->joints; a++) {
         s->times[a] = 1;
         s->wanted[a] = s->torque[a];
-        for (int i = 0; i < s->count; i++) {
-            s->product[a][i] = 0;
-            s->constant[a][i] = s->p[i][a];
-        }
+        s->at[a].a = s->at[a].b = s->at[a].offset = a;
     }
+    for (int i = 0; i < s->count; i++)
+        s->constant[i] = s->p[i];
 }
 
 /* Ask for the stiffness, at the torque that there is. */
 static void want_stiffness(task *s, const awiwi_real *K, awiwi_real tolerance)
 {
+    static const awiwi_real none[AWIWI_MOST_JOINTS * AWIWI_MOST_JOINTS] = {0};
     const int n = s->t->joints;
     s->keep_torque = 1;
     s->tolerance = tolerance;
@@ -102,13 +108,13 @@ static void want_stiffness(task *s, const awiwi_real *K, awiwi_real tolerance)
             const int e = s->entries++, row = s->joint[a], column = s->joint[b];
             s->times[e] = a == b ? 1 : 2;
             s->wanted[e] = (K[row * n + column] + K[column * n + row]) / 2;
-            for (int i = 0; i < s->count; i++) {
-                const int tendon = s->t->searched_tendons[i];
-                s->product[e][i] = s->p[i][a] * s->p[i][b];
-                s->constant[e][i] = s->t->slope ? s->t->slope[(tendon * n + row) * n + column] : 0;
-            }
+            s->at[e].a = a;
+            s->at[e].b = b;
+            s->at[e].offset = row * n + column;
         }
     }
+    for (int i = 0; i < s->count; i++)
+        s->constant[i] = s->t->slope ? s->t->slope + s->t->searched_tendons[i] * n * n : none;
 }
 
 /* -- cost ---------------------------------------------------------------------------------------------------------- */
@@ -138,9 +144,10 @@ static int cost(const task *s, const vector f, model *c)
     if (s->keep_torque && follow_curve(s, f, k, c))
         return AWIWI_OUT_OF_DOMAIN;
     for (int e = 0; e < s->entries; e++) {
+        const place *at = s->at + e;
         awiwi_real excess = -s->wanted[e], terms = awiwi_size(excess);
         for (int i = 0; i < s->count; i++) {
-            const awiwi_real elastic = k[i] * s->product[e][i], other = f[i] * s->constant[e][i];
+            const awiwi_real elastic = k[i] * s->p[i][at->a] * s->p[i][at->b], other = f[i] * s->constant[i][at->offset];
             excess += elastic + other;
             terms += awiwi_size(elastic) + awiwi_size(other);
         }
@@ -226,10 +233,10 @@ static void combine(const task *s, const moves *m, const vector x, awiwi_real si
 /* -- derivatives --------------------------------------------------------------------------------------------------- */
 
 /* How an entry grows with each force. */
-static void grow(const task *s, const model *c, int entry, vector growth)
+static void grow(const task *s, const model *c, const place *at, vector growth)
 {
     for (int i = 0; i < s->count; i++)
-        growth[i] = c->slope[i] * s->product[entry][i] + s->constant[entry][i];
+        growth[i] = c->slope[i] * s->p[i][at->a] * s->p[i][at->b] + s->constant[i][at->offset];
 }
 
 /* Slopes of the cost by each force, with all others at rest. */
@@ -239,7 +246,7 @@ static void slopes(const task *s, const model *c, vector gradient)
     for (int i = 0; i < s->count; i++)
         gradient[i] = 0;
     for (int e = 0; e < s->entries; e++) {
-        grow(s, c, e, growth);
+        grow(s, c, s->at + e, growth);
         subtract(s->count, -s->times[e] * c->excess[e], growth, gradient);
     }
 }
@@ -259,27 +266,28 @@ static void derive(const task *s, const model *c, const moves *m, rates *d)
     }
     for (int e = 0; e < s->entries; e++) {
         const awiwi_real excess = s->times[e] * c->excess[e];
-        grow(s, c, e, growth);
+        grow(s, c, s->at + e, growth);
         for (int j = 0; j < m->count; j++) {
             by[j] = along(m, m->loose[j], growth);
             d->downhill[j] -= excess * by[j];
             subtract(j + 1, -s->times[e] * by[j], by, d->hessian[j]);
         }
-        subtract(s->count, -excess, s->product[e], d->stiffer);
+        for (int i = 0; i < s->count; i++)
+            d->stiffer[i] += excess * s->p[i][s->at[e].a] * s->p[i][s->at[e].b];
     }
 }
 
-/* The Hessian with a diagonal by the forces and a shift along the moves. */
-static void add_diagonal(const moves *m, const rates *d, const vector diagonal, awiwi_real shift, matrix sum)
+/* Work on the Hessian with a diagonal by the forces and a shift along the moves. */
+static void add_diagonal(const moves *m, rates *d, const vector diagonal, awiwi_real shift)
 {
     for (int j = 0; j < m->count; j++) {
         for (int l = 0; l <= j; l++)
-            sum[j][l] = d->hessian[j][l];
-        sum[j][j] += shift + diagonal[m->loose[j]];
+            d->work[j][l] = d->hessian[j][l];
+        d->work[j][j] += shift + diagonal[m->loose[j]];
         for (int r = 0; r < m->rank; r++) {
             const awiwi_real part = m->share[r][m->loose[j]] * diagonal[m->basic[r]];
             for (int l = 0; l <= j; l++)
-                sum[j][l] += part * m->share[r][m->loose[l]];
+                d->work[j][l] += part * m->share[r][m->loose[l]];
         }
     }
 }

@@ -19,7 +19,6 @@ static awiwi_real newton(const task *s, const model *c, const moves *m, rates *d
 {
     const int n = m->count;
     const awiwi_real range = s->t->high - s->t->low, near = c->cost / (range * range);
-    matrix full;
     vector x, diagonal;
     awiwi_real trace = 0, pivot, shift = 0;
     derive(s, c, m, d);
@@ -29,8 +28,8 @@ static awiwi_real newton(const task *s, const model *c, const moves *m, rates *d
         diagonal[i] = s->keep_torque ? d->stiffer[i] * c->curvature[i] : 1024 * AWIWI_REAL_EPSILON * trace;
     const awiwi_real least = 64 * AWIWI_REAL_EPSILON * trace, flat = awiwi_sqrt(AWIWI_REAL_EPSILON) * trace;
     do { /* little damping near the demand: where tendons do the same, the cost is flat along exchanges between them */
-        add_diagonal(m, d, diagonal, shift, full);
-        pivot = awiwi_solve_positive(n, AWIWI_MOST_TENDONS, full[0], least, d->downhill, x);
+        add_diagonal(m, d, diagonal, shift);
+        pivot = awiwi_solve_positive(n, AWIWI_MOST_TENDONS, d->work[0], least, d->downhill, x);
         if (!(shift > 0) && pivot < -BENT * trace)
             combine(s, m, x, awiwi_dot(d->downhill, x, n) < 0 ? -range : range, bend);
         shift = shift > 0 ? 16 * shift : (near < flat ? near : flat) + least;
@@ -38,8 +37,8 @@ static awiwi_real newton(const task *s, const model *c, const moves *m, rates *d
     if (!(pivot > least)) {
         for (int i = 0; i < s->count; i++)
             diagonal[i] = 0;
-        add_diagonal(m, d, diagonal, near < DAMPING * trace ? near + least : DAMPING * trace, full);
-        if (!(awiwi_solve_positive(n, AWIWI_MOST_TENDONS, full[0], 0, d->downhill, x) > 0))
+        add_diagonal(m, d, diagonal, near < DAMPING * trace ? near + least : DAMPING * trace);
+        if (!(awiwi_solve_positive(n, AWIWI_MOST_TENDONS, d->work[0], 0, d->downhill, x) > 0))
             return 0;
     }
     combine(s, m, x, 0, step);
@@ -187,15 +186,13 @@ static void correct(const task *s, const moves *m, vector v)
 
 /* Forces within the limits that give the torque, or the nearest one: those nearest to the middle of the limits, if these
    are within them. */
-static int begin(task *s, const moves *m, vector f)
+static int begin(task *s, const moves *m, vector f, rates *d)
 {
     const awiwi_real middle = s->t->low + (s->t->high - s->t->low) / 2;
     const int held[AWIWI_MOST_TENDONS] = {0};
     int inside = 1;
     moves each;
     model found;
-    rates d;
-    d.bent = 0;
     for (int i = 0; i < s->count; i++)
         f[i] = middle;
     correct(s, m, f);
@@ -207,7 +204,7 @@ static int begin(task *s, const moves *m, vector f)
     for (int i = 0; i < s->count; i++)
         f[i] = middle;
     split(s, 0, held, &each);
-    return descend(s, &each, AWIWI_MOST_TORQUE_STEPS, f, &found, &d);
+    return descend(s, &each, AWIWI_MOST_TORQUE_STEPS, f, &found, d);
 }
 
 /* Move f to where one limit after the other stops the sum of forces from growing by `sense`, at the same torque. */
@@ -248,13 +245,12 @@ static int is_near(const task *s, const vector f, const vector other)
 static int is_nearest_of_all(const task *s, const model *c, const moves *m, rates *d)
 {
     vector extra, x;
-    matrix sum;
     if (d->count < m->count)
         derive(s, c, m, d);
     for (int i = 0; i < s->count; i++)
         extra[i] = 2 * d->price[i] / (s->t->high - s->t->low) + (d->stiffer[i] < 0 ? MARGIN * d->bent * d->stiffer[i] : 0);
-    add_diagonal(m, d, extra, 0, sum);
-    return awiwi_solve_positive(m->count, AWIWI_MOST_TENDONS, sum[0], 0, d->downhill, x) > 0;
+    add_diagonal(m, d, extra, 0);
+    return awiwi_solve_positive(m->count, AWIWI_MOST_TENDONS, d->work[0], 0, d->downhill, x) > 0;
 }
 
 int awiwi_search_forces(const awiwi_tendons *t, const awiwi_real *tau, const awiwi_real *K, awiwi_real tolerance,
@@ -270,7 +266,7 @@ int awiwi_search_forces(const awiwi_tendons *t, const awiwi_real *tau, const awi
     start_task(&s, t, tau, f);
     want_torque(&s, 4 * AWIWI_REAL_EPSILON);
     split(&s, 1, held, &all);
-    int status = begin(&s, &all, best);
+    int status = begin(&s, &all, best, &d);
     for (int i = 0; i < s.count; i++)
         first[i] = best[i];
     want_stiffness(&s, K, tolerance);
