@@ -147,7 +147,8 @@ static int cost(const task *s, const vector f, model *c)
         const place *at = s->at + e;
         awiwi_real excess = -s->wanted[e], terms = awiwi_size(excess);
         for (int i = 0; i < s->count; i++) {
-            const awiwi_real elastic = k[i] * s->p[i][at->a] * s->p[i][at->b], other = f[i] * s->constant[i][at->offset];
+            const awiwi_real elastic = k[i] * s->p[i][at->a] * s->p[i][at->b];
+            const awiwi_real other = f[i] * s->constant[i][at->offset];
             excess += elastic + other;
             terms += awiwi_size(elastic) + awiwi_size(other);
         }

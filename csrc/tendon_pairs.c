@@ -105,7 +105,8 @@ static int sums(const awiwi_tendons *t, const vector d, const vector x, awiwi_re
 static awiwi_real guess(const ends *e, int i, awiwi_real wanted)
 {
     const awiwi_real rise = e->greatest[i] - e->least[i], u = rise > 0 ? (wanted - e->least[i]) / rise : 1, v = 1 - u;
-    const awiwi_real x = e->most[i] * u * u * (3 - 2 * u) + rise * u * v * (v / e->slope_least[i] - u / e->slope_greatest[i]);
+    const awiwi_real bow = rise * u * v * (v / e->slope_least[i] - u / e->slope_greatest[i]);
+    const awiwi_real x = e->most[i] * u * u * (3 - 2 * u) + bow;
     return x >= 0 && x <= e->most[i] ? x : e->most[i];
 }
 

@@ -8,7 +8,7 @@
 
 static const awiwi_real DAMPING = (awiwi_real)1 / 4096;       /* of steps where the Hessian is not positive */
 static const awiwi_real BENT = 4096 * AWIWI_REAL_EPSILON;     /* negative curvature, relative to the trace */
-static const awiwi_real MARGIN = 4;                            /* over the curvatures of springs where a search ends */
+static const awiwi_real MARGIN = 4;                            /* over the greatest curvature met: slopes vary too */
 static const awiwi_real LITTLE = (awiwi_real)1 / 16;          /* gain by a step, relative to the cost */
 enum { BENDS = 8 };                                           /* trials along a direction of negative curvature */
 
@@ -105,7 +105,7 @@ static int take(const task *s, const vector step, awiwi_real most, int *steps, v
     return AWIWI_NOT_CONVERGED;
 }
 
-/* From f down to where no free move and no leaving tendon lowers the cost. `all` are the moves while no tendon is held. */
+/* From f down to where no free move and no leaving tendon lowers the cost. `all` are the moves while none is held. */
 static int descend(const task *s, const moves *all, int steps, vector f, model *here, rates *d)
 {
     int held[AWIWI_MOST_TENDONS] = {0}, left = -1, stopped, straight = 0, changed = 0;
@@ -125,7 +125,8 @@ static int descend(const task *s, const moves *all, int steps, vector f, model *
             return AWIWI_NOT_FINITE;
         const int rounding = gain <= here->blur && 2 * longest >= last; /* nothing to gain, and no nearer */
         const awiwi_real near = s->tolerance * s->t->high;
-        const int none_held = m.rank + m.count == s->count; /* slopes that decide about a held tendon need the last step */
+        /* slopes that decide about a held tendon need the last step */
+        const int none_held = m.rank + m.count == s->count;
         const int ended = longest <= near || (none_held && awiwi_ends_with(longest, last, near)) || rounding;
         const awiwi_real *way = step;
         last = longest;
@@ -184,8 +185,8 @@ static void correct(const task *s, const moves *m, vector v)
             v[i] += m->share[r][i] * x[r];
 }
 
-/* Forces within the limits that give the torque, or the nearest one: those nearest to the middle of the limits, if these
-   are within them. */
+/* Forces within the limits that give the torque, or the nearest one: those nearest to the middle of the limits, if
+   these are within them. */
 static int begin(task *s, const moves *m, vector f, rates *d)
 {
     const awiwi_real middle = s->t->low + (s->t->high - s->t->low) / 2;
@@ -244,11 +245,12 @@ static int is_near(const task *s, const vector f, const vector other)
    gain that are asked to be stiffer. A price is paid for at least the share of the range that is left. */
 static int is_nearest_of_all(const task *s, const model *c, const moves *m, rates *d)
 {
+    const awiwi_real range = s->t->high - s->t->low;
     vector extra, x;
     if (d->count < m->count)
         derive(s, c, m, d);
     for (int i = 0; i < s->count; i++)
-        extra[i] = 2 * d->price[i] / (s->t->high - s->t->low) + (d->stiffer[i] < 0 ? MARGIN * d->bent * d->stiffer[i] : 0);
+        extra[i] = 2 * d->price[i] / range + (d->stiffer[i] < 0 ? MARGIN * d->bent * d->stiffer[i] : 0);
     add_diagonal(m, d, extra, 0);
     return awiwi_solve_positive(m->count, AWIWI_MOST_TENDONS, d->work[0], 0, d->downhill, x) > 0;
 }
