@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field, PrivateAttr
 
@@ -70,7 +70,24 @@ class JointSpring(Part):
     reference: JointAngle
 
 
-class Link(Part):
+class Rotated(Part):
+    """A part with a fixed rotation `rpy`, which its class declares among its keys."""
+
+    if TYPE_CHECKING:
+        rpy: Rpy | None
+    _quarters: Quarters = PrivateAttr((0, 0, 0))  # structure: it stays where numbers become symbols
+
+    def model_post_init(self, context: Any, /) -> None:
+        """Note which angles of `rpy` are quarter turns."""
+        self._quarters = quarters_of(self.rpy)
+
+    @property
+    def quarters(self) -> Quarters:
+        """Of each angle of `rpy`, its number of quarter turns, or None."""
+        return self._quarters
+
+
+class Link(Rotated):
     """A rigid body and the joint that moves it: first the fixed `turn` and `rpy`, then the joint's rotation about z.
 
     The rotation is by the joint angle less `reference`. `offset` leads from this joint to the next one (or to the
@@ -95,18 +112,12 @@ class Link(Part):
     spring: JointSpring | None = None
     source: Source
     _limit_next_to_zero: str = PrivateAttr("")  # structure: it stays where numbers become symbols
-    _quarters: Quarters = PrivateAttr((0, 0, 0))  # likewise
 
     def model_post_init(self, context: Any, /) -> None:
         """Note which limit is nearest to zero, if the range leaves zero out, and which fixed angles are quarter turns."""
+        super().model_post_init(context)
         above, below = (self.low and self.low.value > 0), (self.high and self.high.value < 0)
         self._limit_next_to_zero = "low" if above else "high" if below else ""
-        self._quarters = quarters_of(self.rpy)
-
-    @property
-    def quarters(self) -> Quarters:
-        """Of each angle of `rpy`, its number of quarter turns, or None."""
-        return self._quarters
 
     @property
     def start(self) -> Any:
@@ -133,22 +144,12 @@ class Link(Part):
         return [self.joint, self.turn, self.four_bar_structure(), *([extras] if extras else [])]
 
 
-class Base(Part):
+class Base(Rotated):
     """Where the base frame of a finger stands in the palm: its origin, and its rotation as in URDF."""
 
     position: Point
     rpy: Rpy
     source: Source
-    _quarters: Quarters = PrivateAttr((0, 0, 0))  # structure: it stays where numbers become symbols
-
-    def model_post_init(self, context: Any, /) -> None:
-        """Note which angles are quarter turns."""
-        self._quarters = quarters_of(self.rpy)
-
-    @property
-    def quarters(self) -> Quarters:
-        """Of each angle of `rpy`, its number of quarter turns, or None."""
-        return self._quarters
 
     @property
     def turn(self) -> str:

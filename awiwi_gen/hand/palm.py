@@ -6,11 +6,11 @@ import math
 from collections.abc import Iterator
 from typing import Annotated, Any
 
-from pydantic import Field, PrivateAttr
+from pydantic import Field
 
-from awiwi_gen.hand.links import Base, JointAngle, Quarters, Rpy, Turn, quarters_of
+from awiwi_gen.hand.links import Base, JointAngle, Rotated, Rpy, Turn
 from awiwi_gen.hand.names import JointName, Source
-from awiwi_gen.hand.part import Keys, Part, Point
+from awiwi_gen.hand.part import Keys, Point
 
 __all__ = ["MOST_AXES", "Palm", "PalmJoint", "palm_complaints"]
 
@@ -18,7 +18,7 @@ MOST_AXES = 3
 _NARROWEST_RANGE = 0.01  # deg, as of a finger's joint
 
 
-class PalmJoint(Part):
+class PalmJoint(Rotated):
     """A joint between forearm and palm: first the fixed `turn` and `rpy`, then the joint's rotation about z.
 
     The rotation is by the joint angle less `reference`. `offset` leads from this joint to the next one, or to the palm.
@@ -32,16 +32,6 @@ class PalmJoint(Part):
     high: JointAngle
     offset: Point
     source: Source
-    _quarters: Quarters = PrivateAttr((0, 0, 0))  # structure: it stays where numbers become symbols
-
-    def model_post_init(self, context: Any, /) -> None:
-        """Note which angles of `rpy` are quarter turns."""
-        self._quarters = quarters_of(self.rpy)
-
-    @property
-    def quarters(self) -> Quarters:
-        """Of each angle of `rpy`, its number of quarter turns, or None."""
-        return self._quarters
 
     @property
     def four_bar(self) -> None:
@@ -53,7 +43,7 @@ class PalmJoint(Part):
         return [self.joint, self.turn, self.quarters, self.reference is not None]
 
 
-class Palm(Part):
+class Palm(Rotated):
     """A palm on one to three joints: `base` says where they stand in the forearm, `rpy` how the palm stands on them."""
 
     joints: Annotated[
@@ -63,16 +53,6 @@ class Palm(Part):
     rpy: Rpy | None = None
     base: Base | None = None
     source: Source
-    _quarters: Quarters = PrivateAttr((0, 0, 0))  # structure, as in a joint
-
-    def model_post_init(self, context: Any, /) -> None:
-        """Note which angles of `rpy` are quarter turns."""
-        self._quarters = quarters_of(self.rpy)
-
-    @property
-    def quarters(self) -> Quarters:
-        """Of each angle of `rpy`, its number of quarter turns, or None."""
-        return self._quarters
 
     @property
     def turn(self) -> str:
