@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from awiwi_gen.interchange.model import Body, Joint, Lock, Model, Site, Tendon
+from awiwi_gen.interchange.model import Body, Joint, Mimic, Model, Site, Tendon
 
 
 def body(name: str, parent: int, position=(0.0, 0.0, 0.0), axes=None, mass: float = 0.004) -> Body:
@@ -19,7 +19,7 @@ def joint(name: str, where: int, axis=(0.0, 0.0, 1.0), anchor=(0.0, 0.0, 0.0), *
                  more.pop("low", -0.5), more.pop("high", 1.5), **more)  # fmt: skip
 
 
-def finger(tendons: tuple[Tendon, ...] = (), locks: tuple[Lock, ...] = (), **more) -> Model:
+def finger(tendons: tuple[Tendon, ...] = (), mimics: tuple[Mimic, ...] = (), **more) -> Model:
     """A palm with one finger of three joints, two of them in one body, with skew axes."""
     bodies = (
         body("world", 0, mass=0.0),
@@ -34,7 +34,7 @@ def finger(tendons: tuple[Tendon, ...] = (), locks: tuple[Lock, ...] = (), **mor
         joint("IF:Tip", 3, (0.0, 1.0, 0.0), damping=0.01, friction=0.02, stiffness=0.3, spring_reference=0.1),
     )
     tip = Site("tip", 4, np.array([0.005, 0.0, 0.0]))
-    return Model("Test hand", "test.xml", bodies, joints, tendons, locks, (tip,), **more)
+    return Model("Test hand", "test.xml", bodies, joints, tendons, mimics, (tip,), **more)
 
 
 def two_fingers(**more) -> Model:

@@ -14,7 +14,7 @@ from awiwi_gen.hand import Hand
 from awiwi_gen.interchange import export_mjcf, export_urdf
 from awiwi_gen.interchange.draft import draft
 from awiwi_gen.interchange.export_mjcf import quaternion
-from awiwi_gen.interchange.model import Body, Joint, Lock, Model, Site, Tendon
+from awiwi_gen.interchange.model import Body, Joint, Mimic, Model, Site, Tendon
 from awiwi_gen.interchange.toml import hand_text
 
 HERE = Path(__file__).parent
@@ -47,7 +47,7 @@ def read_mjcf(text: str) -> Model:
             mass, com = float(inertial.get("mass")), numbers(inertial.get("pos"))
             x, y, z, xy, xz, yz = numbers(inertial.get("fullinertia"), f"{inertial.get('diaginertia')} 0 0 0")
             tensor = np.array([[x, xy, xz], [xy, y, yz], [xz, yz, z]])
-            mass, tensor = (0.0, 0 * tensor) if mass <= export_mjcf.SPECK else (mass, tensor)
+            mass, tensor = (0.0, 0 * tensor) if mass <= export_mjcf.LEAST_MASS else (mass, tensor)
         axes = rotation(numbers(element.get("quat"), "1 0 0 0"))
         exact = np.rint(axes)
         axes = np.where(np.abs(axes - exact) < 1e-15, exact, axes)
@@ -64,7 +64,7 @@ def read_mjcf(text: str) -> Model:
     visit(root.find("worldbody/body"), 0)
     places = {site.name: (site.body, site.position) for site in sites}
     references = {joint.name: joint.reference for joint in joints}
-    tendons, locks = [], []
+    tendons, mimics = [], []
     for each in root.findall("tendon/*"):
         _, slack = numbers(each.get("springlength"), "0 0")
         spring = {"stiffness": float(each.get("stiffness", 0)), "rest": slack}
@@ -75,9 +75,9 @@ def read_mjcf(text: str) -> Model:
     for each in root.findall("equality/joint"):
         constant, ratio = numbers(each.get("polycoef"))[:2]
         follower, leader = each.get("joint1"), each.get("joint2")
-        locks.append(Lock(follower, leader, ratio, references[follower] + constant - ratio * references[leader]))
+        mimics.append(Mimic(follower, leader, ratio, references[follower] + constant - ratio * references[leader]))
     return Model(
-        root.get("model"), "export.xml", tuple(bodies), tuple(joints), tuple(tendons), tuple(locks), tuple(sites)
+        root.get("model"), "export.xml", tuple(bodies), tuple(joints), tuple(tendons), tuple(mimics), tuple(sites)
     )
 
 

@@ -15,7 +15,7 @@ import awiwi_gen
 from awiwi_gen.errors import InputError
 from awiwi_gen.hand import Hand
 from awiwi_gen.interchange.draft import draft
-from awiwi_gen.interchange.model import Lock, Loss, Model, Tendon
+from awiwi_gen.interchange.model import Loss, Mimic, Model, Tendon
 from awiwi_gen.interchange.names import finger_names, joint_names, plain
 from awiwi_gen.interchange.quarter import quarter_angle, quarter_axis, quarter_rotation
 from awiwi_gen.interchange.toml import angle, cite, hand_text, length, quantity, tidy
@@ -93,15 +93,15 @@ def test_tendons_through_points_are_as_long_as_in_the_tree():
 
 
 def test_a_follower_turns_with_its_leader_as_published():
-    lock = Lock("IF:Tip", "IF:Bend", -0.5, 0.1)
+    mimic = Mimic("IF:Tip", "IF:Bend", -0.5, 0.1)
     arms = Tendon("arms", arms={"IF:Bend": 0.01, "IF:Tip": 0.03})
-    model = finger(tendons=(arms,), locks=(lock,))
+    model = finger(tendons=(arms,), mimics=(mimic,))
     hand, tables = imported(model)
     (written,) = tables.values()
     assert next(iter(hand.fingers.values())).motion("tip") == (-0.5, 0.1)
     for spread, bend in ((0.1, 0.3), (-0.4, 1.1)):
         q = np.array([spread, bend])
-        angles = {"IF:Spread": spread, "IF:Bend": bend, "IF:Tip": lock.ratio * bend + lock.offset}
+        angles = {"IF:Spread": spread, "IF:Bend": bend, "IF:Tip": mimic.ratio * bend + mimic.offset}
         assert link_angles(written, q) == pytest.approx(list(angles.values()), abs=1e-16)
         base = pose(model, {}, 1)[0] @ rpy_matrix(written["base"]["rpy"])
         axis = pose(model, angles, 3)[0] @ model.joints[2].axis
@@ -110,16 +110,16 @@ def test_a_follower_turns_with_its_leader_as_published():
 
 
 def test_a_chain_of_followers_follows_the_independent_joint():
-    locks = (Lock("IF:Tip", "IF:Bend", 2.0, 0.1), Lock("IF:Bend", "IF:Spread", 0.5, 0.2))
-    found = {lock.follower: lock for each in draft(finger(locks=locks)).fingers for lock in each.followed}
+    mimics = (Mimic("IF:Tip", "IF:Bend", 2.0, 0.1), Mimic("IF:Bend", "IF:Spread", 0.5, 0.2))
+    found = {mimic.follower: mimic for each in draft(finger(mimics=mimics)).fingers for mimic in each.followed}
 
     assert (found["tip"].leader, found["tip"].ratio, found["tip"].offset) == ("spread", 1.0, 0.5)
 
 
 def test_a_coupling_in_a_loop_or_to_another_finger_is_a_loss():
-    loop = (Lock("IF:Tip", "IF:Bend", 1.0), Lock("IF:Bend", "IF:Tip", 1.0))
-    apart = two_fingers(locks=(Lock("index_bend", "thumb_bend", 1.0),))
-    for model, places in ((finger(locks=loop), ("IF:Bend to IF:Tip",)), (apart, ("index_bend to thumb_bend",))):
+    loop = (Mimic("IF:Tip", "IF:Bend", 1.0), Mimic("IF:Bend", "IF:Tip", 1.0))
+    apart = two_fingers(mimics=(Mimic("index_bend", "thumb_bend", 1.0),))
+    for model, places in ((finger(mimics=loop), ("IF:Bend to IF:Tip",)), (apart, ("index_bend to thumb_bend",))):
         (loss,) = (loss for loss in draft(model).losses if loss.what.startswith("couplings"))
         assert loss.places == places
 

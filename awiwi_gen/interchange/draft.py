@@ -11,7 +11,7 @@ from awiwi_gen.errors import Fault, InputError
 from awiwi_gen.hand.parts import PALM
 from awiwi_gen.interchange.fingers import Chain, Segment, composite, find, palm_of, wrist_joints
 from awiwi_gen.interchange.frames import Axis, Frame, base_frame, link_frames
-from awiwi_gen.interchange.locks import Followed, followed
+from awiwi_gen.interchange.mimics import Followed, followed
 from awiwi_gen.interchange.model import Array, Joint, Loss, Model, Tendon
 from awiwi_gen.interchange.names import check_finger, finger_names, joint_names, prefix_of
 
@@ -101,10 +101,10 @@ def draft(model: Model, palm: str = "", named: Mapping[str, str] | None = None) 
     chains = [Chain(c.name or label, c.carrier, c.segments) for c, label in zip(chains, labels, strict=True)]
     names = joint_names({chain.name: [joint.name for joint in chain.joints] for chain in chains})
     owner = {joint.name: chain.name for chain in chains for joint in chain.joints}
-    locks, lost = followed(model.locks, owner, names)
+    mimics, lost = followed(model.mimics, owner, names)
     routed, left = _routed(model, chains, owner)
     fingers = tuple(
-        _finger(model, root, chain, names, {f.published: f for f in locks}, routed[chain.name]) for chain in chains
+        _finger(model, root, chain, names, {f.published: f for f in mimics}, routed[chain.name]) for chain in chains
     )
     wrist = _wrist(model, root)
     if wrist is not None:
@@ -146,7 +146,7 @@ def _approximated(chains: list[Chain], fingers: tuple[DraftFinger, ...]) -> list
 
 
 def _finger(
-    model: Model, palm: int, chain: Chain, names: dict[str, str], locks: Mapping[str, Followed], tendons: list[Tendon]
+    model: Model, palm: int, chain: Chain, names: dict[str, str], mimics: Mapping[str, Followed], tendons: list[Tendon]
 ) -> DraftFinger:
     carrier = model.bodies[chain.segments[0].body].parent
     pose_axes, pose_origin = model.poses[palm]
@@ -161,8 +161,8 @@ def _finger(
             frame, end = frames[len(links)], ends[len(links)]
             holds = joint is segment.joints[-1]
             marks = ("offset",) if assumed and len(links) == len(frames) - 1 else ()
-            lock = locks.get(joint.name)
-            links.append(_link(model, segment, joint, names[joint.name], frame, end, holds, lock, marks))
+            mimic = mimics.get(joint.name)
+            links.append(_link(model, segment, joint, names[joint.name], frame, end, holds, mimic, marks))
     places = {body: links[_last(chain, segment)] for segment in chain.segments for body in segment.members}
     return DraftFinger(
         name=chain.name,
@@ -170,8 +170,8 @@ def _finger(
         axes=pose_axes.T @ base,
         carrier=model.bodies[carrier].name,
         links=tuple(links),
-        tendons=tuple(_tendon(model, tendon, names, locks, places, (base, axes[0].anchor)) for tendon in tendons),
-        followed=tuple(locks[joint.name] for joint in chain.joints if joint.name in locks),
+        tendons=tuple(_tendon(model, tendon, names, mimics, places, (base, axes[0].anchor)) for tendon in tendons),
+        followed=tuple(mimics[joint.name] for joint in chain.joints if joint.name in mimics),
     )
 
 
@@ -212,7 +212,7 @@ def _axis(model: Model, joint: Joint) -> Axis:
 
 def _link(
     model: Model, segment: Segment, joint: Joint, name: str, frame: Frame, end: Array, holds: bool,
-    lock: Followed | None, assumed: tuple[str, ...],
+    mimic: Followed | None, assumed: tuple[str, ...],
 ) -> DraftLink:  # fmt: skip
     mass, com, inertia = composite(model, segment) if holds else (0.0, np.zeros(3), np.zeros((3, 3)))
     limits = (joint.low, joint.high) if joint.low is not None and joint.high is not None else (-np.pi, np.pi)
@@ -222,13 +222,13 @@ def _link(
         body=model.bodies[segment.body].name,
         frame=frame,
         reference=joint.reference - frame.angle,
-        limits=None if lock else limits,
+        limits=None if mimic else limits,
         spring_reference=joint.spring_reference,
         offset=frame.axes.T @ (end - frame.origin),
         mass=mass if mass else None,
         com=frame.axes.T @ (com - frame.origin),
         inertia=frame.axes.T @ inertia @ frame.axes,
-        assumed=assumed + (("low", "high") if joint.low is None and not lock else ()),
+        assumed=assumed + (("low", "high") if joint.low is None and not mimic else ()),
     )
 
 
@@ -276,7 +276,7 @@ def _routed(model: Model, chains: list[Chain], owner: Mapping[str, str]) -> tupl
 
 
 def _tendon(
-    model: Model, tendon: Tendon, names: dict[str, str], locks: Mapping[str, Followed],
+    model: Model, tendon: Tendon, names: dict[str, str], mimics: Mapping[str, Followed],
     places: Mapping[int, DraftLink], base: tuple[Array, Array],
 ) -> DraftTendon:  # fmt: skip
     rest, arms = tendon.constant, {}

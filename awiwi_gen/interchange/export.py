@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
@@ -11,7 +10,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from awiwi_gen.hand import Finger, Hand, Link
-from awiwi_gen.interchange.frames import turn_matrix
+from awiwi_gen.interchange.frames import about, turn_matrix
 from awiwi_gen.interchange.model import Array, Loss
 
 FRICTION = (
@@ -48,17 +47,9 @@ def parts(finger: Finger) -> list[Part]:
 
 
 def rpy_matrix(rpy: Any) -> Array:
-    """Rz(yaw) Ry(pitch) Rx(roll) (3 x 3); quarter turns are exact."""
-    total = np.eye(3)
-    for axis, each in zip((0, 1, 2), rpy or (), strict=False):
-        angle = float(each)
-        c, s = math.cos(angle), math.sin(angle)
-        quarters = angle / (math.pi / 2)
-        if quarters == round(quarters):
-            c, s = float(round(c)), float(round(s))
-        order = [(k + 2 - axis) % 3 for k in range(3)]
-        total = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])[np.ix_(order, order)] @ total
-    return total
+    """Rz(yaw) Ry(pitch) Rx(roll) (3 x 3)."""
+    roll, pitch, yaw = (float(each) for each in rpy or (0, 0, 0))
+    return np.asarray(about(2, yaw) @ about(1, pitch) @ about(0, roll))
 
 
 def value(quantity: Any) -> float:

@@ -23,10 +23,7 @@ from awiwi_gen.interchange.export import (
     value,
     vector,
 )
-from awiwi_gen.interchange.model import Array, Loss
-
-SPECK = 1e-9
-"""Mass [kg] of bodies that have none in the hand, with a radius of gyration of 1 mm: MuJoCo moves no body without."""
+from awiwi_gen.interchange.model import LEAST_MASS, Array, Loss
 
 
 def text_and_losses(hand: Hand) -> tuple[str, list[Loss]]:
@@ -109,9 +106,10 @@ class _Writer:
         _place(body, position, axes)
         if link.mass is None:
             self._lose(
-                f"links without mass: {SPECK * 1e6:g} mg, because MuJoCo moves no body without", body.get("name", "")
+                f"links without mass: {LEAST_MASS * 1e6:g} mg, because MuJoCo moves no body without",
+                body.get("name", ""),
             )
-            SubElement(body, "inertial", pos="0 0 0", mass=text(SPECK), diaginertia=text([SPECK * 1e-6] * 3))
+            SubElement(body, "inertial", pos="0 0 0", mass=text(LEAST_MASS), diaginertia=text([LEAST_MASS * 1e-6] * 3))
         else:
             _inertial(body, float(link.mass), vector(link.com or ()), waiting[-1].inertia)
         for part, axis, anchor in seats:

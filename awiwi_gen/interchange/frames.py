@@ -15,7 +15,7 @@ import numpy as np
 
 from awiwi_gen.interchange.model import Array
 
-__all__ = ["Axis", "Frame", "base_frame", "link_frames", "rotation_about_z", "rpy_of", "turn_matrix"]
+__all__ = ["Axis", "Frame", "about", "base_frame", "link_frames", "rpy_of", "turn_matrix"]
 
 ALIGNED = 1e-12
 """Largest sine of the angle between two directions that are one but for rounding."""
@@ -48,18 +48,17 @@ def turn_matrix(turn: str) -> Array:
     """The exact matrix (3 x 3) of a quarter turn such as "x+90"."""
     if turn == "none":
         return np.eye(3)
-    return np.rint(_about("xyz".index(turn[0]), math.radians(float(turn[1:])))) + 0.0
+    return about("xyz".index(turn[0]), math.radians(float(turn[1:])))
 
 
-def rotation_about_z(angle: float) -> Array:
-    """The matrix (3 x 3) of a joint's rotation."""
-    return _about(2, angle)
-
-
-def _about(axis: int, angle: float) -> Array:
+def about(axis: int, angle: float) -> Array:
+    """The matrix (3 x 3) of a rotation about an axis of the frame; quarter turns are exact."""
     c, s = math.cos(angle), math.sin(angle)
+    quarters = angle / (math.pi / 2)
+    if quarters == round(quarters):
+        c, s = float(round(c)), float(round(s))
     order = [(k + 2 - axis) % 3 for k in range(3)]
-    return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])[np.ix_(order, order)]
+    return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])[np.ix_(order, order)] + 0.0  # no negative zeros
 
 
 def base_frame(axes: Array, first: Axis) -> Array:
@@ -68,7 +67,7 @@ def base_frame(axes: Array, first: Axis) -> Array:
     if _aligned(local) is not None:
         return axes
     yaw, roll = _yaw_and_roll(local)
-    return np.asarray(axes @ _about(2, yaw) @ _about(0, roll))
+    return np.asarray(axes @ about(2, yaw) @ about(0, roll))
 
 
 def _aligned(local: Array) -> str | None:
@@ -100,11 +99,11 @@ def link_frames(base: Array, axes: list[Axis]) -> list[Frame]:
         turn, roll = _aligned(local), 0.0
         if turn is None:
             roll = _yaw_and_roll(local)[1]  # no yaw: the frame before is turned accordingly
-        fixed = before @ turn_matrix(turn or "none") @ _about(0, roll)
+        fixed = before @ turn_matrix(turn or "none") @ about(0, roll)
         angle = 0.0
         if following is not None and _aligned(fixed.T @ following.direction) is None:
             angle = _yaw_and_roll(fixed.T @ following.direction)[0]
-        turned = fixed @ _about(2, angle) if angle else fixed
+        turned = fixed @ about(2, angle) if angle else fixed
         found.append(Frame(turn or "none", roll, angle, turned, axis.anchor))
         before = turned
     return found

@@ -24,7 +24,7 @@ from awiwi_gen.errors import Fault, InputError, unknown
 from awiwi_gen.hand import Hand
 from awiwi_gen.hand.file import HandFile
 from awiwi_gen.interchange.export import Part, parts, value, vector
-from awiwi_gen.interchange.frames import rotation_about_z
+from awiwi_gen.interchange.frames import about
 from awiwi_gen.interchange.model import Array
 from awiwi_gen.interchange.toml import cite, mass_and_inertia
 from awiwi_gen.units import parse_quantity
@@ -156,7 +156,7 @@ def _pose_at_zero(links: list[Part], index: int) -> tuple[Array, Array]:
     axes, origin = np.eye(3), np.zeros(3)
     for part in links[: index + 1]:
         origin = origin + axes @ part.position
-        axes = axes @ part.axes @ rotation_about_z(-part.reference)
+        axes = axes @ part.axes @ about(2, -part.reference)
     return axes, origin
 
 

@@ -15,13 +15,11 @@ import mujoco
 import numpy as np
 
 from awiwi_gen.errors import Fault, InputError
-from awiwi_gen.interchange.model import Array, Body, Joint, Lock, Loss, Model, Site, Tendon
+from awiwi_gen.interchange.model import LEAST_MASS, Array, Body, Joint, Loss, Mimic, Model, Site, Tendon
 from awiwi_gen.interchange.quarter import quarter_angle, quarter_axis, quarter_rotation
 from awiwi_gen.interchange.urdf import require_tree
 from awiwi_gen.interchange.wraps import fitted
 
-SPECK = 1e-9
-"""Mass [kg] that a moving body gets which has none, because MuJoCo refuses those; no more counts as a mass."""
 KINDS = ("free", "ball", "slide", "hinge")
 _INCLUDE = re.compile(r'<include\s[^>]*?file\s*=\s*"([^"]+)"')
 _RPY = re.compile(r'(\brpy\s*=\s*")([^"]*)(")')
@@ -36,7 +34,7 @@ def read(path: Path, exact: bool = False, without: Iterable[str] = (), fit: bool
     spec, notes = parse(path, exact)
     driven = {each.target for each in spec.actuators if each.trntype == mujoco.mjtTrn.mjTRN_TENDON}
     losses = prepare(spec, set(without))
-    massless = {body.name for body in spec.bodies[1:] if body.explicitinertial and body.mass <= SPECK}
+    massless = {body.name for body in spec.bodies[1:] if body.explicitinertial and body.mass <= LEAST_MASS}
     compiled = compile_spec(spec, path)
     tendons, lost = _tendons(compiled, driven, fit)
     return Model(
@@ -45,7 +43,7 @@ def read(path: Path, exact: bool = False, without: Iterable[str] = (), fit: bool
         bodies=tuple(_body(compiled, index, massless) for index in range(compiled.nbody)),
         joints=tuple(_joint(compiled, index) for index in range(compiled.njnt)),
         tendons=tendons,
-        locks=_locks(compiled),
+        mimics=_mimics(compiled),
         sites=tuple(
             Site(compiled.site(i).name, int(compiled.site_bodyid[i]), compiled.site_pos[i].copy())
             for i in range(compiled.nsite)
@@ -87,7 +85,7 @@ def _weigh(spec: Any) -> None:
     """Give moving links of a URDF that have no inertial the least that MuJoCo accepts."""
     for body in spec.bodies[1:]:
         if body.joints and not body.mass and not body.geoms:
-            body.mass, body.inertia, body.explicitinertial = SPECK, [SPECK * 1e-6] * 3, True
+            body.mass, body.inertia, body.explicitinertial = LEAST_MASS, [LEAST_MASS * 1e-6] * 3, True
 
 
 def _includes(text: str, folder: Path) -> dict[str, bytes]:
@@ -295,7 +293,7 @@ def _joint(compiled: Any, index: int) -> Joint:
     )
 
 
-def _locks(compiled: Any) -> tuple[Lock, ...]:
+def _mimics(compiled: Any) -> tuple[Mimic, ...]:
     found = []
     for index in range(compiled.neq):
         follower, leader = int(compiled.eq_obj1id[index]), int(compiled.eq_obj2id[index])
@@ -304,7 +302,7 @@ def _locks(compiled: Any) -> tuple[Lock, ...]:
         # MuJoCo: follower - its zero = constant + ratio * (leader - its zero).
         offset = zeros[0] + constant - ratio * zeros[1]
         names = [compiled.joint(joint).name for joint in (follower, leader)]
-        found.append(Lock(names[0], names[1], ratio, offset))
+        found.append(Mimic(names[0], names[1], ratio, offset))
     return tuple(found)
 
 
@@ -334,7 +332,7 @@ def _tendons(compiled: Any, driven: set[str], fit: bool) -> tuple[tuple[Tendon, 
             path = tuple((int(compiled.site_bodyid[s]), compiled.site_pos[s].copy()) for s in sites)
             found.append(Tendon(name, path=path, **spring))
         elif fit:
-            tendon, error = fitted(compiled, Tendon(name, **spring), _locks(compiled))
+            tendon, error = fitted(compiled, Tendon(name, **spring), _mimics(compiled))
             found.append(tendon)
             fits.append(f"{name} by {error * 1e3:.2g} mm")
         else:

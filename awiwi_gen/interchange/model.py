@@ -14,9 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Array", "Body", "Joint", "Lock", "Loss", "Model", "Site", "Tendon"]
+__all__ = ["LEAST_MASS", "Array", "Body", "Joint", "Loss", "Mimic", "Model", "Site", "Tendon"]
 
 Array = NDArray[np.float64]
+
+LEAST_MASS = 1e-9
+"""Mass [kg] of moving bodies that have none, with a radius of gyration of 1 mm: MuJoCo refuses bodies without."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +77,7 @@ class Tendon:
 
 
 @dataclass(frozen=True)
-class Lock:
+class Mimic:
     """A joint that follows another one: follower angle = ratio * leader angle + offset."""
 
     follower: str
@@ -113,7 +116,7 @@ class Model:
     bodies: tuple[Body, ...]
     joints: tuple[Joint, ...]
     tendons: tuple[Tendon, ...] = ()
-    locks: tuple[Lock, ...] = ()
+    mimics: tuple[Mimic, ...] = ()
     sites: tuple[Site, ...] = ()
     losses: tuple[Loss, ...] = ()
     notes: tuple[str, ...] = ()

@@ -9,8 +9,8 @@ from decimal import Decimal
 
 from awiwi_gen.interchange.draft import DraftFinger, DraftHand, DraftLink, DraftPalm, DraftTendon
 from awiwi_gen.interchange.frames import rpy_of
-from awiwi_gen.interchange.locks import Followed
 from awiwi_gen.interchange.loss import loss_lines
+from awiwi_gen.interchange.mimics import Followed
 from awiwi_gen.interchange.model import Array
 
 NOISE = 2e-15
@@ -85,10 +85,10 @@ def _finger_lines(finger: DraftFinger, file: str) -> list[str]:
     return lines
 
 
-def _coupling(lock: Followed) -> str:
-    ratio = quantity(lock.ratio, "").strip()
-    offset = f', offset = "{angle(lock.offset)}"' if lock.offset else ""
-    return f'follower = "{lock.follower}", leader = "{lock.leader}", ratio = "{ratio}"{offset}'
+def _coupling(mimic: Followed) -> str:
+    ratio = quantity(mimic.ratio, "").strip()
+    offset = f', offset = "{angle(mimic.offset)}"' if mimic.offset else ""
+    return f'follower = "{mimic.follower}", leader = "{mimic.leader}", ratio = "{ratio}"{offset}'
 
 
 def _place_lines(link: DraftLink) -> list[str]:

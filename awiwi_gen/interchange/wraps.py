@@ -9,13 +9,13 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from awiwi_gen.interchange.model import Array, Lock, Tendon
+from awiwi_gen.interchange.model import Array, Mimic, Tendon
 
 _STATES = 400
 _LEAST_ARM = 1e-6  # m; what MuJoCo's solver of wraps leaves of a joint that the tendon does not cross
 
 
-def fitted(compiled: Any, tendon: Tendon, locks: tuple[Lock, ...]) -> tuple[Tendon, float]:
+def fitted(compiled: Any, tendon: Tendon, mimics: tuple[Mimic, ...]) -> tuple[Tendon, float]:
     """The tendon with the arms and the constant length that fit best, and the largest error of its length [m].
 
     Joints without limits count from -1 to 1 rad; followers move with their leaders.
@@ -30,10 +30,10 @@ def fitted(compiled: Any, tendon: Tendon, locks: tuple[Lock, ...]) -> tuple[Tend
 
     def length(angles: Array) -> float:
         data.qpos[places] = angles
-        for lock in locks:
-            if lock.follower in order and lock.leader in order:
-                leader = data.qpos[places[order[lock.leader]]]
-                data.qpos[places[order[lock.follower]]] = lock.ratio * leader + lock.offset
+        for mimic in mimics:
+            if mimic.follower in order and mimic.leader in order:
+                leader = data.qpos[places[order[mimic.leader]]]
+                data.qpos[places[order[mimic.follower]]] = mimic.ratio * leader + mimic.offset
         mujoco.mj_kinematics(compiled, data)
         mujoco.mj_tendon(compiled, data)
         return float(data.ten_length[index])

@@ -24,19 +24,19 @@ class MujocoFinger:
 
     def __post_init__(self) -> None:
         self.data = mujoco.MjData(self.compiled)
-        locks = {lock.published: lock for lock in self.finger.followed}
+        mimics = {mimic.published: mimic for mimic in self.finger.followed}
         joints = [link.published.name for link in self.finger.links]
         names = {link.published.name: link.joint for link in self.finger.links}
-        self.free = [name for name in joints if name not in locks]
+        self.free = [name for name in joints if name not in mimics]
         self.qpos = [int(self.compiled.joint(name).qposadr[0]) for name in joints]
         self.dofs = [int(self.compiled.joint(name).dofadr[0]) for name in joints]
         self.matrix = np.zeros((len(joints), len(self.free)))
         self.offset = np.zeros(len(joints))
         free = [names[name] for name in self.free]
         for row, name in enumerate(joints):
-            lock = locks.get(name)
-            self.matrix[row, free.index(lock.leader if lock else names[name])] = lock.ratio if lock else 1.0
-            self.offset[row] = lock.offset if lock else 0.0
+            mimic = mimics.get(name)
+            self.matrix[row, free.index(mimic.leader if mimic else names[name])] = mimic.ratio if mimic else 1.0
+            self.offset[row] = mimic.offset if mimic else 0.0
         self.last = [self._is_last(link.published.name) for link in self.finger.links]
         mujoco.mj_resetData(self.compiled, self.data)
         self.data.qpos[:] = self.compiled.qpos0

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from awiwi_gen.interchange.model import Lock, Loss
+from awiwi_gen.interchange.model import Loss, Mimic
 
 
 @dataclass(frozen=True)
@@ -20,20 +20,20 @@ class Followed:
 
 
 def followed(
-    locks: Iterable[Lock], owner: Mapping[str, str], names: Mapping[str, str]
+    mimics: Iterable[Mimic], owner: Mapping[str, str], names: Mapping[str, str]
 ) -> tuple[list[Followed], list[Loss]]:
     """The couplings of joints within their finger, each to an independent leader; and those that are lost."""
-    direct: dict[str, Lock] = {}
+    direct: dict[str, Mimic] = {}
     lost = []
-    for lock in locks:
-        together = lock.follower in owner and owner[lock.follower] == owner.get(lock.leader)
-        if not together or not lock.ratio or lock.follower in direct or _loops(lock, direct):
-            lost.append(f"{lock.follower} to {lock.leader}")
+    for mimic in mimics:
+        together = mimic.follower in owner and owner[mimic.follower] == owner.get(mimic.leader)
+        if not together or not mimic.ratio or mimic.follower in direct or _loops(mimic, direct):
+            lost.append(f"{mimic.follower} to {mimic.leader}")
         else:
-            direct[lock.follower] = lock
+            direct[mimic.follower] = mimic
     found = []
-    for name, lock in direct.items():
-        ratio, offset, leader = lock.ratio, lock.offset, lock.leader
+    for name, mimic in direct.items():
+        ratio, offset, leader = mimic.ratio, mimic.offset, mimic.leader
         while leader in direct:
             further = direct[leader]
             ratio, offset, leader = ratio * further.ratio, offset + ratio * further.offset, further.leader
@@ -42,8 +42,8 @@ def followed(
     return found, [Loss(what, tuple(lost))] if lost else []
 
 
-def _loops(lock: Lock, direct: Mapping[str, Lock]) -> bool:
-    leader = lock.leader
+def _loops(mimic: Mimic, direct: Mapping[str, Mimic]) -> bool:
+    leader = mimic.leader
     while leader in direct:
         leader = direct[leader].leader
-    return leader == lock.follower
+    return leader == mimic.follower
