@@ -37,6 +37,21 @@ typedef struct awiwi_problem {
 int awiwi_least_squares(const awiwi_problem *problem, const awiwi_real *measured, const awiwi_real *start,
                         int iterations, awiwi_real tolerance, awiwi_real *result);
 
+/* Unknowns and the equations that depend on them alone. Its part of the Jacobian is constant if it is linear. */
+typedef struct awiwi_part {
+    int unknowns;
+    const int *unknown;
+    int equations;
+    const int *equation;
+    int linear;
+} awiwi_part;
+
+/* The same for a problem that falls into parts, one after the other: at most 1 + parts * (iterations - 1) evaluations
+   of the model, none of them for linear parts but the first. Unknowns in no part stay at the start. */
+int awiwi_least_squares_in_parts(const awiwi_problem *problem, int parts, const awiwi_part *part,
+                                 const awiwi_real *measured, const awiwi_real *start, int iterations,
+                                 awiwi_real tolerance, awiwi_real *result);
+
 /* The gradient search of algorithm 1, corrected: exactly `iterations` trials, the first of length `step` times the
    gradient of the squared residual; a trial that does not improve is rejected and halves the step. Step 0 means 2 over
    the sum of the curvatures at the start: it cannot diverge, and is the best fixed step for the worse of two unknowns.

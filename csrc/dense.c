@@ -20,10 +20,10 @@ awiwi_real awiwi_largest(const awiwi_real *x, int n)
 
 int awiwi_all_finite(const awiwi_real *x, int n)
 {
+    awiwi_real nothing = 0; /* neither a number that is infinite nor one that is none gives 0 */
     for (int i = 0; i < n; i++)
-        if (!(awiwi_size(x[i]) <= AWIWI_REAL_MAX))
-            return 0;
-    return 1;
+        nothing += x[i] * 0;
+    return nothing >= 0;
 }
 
 void awiwi_product(int n, const awiwi_real *A, const awiwi_real *B, awiwi_real *C)

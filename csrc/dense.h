@@ -29,6 +29,14 @@ static inline awiwi_real awiwi_clamp(awiwi_real x, awiwi_real low, awiwi_real hi
     return x < low ? low : x > high ? high : x;
 }
 
+/* Whether Newton's method, after steps of length last and this, is within `near` after this one: errors square, and
+   the last two steps tell by how much, with a margin. A first step has no last one, AWIWI_REAL_MAX. */
+static inline int awiwi_ends_with(awiwi_real length, awiwi_real last, awiwi_real near)
+{
+    const awiwi_real share = length / last;
+    return last < AWIWI_REAL_MAX && 64 * share * share * length <= near;
+}
+
 /* a'b of n numbers, summed from the first on. */
 awiwi_real awiwi_dot(const awiwi_real *a, const awiwi_real *b, int n);
 

@@ -6,31 +6,50 @@
 typedef awiwi_real vector[AWIWI_MOST_UNKNOWNS];
 typedef awiwi_real matrix[AWIWI_MOST_UNKNOWNS][AWIWI_MOST_UNKNOWNS];
 
-/* Half the squared residual, its gradient, and J'J, at q; also how far rounding may move the result. */
-static awiwi_real cost(const awiwi_problem *p, const awiwi_real *measured, const awiwi_real *q, vector gradient,
-                       matrix normal, awiwi_real *blur)
-{
+/* Values and Jacobian of all equations at a point. */
+typedef struct values {
     awiwi_real h[AWIWI_MOST_EQUATIONS], P[AWIWI_MOST_EQUATIONS * AWIWI_MOST_UNKNOWNS];
+} values;
+
+/* What is minimised over a part, in its own order: half the squared residual, its gradient, and the lower half of J'J;
+   also how far rounding may move the result. */
+typedef struct sums {
+    awiwi_real cost, blur;
+    vector gradient;
+    matrix normal;
+} sums;
+
+static void add_up(const awiwi_problem *p, const awiwi_part *b, const awiwi_real *measured, const values *v, sums *s)
+{
     awiwi_real total = 0, terms = 0;
-    p->model(p->context, q, h, P);
-    for (int j = 0; j < p->unknowns; j++) {
-        gradient[j] = 0;
-        for (int k = 0; k < p->unknowns; k++)
-            normal[j][k] = 0;
+    for (int j = 0; j < b->unknowns; j++) {
+        s->gradient[j] = 0;
+        for (int k = 0; k <= j; k++)
+            s->normal[j][k] = 0;
     }
-    for (int i = 0; i < p->equations; i++) {
-        const awiwi_real *row = P + i * p->unknowns;
-        const awiwi_real residual = h[i] - measured[i];
+    for (int i = 0; i < b->equations; i++) {
+        const int e = b->equation[i];
+        const awiwi_real residual = v->h[e] - measured[e];
+        const awiwi_real *row = v->P + e * p->unknowns;
         total += residual * residual;
-        terms += awiwi_size(residual) * (awiwi_size(h[i]) + awiwi_size(measured[i]));
-        for (int j = 0; j < p->unknowns; j++) {
-            gradient[j] += row[j] * residual;
+        terms += awiwi_size(residual) * (awiwi_size(v->h[e]) + awiwi_size(measured[e]));
+        for (int j = 0; j < b->unknowns; j++) {
+            const awiwi_real slope = row[b->unknown[j]];
+            s->gradient[j] += slope * residual;
             for (int k = 0; k <= j; k++)
-                normal[j][k] += row[j] * row[k];
+                s->normal[j][k] += slope * row[b->unknown[k]];
         }
     }
-    *blur = 4 * AWIWI_REAL_EPSILON * terms;
-    return total / 2;
+    s->blur = 4 * AWIWI_REAL_EPSILON * terms;
+    s->cost = total / 2;
+}
+
+/* One part, of all. */
+static awiwi_part whole(const awiwi_problem *p)
+{
+    static const int every[AWIWI_MOST_EQUATIONS] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+    const awiwi_part all = {p->unknowns, every, p->equations, every, 0};
+    return all;
 }
 
 /* Solve (A + damping diag A) x = -b for the unknowns not held, by Cholesky without roots; A's lower half is read. */
@@ -67,72 +86,125 @@ static int begin(const awiwi_problem *p, const awiwi_real *measured, const awiwi
     return finite;
 }
 
-int awiwi_least_squares(const awiwi_problem *p, const awiwi_real *measured, const awiwi_real *start, int iterations,
-                        awiwi_real tolerance, awiwi_real *q)
+/* Values of a linear part after a move of its unknowns; the Jacobian stays. */
+static void shift(const awiwi_problem *p, const awiwi_part *b, const vector move, const values *from, values *to)
 {
-    vector gradient, trial_gradient, step, trial;
-    matrix normal, trial_normal;
-    awiwi_real damping = 0, blur;
-    if (!begin(p, measured, start, q))
-        return AWIWI_NOT_FINITE;
-    awiwi_real best = cost(p, measured, q, gradient, normal, &blur);
-    if (!(best <= AWIWI_REAL_MAX))
+    *to = *from;
+    for (int i = 0; i < b->equations; i++)
+        for (int j = 0; j < b->unknowns; j++)
+            to->h[b->equation[i]] += from->P[b->equation[i] * p->unknowns + b->unknown[j]] * move[j];
+}
+
+/* From q, with its values, down to the minimum over one part. */
+static int descend(const awiwi_problem *p, const awiwi_part *b, const awiwi_real *measured, const values *begun,
+                   int iterations, awiwi_real tolerance, awiwi_real *q)
+{
+    sums two[2];
+    int now = 0; /* which of the two belongs to q; the other is that of the trial */
+    values last = *begun, there;
+    vector step, trial;
+    awiwi_real damping = 0;
+    add_up(p, b, measured, &last, &two[now]);
+    if (!(two[now].cost <= AWIWI_REAL_MAX))
         return AWIWI_NOT_FINITE;
     for (int i = 1; i < iterations; i++) {
+        sums *here = &two[now];
         int held[AWIWI_MOST_UNKNOWNS];
         awiwi_real longest = 0;
-        for (int j = 0; j < p->unknowns; j++) /* at a limit and pushed against it */
-            held[j] = (q[j] <= p->low[j] && gradient[j] >= 0) || (q[j] >= p->high[j] && gradient[j] <= 0);
-        damped_step(p->unknowns, normal, gradient, held, damping, step);
-        for (int j = 0; j < p->unknowns; j++) {
-            trial[j] = awiwi_clamp(q[j] + step[j], p->low[j], p->high[j]);
-            longest = awiwi_size(trial[j] - q[j]) > longest ? awiwi_size(trial[j] - q[j]) : longest;
+        int free = b->linear && !(damping > 0); /* whether the first step ends at the minimum */
+        for (int j = 0; j < b->unknowns; j++) { /* at a limit and pushed against it */
+            const int u = b->unknown[j];
+            held[j] = (q[u] <= p->low[u] && here->gradient[j] >= 0) || (q[u] >= p->high[u] && here->gradient[j] <= 0);
+            free = free && !held[j];
+        }
+        damped_step(b->unknowns, here->normal, here->gradient, held, damping, step);
+        for (int j = 0; j < p->unknowns; j++)
+            trial[j] = q[j];
+        for (int j = 0; j < b->unknowns; j++) {
+            const int u = b->unknown[j];
+            const awiwi_real aim = q[u] + step[j];
+            trial[u] = awiwi_clamp(aim, p->low[u], p->high[u]);
+            free = free && aim >= p->low[u] && aim <= p->high[u];
+            step[j] = trial[u] - q[u];
+            longest = awiwi_size(step[j]) > longest ? awiwi_size(step[j]) : longest;
         }
         if (!awiwi_all_finite(trial, p->unknowns))
             return AWIWI_NOT_FINITE;
-        const awiwi_real found = cost(p, measured, trial, trial_gradient, trial_normal, &blur);
-        /* near the bottom rounding decides which cost is lower, and the step is still right */
-        if (found <= best + blur || longest <= tolerance) {
-            best = found;
-            damping = damping / 10;
-            for (int j = 0; j < p->unknowns; j++) {
-                q[j] = trial[j];
-                gradient[j] = trial_gradient[j];
-                for (int k = 0; k < p->unknowns; k++)
-                    normal[j][k] = trial_normal[j][k];
-            }
-            if (longest <= tolerance)
-                return AWIWI_OK;
-        } else {
-            damping = damping > 0 ? damping * 10 : (awiwi_real)0.001;
+        const int ended = longest <= tolerance || free;
+        if (!ended) {
+            if (b->linear)
+                shift(p, b, step, &last, &there);
+            else
+                p->model(p->context, trial, there.h, there.P);
+            add_up(p, b, measured, &there, &two[!now]);
         }
+        /* near the bottom rounding decides which cost is lower, and the step is still right */
+        if (!ended && !(two[!now].cost <= here->cost + two[!now].blur)) {
+            damping = damping > 0 ? damping * 10 : (awiwi_real)0.001;
+            continue;
+        }
+        for (int j = 0; j < b->unknowns; j++)
+            q[b->unknown[j]] = trial[b->unknown[j]];
+        if (ended)
+            return AWIWI_OK;
+        if (b->linear)
+            last = there;
+        damping = damping / 10;
+        now = !now;
     }
     return AWIWI_NOT_CONVERGED;
+}
+
+int awiwi_least_squares_in_parts(const awiwi_problem *p, int parts, const awiwi_part *part,
+                                 const awiwi_real *measured, const awiwi_real *start, int iterations,
+                                 awiwi_real tolerance, awiwi_real *q)
+{
+    int status = AWIWI_OK;
+    values begun;
+    if (!begin(p, measured, start, q))
+        return AWIWI_NOT_FINITE;
+    p->model(p->context, q, begun.h, begun.P);
+    for (int i = 0; i < parts; i++) {
+        const int ended = descend(p, part + i, measured, &begun, iterations, tolerance, q);
+        if (ended == AWIWI_NOT_FINITE)
+            return ended;
+        status = ended == AWIWI_OK ? status : ended;
+    }
+    return status;
+}
+
+int awiwi_least_squares(const awiwi_problem *p, const awiwi_real *measured, const awiwi_real *start, int iterations,
+                        awiwi_real tolerance, awiwi_real *q)
+{
+    const awiwi_part all = whole(p);
+    return awiwi_least_squares_in_parts(p, 1, &all, measured, start, iterations, tolerance, q);
 }
 
 int awiwi_gradient_search(const awiwi_problem *p, const awiwi_real *measured, const awiwi_real *start, int iterations,
                           awiwi_real step, awiwi_real *q)
 {
-    vector gradient, trial_gradient, trial;
-    matrix normal;
-    awiwi_real blur, curvature = 0;
+    const awiwi_part all = whole(p);
+    values at;
+    vector trial;
+    sums here, there;
+    awiwi_real curvature = 0;
     if (!begin(p, measured, start, q))
         return AWIWI_NOT_FINITE;
-    awiwi_real best = cost(p, measured, q, gradient, normal, &blur);
+    p->model(p->context, q, at.h, at.P);
+    add_up(p, &all, measured, &at, &here);
     for (int j = 0; j < p->unknowns; j++)
-        curvature += normal[j][j];
+        curvature += here.normal[j][j];
     if (!(step > 0))
         step = curvature > 0 ? 1 / curvature : 0;
     for (int i = 0; i < iterations; i++) {
         for (int j = 0; j < p->unknowns; j++) /* the gradient of the whole square is twice that of half of it */
-            trial[j] = awiwi_clamp(q[j] - 2 * step * gradient[j], p->low[j], p->high[j]);
-        const awiwi_real found = cost(p, measured, trial, trial_gradient, normal, &blur);
-        if (found < best) {
-            best = found;
-            for (int j = 0; j < p->unknowns; j++) {
+            trial[j] = awiwi_clamp(q[j] - 2 * step * here.gradient[j], p->low[j], p->high[j]);
+        p->model(p->context, trial, at.h, at.P);
+        add_up(p, &all, measured, &at, &there);
+        if (there.cost < here.cost) {
+            here = there;
+            for (int j = 0; j < p->unknowns; j++)
                 q[j] = trial[j];
-                gradient[j] = trial_gradient[j];
-            }
         } else {
             step = step / 2;
         }

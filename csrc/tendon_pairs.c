@@ -10,6 +10,12 @@
 typedef awiwi_real vector[AWIWI_MOST_TENDONS];
 typedef awiwi_real couple[2];
 
+/* Of every pair: the smaller force goes from 0 to `most` above the limit, and the sum of stiffnesses from least to
+   greatest, with these slopes there. */
+typedef struct ends {
+    vector most, least, greatest, slope_least, slope_greatest;
+} ends;
+
 /* The least of x' G x / 2 - c' x in a box, G = (a, b; b, d) positive definite. Where the least of all lies outside,
    one of the sides it lies beyond holds the answer; the other number is then the best for that side. */
 static void nearest(awiwi_real a, awiwi_real b, awiwi_real d, const couple c, const couple low, const couple high,
@@ -94,22 +100,33 @@ static int sums(const awiwi_tendons *t, const vector d, const vector x, awiwi_re
     return off;
 }
 
-/* x between 0 and most, of all pairs at once, where the sums of stiffnesses, least and greatest at the ends, are what
-   is wanted: Newton's method from the stiff end, where a stiffening spring lets it never overshoot; bisection where it
-   leaves the bracket or does not halve what is missing. */
-static int invert(const awiwi_tendons *t, const vector d, const vector least, const vector greatest,
-                  const vector wanted, const vector most, awiwi_real tolerance, awiwi_real *f)
+/* Where a pair's sum of stiffnesses, which the two ends of x in [0, most] tell with its slopes, is about the wanted
+   one: a cubic in the sum. */
+static awiwi_real guess(const ends *e, int i, awiwi_real wanted)
+{
+    const awiwi_real rise = e->greatest[i] - e->least[i], u = rise > 0 ? (wanted - e->least[i]) / rise : 1, v = 1 - u;
+    const awiwi_real bow = rise * u * v * (v / e->slope_least[i] - u / e->slope_greatest[i]);
+    const awiwi_real x = e->most[i] * u * u * (3 - 2 * u) + bow;
+    return x >= 0 && x <= e->most[i] ? x : e->most[i];
+}
+
+/* x between 0 and most, of all pairs at once, where the sums of stiffnesses are what is wanted: Newton's method, with
+   bisection where it leaves the bracket or does not halve what is missing. */
+static int invert(const awiwi_tendons *t, const vector d, const ends *e, const vector wanted, awiwi_real tolerance,
+                  awiwi_real *f)
 {
     const awiwi_real near = tolerance * t->high;
     vector below, above, x, missing, k, slope;
+    awiwi_real last = AWIWI_REAL_MAX;
     for (int i = 0; i < t->pairs; i++) {
-        below[i] = wanted[i] < greatest[i] ? 0 : most[i];
-        above[i] = wanted[i] > least[i] ? most[i] : below[i];
-        x[i] = above[i];
+        below[i] = wanted[i] < e->greatest[i] ? 0 : e->most[i];
+        above[i] = wanted[i] > e->least[i] ? e->most[i] : below[i];
+        x[i] = awiwi_clamp(guess(e, i, wanted[i]), below[i], above[i]);
         missing[i] = AWIWI_REAL_MAX;
     }
     for (int round = 0; round < AWIWI_MOST_INVERSIONS; round++) {
         awiwi_real longest = 0;
+        int bisected = 0;
         if (sums(t, d, x, f, k, slope))
             return AWIWI_OUT_OF_DOMAIN;
         for (int i = 0; i < t->pairs; i++) {
@@ -120,17 +137,20 @@ static int invert(const awiwi_tendons *t, const vector d, const vector least, co
                 above[i] = here;
             x[i] = slope[i] > 0 ? here - excess / slope[i] : above[i] + 2 * near;
             if (awiwi_size(x[i] - here) <= near
-                || (x[i] >= below[i] && x[i] <= above[i] && awiwi_size(excess) <= missing[i] / 2))
-                x[i] = awiwi_clamp(x[i], 0, most[i]);
-            else
+                || (x[i] >= below[i] && x[i] <= above[i] && awiwi_size(excess) <= missing[i] / 2)) {
+                x[i] = awiwi_clamp(x[i], 0, e->most[i]);
+            } else {
                 x[i] = below[i] + (above[i] - below[i]) / 2;
+                bisected = 1;
+            }
             missing[i] = awiwi_size(excess);
             longest = awiwi_size(x[i] - here) > longest ? awiwi_size(x[i] - here) : longest;
         }
-        if (longest <= near) {
+        if (longest <= near || (!bisected && awiwi_ends_with(longest, last, near))) {
             place(t, d, x, f);
             return AWIWI_OK;
         }
+        last = bisected ? AWIWI_REAL_MAX : longest;
     }
     return AWIWI_NOT_CONVERGED;
 }
@@ -139,7 +159,8 @@ static int distribute_pairs(const awiwi_tendons *t, const awiwi_real *tau, const
                             awiwi_real *f)
 {
     const awiwi_real range = t->high - t->low;
-    vector aim = {0}, low = {0}, high = {0}, none = {0}, d, most, wanted, slope;
+    vector aim = {0}, low = {0}, high = {0}, none = {0}, d, wanted;
+    ends e;
     for (int i = 0; i < t->pairs; i++) { /* the torque is -sum d_i p_i */
         const awiwi_real *p = t->coupling + t->pair[i].first * t->joints;
         aim[i] = 0;
@@ -150,8 +171,8 @@ static int distribute_pairs(const awiwi_tendons *t, const awiwi_real *tau, const
     }
     nearest_of_all(t, 0, aim, low, high, d);
     for (int i = 0; i < t->pairs; i++)
-        most[i] = range - awiwi_size(d[i]);
-    if (sums(t, d, none, f, low, slope) || sums(t, d, most, f, high, slope))
+        e.most[i] = range - awiwi_size(d[i]);
+    if (sums(t, d, none, f, e.least, e.slope_least) || sums(t, d, e.most, f, e.greatest, e.slope_greatest))
         return AWIWI_OUT_OF_DOMAIN;
     for (int i = 0; i < t->pairs; i++) { /* the stiffness is sum of (k_i1 + k_i2) p_i p_i' */
         const awiwi_real *p = t->coupling + t->pair[i].first * t->joints;
@@ -160,8 +181,8 @@ static int distribute_pairs(const awiwi_tendons *t, const awiwi_real *tau, const
             for (int l = 0; l < t->joints; l++)
                 aim[i] += p[j] * K[j * t->joints + l] * p[l];
     }
-    nearest_of_all(t, 1, aim, low, high, wanted);
-    return invert(t, d, low, high, wanted, most, tolerance, f);
+    nearest_of_all(t, 1, aim, e.least, e.greatest, wanted);
+    return invert(t, d, &e, wanted, tolerance, f);
 }
 
 /* Whether the forces give the torque, up to rounding. */

@@ -26,8 +26,13 @@ int awiwi_thumb_joint_estimate(const double h_in[restrict 8], const double start
 {
     static const awiwi_real low[4] = {-0.6108652381980153, -0.6108652381980153, -0.08726646259971647, -0.08726646259971647};
     static const awiwi_real high[4] = {0.6108652381980153, 0.6108652381980153, 1.3962634015954636, 1.3962634015954636};
+    static const int joints_0[] = {0, 1};
+    static const int tendons_0[] = {0, 1, 2, 3};
+    static const int joints_1[] = {2, 3};
+    static const int tendons_1[] = {4, 5, 6, 7};
+    static const awiwi_part parts[] = {{2, joints_0, 4, tendons_0, 0}, {2, joints_1, 4, tendons_1, 1}};
     const awiwi_real tolerance = 1e-11;
     const awiwi_problem problem = {model, 0, 4, 8, low, high};
 
-    return awiwi_least_squares(&problem, h_in, start_in, 24, tolerance, q_out);
+    return awiwi_least_squares_in_parts(&problem, 2, parts, h_in, start_in, 24, tolerance, q_out);
 }

@@ -11,6 +11,7 @@ from thumbs import SHIPPED, literal, replaced, thumb, wider
 
 from awiwi_gen.build import load
 from awiwi_gen.hand import Hand
+from awiwi_gen.kernels.fingers import estimated_parts
 from awiwi_gen.pipeline import Job, cached_tree
 from awiwi_gen.reproduce.base_search import BaseSearch
 from awiwi_gen.tasks import ordered
@@ -80,6 +81,23 @@ def test_few_steps_find_the_base_joints(readings, reading, reach, noise, steps):
     assert (found.status == OK).all()
     if noise == 0:
         assert np.abs(found.q - q).max() < 1e-14
+
+
+def test_the_parts_that_are_solved_apart_are_read_off_the_routing(hand):
+    assert estimated_parts(hand.fingers["thumb"]) == [([0, 1], [0, 1, 2, 3], False), ([2, 3], [4, 5, 6, 7], True)]
+
+
+def test_joints_at_their_limits_leave_the_estimates_of_other_parts_alone(lib):
+    low, high = limits(lib, "thumb")
+    q = draw(lib, "thumb", 200)
+    h, beyond = lib.thumb_tendon_lengths(q), lib.thumb_tendon_lengths(np.column_stack([q[:, :2], q[:, 2:] + 3]))
+    start = np.broadcast_to((low + high) / 2, q.shape)
+
+    inside, at_limits = lib.thumb_joint_estimate(h, start), lib.thumb_joint_estimate(beyond, start)
+
+    assert not at_limits.status.any()
+    assert np.array_equal(inside.q[:, :2], at_limits.q[:, :2])
+    assert np.all(at_limits.q[:, 2] == high[2])
 
 
 def test_too_few_iterations_are_told_and_leave_the_best_that_was_found(readings):

@@ -11,7 +11,8 @@ from awiwi_gen.build import load
 from awiwi_gen.errors import InputError
 from awiwi_gen.hand import Hand
 from awiwi_gen.hand.pose import Chain
-from awiwi_gen.kernels.fingers_control import antagonists, groups
+from awiwi_gen.kernels.fingers_control import antagonists
+from awiwi_gen.kernels.routing import groups
 from awiwi_gen.pipeline import Job, cached_tree, verify
 
 ONE_FINGER = Path(__file__).with_name("one_finger.toml").read_text(encoding="utf-8")

@@ -8,7 +8,9 @@ import scipy.optimize
 from tendon_demands import HIGH, LOW, Demands
 from tendon_solvers import INFEASIBLE, NOT_FINITE, OK, OUT_OF_DOMAIN
 
-from awiwi_gen.kernels.fingers_control import antagonists, groups
+from awiwi_gen.kernels.fingers_control import antagonists
+from awiwi_gen.kernels.routing import groups
+from awiwi_gen.verify import nearest_forces
 
 FINGERS = ["thumb", "index", "middle", "ring", "fifth"]
 SHAPES = ["thumb", "index", "ring"]  # of routing: the others are like the index
@@ -122,6 +124,22 @@ def test_no_point_of_a_grid_over_all_pretensions_of_the_thumb_is_nearer(lib):
 
     assert np.isfinite(theirs).mean() > 0.9
     assert np.all(ours <= theirs * (1 + 1e-9) + 1e-12)
+
+
+def test_no_descent_from_many_random_starts_ends_nearer(lib):
+    demands = Demands(lib, "thumb", 300, seed=12)
+    demands.unreachable()
+    best, count = demands.solved().f, len(demands.f)
+
+    def curve(f, *names):
+        found = demands.curve(f.T)
+        return [getattr(found, name).T for name in names]
+
+    K, low, high = (demands.K + demands.K.swapaxes(1, 2)) / 2, np.full(count, LOW), np.full(count, HIGH)
+    others = nearest_forces.Demands(best, K, demands.P, demands.dP, low, high, best < 0, [0, 1, 2, 3])
+    theirs = np.min([demands.error(f) for f in nearest_forces.minima(others, curve).swapaxes(0, 1)], axis=0)
+
+    assert np.all(demands.error(best) <= theirs * (1 + 1e-9) + 1e-12)
 
 
 # -- torques out of reach -----------------------------------------------------------------------------------

@@ -14,7 +14,7 @@ from awiwi_gen.hand import Finger, Hand
 from awiwi_gen.kernel import Kernel, Port, Solver
 from awiwi_gen.kernels.declare import Family
 from awiwi_gen.kernels.fingers import Size, input_ports, joint_limits, limit_paths
-from awiwi_gen.kernels.fingers_control import moved
+from awiwi_gen.kernels.routing import moved
 from awiwi_gen.units import rad
 
 TRIALS = 50  # as in algorithm 1; figure 5.17 shows that 15 are enough for noisy lengths

@@ -12,6 +12,7 @@ from awiwi_gen.hand.lever import Lever
 from awiwi_gen.hand.parts import Finger, PathPoint, Tendon
 from awiwi_gen.kernel import Kernel, Port, Solver
 from awiwi_gen.kernels.declare import Family, within
+from awiwi_gen.kernels.routing import groups, moved
 from awiwi_gen.structure import link_number, rolls
 from awiwi_gen.units import J, N, Unit, kg, m, one, rad, s
 
@@ -294,7 +295,22 @@ def return_torque(finger: Any, q: Any) -> Any:
 
 def is_curved(finger: Finger) -> bool:
     """Whether the coupling depends on the pose, as that of straight lines does."""
-    return any(tendon.span or tendon.path for tendon in finger.pulled)
+    return any(is_bent(tendon) for tendon in finger.pulled)
+
+
+def is_bent(tendon: Tendon) -> bool:
+    """Whether a tendon has a straight line between points of two links."""
+    return bool(tendon.span or tendon.path)
+
+
+def estimated_parts(finger: Finger) -> list[tuple[list[int], list[int], bool]]:
+    """Joints and tendons, by index, that depend on no others, and whether their coupling is constant."""
+    found = []
+    for tendons in groups(finger):
+        pulled = set().union(*(moved(finger, finger.pulled[i]) for i in tendons))
+        joints = [i for i, joint in enumerate(finger.joints) if joint in pulled]
+        found.append((joints, tendons, not any(is_bent(finger.pulled[i]) for i in tendons)))
+    return [part for part in found if part[0]]
 
 
 def nonlinear_estimate(finger: Finger, iterations: int = 24) -> Solver | None:
@@ -302,6 +318,8 @@ def nonlinear_estimate(finger: Finger, iterations: int = 24) -> Solver | None:
     if not is_curved(finger):
         return None
     low, high = joint_limits(finger)
+    parts = estimated_parts(finger)
+    curved = sum(not linear for _, _, linear in parts)
     return Solver(
         template="joint_estimate.c.j2",
         problem="least squares",
@@ -309,8 +327,20 @@ def nonlinear_estimate(finger: Finger, iterations: int = 24) -> Solver | None:
         equations=tuple(range(len(finger.pulled))),
         unknowns=tuple(range(len(low))),
         arrays={"low": low, "high": high},
-        strings={"search": f"awiwi_least_squares(&problem, h_in, start_in, {iterations}, tolerance, q_out)"},
-        iterations=iterations,
+        strings={
+            "orders": "\n".join(
+                f"    static const int {name}_{i}[] = {{{', '.join(map(str, numbers))}}};"
+                for i, (joints, tendons, _) in enumerate(parts)
+                for name, numbers in (("joints", joints), ("tendons", tendons))
+            ),
+            "parts": ", ".join(
+                f"{{{len(joints)}, joints_{i}, {len(tendons)}, tendons_{i}, {int(linear)}}}"
+                for i, (joints, tendons, linear) in enumerate(parts)
+            ),
+            "part_count": str(len(parts)),
+            "iterations": str(iterations),
+        },
+        iterations=1 + curved * (iterations - 1),
         tolerance={"f64": 1e-12, "f32": 1e-5},
         limits=limit_paths(finger),
     )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Any
 
 from awiwi_gen.hand import Finger, Hand
@@ -13,7 +12,7 @@ from awiwi_gen.hand.parts import Tendon
 from awiwi_gen.kernel import Kernel, Port, Solver
 from awiwi_gen.kernels.declare import Family
 from awiwi_gen.kernels.fingers import force_range, is_curved, per_finger
-from awiwi_gen.structure import link_number, rolls
+from awiwi_gen.kernels.routing import geared, groups, senses
 from awiwi_gen.units import N, m, one
 
 SEARCHES, INVERSIONS = 3 * 97, 66  # evaluations of the curve in the worst case, see csrc/awiwi_distribution.h
@@ -104,38 +103,6 @@ def tendon_stiffness(elastic: Any, tension: Any) -> Any:
 # -- forces for a torque and a stiffness --------------------------------------------------------------------
 
 
-def senses(finger: Finger, tendon: Tendon) -> Counter[str]:
-    """Signed number of pulleys of each independent joint that a tendon runs over."""
-    found: Counter[str] = Counter()
-    for over in tendon.over:
-        found[finger.leaders.get(over[1:], over[1:])] += 1 if over[0] == "+" else -1
-    return Counter({joint: count for joint, count in found.items() if count})
-
-
-def moved(finger: Finger, tendon: Tendon) -> set[str]:
-    """The independent joints that a tendon pulls."""
-    order = [link.joint for link in finger.links]
-    between = order[: order.index(tendon.span.joint)] if tendon.span else []
-    for ends in pairwise(tendon.path):
-        first, last = sorted(link_number(finger, point.link) for point in ends)
-        between += order[first + 1 : last + 1]
-    return {finger.leaders.get(joint, joint) for joint in (*between, *tendon.arms, *_geared(finger, tendon))} | set(
-        senses(finger, tendon)
-    )
-
-
-def groups(finger: Finger) -> list[list[int]]:
-    """The tendons in groups; tendons that share a joint are in one group."""
-    found: list[tuple[set[str], list[int]]] = []
-    for i, tendon in enumerate(finger.pulled):
-        joints, members = moved(finger, tendon), [i]
-        for other in [group for group in found if group[0] & joints]:
-            found.remove(other)
-            joints, members = joints | other[0], other[1] + members
-        found.append((joints, members))
-    return [sorted(members) for _, members in found]
-
-
 def antagonists(finger: Finger, group: list[int]) -> list[tuple[int, int]]:
     """A group as one or two independent pairs of tendons with opposite couplings; empty if it is not such a group."""
     rest, pairs = list(group), []
@@ -157,12 +124,7 @@ def antagonists(finger: Finger, group: list[int]) -> list[tuple[int, int]]:
 
 def _counts(finger: Finger, tendon: Tendon) -> bool:
     """Whether a tendon's coupling follows from its `senses`: from pulleys of leaders, and of joints that roll on these."""
-    return not (_geared(finger, tendon) or tendon.span or tendon.path or tendon.arms)
-
-
-def _geared(finger: Finger, tendon: Tendon) -> list[str]:
-    """The joints under a tendon that follow others by a ratio or with an offset, not by rolling on pulleys."""
-    return [over[1:] for over in tendon.over if over[1:] in finger.leaders and not rolls(finger, over[1:])]
+    return not (geared(finger, tendon) or tendon.span or tendon.path or tendon.arms)
 
 
 def _opposite(a: Counter[str], b: Counter[str]) -> bool:

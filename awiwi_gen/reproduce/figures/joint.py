@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from awiwi_gen.hand import Hand
-from awiwi_gen.kernels.fingers_control import antagonists, groups, senses
+from awiwi_gen.kernels.fingers_control import antagonists
+from awiwi_gen.kernels.routing import groups, senses
 from awiwi_gen.loops.hand_joint import STRETCH, Joint, joint_of, loop_around, values_of
 from awiwi_gen.loops.step import overshoot, run, settling
 from awiwi_gen.reproduce.distribution_search import Demands, closed_form_of

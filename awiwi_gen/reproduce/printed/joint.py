@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from awiwi_gen.hand import Hand
-from awiwi_gen.kernels.fingers_control import antagonists, groups
+from awiwi_gen.kernels.fingers_control import antagonists
+from awiwi_gen.kernels.routing import groups
 from awiwi_gen.reproduce.distribution_search import WEIGHTS, Demands, closed_form_of
 from awiwi_gen.results import Printed, compared, judged, misprint
 from awiwi_gen.simulate import PERIOD
