@@ -19,30 +19,34 @@ def tendon_stiffness(elastic: Any, tension: Matrix) -> tuple[Matrix, Matrix, Mat
     """k [N/m], dk/df [1/m] and d2k/df2 [1/(N m)] of each tendon (m) at its force (m) [N]."""
     derivation = Derivation("k")
     if elastic.limits:
-        return _linear(elastic.limits, tension)
+        return _linear(elastic.limits, tension, derivation)
     curves: dict[int, _Curve] = {}
-    rows, farthest = [], Rational(0)
+    rows, arguments = [], []
     for force, spring in zip(tension, elastic.springs, strict=True):
         if id(spring) not in curves:
             curves[id(spring)] = _Curve(spring, elastic.fibre, derivation)
         curve = curves[id(spring)]
         rows.append(curve.at(force))
-        x = curve.normalised(force)
-        farthest = derivation.name((farthest + x**2 + abs(farthest - x**2)) / 2)  # the larger of the two
+        arguments.append(curve.normalised(force))
     table = Matrix(rows)
-    return table[:, 0], table[:, 1], table[:, 2], [BEYOND - farthest]
+    return table[:, 0], table[:, 1], table[:, 2], [BEYOND - _farthest(arguments, derivation)]
 
 
-def _linear(limits: Any, tension: Matrix) -> tuple[Matrix, Matrix, Matrix, list[Expr]]:
+def _farthest(arguments: list[Expr], derivation: Derivation) -> Expr:
+    """The largest square of the curves' arguments."""
+    largest: Expr = Rational(0)
+    for x in arguments:
+        largest = derivation.name((largest + x**2 + abs(largest - x**2)) / 2)  # the larger of the two
+    return largest
+
+
+def _linear(limits: Any, tension: Matrix, derivation: Derivation) -> tuple[Matrix, Matrix, Matrix, list[Expr]]:
     """For hands without springs: stiffness grows linearly between its limits, from force zero to the largest force."""
     slope = (limits.tendon_stiffness_high - limits.tendon_stiffness_low) / limits.tendon_force
     k = tension.applyfunc(lambda force: limits.tendon_stiffness_low + slope * force)
     count = len(tension)
     arguments = [2 * force / limits.tendon_force - 1 for force in tension]
-    farthest = Rational(0)
-    for x in arguments:
-        farthest = (farthest + x**2 + abs(farthest - x**2)) / 2
-    return k, Matrix([slope] * count), Matrix([0] * count), [BEYOND - farthest]
+    return k, Matrix([slope] * count), Matrix([0] * count), [BEYOND - _farthest(arguments, derivation)]
 
 
 class _Curve:
