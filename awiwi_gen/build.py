@@ -1,7 +1,8 @@
 """Compile generated C and load it: the only file that knows cffi.
 
-Every C file becomes an object, cached by the digest of its text, the headers, the flags and the compiler, so a
-changed number recompiles the kernels it changes. The wrapper cffi makes depends on prototypes only.
+Every C file becomes an object, cached by the digest of its text, the headers it includes, the flags and the compiler, so
+a changed number recompiles the kernels it changes, and all hands share the objects of csrc. The wrapper cffi makes
+depends on prototypes only.
 """
 
 from __future__ import annotations
@@ -39,14 +40,27 @@ GLUE_FLAGS = ("-O0", "-fPIC", "-w")  # cffi's wrapper is long and runs once a ca
 OPTIMISED = '#pragma GCC push_options\n#pragma GCC optimize ("O1")\n{}\n#pragma GCC pop_options\n'
 BATCH_FLAGS = (*VECTOR_FLAGS, "-fPIC", "-w")
 UNFUSED = (("-mno-fma",), ("-mno-fma", "-mno-avx512f"))  # x86 without the instructions, in AVX-512 they are built in
+INCLUDE = re.compile(r'^\s*#\s*include\s*"([^"]+)"', re.MULTILINE)
 FUSED = re.compile(r"\b(v?fn?m(add|sub|la|ls|acc|sac)|xvn?m(add|sub)|vfm[as])\w*")
 
 
-def headers(directory: Path) -> str:
-    """Everything a generated C file may include, as one text, without comments: they decide no object."""
-    files = sorted(directory.glob("*.h")) + sorted(CSRC.glob("*.h"))
-    texts = (path.read_text(encoding="utf-8") for path in files)
-    return "\0".join(re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL) for text in texts)
+def headers(directory: Path) -> dict[str, str]:
+    """Everything a generated C file may include, by name, without comments: they decide no object."""
+    files = [*sorted(CSRC.glob("*.h")), *sorted(directory.glob("*.h"))]
+    texts = {path.name: path.read_text(encoding="utf-8") for path in files}
+    return {name: re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL) for name, text in texts.items()}
+
+
+def included(text: str, shared: Mapping[str, str]) -> dict[str, str]:
+    """Those of the headers that a C text includes, directly or through others."""
+    found: dict[str, str] = {}
+    waiting = INCLUDE.findall(text)
+    while waiting:
+        name = waiting.pop()
+        if name in shared and name not in found:
+            found[name] = shared[name]
+            waiting += INCLUDE.findall(shared[name])
+    return found
 
 
 def sources(directory: Path) -> list[Path]:
@@ -54,9 +68,10 @@ def sources(directory: Path) -> list[Path]:
     return [*sorted(directory.glob("*.c")), *sorted(CSRC.glob("*.c"))]
 
 
-def object_key(source: Path, shared: str) -> str:
+def object_key(source: Path, shared: Mapping[str, str]) -> str:
     """The digest of everything that decides an object."""
-    return key(source.read_text(encoding="utf-8"), shared, FLAGS, compiler().identity)
+    text = source.read_text(encoding="utf-8")
+    return key(text, sorted(included(text, shared).items()), FLAGS, compiler().identity)
 
 
 def compile_objects(directory: Path, store: Cache, into: Path) -> list[Path]:
@@ -78,7 +93,7 @@ def compile_objects(directory: Path, store: Cache, into: Path) -> list[Path]:
         return list(pool.map(compile_one, sources(directory)))
 
 
-def declarations(directory: Path, store: Cache, shared: str) -> str:
+def declarations(directory: Path, store: Cache, shared: Mapping[str, str]) -> str:
     """The firmware header, preprocessed: cffi reads what C sees."""
 
     def preprocess() -> str:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,12 +12,13 @@ import numpy as np
 from awiwi_gen.emit.files import banner, render
 from awiwi_gen.emit.names import function_name
 from awiwi_gen.emit.options import Options
+from awiwi_gen.hand import Hand
 from awiwi_gen.ir.algebras import Bounded, Floats
 from awiwi_gen.ir.elementary import OWN
 from awiwi_gen.ir.graph import Graph
 from awiwi_gen.kernel import Kernel
-from awiwi_gen.parameters import derivations
-from awiwi_gen.records import Record, solver_of, values_of
+from awiwi_gen.parameters import derivations, of_part
+from awiwi_gen.records import Record, solver_of
 from awiwi_gen.verify.samples import draw
 from awiwi_gen.verify.verdict import STATUS, float_values, stack
 
@@ -26,17 +28,23 @@ FIRST = 9  # the first sample that is inside the ranges, neither at a limit nor 
 PER_LINE = 4
 
 Array = np.ndarray[Any, Any]
+Values = Callable[..., dict[str, Any]]  # of a graph, from inputs and in an algebra
 
 
 def self_test_files(
-    kernels: Sequence[Kernel], records: Mapping[str, Record], prefix: str, options: Options
+    hand: Hand, kernels: Sequence[Kernel], records: Mapping[str, Record], options: Options
 ) -> dict[str, str]:
     """The C file of the self-test and its header."""
-    derived = derivations(kernels, records)
-    tests = [_test(kernel, records[kernel.name], prefix, options, derived.get(kernel.path)) for kernel in kernels]
+    derived, numbers = derivations(kernels, records), {path: each.value for path, each in hand.quantities().items()}
+    tests = []
+    for kernel in kernels:
+        # A part's derived numbers may read more than the kernel: the hand's kernels are derived from a finger each.
+        params, derivation = of_part(kernel.path, numbers), derived.get(kernel.path)
+        values = partial(float_values, params=params, derivation=derivation)
+        tests.append(_test(kernel, records[kernel.name], hand.prefix, options, values))
     strings = {
         "banner": banner(),
-        "prefix": prefix,
+        "prefix": hand.prefix,
         "reads_params": any("_params *" in records[kernel.name].function.prototype for kernel in kernels),
         "most": max(sum(port.size for port in kernel.outputs.values()) for kernel in kernels),
     }
@@ -46,8 +54,8 @@ def self_test_files(
     }
 
 
-def _test(kernel: Kernel, record: Record, prefix: str, options: Options, derivation: Graph | None) -> dict[str, Any]:
-    """Everything that the template prints for one kernel; ``derivation`` is the graph of its part's derived numbers."""
+def _test(kernel: Kernel, record: Record, prefix: str, options: Options, values: Values) -> dict[str, Any]:
+    """Everything that the template prints for one kernel."""
     graph = record.graph
     is_exact = graph is not None and not (options.math == "libm" and _calls_library(graph))
     inputs, outputs = (sum(port.size for port in side.values()) for side in (kernel.inputs, kernel.outputs))
@@ -57,9 +65,9 @@ def _test(kernel: Kernel, record: Record, prefix: str, options: Options, derivat
     near: Array = np.zeros((0, 2), options.dtype)
     digest = 0
     if is_exact and graph is not None:
-        digest = digest_of(_mirrored(kernel, graph, given, options, derivation))
+        digest = digest_of(_mirrored(kernel, graph, given, options, values))
     else:
-        near = _near(kernel, record, given, rows, options, derivation)
+        near = _near(kernel, record, given, rows, options, values)
     flat = np.concatenate([given[name] for name in kernel.inputs], axis=1)
     symbol = f"near_{kernel.name}" if len(near) else "0"
     sizes = f"{len(rows)}, {inputs}, {outputs}"
@@ -92,12 +100,10 @@ def _given(kernel: Kernel, record: Record, options: Options, rows: list[int]) ->
     return {name: np.asarray(inputs[name]).reshape(len(inputs[name]), -1)[rows] for name in kernel.inputs}
 
 
-def _mirrored(
-    kernel: Kernel, graph: Graph, given: Mapping[str, Array], options: Options, derivation: Graph | None
-) -> Array:
+def _mirrored(kernel: Kernel, graph: Graph, given: Mapping[str, Array], options: Options, values: Values) -> Array:
     """All outputs in the precision of the C (samples, outputs), to the last bit."""
     floats = Floats(options.dtype, options.math == "own")
-    found = float_values(graph, given, values_of(kernel), floats, derivation)
+    found = values(graph, given, algebra=floats)
     samples = len(next(iter(given.values())))
     columns = [column for name in kernel.outputs for column in found[name]]
     mirrored: Array = stack(columns, samples).astype(options.dtype)
@@ -105,16 +111,15 @@ def _mirrored(
 
 
 def _near(
-    kernel: Kernel, record: Record, given: Mapping[str, Array], rows: list[int], options: Options,
-    derivation: Graph | None,
-) -> Array:  # fmt: skip
+    kernel: Kernel, record: Record, given: Mapping[str, Array], rows: list[int], options: Options, values: Values
+) -> Array:
     """Every output and its largest error (samples outputs, 2): as verified, or any finite number where none is known."""
     columns = []
     known = record.reference.high
     bounds: dict[str, Any] = {}
     if record.graph is not None:
         algebra = Bounded(options.dtype, options.math == "own")
-        bounds = float_values(record.graph, given, values_of(kernel), algebra, derivation)
+        bounds = values(record.graph, given, algebra=algebra)
     for name, port in kernel.outputs.items():
         if name not in known:
             value = np.zeros((len(rows), port.size))

@@ -13,6 +13,7 @@ from awiwi_gen.emit.options import Options
 from awiwi_gen.ir.algebras import Floats
 from awiwi_gen.ir.graph import Graph
 from awiwi_gen.kernel import Kernel, Port
+from awiwi_gen.parameters import of_part
 from awiwi_gen.records import Record, problem_of, solver_of, values_of
 from awiwi_gen.sources import code_of
 from awiwi_gen.units import Quantity
@@ -74,13 +75,12 @@ def judge_record(
         own=own,
         derivation=loaded.derivations.get(kernel.path),
     )
-    verdict = examine(record.reference, inputs, values_of(kernel), function)
+    verdict = examine(record.reference, inputs, of_part(kernel.path, loaded.values), function)
     if record.varied is None:
         return verdict
     there = {port: column[list(record.varied.rows)] for port, column in inputs.items()}
-    others = examine(
-        record.varied.reference, there, varied(values_of(kernel), kernel.path), loaded.with_others[kernel.name]
-    )
+    numbers = of_part(kernel.path, loaded.others)
+    others = examine(record.varied.reference, there, numbers, loaded.with_others[kernel.name])
     return verdict.joined(others, "with other numbers")
 
 
@@ -90,12 +90,6 @@ def _rounded(loaded: Loaded, options: Options) -> dict[str, Fraction]:
     for part, graph in loaded.derivations.items():
         found |= derived_values(graph, of_part(part, loaded.values), floats)
     return {path: Fraction(float(value)) for path, value in found.items()}
-
-
-def of_part(part: str, values: Mapping[str, Fraction]) -> dict[str, Fraction]:
-    """The numbers of a part, by their paths relative to it."""
-    start = f"{part}." if part else ""
-    return {path.removeprefix(start): value for path, value in values.items() if path.startswith(start)}
 
 
 def _field(library: Library, part: str, path: str) -> Any:

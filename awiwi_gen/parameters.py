@@ -34,6 +34,12 @@ def derivations(kernels: Sequence[Kernel], records: Mapping[str, Record]) -> dic
     return {part: merge(graphs) for part, graphs in parts.items()}
 
 
+def of_part(part: str, values: Mapping[str, Fraction]) -> dict[str, Fraction]:
+    """The numbers of a part, by their paths relative to it."""
+    start = f"{part}." if part else ""
+    return {path.removeprefix(start): value for path, value in values.items() if path.startswith(start)}
+
+
 def numbers_of(hand: Hand, kernels: Sequence[Kernel], records: Mapping[str, Record]) -> Numbers | None:
     """The numbers that kernels or their callers read, in the order of the hand file; None if there are none."""
     derived, paths, zeros = derivations(kernels, records), set[str](), set[str]()

@@ -225,7 +225,7 @@ def emit(job: Job, records: Mapping[str, Record], directory: Path) -> dict[str, 
     numbers = numbers_of(job.hand, job.kernels, records) if job.options.params == "runtime" else None
     fields = struct_fields(numbers, job.options) if numbers else ((), ())
     files |= shared_files(job.hand.prefix, functions, job.hand.digest(), job.options, fields)
-    files |= self_test_files(job.kernels, records, job.hand.prefix, job.options)
+    files |= self_test_files(job.hand, job.kernels, records, job.options)
     if numbers:
         files |= params_files(job.hand.prefix, numbers, job.options)
     entries = [manifest_entry(kernel, records[kernel.name]) for kernel in job.kernels]

@@ -14,10 +14,8 @@ import pytest
 PATTERNS = ("*_mass_matrix", "*_joint_stiffness", "*_estimate", "wrist_coupling", "motor_acceleration")
 SURROUNDINGS = [
     {"PYTHONHASHSEED": "0"},
-    {"PYTHONHASHSEED": "1", "LC_ALL": "C", "TZ": "Pacific/Chatham"},
-    {"PYTHONHASHSEED": "12345", "HOME": "/nonexistent", "AWIWI_CORES": "1"},
-    {"PYTHONHASHSEED": "99999999", "PYTHONUTF8": "0", "LANG": "de_DE"},
-    {"PYTHONHASHSEED": "4294967295", "PYTHONOPTIMIZE": "1"},
+    {"PYTHONHASHSEED": "12345", "LC_ALL": "C", "TZ": "Pacific/Chatham", "HOME": "/nonexistent", "AWIWI_CORES": "1"},
+    {"PYTHONHASHSEED": "4294967295", "PYTHONUTF8": "0", "LANG": "de_DE", "PYTHONOPTIMIZE": "1"},
 ]
 PROGRAM = """
 import os, sys

@@ -15,9 +15,10 @@ from awiwi_gen.build import FLAGS, compiler
 from awiwi_gen.emit.options import Options
 from awiwi_gen.golden import digest_of
 from awiwi_gen.hand import Hand
-from awiwi_gen.pipeline import Job, cached_tree
+from awiwi_gen.pipeline import Job, cached_tree, verify
 from awiwi_gen.resources import CSRC
 
+SOME = "jaw_*"  # kernels of all kinds, where the flags are what is tried
 MOST = 2048  # bytes of golden numbers for a kernel
 MAIN = """#include <stdio.h>
 #include <fenv.h>
@@ -39,8 +40,8 @@ def hand(root):
     return Hand.load(root / "tests" / "one_finger.toml")
 
 
-def tree_of(hand, **options) -> Path:
-    return cached_tree(Job(hand, Options(**options)))
+def tree_of(hand, only="*", **options) -> Path:
+    return cached_tree(Job(hand, Options(**options), only))
 
 
 def outcome(tree: Path, place: Path, command: list[str], flags: list[str], *before: str) -> tuple[int, str]:
@@ -68,7 +69,16 @@ def test_it_passes_with_the_documented_flags(options, hand, tmp_path):
 @pytest.mark.parametrize("level", ["-O0", "-O3"])
 @pytest.mark.parametrize("program", ["gcc", "clang"])
 def test_it_passes_with_every_compiler_and_level(program, level, hand, tmp_path):
-    assert outcome(tree_of(hand), tmp_path, [program], [level]) == (0, "-")
+    assert outcome(tree_of(hand, SOME), tmp_path, [program], [level]) == (0, "-")
+
+
+def test_hands_of_several_fingers_pass_with_numbers_that_are_read_at_run_time(root, tmp_path):
+    claw = Hand.load(root / "examples" / "claw.toml")
+    tree = tree_of(claw, "*_measured_lengths", params="runtime")
+
+    assert len(list(tree.glob("*_measured_lengths.c"))) > 1
+    assert outcome(tree, tmp_path, [*compiler().command], ["-O0"]) == (0, "-")
+    assert verify(Job(claw, Options(params="runtime"), "*_measured_lengths"), tree).passed
 
 
 WRONG = [
@@ -82,7 +92,7 @@ WRONG = [
 @pytest.mark.parametrize("scalar", ["f64", "f32"])
 @pytest.mark.parametrize(("program", "flags"), WRONG, ids=lambda value: value if isinstance(value, str) else value[-1])
 def test_flags_that_no_macro_tells_fail_and_a_kernel_is_named(program, flags, scalar, hand, tmp_path):
-    tree = tree_of(hand, scalar=scalar)
+    tree = tree_of(hand, SOME, scalar=scalar)
     number, name = outcome(tree, tmp_path, [program], flags)
 
     assert number > 0
@@ -95,7 +105,7 @@ def test_flags_that_no_macro_tells_fail_and_a_kernel_is_named(program, flags, sc
     ["fesetround(FE_UPWARD);", "__builtin_ia32_ldmxcsr(__builtin_ia32_stmxcsr() | 0x8040); /* no subnormal numbers */"],
 )
 def test_a_wrong_mode_of_the_floating_point_unit_fails(before, hand, tmp_path):
-    assert outcome(tree_of(hand), tmp_path, ["gcc"], ["-O2"], before) == (-1, "arithmetic")
+    assert outcome(tree_of(hand, SOME), tmp_path, ["gcc"], ["-O2"], before) == (-1, "arithmetic")
 
 
 SPOILED = {
