@@ -72,8 +72,8 @@ static int cost(const awiwi_tendons *t, const columns *c, const awiwi_real *K, a
                           + (t->slope ? f[i] * t->slope[(i * n + a) * n + b] : 0);
             *total += excess * excess / 2;
             for (int i = 0; i < t->tendons; i++) {
-                const int moves = f[i] >= t->low && f[i] <= t->high;
-                gradient[i] += excess * ((moves ? slope[i] : 0) * t->coupling[i * n + a] * t->coupling[i * n + b]
+                const int permitted = f[i] >= t->low && f[i] <= t->high;
+                gradient[i] += excess * ((permitted ? slope[i] : 0) * t->coupling[i * n + a] * t->coupling[i * n + b]
                                          + (t->slope ? t->slope[(i * n + a) * n + b] : 0));
             }
         }

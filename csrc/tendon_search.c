@@ -173,7 +173,7 @@ static int descend(const task *s, const moves *all, int steps, vector f, model *
 /* The least change of forces after which they give the torque; all tendons are free. */
 static void correct(const task *s, const moves *m, vector v)
 {
-    awiwi_real G[AWIWI_MOST_JOINTS][AWIWI_MOST_JOINTS], missing[AWIWI_MOST_JOINTS], x[AWIWI_MOST_JOINTS];
+    awiwi_real G[AWIWI_MOST_JOINTS][AWIWI_MOST_JOINTS], missing[AWIWI_MOST_JOINTS] = {0}, x[AWIWI_MOST_JOINTS];
     for (int r = 0; r < m->rank; r++) {
         missing[r] = m->share[r][s->count] - awiwi_dot(m->share[r], v, s->count);
         for (int l = 0; l <= r; l++)

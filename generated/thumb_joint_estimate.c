@@ -30,7 +30,7 @@ int awiwi_thumb_joint_estimate(const double h_in[restrict 8], const double start
     static const int tendons_0[] = {0, 1, 2, 3};
     static const int joints_1[] = {2, 3};
     static const int tendons_1[] = {4, 5, 6, 7};
-    static const awiwi_part parts[] = {{2, joints_0, 4, tendons_0, 0}, {2, joints_1, 4, tendons_1, 1}};
+    const awiwi_part parts[] = {{2, joints_0, 4, tendons_0, 0}, {2, joints_1, 4, tendons_1, 1}};
     const awiwi_real tolerance = 1e-11;
     const awiwi_problem problem = {model, 0, 4, 8, low, high};
 

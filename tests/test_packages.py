@@ -148,7 +148,7 @@ def test_the_compiler_lists_calls_that_drop_a_status_where_it_is_asked_to(tree, 
 def test_local_names_get_the_name_of_their_file_and_members_of_public_structs_stay(tree):
     text = amalgamate(tree)["awiwi.c"]
 
-    assert "static awiwi_real least_squares_cost(" in text
+    assert "static void least_squares_add_up(" in text
     assert "->model(" in text
 
 
