@@ -44,23 +44,32 @@ INCLUDE = re.compile(r'^\s*#\s*include\s*"([^"]+)"', re.MULTILINE)
 FUSED = re.compile(r"\b(v?fn?m(add|sub|la|ls|acc|sac)|xvn?m(add|sub)|vfm[as])\w*")
 
 
-def headers(directory: Path) -> dict[str, str]:
-    """Everything a generated C file may include, by name, without comments: they decide no object."""
-    files = [*sorted(CSRC.glob("*.h")), *sorted(directory.glob("*.h"))]
-    texts = {path.name: path.read_text(encoding="utf-8") for path in files}
-    return {name: re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL) for name, text in texts.items()}
+class Headers:
+    """Texts that a C file may include, by name, without comments: they decide no object."""
 
+    def __init__(self, texts: Mapping[str, str]) -> None:
+        code = {name: re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL) for name, text in texts.items()}
+        self.digests = {name: key(name, text) for name, text in code.items()}
+        self._direct = {name: INCLUDE.findall(text) for name, text in code.items()}
 
-def included(text: str, shared: Mapping[str, str]) -> dict[str, str]:
-    """Those of the headers that a C text includes, directly or through others."""
-    found: dict[str, str] = {}
-    waiting = INCLUDE.findall(text)
-    while waiting:
-        name = waiting.pop()
-        if name in shared and name not in found:
-            found[name] = shared[name]
-            waiting += INCLUDE.findall(shared[name])
-    return found
+    @classmethod
+    def of(cls, directory: Path) -> Headers:
+        """The headers of a generated directory and of csrc."""
+        files = [*sorted(CSRC.glob("*.h")), *sorted(directory.glob("*.h"))]
+        return cls({path.name: path.read_text(encoding="utf-8") for path in files})
+
+    def __str__(self) -> str:
+        return key(*self.digests.values())
+
+    def included(self, text: str) -> list[str]:
+        """Names of those that a C text includes, directly or through others, in alphabetical order."""
+        found, waiting = set[str](), INCLUDE.findall(text)
+        while waiting:
+            name = waiting.pop()
+            if name in self.digests and name not in found:
+                found.add(name)
+                waiting += self._direct[name]
+        return sorted(found)
 
 
 def sources(directory: Path) -> list[Path]:
@@ -68,19 +77,20 @@ def sources(directory: Path) -> list[Path]:
     return [*sorted(directory.glob("*.c")), *sorted(CSRC.glob("*.c"))]
 
 
-def object_key(source: Path, shared: Mapping[str, str]) -> str:
-    """The digest of everything that decides an object."""
+def object_key(source: Path, shared: Headers, identity: str) -> str:
+    """The digest of everything that decides an object; ``identity`` is that of the compiler."""
     text = source.read_text(encoding="utf-8")
-    return key(text, sorted(included(text, shared).items()), FLAGS, compiler().identity)
+    return key(text, *(shared.digests[name] for name in shared.included(text)), FLAGS, identity)
 
 
 def compile_objects(directory: Path, store: Cache, into: Path) -> list[Path]:
     """Objects of all C files of a generated directory and of csrc, as files in a folder; only new ones are compiled."""
-    cc, shared = compiler(), headers(directory)
+    cc, shared = compiler(), Headers.of(directory)
+    identity = cc.identity
     includes = (f"-I{directory}", f"-I{CSRC}")
 
     def compile_one(source: Path) -> Path:
-        digest, target = object_key(source, shared), into / f"{source.stem}.o"
+        digest, target = object_key(source, shared, identity), into / f"{source.stem}.o"
         found = store.read("objects", digest)
         if found is None:
             cc.run(*FLAGS, *includes, "-c", str(source), "-o", str(target))
@@ -93,7 +103,7 @@ def compile_objects(directory: Path, store: Cache, into: Path) -> list[Path]:
         return list(pool.map(compile_one, sources(directory)))
 
 
-def declarations(directory: Path, store: Cache, shared: Mapping[str, str]) -> str:
+def declarations(directory: Path, store: Cache, shared: Headers) -> str:
     """The firmware header, preprocessed: cffi reads what C sees."""
 
     def preprocess() -> str:
@@ -116,11 +126,11 @@ def load(directory: str | Path, store: Cache | None = None) -> Library:
     manifest = read_manifest(directory)
     if manifest is None:
         raise InputError(f"{directory}: nothing generated here; run awiwi-gen generate -o {directory}")
-    shared = headers(directory)
+    shared, identity = Headers.of(directory), compiler().identity
     glue = _glue_source(manifest, declarations(directory, store, shared))
     python = f"{bindings()} {sysconfig.get_config_var('EXT_SUFFIX')}"
-    name = "_awiwi_" + key(glue, python, GLUE_FLAGS, compiler().identity)[:16]
-    objects = [object_key(source, shared) for source in sources(directory)]
+    name = "_awiwi_" + key(glue, python, GLUE_FLAGS, identity)[:16]
+    objects = [object_key(source, shared, identity) for source in sources(directory)]
     digest = key(name, glue, *objects)
     data = store.read("libraries", digest)
     if data is None:
@@ -201,12 +211,12 @@ def batch_function(
     text = source.read_text(encoding="utf-8")
     if not worthwhile(entry, text):
         return None
-    shared = headers(directory)
-    if object_key(source, shared) not in loaded:
+    shared, identity = Headers.of(directory), compiler().identity
+    if object_key(source, shared, identity) not in loaded:
         raise BuildError(f"{directory} has changed since it was loaded; load it again")
     looped = directory / BATCHES / source.name
-    texts = (text, shared, looped.read_text(encoding="utf-8"), headers(directory / BATCHES))
-    digest = key(texts, BATCH_FLAGS, GCC_FLAGS, UNFUSED, native(), compiler().identity)
+    texts = (text, shared, looped.read_text(encoding="utf-8"), Headers.of(directory / BATCHES))
+    digest = key(*texts, BATCH_FLAGS, GCC_FLAGS, UNFUSED, native(), identity)
     data = store.read("batches", digest)
     if data is None:
         with tempfile.TemporaryDirectory() as scratch:

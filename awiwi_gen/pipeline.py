@@ -292,12 +292,12 @@ def _examine(job: Job, directory: Path) -> Proof:
 
 
 def _judged(job: Job, directory: Path, library: Library, records: Mapping[str, Record]) -> list[Verdict]:
-    from awiwi_gen.build import headers
+    from awiwi_gen.build import Headers
     from awiwi_gen.compiler import compiler, machine
     from awiwi_gen.judge import Loaded, judge_derivation, judge_record, verdict_key
     from awiwi_gen.parameters import derivations
 
-    shared = headers(directory)
+    shared, identity = Headers.of(directory), compiler().identity
     derived = derivations(job.kernels, records)
     loaded = Loaded(library, job.hand.quantities(), derived)
     verdicts = []
@@ -305,7 +305,7 @@ def _judged(job: Job, directory: Path, library: Library, records: Mapping[str, R
         record, used = records[kernel.name], {family: records[name] for family, name in kernel.needs.items()}
         text = (directory / f"{kernel.name}.c").read_text(encoding="utf-8")
         numbers = derived[kernel.path].digest if kernel.path in derived else ""
-        digest = verdict_key(record, key(text, shared, numbers, compiler().identity, machine()))
+        digest = verdict_key(record, key(text, shared, numbers, identity, machine()))
         examine = partial(judge_record, kernel, record, used, loaded, job.options)
         verdicts.append(job.store.memo("verdicts", digest, examine))
         job.progress("verify", len(verdicts), len(job.kernels))

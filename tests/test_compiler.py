@@ -11,13 +11,13 @@ import pytest
 
 import awiwi_gen
 from awiwi_gen import cache, compiler
-from awiwi_gen.build import headers, included, load, object_key
+from awiwi_gen.build import Headers, load, object_key
 from awiwi_gen.compiler import VARIABLES, bindings, machine
 from awiwi_gen.errors import NoCompilerError
 from awiwi_gen.resources import CSRC
 
 SOURCE = CSRC / "dense.c"
-HEADERS = headers(CSRC)
+HEADERS = {path.name: path.read_text() for path in CSRC.glob("*.h")}
 GCC = shutil.which("gcc")
 needs_gcc = pytest.mark.skipif(GCC is None, reason="the options are gcc's")
 
@@ -29,7 +29,12 @@ def surroundings(monkeypatch):
 
 
 def current() -> str:
-    return object_key(SOURCE, HEADERS)
+    return key_of(SOURCE)
+
+
+def key_of(source: Path, **texts: str) -> str:
+    """The key of an object where some headers have other texts."""
+    return object_key(source, Headers(HEADERS | texts), compiler.compiler().identity)
 
 
 @needs_gcc
@@ -85,8 +90,8 @@ def test_another_program_that_the_driver_runs_changes_the_key(monkeypatch, tmp_p
 
 def test_flags_text_and_headers_change_the_key(monkeypatch, tmp_path):
     before = current()
-    assert object_key(SOURCE, HEADERS | {"real.h": "typedef float awiwi_real;"}) != before
-    assert object_key(CSRC / "riccati.c", HEADERS) != before
+    assert key_of(SOURCE, **{"real.h": "typedef float awiwi_real;"}) != before
+    assert key_of(CSRC / "riccati.c") != before
     monkeypatch.setattr(sys.modules["awiwi_gen.build"], "FLAGS", ("-std=c99",))
     assert current() != before
 
@@ -94,8 +99,8 @@ def test_flags_text_and_headers_change_the_key(monkeypatch, tmp_path):
 def test_only_headers_that_are_included_change_the_key():
     texts = {"a.h": '#include "b.h"', "b.h": ' # include  "c.h"\n#include <math.h>', "c.h": "int c;", "d.h": "int d;"}
 
-    assert set(included('#include <stdio.h>\n#include "a.h"\n', texts)) == {"a.h", "b.h", "c.h"}
-    assert object_key(SOURCE, HEADERS | {"kernels.h": "other kernels"}) == current()
+    assert Headers(texts).included('#include <stdio.h>\n#include "a.h"\n') == ["a.h", "b.h", "c.h"]
+    assert key_of(SOURCE, **{"kernels.h": "other kernels"}) == current()
 
 
 @pytest.mark.parametrize("package", ["cffi", "numpy"])
