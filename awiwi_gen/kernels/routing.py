@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from itertools import pairwise
 
 from awiwi_gen.hand import Finger
 from awiwi_gen.hand.parts import Tendon
@@ -22,9 +21,9 @@ def moved(finger: Finger, tendon: Tendon) -> set[str]:
     """The independent joints that a tendon pulls."""
     order = [link.joint for link in finger.links]
     between = order[: order.index(tendon.span.joint)] if tendon.span else []
-    for ends in pairwise(tendon.path):
-        first, last = sorted(link_number(finger, point.link) for point in ends)
-        between += order[first + 1 : last + 1]
+    for run in tendon.runs:
+        touched = [link_number(finger, each.link) for each in (run.start, run.body, run.end) if each is not None]
+        between += order[min(touched) + 1 : max(touched) + 1]
     return {finger.leaders.get(joint, joint) for joint in (*between, *tendon.arms, *geared(finger, tendon))} | set(
         senses(finger, tendon)
     )

@@ -1,12 +1,11 @@
 """Tendons of a finger by automatic differentiation: torques and stiffnesses are derivatives of an energy.
 
 The lengths are written down, with points of straight lines from the recursion along the chain. The coupling of a path
-from point to point needs no derivative: a tight string pulls its ends by unit forces, whose moments about the joints'
-axes are its arms.
+from point to point needs no derivative: a tight string pulls its ends by unit forces, and presses on the bodies that it
+wraps round; the moments of these forces about the joints' axes are its arms.
 """
 
 from collections.abc import Iterable, Iterator
-from itertools import pairwise
 from typing import Any
 
 import casadi as ca
@@ -14,6 +13,7 @@ from casadi import SX
 
 from awiwi_gen.structure import Finger, coordinates, leaders, link_number, motion, radius, rolls, sense
 from awiwi_gen.witnesses.kinematics import point_before_joint, point_of_link
+from awiwi_gen.witnesses.wraps import Wrap
 
 Tendon = Any
 
@@ -48,6 +48,7 @@ def _lengths(finger: Finger, tendons: Iterable[Tendon], q: SX, paths: bool = Tru
             length += ca.norm_2(end - ca.vertcat(*tendon.span.from_))
         if paths:
             length += sum(ca.norm_2(line) for line, _ in _lines(finger, tendon, q))
+            length += sum(Wrap.of(finger, run, q).length() for run in tendon.runs if run.body is not None)
         lengths.append(length)
     return lengths
 
@@ -74,9 +75,11 @@ def return_torque(finger: Finger, q: SX) -> tuple[SX, SX]:
 
 def _lines(finger: Finger, tendon: Tendon, q: SX) -> Iterator[tuple[SX, SX]]:
     """The straight lines of a path: the vector (3) [m] from a point to the next one, and its rates (3 x n) [m/rad]."""
-    for ends in pairwise(tendon.path):
-        one, other = (link_number(finger, point.link) for point in ends)
-        start, end = (ca.vertcat(*point.at) for point in ends)
+    for run in tendon.runs:
+        if run.body is not None:
+            continue
+        one, other = (link_number(finger, point.link) for point in (run.start, run.end))
+        start, end = (ca.vertcat(*point.at) for point in (run.start, run.end))
         if one == other:
             yield end - start, SX.zeros(3, q.numel())
         else:
@@ -91,7 +94,7 @@ def _arms(finger: Finger, tendon: Tendon, q: SX) -> SX:
     arms = SX.zeros(1, q.numel())
     for line, rates in _lines(finger, tendon, q):
         arms += (line / ca.norm_2(line)).T @ rates
-    return arms
+    return arms + sum(Wrap.of(finger, run, q).arms() for run in tendon.runs if run.body is not None)
 
 
 def _column(elements: list[SX]) -> SX:

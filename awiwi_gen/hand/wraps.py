@@ -1,0 +1,56 @@
+"""Bodies that tendons wrap round, in plain floats: what the checks of a hand file need before anything is derived."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+__all__ = ["Body", "Vector"]
+
+Vector = tuple[float, float, float]
+
+
+class Body(NamedTuple):
+    """A sphere, or a cylinder if it has an axis, in the frame of a link (-1: the base): lengths in metres."""
+
+    link: int
+    centre: Vector
+    radius: float
+    axis: Vector | None
+    side: Vector | None
+
+    def across(self, place: Vector) -> tuple[list[float], float]:
+        """A point of the frame from the centre, across the axis, and its height along the axis [m]."""
+        from_centre = [a - b for a, b in zip(place, self.centre, strict=True)]
+        if self.axis is None:
+            return from_centre, 0.0
+        unit = [a / math.hypot(*self.axis) for a in self.axis]
+        height = _dot(unit, from_centre)
+        return [a - height * b for a, b in zip(from_centre, unit, strict=True)], height
+
+    def distance(self, place: Vector) -> float:
+        """Distance [m] of a point of the frame from the axis, or from a sphere's centre."""
+        return math.hypot(*self.across(place)[0])
+
+    def length(self, start: Vector, end: Vector) -> float:
+        """Length [m] of the line round the body between two points of the frame; straight where one is inside."""
+        (first, low), (last, high) = self.across(start), self.across(end)
+        distances = math.hypot(*first), math.hypot(*last)
+        straight = math.dist(first, last)
+        if min(distances) <= self.radius:
+            return math.hypot(straight, high - low)
+        one, other = ([x / distance for x in each] for each, distance in zip((first, last), distances, strict=True))
+        middle = [a + b for a, b in zip(one, other, strict=True)]
+        half = math.atan2(math.dist(one, other), math.hypot(*middle))
+        if self.side is not None and _dot(self.across(self.side)[0], middle) < 0:
+            half = math.pi - half
+        arc = 2 * half - sum(math.acos(self.radius / distance) for distance in distances)
+        if arc <= 0:
+            return math.hypot(straight, high - low)
+        tangents = sum(math.sqrt(distance**2 - self.radius**2) for distance in distances)
+        return math.hypot(tangents + self.radius * arc, high - low)
+
+
+def _dot(a: Sequence[float], b: Sequence[float]) -> float:
+    return sum(x * y for x, y in zip(a, b, strict=True))
