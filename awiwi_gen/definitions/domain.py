@@ -7,7 +7,7 @@ from sympy import Expr, Matrix
 
 from awiwi_gen.definitions.kinematics import frames, joint_angles
 from awiwi_gen.definitions.naming import Derivation
-from awiwi_gen.definitions.wraps import clearance, passing, seen_from_body
+from awiwi_gen.definitions.wraps import clearance, same_side, seen_from_body
 from awiwi_gen.structure import loose_ends, middle, wraps
 
 
@@ -33,7 +33,7 @@ def wraps_hold(finger: Any, q: Matrix, *_: Matrix) -> list[Expr]:
         ends = {run.first: wrap.start, run.last: wrap.end}
         guards += [clearance(wrap, ends[index]) for index, _ in loose_ends(run)]
         if run.body.side is not None:
-            guards.append(passing(wrap) * passing(seen_from_body(finger, run, there, derivation)))
+            guards.append(same_side(wrap, seen_from_body(finger, run, there, derivation)))
     return guards
 
 

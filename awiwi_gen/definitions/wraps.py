@@ -83,6 +83,22 @@ def passing(wrap: Wrap) -> Expr:
     return _unit(wrap.body.axis).dot(side.cross(last - first))
 
 
+def same_side(wrap: Wrap, other: Wrap) -> Expr:
+    """Positive where a run passes the body on the same side in two poses.
+
+    Past half a turn round a sphere, it goes on in its plane to the side that is away from the side point.
+    """
+    sides = passing(wrap) * passing(other)
+    if wrap.body.axis is not None:
+        return sides
+    turns = []
+    for each in (wrap, other):
+        product = each.start.cross(each.end)
+        turns.append(sympy.sign(passing(each)) * product / _length(product))
+    planes = turns[0].dot(turns[1])
+    return (sides + planes + abs(sides - planes)) / 2
+
+
 def _angle(wrap: Wrap, distances: list[Expr], derivation: Derivation) -> Expr:
     """The angle [rad] at the body from the start to the end, on the side of the side point; else the smaller one.
 

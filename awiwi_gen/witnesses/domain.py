@@ -34,7 +34,7 @@ def wraps_hold(finger: Any, q: SX, *_: SX) -> list[SX]:
         ends = {run.first: wrap.distances[0], run.last: wrap.distances[1]}
         guards += [(ends[index] / wrap.radius - 1) * (ends[index] / wrap.radius + 1) for index, _ in loose_ends(run)]
         if run.body.side is not None:
-            guards.append(wrap.passing() * Wrap.of(finger, run, still).passing())
+            guards.append(wrap.same_side(Wrap.of(finger, run, still)))
     return guards
 
 

@@ -22,7 +22,10 @@ Moving = tuple[SX, SX]
 
 @dataclass(frozen=True)
 class Wrap:
-    """A run of tendon round a body: its ends, the centre and the axis (zero for a sphere) in the base, and their rates."""
+    """A run of tendon round a body: its ends, the centre and the axis (zero for a sphere) in the base, and their rates.
+
+    `home` (3 x 3) has the axes of the body's link in the base.
+    """
 
     body: Any
     start: Moving
@@ -30,6 +33,7 @@ class Wrap:
     centre: Moving
     axis: Moving
     side: SX
+    home: SX
 
     @classmethod
     def of(cls, finger: Finger, run: Any, q: SX) -> Wrap:
@@ -53,7 +57,8 @@ class Wrap:
             axis = axis[0] / body.radius, axis[1] / body.radius
         if body.side is not None:
             side = from_centre(ca.vertcat(*body.side) - centre)[0]
-        return cls(body, start, end, middle, axis, side)
+        home = ca.horzcat(*(from_centre(body.radius * unit)[0] / body.radius for unit in ca.horzsplit(SX.eye(3))))
+        return cls(body, start, end, middle, axis, side, home)
 
     @property
     def radius(self) -> SX:
@@ -87,6 +92,17 @@ class Wrap:
         if self.body.axis is None:
             return ca.dot(side, first) + ca.dot(side, last)
         return ca.dot(ca.cross(self.axis[0], side), last - first)
+
+    def same_side(self, other: Wrap) -> SX:
+        """Positive where a run passes the body on the same side in two poses.
+
+        Past half a turn round a sphere, it goes on in its plane to the side that is away from the side point.
+        """
+        sides = self.passing() * other.passing()
+        if self.body.axis is not None:
+            return sides
+        planes = ca.dot(self.home.T @ self.turn, other.home.T @ other.turn)
+        return (sides + planes + ca.fabs(sides - planes)) / 2
 
     def _directions(self) -> tuple[SX, SX]:
         first, last = (end / distance for end, distance in zip(self.across, self.distances, strict=True))
