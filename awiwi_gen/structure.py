@@ -57,10 +57,10 @@ def wraps(finger: Finger) -> list[tuple[int, Any]]:
     ]
 
 
-def loose_ends(run: Any) -> list[tuple[int, Any]]:
-    """The ends (index in the path, point) of a run that move against the body between them."""
-    ends = (run.first, run.start), (run.last, run.end)
-    return [(index, point) for index, point in ends if point.link != run.body.link]
+def loose_ends(run: Any) -> list[int]:
+    """The ends of a run that move against the body between them, as indices in the path."""
+    ends = {run.first: run.start, run.last: run.end}
+    return [index for index, point in ends.items() if point.link != run.body.link]
 
 
 def middle(finger: Finger) -> list[Any]:

@@ -15,14 +15,14 @@ import awiwi_gen
 from awiwi_gen.errors import InputError
 from awiwi_gen.hand import Hand
 from awiwi_gen.interchange.draft import draft
-from awiwi_gen.interchange.model import Loss, Mimic, Model, Tendon
+from awiwi_gen.interchange.model import Loss, Mimic, Model, Place, Tendon
 from awiwi_gen.interchange.names import finger_names, joint_names, plain
 from awiwi_gen.interchange.quarter import quarter_angle, quarter_axis, quarter_rotation
 from awiwi_gen.interchange.toml import angle, cite, hand_text, length, quantity, tidy
 from awiwi_gen.interchange.urdf import require_tree
 
 POINTS = {1: np.array([0.0, 0.01, 0.0]), 2: np.array([0.01, 0.0, 0.004]), 4: np.array([0.0, 0.0, 0.002])}
-PATH = Tendon("string", path=tuple(POINTS.items()))
+PATH = Tendon("string", path=tuple(Place(*each) for each in POINTS.items()))
 
 
 def imported(model: Model, **options) -> tuple[Hand, dict]:

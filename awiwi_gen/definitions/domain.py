@@ -28,10 +28,10 @@ def wraps_hold(finger: Any, q: Matrix, *_: Matrix) -> list[Expr]:
     derivation = Derivation()
     here, there = (frames(finger, each, derivation)[:-1] for each in (q, Matrix(middle(finger))))
     guards = []
-    for _, run in wraps(finger):
+    for _number, run in wraps(finger):
         wrap = seen_from_body(finger, run, here, derivation)
         ends = {run.first: wrap.start, run.last: wrap.end}
-        guards += [clearance(wrap, ends[index]) for index, _ in loose_ends(run)]
+        guards += [clearance(wrap, ends[index]) for index in loose_ends(run)]
         if run.body.side is not None:
             guards.append(same_side(wrap, seen_from_body(finger, run, there, derivation)))
     return guards

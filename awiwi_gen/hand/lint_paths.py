@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from functools import partial
 
-from awiwi_gen.hand.parts import Finger, Keys, PathPoint, Tendon
+from awiwi_gen.hand.parts import Finger, Keys, PathPoint, Run, Tendon
 from awiwi_gen.hand.pose import Chain, Line
 from awiwi_gen.hand.wraps import Body
 
@@ -53,28 +53,42 @@ def _side(body: PathPoint) -> Iterator[str]:
 def without_length(chain: Chain, number: int) -> Iterator[Complaint]:
     """The first line of a tendon whose ends meet in some pose, or lie inside the body between them."""
     tendon = chain.finger.tendons[number]
-    places: list[Keys] = [("span",)] if tendon.span else []
-    places += [("path", run.last) for run in tendon.runs]
-    bodies = [None] * bool(tendon.span) + tendon.runs
-    for keys, run, line in zip(places, bodies, chain.lines[number], strict=True):
+    runs = [None] * bool(tendon.span) + tendon.runs
+    for run, line in zip(runs, chain.lines[number], strict=True):
         length, q = chain.shortest(Line(line.start, line.end, None))
         if length < _SHORTEST:
-            what = "has a length of" if keys == ("span",) else "lies behind the point before it by"
+            keys: Keys = ("span",) if run is None else ("path", run.last)
+            what = "has a length of" if run is None else "lies behind the point before it by"
             least = f"expected at least {_SHORTEST * 1e3:g} mm in every pose"
             yield keys, f"{what} {length * 1e3:.2g} mm at {told(chain.finger, q)}; {least}"
             return
-        if run is None or line.body is None:
-            continue
-        for end, index in enumerate((run.first, run.last)):
-            distance, q = chain.least(partial(_distance, chain, line.body, line, end))
-            if distance < line.body.radius:
-                depth, kind = (line.body.radius - distance) * 1e3, run.body.kind
-                yield (
-                    ("path", index),
-                    f"lies {depth:.2g} mm inside the {kind} path[{run.between}] at {told(chain.finger, q)}; "
-                    f"expected a point outside it in every pose",
-                )
+        if run is not None and line.body is not None:
+            found = [*_touching(chain, run, line, line.body)]
+            yield from found
+            if found:
                 return
+
+
+def _touching(chain: Chain, run: Run, line: Line, body: Body) -> Iterator[Complaint]:
+    """Points inside the body that a run wraps round, and a side that changes."""
+    kind = "sphere" if body.axis is None else "cylinder"
+    for end, index in enumerate((run.first, run.last)):
+        distance, q = chain.least(partial(_distance, chain, body, line, end))
+        if distance < body.radius:
+            depth, pose = (body.radius - distance) * 1e3, told(chain.finger, q)
+            inside = f"lies {depth:.2g} mm inside the {kind} path[{run.between}] at {pose}"
+            yield ("path", index), f"{inside}; expected a point outside it in every pose"
+            return
+    middle, *poses = chain.poses()
+    there = body.turn(*chain.seen_by(body, middle, line))
+    for q in poses:
+        if body.side is not None and not body.same_side(there, body.turn(*chain.seen_by(body, q, line))):
+            jump = f"is passed on the other side at {told(chain.finger, q)} than at {told(chain.finger, middle)}"
+            yield (
+                ("path", run.between or 0, "side"),
+                f"{jump}; the tendon would jump over the {kind}: expected one side",
+            )
+            return
 
 
 def _distance(chain: Chain, body: Body, line: Line, end: int, q: Sequence[float]) -> float:

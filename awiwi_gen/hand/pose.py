@@ -155,9 +155,10 @@ class Chain:
             lines.append(Line(Spot(-1, True, _floats(span.from_)), end, None))
         for run in tendon.runs:
             first, last = (Spot(number[each.link], True, _floats(each.at)) for each in (run.start, run.end))
-            body = run.body and Body(number[run.body.link], _floats(run.body.at), float(run.body.radius or 0),
-                                     run.body.axis and _floats(run.body.axis),
-                                     run.body.side and _floats(run.body.side))  # fmt: skip
+            body = None
+            if run.body is not None:
+                axis, side = (None if each is None else _floats(each) for each in (run.body.axis, run.body.side))
+                body = Body(number[run.body.link], _floats(run.body.at), float(run.body.radius or 0), axis, side)
             lines.append(Line(first, last, body))
         return lines
 

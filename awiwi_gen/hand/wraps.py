@@ -33,6 +33,22 @@ class Body(NamedTuple):
         """Distance [m] of a point of the frame from the axis, or from a sphere's centre."""
         return math.hypot(*self.across(place)[0])
 
+    def turn(self, start: Vector, end: Vector) -> tuple[float, list[float]]:
+        """On which side a line passes the body, by its sign, and the vector about which it turns."""
+        first, last = (self.across(each)[0] for each in (start, end))
+        one, other = ([x / math.hypot(*each) for x in each] for each in (first, last))
+        side = self.across(self.side)[0] if self.side is not None else [0.0] * 3
+        if self.axis is None:
+            passing = _dot(side, [a + b for a, b in zip(one, other, strict=True)])
+            return passing, [math.copysign(1, passing) * each for each in _cross(one, other)]
+        passing = _dot(self.axis, _cross(side, [b - a for a, b in zip(one, other, strict=True)]))
+        return passing, [math.copysign(1, passing) * each for each in self.axis]
+
+    @staticmethod
+    def same_side(one: tuple[float, list[float]], other: tuple[float, list[float]]) -> bool:
+        """Whether two turns are on the same side: past half a turn, only a sphere's plane tells."""
+        return one[0] * other[0] > 0 or _dot(one[1], other[1]) > 0
+
     def length(self, start: Vector, end: Vector) -> float:
         """Length [m] of the line round the body between two points of the frame; straight where one is inside."""
         (first, low), (last, high) = self.across(start), self.across(end)
@@ -50,6 +66,10 @@ class Body(NamedTuple):
             return math.hypot(straight, high - low)
         tangents = sum(math.sqrt(distance**2 - self.radius**2) for distance in distances)
         return math.hypot(tangents + self.radius * arc, high - low)
+
+
+def _cross(a: Sequence[float], b: Sequence[float]) -> list[float]:
+    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 
 
 def _dot(a: Sequence[float], b: Sequence[float]) -> float:

@@ -29,10 +29,10 @@ def loops_close(finger: Any, q: SX, *_: SX) -> list[SX]:
 def wraps_hold(finger: Any, q: SX, *_: SX) -> list[SX]:
     """For every body that a tendon wraps round, that points stay outside it, and the side that of the joints' middles."""
     guards, still = [], ca.vertcat(*middle(finger))
-    for _, run in wraps(finger):
+    for _number, run in wraps(finger):
         wrap = Wrap.of(finger, run, q)
         ends = {run.first: wrap.distances[0], run.last: wrap.distances[1]}
-        guards += [(ends[index] / wrap.radius - 1) * (ends[index] / wrap.radius + 1) for index, _ in loose_ends(run)]
+        guards += [(ends[index] / wrap.radius - 1) * (ends[index] / wrap.radius + 1) for index in loose_ends(run)]
         if run.body.side is not None:
             guards.append(wrap.same_side(Wrap.of(finger, run, still)))
     return guards

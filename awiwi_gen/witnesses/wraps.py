@@ -63,7 +63,7 @@ class Wrap:
     @property
     def radius(self) -> SX:
         """Radius [m] of the body."""
-        return self.body.radius
+        return SX(self.body.radius)
 
     @cached_property
     def heights(self) -> list[SX]:
@@ -111,7 +111,8 @@ class Wrap:
     @cached_property
     def turn(self) -> SX:
         """The unit vector (3) about which the run turns round the body."""
-        product = ca.cross(*self.across)
+        start, end = self.across
+        product = ca.cross(start, end)
         if self.body.axis is None:
             return product / ca.norm_2(product) * (1 if self.body.side is None else ca.sign(self.passing()))
         sense = ca.dot(self.axis[0], product) if self.body.side is None else self.passing()
