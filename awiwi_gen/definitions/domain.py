@@ -32,8 +32,7 @@ def wraps_hold(finger: Any, q: Matrix, *_: Matrix) -> list[Expr]:
         wrap = seen_from_body(finger, run, here, derivation)
         ends = {run.first: wrap.start, run.last: wrap.end}
         guards += [clearance(wrap, ends[index]) for index in loose_ends(run)]
-        if run.body.side is not None:
-            guards.append(same_side(wrap, seen_from_body(finger, run, there, derivation)))
+        guards.append(same_side(wrap, seen_from_body(finger, run, there, derivation)))
     return guards
 
 

@@ -86,17 +86,23 @@ def passing(wrap: Wrap) -> Expr:
 def same_side(wrap: Wrap, other: Wrap) -> Expr:
     """Positive where a run passes the body on the same side in two poses.
 
-    Past half a turn round a sphere, it goes on in its plane to the side that is away from the side point.
+    Without a side point, or past half a turn round a sphere, the vectors tell about which the run turns. Such a vector may
+    also change where both ends are in nearly one direction from the body, for there the run is straight.
     """
-    sides = passing(wrap) * passing(other)
-    if wrap.body.axis is not None:
-        return sides
-    turns = []
-    for each in (wrap, other):
-        product = each.start.cross(each.end)
-        turns.append(sympy.sign(passing(each)) * product / _length(product))
-    planes = turns[0].dot(turns[1])
-    return (sides + planes + abs(sides - planes)) / 2
+    if wrap.body.side is None:
+        sides = wrap.directions[0].dot(wrap.directions[1])
+    else:
+        sides = passing(wrap) * passing(other)
+        if wrap.body.axis is not None:
+            return sides
+    turns = _turn(wrap).dot(_turn(other))
+    return (sides + turns + abs(sides - turns)) / 2
+
+
+def _turn(wrap: Wrap) -> Matrix:
+    """A vector (3 x 1) about which the run turns, as long as the sine of its angle."""
+    first, last = wrap.directions
+    return first.cross(last) * (1 if wrap.body.side is None else sympy.sign(passing(wrap)))
 
 
 def _angle(wrap: Wrap, distances: list[Expr], derivation: Derivation) -> Expr:

@@ -82,12 +82,9 @@ def _touching(chain: Chain, run: Run, line: Line, body: Body) -> Iterator[Compla
     middle, *poses = chain.poses()
     there = body.turn(*chain.seen_by(body, middle, line))
     for q in poses:
-        if body.side is not None and not body.same_side(there, body.turn(*chain.seen_by(body, q, line))):
+        if not body.turn(*chain.seen_by(body, q, line)).is_like(there):
             jump = f"is passed on the other side at {told(chain.finger, q)} than at {told(chain.finger, middle)}"
-            yield (
-                ("path", run.between or 0, "side"),
-                f"{jump}; the tendon would jump over the {kind}: expected one side",
-            )
+            yield ("path", run.between or 0), f"{jump}; the tendon would jump over the {kind}: expected one side"
             return
 
 

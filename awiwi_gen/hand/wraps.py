@@ -11,6 +11,19 @@ __all__ = ["Body", "Vector"]
 Vector = tuple[float, float, float]
 
 
+class Turn(NamedTuple):
+    """How a line passes a body: on which side (by sign; None without a side), the cosine of its angle, and its axis."""
+
+    side: float | None
+    cosine: float
+    axis: list[float]
+
+    def is_like(self, other: Turn) -> bool:
+        """Whether a line goes round the body as another does, as the kernels' guards see it."""
+        near = self.cosine if self.side is None or other.side is None else self.side * other.side
+        return max(near, _dot(self.axis, other.axis)) > 0
+
+
 class Body(NamedTuple):
     """A sphere, or a cylinder if it has an axis, in the frame of a link (-1: the base): lengths in metres."""
 
@@ -33,21 +46,17 @@ class Body(NamedTuple):
         """Distance [m] of a point of the frame from the axis, or from a sphere's centre."""
         return math.hypot(*self.across(place)[0])
 
-    def turn(self, start: Vector, end: Vector) -> tuple[float, list[float]]:
-        """On which side a line passes the body, by its sign, and the vector about which it turns."""
-        first, last = (self.across(each)[0] for each in (start, end))
-        one, other = ([x / math.hypot(*each) for x in each] for each in (first, last))
-        side = self.across(self.side)[0] if self.side is not None else [0.0] * 3
-        if self.axis is None:
-            passing = _dot(side, [a + b for a, b in zip(one, other, strict=True)])
-            return passing, [math.copysign(1, passing) * each for each in _cross(one, other)]
-        passing = _dot(self.axis, _cross(side, [b - a for a, b in zip(one, other, strict=True)]))
-        return passing, [math.copysign(1, passing) * each for each in self.axis]
-
-    @staticmethod
-    def same_side(one: tuple[float, list[float]], other: tuple[float, list[float]]) -> bool:
-        """Whether two turns are on the same side: past half a turn, only a sphere's plane tells."""
-        return one[0] * other[0] > 0 or _dot(one[1], other[1]) > 0
+    def turn(self, start: Vector, end: Vector) -> Turn:
+        """How a line passes the body between two points of the frame."""
+        one, other = ([x / math.hypot(*each) for x in each] for each in (self.across(start)[0], self.across(end)[0]))
+        if self.side is None:
+            return Turn(None, _dot(one, other), _cross(one, other))
+        side = self.across(self.side)[0]
+        if self.axis is not None:
+            change = [b - a for a, b in zip(one, other, strict=True)]
+            return Turn(_dot(self.axis, _cross(side, change)), 0.0, [0.0] * 3)
+        passing = _dot(side, [a + b for a, b in zip(one, other, strict=True)])
+        return Turn(passing, 0.0, [math.copysign(1, passing) * each for each in _cross(one, other)])
 
     def length(self, start: Vector, end: Vector) -> float:
         """Length [m] of the line round the body between two points of the frame; straight where one is inside."""

@@ -52,8 +52,7 @@ def wraps_hold(finger: Finger) -> tuple[str, ...]:
     for number, run in wraps(finger):
         body = f"path[{run.between}] of tendons[{number}]"
         found += [f"path[{index}] is outside {body}" for index in loose_ends(run)]
-        if run.body.side is not None:
-            found.append(f"the string passes {body} on the side where it does at the middle of the joints' ranges")
+        found.append(f"the string passes {body} on the side where it does at the middle of the joints' ranges")
     return tuple(found)
 
 

@@ -33,8 +33,7 @@ def wraps_hold(finger: Any, q: SX, *_: SX) -> list[SX]:
         wrap = Wrap.of(finger, run, q)
         ends = {run.first: wrap.distances[0], run.last: wrap.distances[1]}
         guards += [(ends[index] / wrap.radius - 1) * (ends[index] / wrap.radius + 1) for index in loose_ends(run)]
-        if run.body.side is not None:
-            guards.append(wrap.same_side(Wrap.of(finger, run, still)))
+        guards.append(wrap.same_side(Wrap.of(finger, run, still)))
     return guards
 
 

@@ -96,13 +96,24 @@ class Wrap:
     def same_side(self, other: Wrap) -> SX:
         """Positive where a run passes the body on the same side in two poses.
 
-        Past half a turn round a sphere, it goes on in its plane to the side that is away from the side point.
+        Without a side point, or past half a turn round a sphere, the vectors tell about which the run turns. Such a vector
+        may also change where both ends are in nearly one direction from the body, for there the run is straight.
         """
-        sides = self.passing() * other.passing()
-        if self.body.axis is not None:
-            return sides
-        planes = ca.dot(self.home.T @ self.turn, other.home.T @ other.turn)
-        return (sides + planes + ca.fabs(sides - planes)) / 2
+        if self.body.side is None:
+            first, last = self._directions()
+            sides = ca.dot(first, last)
+        else:
+            sides = self.passing() * other.passing()
+            if self.body.axis is not None:
+                return sides
+        turns = ca.dot(self.home.T @ self._sine(), other.home.T @ other._sine())
+        return (sides + turns + ca.fabs(sides - turns)) / 2
+
+    def _sine(self) -> SX:
+        """A vector (3) about which the run turns, as long as the sine of its angle."""
+        sense = 1 if self.body.side is None else ca.sign(self.passing())
+        start, end = self.across
+        return sense * ca.cross(start, end) / (self.distances[0] * self.distances[1])
 
     def _directions(self) -> tuple[SX, SX]:
         first, last = (end / distance for end, distance in zip(self.across, self.distances, strict=True))
