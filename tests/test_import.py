@@ -82,7 +82,7 @@ def test_tendons_through_points_are_as_long_as_in_the_tree():
     (written,) = tables.values()
     for angles in states(model):
         points = []
-        for index, local in PATH.path:
+        for index, local, *_ in PATH.path:
             axes, origin = pose(model, angles, index)
             points.append(origin + axes @ local)
         expected = sum(np.linalg.norm(b - a) for a, b in pairwise(points))

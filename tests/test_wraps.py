@@ -128,7 +128,7 @@ def test_no_pose_has_a_string_inside_the_body(hand, q):
 def test_the_arms_of_the_checks_are_those_of_the_kernel(hand, lib, q):
     chain = Chain(hand.fingers["claw"])
 
-    np.testing.assert_allclose([chain.coupling(each)[:2] for each in q], lib.claw_coupling(q).P, rtol=0, atol=1e-9)
+    np.testing.assert_allclose([chain.coupling(each)[:3] for each in q], lib.claw_coupling(q).P, rtol=0, atol=1e-9)
 
 
 def test_arms_are_the_slopes_of_lengths(lib, q):
@@ -141,7 +141,7 @@ def test_arms_are_the_slopes_of_lengths(lib, q):
 def test_a_string_round_a_cylinder_pulls_by_its_stretch(lib, q):
     found = lib.claw_return_torque(q)
     chain = Chain(Hand.parse(FILE).fingers["claw"])
-    stretch = np.array([max(0.0, chain._length(2, each) - 25e-3) for each in q])
+    stretch = np.array([max(0.0, chain._length(3, each) - 25e-3) for each in q])
 
     np.testing.assert_allclose(found.energy, 150 * stretch**2, rtol=1e-9)
 
@@ -196,6 +196,14 @@ def test_a_path_is_cut_into_runs_at_its_points(hand):
     assert all(one.end == other.start for one, other in pairwise(runs))
 
 
+def test_branches_behind_pulleys_count_divided(lib, hand, q):
+    chain = Chain(hand.fingers["claw"])
+    first, half, *third = ([chain.distance(each, line) for each in q] for line in chain.lines[2])
+    total = np.array(first) + np.array(half) / 2 + np.array(third).sum(axis=0) / 3
+
+    np.testing.assert_allclose(lib.claw_tendon_lengths(q).h[:, 2], total, rtol=1e-12)
+
+
 @pytest.mark.parametrize(
     ("path", "message"),
     [
@@ -206,6 +214,18 @@ def test_a_path_is_cut_into_runs_at_its_points(hand):
         (
             START + place("palm", 0, 0, 0, CYLINDER) + place("root", 9, 0, 0, SPHERE) + END,
             "path[1] is a cylinder with another body after it; expected a point between the two",
+        ),
+        (
+            START + END + place("palm", 9, 0, 0, ', divisor = "2"'),
+            "path[2] is a branch of one point; expected two or more",
+        ),
+        (
+            START + place("palm", 0, 0, 0, SPHERE) + place("palm", 9, 0, 0, ', divisor = "2"') + END,
+            "path[1] is a sphere at the end of the path",
+        ),
+        (
+            START + place("palm", 0, 0, 0, SPHERE + ', divisor = "2"') + END,
+            "path[1].divisor is at a sphere; expected it at the point where the branch begins",
         ),
         (
             START + place("root", 9, 0, 0, ', axis = ["0", "0", "1"]') + END,

@@ -92,7 +92,7 @@ def _lengths(finger: Finger, tendons: Iterable[Tendon], q: Matrix, derivation: D
         if tendon.span is not None:
             span = before[tendon.span.joint].point(Matrix(tendon.span.to)) - Matrix(tendon.span.from_)
             length += derivation.name(sympy.sqrt(sum(x**2 for x in derivation.name_all(span))))
-        length += sum(map(length_of, tendon.runs))
+        length += sum(run.counted(length_of(run)) for run in tendon.runs)
         lengths.append(length)
     return Matrix(len(lengths), 1, lengths)
 

@@ -19,17 +19,23 @@ _NO_DIRECTION = 1e-6  # of a cylinder's axis, and [m] of a side point from that 
 
 
 def misplaced(tendon: Tendon) -> Iterator[Complaint]:
-    """Bodies that a path cannot wrap round: at its ends, two in a row, or of no shape."""
+    """Bodies that a path cannot wrap round: at an end of it or of a branch, two in a row, or of no shape."""
     for index, each in enumerate(tendon.path):
         keys: Keys = ("path", index)
+        after = tendon.path[index + 1] if index + 1 < len(tendon.path) else None
+        ends = after is None or after.divisor is not None
         if each.radius is None:
             for key in ("axis", "side"):
                 if getattr(each, key) is not None:
                     yield (*keys, key), 'is at a point; expected a radius such as "6.2 mm" beside it'
+            if ends and (index == 0 or each.divisor is not None):
+                yield keys, "is a branch of one point; expected two or more"
             continue
-        if index in (0, len(tendon.path) - 1):
+        if each.divisor is not None:
+            yield (*keys, "divisor"), f"is at a {each.kind}; expected it at the point where the branch begins"
+        if index == 0 or ends:
             yield keys, f"is a {each.kind} at the end of the path; expected a point before it and one after it"
-        elif tendon.path[index + 1].radius is not None:
+        elif after is not None and after.radius is not None:
             yield keys, f"is a {each.kind} with another body after it; expected a point between the two"
         if each.axis is not None and math.hypot(*map(float, each.axis)) < _NO_DIRECTION:
             yield (*keys, "axis"), 'has no direction; expected such as ["0", "0", "1"]'

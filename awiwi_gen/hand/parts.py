@@ -55,6 +55,9 @@ class PathPoint(Part):
     Without a radius it is a point. With one it is a body that the tendon wraps round where a straight line would cut it:
     a sphere about `at`, or, with a direction `axis`, an endless cylinder whose axis runs through `at`. The tendon passes
     the body on the side of the point `side`, or by the shorter way.
+
+    A point with a `divisor` begins a new branch of the tendon, behind a pulley: nothing leads there from the point before,
+    and the lines from there on count divided by it.
     """
 
     link: Annotated[JointName, Field(examples=['"palm"', '"flexion"'])]
@@ -62,6 +65,7 @@ class PathPoint(Part):
     radius: Size | None = None
     axis: Direction | None = None
     side: Point | None = None
+    divisor: Annotated[Quantity, Measure("2", "0.01", "100")] | None = None
 
     @property
     def kind(self) -> str:
@@ -72,17 +76,27 @@ class PathPoint(Part):
 
     def structure(self) -> str | list[Any]:
         """Everything but the numbers."""
-        return self.link if self.kind == "point" else [self.link, self.kind, self.side is not None]
+        if self.kind == "point":
+            return self.link if self.divisor is None else [self.link, "branch"]
+        return [self.link, self.kind, self.side is not None]
 
 
 @dataclass(frozen=True)
 class Run:
-    """A piece of a path, from one point to the next by their indices, and the body between them."""
+    """A piece of a path, from one point to the next by their indices, and the body between them.
+
+    Behind a pulley its length counts divided by `divisor`.
+    """
 
     path: tuple[PathPoint, ...]
     first: int
     between: int | None
     last: int
+    divisor: Quantity | None = None
+
+    def counted(self, length: Any) -> Any:
+        """What a length, or a derivative of it, adds to that of the tendon."""
+        return length if self.divisor is None else length / self.divisor
 
     @property
     def start(self) -> PathPoint:
@@ -127,14 +141,16 @@ class Tendon(Part):
     def runs(self) -> list[Run]:
         """The path from point to point, with the body between two points if there is one."""
         found: list[Run] = []
-        start, body = None, None
+        start, body, divisor = None, None, None
         for index, each in enumerate(self.path):
             if each.radius is not None:
                 body = index
-            else:
-                if start is not None:
-                    found.append(Run(self.path, start, body, index))
-                start, body = index, None
+                continue
+            if each.divisor is not None:
+                divisor = each.divisor
+            elif start is not None:
+                found.append(Run(self.path, start, body, index, divisor))
+            start, body = index, None
         return found
 
     def structure(self) -> list[Any]:

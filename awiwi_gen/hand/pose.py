@@ -36,11 +36,12 @@ class Spot(NamedTuple):
 
 
 class Line(NamedTuple):
-    """A piece of a tendon from point to point, straight or round a body."""
+    """A piece of a tendon from point to point, straight or round a body; its length counts divided by `divisor`."""
 
     start: Spot
     end: Spot
     body: Body | None
+    divisor: float = 1.0
 
 
 class Chain:
@@ -89,7 +90,7 @@ class Chain:
                     ends = [list(q), list(q)]
                     ends[0][column] -= _STEP
                     ends[1][column] += _STEP
-                    before, after = (sum(self.distance(end, line) for line in lines) for end in ends)
+                    before, after = (sum(self.distance(end, line) / line.divisor for line in lines) for end in ends)
                     row[column] += (after - before) / (2 * _STEP)
             rows.append(row)
         return rows
@@ -120,7 +121,7 @@ class Chain:
     def _length(self, number: int, q: Sequence[float]) -> float:
         """Length of a tendon [m]."""
         tendon = self.finger.tendons[number]
-        length = float(tendon.rest) + sum(self.distance(q, line) for line in self.lines[number])
+        length = float(tendon.rest) + sum(self.distance(q, line) / line.divisor for line in self.lines[number])
         for joint, arm in self._arms(tendon):
             column, factor, offset = self._angles[self._order[joint]]
             length += arm * (factor * q[column] + offset)
@@ -159,7 +160,7 @@ class Chain:
             if run.body is not None:
                 axis, side = (None if each is None else _floats(each) for each in (run.body.axis, run.body.side))
                 body = Body(number[run.body.link], _floats(run.body.at), float(run.body.radius or 0), axis, side)
-            lines.append(Line(first, last, body))
+            lines.append(Line(first, last, body, float(run.divisor or 1)))
         return lines
 
     def _frame(self, q: Sequence[float], joint: int, rotated: bool) -> Frame:

@@ -156,10 +156,12 @@ class _Writer:
         for number, points in enumerate(self._lines(tendon)):
             full = name if not written else f"{name}.line{number}"
             written.append(SubElement(self.sections["tendon"], "spatial", name=full))
-            for place, (link, at, body) in enumerate(points):
-                if body is not None:
-                    self._wrap(written[-1], f"{full}.geom{place}", body)
+            for place, (link, at, passed) in enumerate(points):
+                if passed is not None and passed.radius is not None:
+                    self._wrap(written[-1], f"{full}.geom{place}", passed)
                     continue
+                if passed is not None and passed.divisor is not None:
+                    SubElement(written[-1], "pulley", divisor=text(float(passed.divisor)))
                 SubElement(self.bodies[link], "site", name=f"{full}.site{place}", pos=text(at))
                 SubElement(written[-1], "site", site=f"{full}.site{place}")
         if len(written) > 1:
@@ -184,7 +186,7 @@ class _Writer:
             step.set("sidesite", f"{name}.side")
 
     def _lines(self, tendon: Tendon) -> list[list[tuple[str, Array, PathPoint | None]]]:
-        """What the span and the path pass, each as (link, position in its frame, body to wrap round or None)."""
+        """What the span and the path pass, each as (link, position in its frame, entry of the path or None)."""
         found: list[list[tuple[str, Array, PathPoint | None]]] = []
         if tendon.span is not None:
             order = [part.link.joint for part in self.parts]
@@ -193,7 +195,7 @@ class _Writer:
             before = self._before(tendon.span.joint)
             found.append([(PALM, vector(tendon.span.from_), None), (before, fixed, None)])
         if tendon.path:
-            found.append([(each.link, vector(each.at), each if each.radius else None) for each in tendon.path])
+            found.append([(each.link, vector(each.at), each) for each in tendon.path])
         return found
 
     def _pull(self, element: Element, tendon: Tendon, alone: bool) -> None:

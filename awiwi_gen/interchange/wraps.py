@@ -23,12 +23,16 @@ def path_of(compiled: Any, places: Iterable[int]) -> tuple[tuple[Place, ...], li
     site = mujoco.mjtWrap.mjWRAP_SITE
     path: list[Place] = []
     lost: list[str] = []
+    divisor = None
     for k in places:
         target = int(compiled.wrap_objid[k])
         if compiled.wrap_type[k] == mujoco.mjtWrap.mjWRAP_PULLEY:
-            return (), ["tendons that branch at pulleys: left out (--fit-wraps)"]
+            divisor = float(compiled.wrap_prm[k])
+            continue
         if compiled.wrap_type[k] == site:
-            path.append(Place(int(compiled.site_bodyid[target]), compiled.site_pos[target].copy()))
+            body = Place(int(compiled.site_bodyid[target]), compiled.site_pos[target].copy(), divisor=divisor)
+            path.append(body)
+            divisor = None
             continue
         body, side = _body(compiled, target), int(compiled.wrap_prm[k])
         if side >= 0:

@@ -136,10 +136,11 @@ def length_range(finger: Finger, tendon: Tendon) -> tuple[float, float]:
     low, high = rest - reach, rest + reach
     for run in tendon.runs:
         if run.body is None:
-            high += longest(finger, run.start, run.end)
+            most = longest(finger, run.start, run.end)
         else:
-            high += longest(finger, run.start, run.body) + longest(finger, run.body, run.end)
-            high += 2 * math.pi * float(run.body.radius or 0)
+            most = longest(finger, run.start, run.body) + longest(finger, run.body, run.end)
+            most += 2 * math.pi * float(run.body.radius or 0)
+        high += most / float(run.divisor or 1)
     if tendon.span is None:
         return low, high
     points = (tendon.span.from_, tendon.span.to, *(link.offset for link in finger.links))
