@@ -1,7 +1,9 @@
 """Tendons that wrap round spheres and cylinders: the shortest line between two points outside, on one side of the body.
 
 Everything is seen from the body. In the plane of a sphere's centre and both points, or across a cylinder's axis, the line
-is a tangent, an arc and a tangent, as long as the arc is not negative; else it is straight. Unrolled, the line on a
+is a tangent, an arc and a tangent, as long as the arc is not negative; else it is straight. Both have the same length and
+the same arms where the arc is zero, to the third and second order in the arc. So the arc may also be slightly negative:
+many models are drawn with strings that just touch, and there the stiffness would be undecided. Unrolled, the line on a
 cylinder is straight too, so its length is the hypotenuse of the length in the plane and the distance along the axis.
 """
 
@@ -14,6 +16,8 @@ from sympy import Expr, Matrix
 from awiwi_gen.definitions.kinematics import Frame
 from awiwi_gen.definitions.naming import Derivation
 from awiwi_gen.structure import Finger, link_number
+
+_LAST = sympy.Rational(1, 1000000)  # rad; minus the most negative arc
 
 
 @dataclass(frozen=True)
@@ -64,7 +68,7 @@ def wrapped_length(wrap: Wrap, derivation: Derivation) -> Expr:
     tangents = [name(sympy.sqrt(distance**2 - radius**2)) for distance in distances]
     angle = _angle(wrap, distances, derivation)
     arc = name(angle - sum(sympy.atan2(tangent, radius) for tangent in tangents))
-    touches = name((1 + sympy.sign(arc)) / 2)
+    touches = name((1 + sympy.sign(arc + _LAST)) / 2)
     across = name(straight + touches * (sum(tangents) + radius * arc - straight))
     return across if wrap.body.axis is None else name(sympy.sqrt(across**2 + wrap.rise**2))
 
