@@ -101,7 +101,7 @@ def examine(published: Published, folder: Path) -> Result:
     with tempfile.TemporaryDirectory() as scratch:
         file, generated = Path(scratch) / "hand.toml", Path(scratch) / "generated"
         try:
-            drafted = draft(read(path))
+            drafted = draft(read(path, without=published.without))
             file.write_text(hand_text(drafted), encoding="utf-8")
             hand = Hand.load(file)
         except AwiwiError as error:
@@ -109,7 +109,7 @@ def examine(published: Published, folder: Path) -> Result:
             text = re.sub(r"^(\S+):\d+ ", r"\1 ", text)  # lines move with every sentence of the importer
             return Result((published.name, published.package, "-", "-", "-", "-", f"refused: {text}", "-"), [])
         faults = [f"{published.name}: {fault}" for fault in prove(file, published.finger, generated)]
-        compiled = compiled_model(path, exact=False)
+        compiled = compiled_model(path, exact=False, without=frozenset(published.without))
         found = worst_differences(compiled, drafted, hand, published.finger, generated)
         if drafted.wrist is not None:
             wrist = Path(scratch) / "wrist"
