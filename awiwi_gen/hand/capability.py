@@ -43,10 +43,6 @@ def left_out(hand: Hand) -> dict[tuple[str, str], str]:
     without = [name for name, finger in hand.fingers.items() if not finger.pulled]
     driven = ("tendon_stiffness", *(["measured_lengths"] if hand.motor else []))
     found |= {("", f"{name}_{family}"): _none(hand.fingers[name]) for name in without for family in driven}
-    if any(run.body for finger in hand.fingers.values() for each in finger.pulled for run in each.runs):
-        found |= dict.fromkeys(
-            _of_all_tendons(hand)[:4], "tendons wrap round bodies: the kernels of each finger tell where"
-        )
     if not hand.tendons:
         found |= dict.fromkeys(_of_all_tendons(hand), "no motor pulls a tendon of this hand")
     return found

@@ -11,8 +11,8 @@ from awiwi_gen.hand.lever import Lever
 from awiwi_gen.hand.parts import Finger, PathPoint, Tendon
 from awiwi_gen.kernel import Kernel, Port, Solver
 from awiwi_gen.kernels.declare import Family, within
-from awiwi_gen.kernels.routing import groups, moved
-from awiwi_gen.structure import link_number, loose_ends, rolls, wraps
+from awiwi_gen.kernels.routing import groups, moved, wraps_hold
+from awiwi_gen.structure import link_number, rolls
 from awiwi_gen.units import J, N, Unit, kg, m, one, rad, s
 
 
@@ -44,16 +44,6 @@ def guarded(finger: Finger, kernels: list[Kernel]) -> list[Kernel]:
     kernels = [kernel for kernel in kernels if kernel.family != "return_torque" or finger.strings]
     kernels = [within(k, "domain", "loops_close", loops) if loops and moves_the_chain(k) else k for k in kernels]
     return [within(k, "domain", "wraps_hold", held) if held and moves_tendons(k) else k for k in kernels]
-
-
-def wraps_hold(finger: Finger) -> tuple[str, ...]:
-    """The conditions under which tendons wrap round bodies as they do in the middle of the joints' ranges."""
-    found = []
-    for number, run in wraps(finger):
-        body = f"path[{run.between}] of tendons[{number}]"
-        found += [f"path[{index}] is outside {body}" for index in loose_ends(run)]
-        found.append(f"the string passes {body} on the side where it does at the middle of the joints' ranges")
-    return tuple(found)
 
 
 def moves_tendons(kernel: Kernel) -> bool:
