@@ -174,10 +174,24 @@ def test_without_a_side_the_shorter_way_is_taken_and_no_other():
         hand_with(START + place("palm", 0, 0, 0, CYLINDER) + END)
 
 
+def test_forces_are_distributed_over_strings_round_bodies_where_these_have_a_status_of_zero():
+    sides = [START + place("palm", 0, 0, 0, CYLINDER + ABOVE) + END]
+    sides += [place("palm", -20, -9, z) + place("root", 20, -9, z) for z in (-4, 4)]
+    sides += [place("palm", -20, 0, z) + place("end", 9, y, z) for y, z in ((8, 2), (-8, -2))]
+    job = Job(hand_with(*sides), only="claw_tendon_distribution")
+    lib = load(cached_tree(job), job.store)
+    outside = lib.claw_tendon_distribution([3.0, 0.0], [0.01, 0.0], np.zeros((2, 2)), 1.0, 90.0)
+    inside = lib.claw_tendon_distribution([-0.3, 0.2], [0.01, 0.02], np.zeros((2, 2)), 1.0, 90.0)
+
+    assert (outside.status, inside.status) == (1, 0)
+    np.testing.assert_array_equal(outside.f, 1)
+    torque = -lib.claw_coupling([-0.3, 0.2]).P.T @ inside.f
+    np.testing.assert_allclose(torque, [0.01, 0.02], rtol=1e-9)
+
+
 def test_kernels_that_need_smooth_lengths_are_left_out_and_say_so(hand):
     absent = left_out(hand)
 
-    assert "wrap round bodies" in absent[("fingers.claw", "tendon_distribution")]
     assert "wrap round bodies" in absent[("fingers.claw", "joint_estimate")]
     assert ("fingers.claw", "coupling_derivative") not in absent
     assert not any(family.startswith("hand_") for _, family in absent)

@@ -43,6 +43,7 @@ def solver_function(
             family: f"(const {prefix}_params *)context, " if "_params *" in function.prototype else ""
             for family, function in used.items()
         },
+        refusing=[family for family, function in used.items() if function.prototype.startswith("int ")],
         given="params" if runtime else "0",
         n=len(solver.unknowns),
         m=len(solver.equations),

@@ -26,9 +26,9 @@ _NEED_TENDONS = ("tendon_lengths", "coupling", "coupling_derivative", "joint_tor
 _NEED_LENGTHS = ("joint_estimate", "joint_estimate_error")
 _NEED_TORQUES = ("tendon_distribution",)
 _NEED_SPANS = ("base_estimate_by_gradient",)
-# Kernel families that iterate over smooth lengths and couplings.
-_NEED_SMOOTH = ("joint_estimate", "tendon_distribution", "base_estimate_by_gradient")
-_WRAPPED = "tendons wrap round bodies, and no solver here knows where they lift off"
+# Kernel families that iterate over lengths and their slopes, and come to their full accuracy where these are smooth.
+_NEED_SMOOTH = ("joint_estimate", "base_estimate_by_gradient")
+_WRAPPED = "tendons wrap round bodies, and their lengths are not smooth where they lift off"
 _RANK = 1e-7  # a singular value below this share of the largest is zero; central differences are good to 1e-10
 _RESIDUAL = 1e-7  # likewise for the part of a torque that no forces give
 
