@@ -103,7 +103,9 @@ def test_a_body_that_a_tendon_wraps_round_stands_where_the_tree_has_it():
         axes, position = pose(model, angles, 2)
         own_axes, own = poses(written, np.array(list(angles.values())))[number]
         for local, key in ((wrap.at, "at"), (side, "side")):
-            assert origin + base @ (own + own_axes @ np.array(body[key])) == pytest.approx(position + axes @ local, abs=1e-15)
+            assert origin + base @ (own + own_axes @ np.array(body[key])) == pytest.approx(
+                position + axes @ local, abs=1e-15
+            )
         assert base @ own_axes @ np.array(body["axis"], float) == pytest.approx(axes @ axis, abs=1e-14)
     assert [each.get("divisor") for each in written["tendons"][0]["path"]] == [None, None, None, 2.0]
     assert body["radius"] == 0.002
