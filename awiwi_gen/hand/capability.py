@@ -26,9 +26,6 @@ _NEED_TENDONS = ("tendon_lengths", "coupling", "coupling_derivative", "joint_tor
 _NEED_LENGTHS = ("joint_estimate", "joint_estimate_error")
 _NEED_TORQUES = ("tendon_distribution",)
 _NEED_SPANS = ("base_estimate_by_gradient",)
-# Kernel families that iterate over lengths and their slopes, and come to their full accuracy where these are smooth.
-_NEED_SMOOTH = ("joint_estimate", "base_estimate_by_gradient")
-_WRAPPED = "tendons wrap round bodies, and their lengths are not smooth where they lift off"
 _RANK = 1e-7  # a singular value below this share of the largest is zero; central differences are good to 1e-10
 _RESIDUAL = 1e-7  # likewise for the part of a torque that no forces give
 
@@ -66,12 +63,10 @@ def _of_finger(finger: Finger) -> tuple[tuple[str, str], ...]:
     if not finger.pulled:
         return tuple((family, _none(finger)) for family in (*_NEED_TENDONS, *_NEED_LENGTHS, *_NEED_TORQUES))
     rows = [row for row, tendon in enumerate(finger.tendons) if tendon.spring is None]
-    wrapped = any(run.body for tendon in finger.pulled for run in tendon.runs)
-    smooth = tuple((family, _WRAPPED) for family in _NEED_SMOOTH if wrapped)
     couplings = ([coupling[row] for row in rows] for coupling in Chain(finger).couplings())
     first = next(couplings)
     # What one pose allows is no longer in question; most fingers need no second one.
-    return (_reasons(finger, [first]) and _reasons(finger, [first, *couplings])) + smooth
+    return _reasons(finger, [first]) and _reasons(finger, [first, *couplings])
 
 
 def _reasons(finger: Finger, couplings: Sequence[Any]) -> tuple[tuple[str, str], ...]:

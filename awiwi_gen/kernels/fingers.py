@@ -9,10 +9,10 @@ from typing import Any
 from awiwi_gen.hand import Hand
 from awiwi_gen.hand.lever import Lever
 from awiwi_gen.hand.parts import Finger, PathPoint, Tendon
-from awiwi_gen.kernel import Kernel, Port, Solver
+from awiwi_gen.kernel import STOP, Kernel, Port, Solver
 from awiwi_gen.kernels.declare import Family, within
 from awiwi_gen.kernels.routing import groups, moved, wraps_hold
-from awiwi_gen.structure import link_number, rolls
+from awiwi_gen.structure import link_number, rolls, wraps
 from awiwi_gen.units import J, N, Unit, kg, m, one, rad, s
 
 
@@ -357,6 +357,9 @@ def nonlinear_estimate(finger: Finger, iterations: int = 24) -> Solver | None:
         iterations=1 + curved * (iterations - 1),
         tolerance={"f64": 1e-12, "f32": 1e-5},
         limits=limit_paths(finger),
+        stop=STOP | {"f64": "1e-13"}
+        if wraps(finger)
+        else STOP,  # steps get shorter more slowly where lengths bend more
     )
 
 
