@@ -76,6 +76,9 @@ class Port:
         return [(float(a or 0.0), float(b or 0.0)) for a, b in zip(low, high, strict=True)]
 
 
+STOP = {"f64": "1e-11", "f32": "1e-6"}
+
+
 @dataclass(frozen=True)
 class Solver:
     """How a kernel iterates: a template that binds a solver of csrc to generated kernels.
@@ -85,6 +88,7 @@ class Solver:
     unchanged. ``problem`` names an entry of `verify.problems.PROBLEMS`, which draws well-posed inputs and has their exact
     solutions; a compiled result may differ from these by ``tolerance`` of the largest element, per scalar type.
     ``iterations`` is the number of calls of the used kernels in the worst case; those in ``once`` are called once.
+    A last step shorter than ``stop``, per scalar type, ends an iteration.
     ``limits`` are the paths of the numbers in ``arrays`` that are read at run time where others are.
     """
 
@@ -99,6 +103,7 @@ class Solver:
     tolerance: Mapping[str, float]
     once: tuple[str, ...] = ()
     limits: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    stop: Mapping[str, str] = field(default_factory=lambda: STOP)
 
 
 @dataclass(frozen=True)

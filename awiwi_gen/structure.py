@@ -6,7 +6,9 @@ A finger is anything with these attributes (the hand file's `Finger` and its sym
                   quarters[3], and None or rpy[3], reference, four_bar, armature, damping, friction, spring
     pulleys[i]    joint, radius
     tendons[i]    rest, over (senses and joints: "+flexion", "-pip"), arms (joint -> arm), span (None or from_[3], to[3],
-                  joint), path (points: link, at[3]), spring (None or stiffness, rest)
+                  joint), path (points: link, at[3]; bodies also radius, axis (None or [3]), side (None or [3]),
+                  and kind), runs (path from point to point: start, body or None, end,
+                  counted()), spring (None or stiffness, rest)
     pulled, strings   the tendons without a spring, and those with one
     couplings[i]  follower, leader, ratio (or None), offset (or None)
     base          None or position[3], turn, quarters[3], rpy[3]
@@ -47,6 +49,25 @@ def straight(finger: Finger) -> list[Any]:
 def link_number(finger: Finger, name: str) -> int:
     """Index of the link that a joint moves; -1 for "palm", the base frame."""
     return -1 if name == "palm" else next(i for i, link in enumerate(finger.links) if link.joint == name)
+
+
+def wraps(finger: Finger) -> list[tuple[int, Any]]:
+    """The runs that wrap round bodies, each with the index of its tendon in the file."""
+    return [
+        (number, run) for number, tendon in enumerate(finger.tendons) for run in tendon.runs if run.body is not None
+    ]
+
+
+def loose_ends(run: Any) -> list[int]:
+    """The ends of a run that move against the body between them, as indices in the path."""
+    ends = {run.first: run.start, run.last: run.end}
+    return [index for index, point in ends.items() if point.link != run.body.link]
+
+
+def middle(finger: Finger) -> list[Any]:
+    """The independent joint angles [rad] in the middle of their ranges."""
+    follows = leaders(finger)
+    return [(link.low + link.high) / 2 for link in finger.links if link.joint not in follows]
 
 
 def radius(finger: Finger, joint: str) -> Any:

@@ -14,7 +14,7 @@ from awiwi_gen.hand import Hand
 from awiwi_gen.interchange import export_mjcf, export_urdf
 from awiwi_gen.interchange.draft import draft
 from awiwi_gen.interchange.export_mjcf import quaternion
-from awiwi_gen.interchange.model import Body, Joint, Mimic, Model, Site, Tendon
+from awiwi_gen.interchange.model import Body, Joint, Mimic, Model, Place, Site, Tendon
 from awiwi_gen.interchange.toml import hand_text
 
 HERE = Path(__file__).parent
@@ -39,6 +39,7 @@ def read_mjcf(text: str) -> Model:
     root = ElementTree.fromstring(text)  # noqa: S314 our own
     zero = np.zeros(3)
     bodies, joints, sites = [Body("world", 0, zero, np.eye(3), 0.0, zero, np.zeros((3, 3)))], [], []
+    round_ = {}
 
     def visit(element: ElementTree.Element, parent: int) -> None:
         inertial, index = element.find("inertial"), len(bodies)
@@ -58,20 +59,32 @@ def read_mjcf(text: str) -> Model:
             axis, anchor = numbers(each.get("axis")), numbers(each.get("pos"))
             joints.append(Joint(each.get("name"), index, "hinge", axis, anchor, low, high, **own))
         sites.extend(Site(each.get("name"), index, numbers(each.get("pos"))) for each in element.findall("site"))
+        for each in element.findall("geom"):
+            axis = None if each.get("zaxis") is None else numbers(each.get("zaxis"))
+            radius = float(numbers(each.get("size"))[0])
+            round_[each.get("name")] = Place(index, numbers(each.get("pos")), radius, axis)
         for child in element.findall("body"):
             visit(child, index)
 
     visit(root.find("worldbody/body"), 0)
-    places = {site.name: (site.body, site.position) for site in sites}
+    places = {site.name: Place(site.body, site.position) for site in sites}
     references = {joint.name: joint.reference for joint in joints}
     tendons, mimics = [], []
     for each in root.findall("tendon/*"):
         _, slack = numbers(each.get("springlength"), "0 0")
         spring = {"stiffness": float(each.get("stiffness", 0)), "rest": slack}
         arms = {joint.get("joint"): float(joint.get("coef")) for joint in each.findall("joint")}
-        tendons.append(
-            Tendon(each.get("name"), arms, tuple(places[s.get("site")] for s in each.findall("site")), **spring)
-        )
+        path, divisor = [], None
+        for step in each:
+            if step.tag == "site":
+                path.append(places[step.get("site")]._replace(divisor=divisor))
+                divisor = None
+            elif step.tag == "geom":
+                side = places[step.get("sidesite")].at if step.get("sidesite") else None
+                path.append(round_[step.get("geom")]._replace(side=side))
+            elif step.tag == "pulley":
+                divisor = float(step.get("divisor"))
+        tendons.append(Tendon(each.get("name"), arms, tuple(path), **spring))
     for each in root.findall("equality/joint"):
         constant, ratio = numbers(each.get("polycoef"))[:2]
         follower, leader = each.get("joint1"), each.get("joint2")
@@ -138,6 +151,18 @@ def test_tendons_of_arms_and_through_points_are_as_long_as_before():
     for q in np.random.default_rng(3).uniform(-0.4, 0.4, (5, 3)):
         assert tendon_lengths(after, q)[5:] == pytest.approx(tendon_lengths(before, q)[5:], abs=1e-15)
     assert after["tendons"][-1]["spring"] == before["tendons"][-1]["spring"]
+
+
+def test_a_path_round_bodies_comes_back_with_its_sides_and_branches():
+    hand = Hand.load(HERE / "wrapped_finger.toml").fingers["claw"]
+    text = export_mjcf.text_and_losses(Hand.load(HERE / "wrapped_finger.toml"))[0]
+    again = Hand.parse(hand_text(draft(read_mjcf(text)))).fingers["claw"]
+
+    assert [tendon.structure() for tendon in again.tendons] == [tendon.structure() for tendon in hand.tendons]
+    for ours, theirs in zip(hand.tendons, again.tendons, strict=True):
+        for place, number in ours.quantities().items():
+            if place.startswith("path"):
+                assert float(theirs.quantities()[place]) == pytest.approx(float(number), rel=1e-14, abs=1e-17)
 
 
 def test_a_urdf_has_mimic_joints_and_loses_tendons():

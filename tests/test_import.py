@@ -15,14 +15,14 @@ import awiwi_gen
 from awiwi_gen.errors import InputError
 from awiwi_gen.hand import Hand
 from awiwi_gen.interchange.draft import draft
-from awiwi_gen.interchange.model import Loss, Mimic, Model, Tendon
+from awiwi_gen.interchange.model import Loss, Mimic, Model, Place, Tendon
 from awiwi_gen.interchange.names import finger_names, joint_names, plain
 from awiwi_gen.interchange.quarter import quarter_angle, quarter_axis, quarter_rotation
 from awiwi_gen.interchange.toml import angle, cite, hand_text, length, quantity, tidy
 from awiwi_gen.interchange.urdf import require_tree
 
 POINTS = {1: np.array([0.0, 0.01, 0.0]), 2: np.array([0.01, 0.0, 0.004]), 4: np.array([0.0, 0.0, 0.002])}
-PATH = Tendon("string", path=tuple(POINTS.items()))
+PATH = Tendon("string", path=tuple(Place(*each) for each in POINTS.items()))
 
 
 def imported(model: Model, **options) -> tuple[Hand, dict]:
@@ -82,11 +82,33 @@ def test_tendons_through_points_are_as_long_as_in_the_tree():
     (written,) = tables.values()
     for angles in states(model):
         points = []
-        for index, local in PATH.path:
+        for index, local, *_ in PATH.path:
             axes, origin = pose(model, angles, index)
             points.append(origin + axes @ local)
         expected = sum(np.linalg.norm(b - a) for a, b in pairwise(points))
         assert tendon_lengths(written, np.array(list(angles.values()))) == pytest.approx([expected], abs=1e-15)
+
+
+def test_a_body_that_a_tendon_wraps_round_stands_where_the_tree_has_it():
+    axis, side = np.array([0.6, 0.0, 0.8]), np.array([0.01, 0.02, 0.004])
+    wrap = Place(2, POINTS[2], 0.002, axis, side)
+    start, end = Place(1, POINTS[1]), Place(4, POINTS[4], divisor=2.0)
+    model = finger(tendons=(Tendon("string", path=(start, wrap, Place(2, POINTS[2] + [0.02, 0.0, 0.0]), end)),))
+    (written,) = fingers_of(hand_text(draft(model))).values()
+    body = written["tendons"][0]["path"][1]
+    number = [link["joint"] for link in written["links"]].index(body["link"])
+    base = pose(model, {}, 1)[0] @ rpy_matrix(written["base"]["rpy"])
+    origin = pose(model, {}, 1)[1] + pose(model, {}, 1)[0] @ np.array(written["base"]["position"])
+    for angles in states(model):
+        axes, position = pose(model, angles, 2)
+        own_axes, own = poses(written, np.array(list(angles.values())))[number]
+        for local, key in ((wrap.at, "at"), (side, "side")):
+            assert origin + base @ (own + own_axes @ np.array(body[key])) == pytest.approx(
+                position + axes @ local, abs=1e-15
+            )
+        assert base @ own_axes @ np.array(body["axis"], float) == pytest.approx(axes @ axis, abs=1e-14)
+    assert [each.get("divisor") for each in written["tendons"][0]["path"]] == [None, None, None, 2.0]
+    assert body["radius"] == 0.002
 
 
 # -- couplings -------------------------------------------------------------------------------------------------------

@@ -5,7 +5,10 @@ from typing import Any
 import sympy
 from sympy import Expr, Matrix
 
-from awiwi_gen.definitions.kinematics import joint_angles
+from awiwi_gen.definitions.kinematics import frames, joint_angles
+from awiwi_gen.definitions.naming import Derivation
+from awiwi_gen.definitions.wraps import clearance, same_side, seen_from_body
+from awiwi_gen.structure import loose_ends, middle, wraps
 
 
 def loops_close(finger: Any, q: Matrix, *_: Matrix) -> list[Expr]:
@@ -17,6 +20,19 @@ def loops_close(finger: Any, q: Matrix, *_: Matrix) -> list[Expr]:
             crank = angle + bar.reference
             squared = bar.ground**2 + bar.crank**2 - 2 * bar.ground * bar.crank * sympy.cos(crank)
             guards.append(1 - ((bar.coupler**2 + bar.rocker**2 - squared) / (2 * bar.coupler * bar.rocker)) ** 2)
+    return guards
+
+
+def wraps_hold(finger: Any, q: Matrix, *_: Matrix) -> list[Expr]:
+    """For every body that a tendon wraps round, that points stay outside it, and the side that of the joints' middles."""
+    derivation = Derivation()
+    here, there = (frames(finger, each, derivation)[:-1] for each in (q, Matrix(middle(finger))))
+    guards = []
+    for _number, run in wraps(finger):
+        wrap = seen_from_body(finger, run, here, derivation)
+        ends = {run.first: wrap.start, run.last: wrap.end}
+        guards += [clearance(wrap, ends[index]) for index in loose_ends(run)]
+        guards.append(same_side(wrap, seen_from_body(finger, run, there, derivation)))
     return guards
 
 

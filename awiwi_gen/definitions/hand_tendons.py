@@ -4,7 +4,7 @@
 outside these blocks is exactly zero, so no operation is spent on it.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import sympy
@@ -12,6 +12,7 @@ from sympy import Expr, Matrix
 
 from awiwi_gen.definitions import tendons
 from awiwi_gen.definitions import wrist as wrists
+from awiwi_gen.definitions.domain import wraps_hold
 
 Hand = Any
 
@@ -20,24 +21,31 @@ def tendon_lengths(hand: Hand, q: Matrix, wrist: Matrix | None = None) -> Any:
     """Path lengths (m) [m] in the fingers and, if the hand has one, in the wrist at its angles (2); then its guards."""
     fingers = Matrix.vstack(*_blocks(hand, tendons.tendon_lengths, q))
     if wrist is None:
-        return fingers
+        return _guarded(hand, q, fingers)
     in_wrist, guards = wrists.tendon_lengths(hand.wrist, wrist[:1], wrist[1:])
-    return fingers + in_wrist, guards
+    return _guarded(hand, q, fingers + in_wrist, guards)
 
 
-def coupling(hand: Hand, q: Matrix) -> Matrix:
+def coupling(hand: Hand, q: Matrix) -> Any:
     """P = dh/dq (m x n) [m/rad] (eq. 5.6)."""
-    return sympy.diag(*_blocks(hand, tendons.coupling, q))
+    return _guarded(hand, q, sympy.diag(*_blocks(hand, tendons.coupling, q)))
 
 
-def joint_torque(hand: Hand, q: Matrix, f: Matrix) -> Matrix:
+def joint_torque(hand: Hand, q: Matrix, f: Matrix) -> Any:
     """Joint torques (n) [N m] of the tendon forces f (m) [N] (eq. 5.8)."""
-    return Matrix.vstack(*_blocks(hand, tendons.joint_torque, q, f))
+    return _guarded(hand, q, Matrix.vstack(*_blocks(hand, tendons.joint_torque, q, f)))
 
 
-def joint_stiffness(hand: Hand, q: Matrix, f: Matrix, k: Matrix) -> Matrix:
+def joint_stiffness(hand: Hand, q: Matrix, f: Matrix, k: Matrix) -> Any:
     """-d tau/dq (n x n) [N m/rad] through tendons of stiffness k (m) [N/m] (eq. 5.12, 5.23)."""
-    return sympy.diag(*_blocks(hand, tendons.joint_stiffness, q, f, k))
+    return _guarded(hand, q, sympy.diag(*_blocks(hand, tendons.joint_stiffness, q, f, k)))
+
+
+def _guarded(hand: Hand, q: Matrix, result: Matrix, guards: Iterable[Expr] = ()) -> Any:
+    """A result with its guards, and those of tendons that wrap round bodies; the result alone if there are none."""
+    wraps = (wraps_hold(hand.fingers[name], _column(q[joints])) for name, (_, joints) in hand.blocks.items())
+    found = [*guards, *(guard for of_finger in wraps for guard in of_finger)]
+    return (result, found) if found else result
 
 
 def _blocks(hand: Hand, of_finger: Callable[..., Matrix], q: Matrix, *by_tendon: Matrix) -> list[Matrix]:

@@ -74,7 +74,7 @@ class Derivation:
             factors = expr.args
             return _sum([_product(*factors[:i], rate, *factors[i + 1 :]) for i, rate in enumerate(rates) if rate])
         slopes = self._power_slope(expr) if expr.is_Pow else self._function_slopes(expr)
-        return _sum([_product(slope, rate) for slope, rate in zip(slopes, rates, strict=True) if rate])
+        return _sum([_product(slope, rate) for slope, rate in zip(slopes, rates, strict=True) if slope and rate])
 
     def _function_slopes(self, call: Expr) -> tuple[Expr, ...]:
         if call.func not in _SLOPES:
@@ -126,6 +126,7 @@ _SLOPES: dict[Any, Callable[..., tuple[Expr, ...]]] = {
     sympy.atan2: lambda y, x: (x / (x**2 + y**2), -y / (x**2 + y**2)),
     sympy.exp: lambda x: (sympy.exp(x),),
     sympy.log: lambda x: (1 / x,),
+    sympy.sign: lambda x: (sympy.S.Zero,),
 }
 
 

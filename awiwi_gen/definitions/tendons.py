@@ -6,7 +6,6 @@ function of their own.
 """
 
 from collections.abc import Iterable
-from itertools import pairwise
 from typing import Any
 
 import sympy
@@ -14,13 +13,14 @@ from sympy import Expr, Matrix
 
 from awiwi_gen.definitions.kinematics import frames, joint_angles, joint_frames
 from awiwi_gen.definitions.naming import Derivation
+from awiwi_gen.definitions.wraps import seen_from_body, wrapped_length
 from awiwi_gen.structure import Finger, link_number, radius, sense
 
 Tendon = Any
 
 
 def tendon_lengths(finger: Finger, q: Matrix) -> Matrix:
-    """Path lengths h (m) [m]: arcs on pulleys (eq. 5.5) and straight lines, as in tensegrity joints (eq. 5.20, 5.22)."""
+    """Path lengths h (m) [m]: arcs on pulleys (eq. 5.5), straight lines (eq. 5.20, 5.22), and lines round bodies."""
     return _lengths(finger, finger.pulled, q, Derivation())
 
 
@@ -74,9 +74,11 @@ def _lengths(finger: Finger, tendons: Iterable[Tendon], q: Matrix, derivation: D
     angles, before = joint_angles(finger, q), joint_frames(finger, q, derivation)
     links = frames(finger, q, derivation)[:-1]  # the base, then the frames of the links
 
-    def straight(a: Any, b: Any) -> Expr:
-        one, other = link_number(finger, a.link), link_number(finger, b.link)
-        start, end = Matrix(a.at), Matrix(b.at)
+    def length_of(run: Any) -> Expr:
+        if run.body is not None:
+            return wrapped_length(seen_from_body(finger, run, links, derivation), derivation)
+        one, other = link_number(finger, run.start.link), link_number(finger, run.end.link)
+        start, end = Matrix(run.start.at), Matrix(run.end.at)
         line = end - start if one == other else links[other + 1].point(end) - links[one + 1].point(start)
         return derivation.name(sympy.sqrt(sum(x**2 for x in derivation.name_all(line))))
 
@@ -90,7 +92,7 @@ def _lengths(finger: Finger, tendons: Iterable[Tendon], q: Matrix, derivation: D
         if tendon.span is not None:
             span = before[tendon.span.joint].point(Matrix(tendon.span.to)) - Matrix(tendon.span.from_)
             length += derivation.name(sympy.sqrt(sum(x**2 for x in derivation.name_all(span))))
-        length += sum(straight(a, b) for a, b in pairwise(tendon.path))
+        length += sum(run.counted(length_of(run)) for run in tendon.runs)
         lengths.append(length)
     return Matrix(len(lengths), 1, lengths)
 

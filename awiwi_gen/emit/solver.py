@@ -12,8 +12,6 @@ from awiwi_gen.emit.options import Options
 from awiwi_gen.ir.cost import Cost
 from awiwi_gen.kernel import Kernel, Solver
 
-STOP = {"f64": "1e-11", "f32": "1e-6"}  # a last step this short ends an iteration
-
 
 def solver_function(
     kernel: Kernel, solver: Solver, prefix: str, options: Options, used: Mapping[str, CFunction], runtime: bool
@@ -43,6 +41,7 @@ def solver_function(
             family: f"(const {prefix}_params *)context, " if "_params *" in function.prototype else ""
             for family, function in used.items()
         },
+        refusing=[family for family, function in used.items() if function.prototype.startswith("int ")],
         given="params" if runtime else "0",
         n=len(solver.unknowns),
         m=len(solver.equations),
@@ -53,7 +52,7 @@ def solver_function(
             _array(name, values, options, kernel.path, solver.limits.get(name, ()) if runtime else ())
             for name, values in solver.arrays.items()
         ],
-        tolerance=options.literal(Fraction(STOP[options.scalar])),
+        tolerance=options.literal(Fraction(solver.stop[options.scalar])),
         **solver.strings,
     )
     total = sum((function.cost * calls[family] for family, function in used.items()), Cost())

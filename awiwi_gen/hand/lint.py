@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Protocol
 
+from awiwi_gen.hand.lint_paths import misplaced, told, without_length
 from awiwi_gen.hand.massless import without_inertia
 from awiwi_gen.hand.parts import PALM, Finger, FourBar, Keys, Limits, Link, Part, covers
 from awiwi_gen.hand.pose import Chain
@@ -23,7 +24,6 @@ Complaint = tuple[Keys, str]
 
 _CLOSURE_STEPS = 1000
 _NARROWEST_RANGE = 0.01  # deg; less than the backlash of any joint
-_SHORTEST_SPAN = 1e-4  # m; less than the thickness of a tendon
 _BODY = {
     "mass": 'a mass such as "1.5 g"',
     "com": 'a point such as ["6 mm", "0 mm", "0 mm"]',
@@ -133,6 +133,7 @@ def _names(finger: Finger) -> Iterator[Complaint]:
             yield from _known(keys, point.link, point.link, [*joints, PALM], "link")
             if point.link == PALM in joints:
                 yield keys, f'= "{PALM}" is the base frame, and a joint of this finger; rename the joint'
+        yield from below(("tendons", number), misplaced(tendon))
         if not (tendon.over or tendon.arms or tendon.span or tendon.path):
             yield ("tendons", number), "has neither over nor arms nor span nor path; it would pull nothing"
         if tendon.span:
@@ -235,12 +236,7 @@ def _singular(finger: Finger) -> Iterator[Complaint]:
         joint, q = found
         keys: Keys = ("links", [link.joint for link in finger.links].index(joint), "joint")
         need = "expected mass, com and inertia for a link that only this joint moves, or armature"
-        yield keys, f'= "{joint}" moves no inertia of its own at {_told(finger, q)}; {need}'
-
-
-def _told(finger: Finger, q: Sequence[float]) -> str:
-    """A pose in words."""
-    return ", ".join(f"{joint} = {math.degrees(x):.4g} deg" for joint, x in zip(finger.joints, q, strict=True))
+        yield keys, f'= "{joint}" moves no inertia of its own at {told(finger, q)}; {need}'
 
 
 # ---------------------------------------------------------------------------------------------------- tendons
@@ -251,7 +247,7 @@ def _tendons(finger: Finger) -> Iterator[Complaint]:
     chain = Chain(finger)
     arms = [*chain.couplings()]
     for index, tendon in enumerate(finger.tendons):
-        short = [*_without_length(chain, index)]
+        short = [*without_length(chain, index)]
         yield from below(("tendons", index), short)
         if not short and max(abs(arm) for coupling in arms for arm in coupling[index]) < _LEAST_ARM:
             yield ("tendons", index), "pulls nothing: its length is the same in every pose"
@@ -261,17 +257,3 @@ def _tendons(finger: Finger) -> Iterator[Complaint]:
                 ("tendons", index, "spring", "rest"),
                 f"{slack}; expected less than its length, {longest * 1e3:.4g} mm",
             )
-
-
-def _without_length(chain: Chain, index: int) -> Iterator[Complaint]:
-    """The first straight line of a tendon whose ends meet in some pose."""
-    spanned = chain.finger.tendons[index].span is not None
-    for number, line in enumerate(chain.lines[index]):
-        length, q = chain.shortest(line)
-        if length < _SHORTEST_SPAN:
-            keys: Keys = ("span",) if spanned and number == 0 else ("path", number - spanned + 1)
-            what = "has a length of" if keys == ("span",) else "lies behind the point before it by"
-            pose = ", ".join(f"{joint} = {math.degrees(x):.4g} deg" for joint, x in zip(chain.joints, q, strict=True))
-            least = f"expected at least {_SHORTEST_SPAN * 1e3:g} mm in every pose"
-            yield keys, f"{what} {length * 1e3:.2g} mm at {pose}; {least}"
-            return

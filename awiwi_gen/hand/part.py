@@ -24,6 +24,8 @@ Mass = Annotated[Quantity, Measure("1.5 g", "1 ng", "10 kg")]
 Moment = Annotated[Quantity, Measure("35 g mm^2", "1e-9 g mm^2", "1 kg m^2")]
 Product = Annotated[Quantity, Measure("-2 g mm^2", "-1 kg m^2", "1 kg m^2")]
 Point = Annotated[tuple[Length, Length, Length], Field(strict=False, examples=['["6 mm", "0 mm", "0 mm"]'])]
+Component = Annotated[Quantity, Measure("0.6", "-1", "1")]
+Direction = Annotated[tuple[Component, Component, Component], Field(strict=False, examples=['["0", "0", "1"]'])]
 
 
 # ---------------------------------------------------------------------------------------------------- parts

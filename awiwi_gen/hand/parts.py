@@ -6,6 +6,7 @@ branch of a four-bar) is structure, on which derivations depend, while they neve
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Annotated, Any
 
 from pydantic import Field
@@ -13,13 +14,13 @@ from pydantic import Field
 from awiwi_gen.hand.links import Base, FourBar, Inertia, Link
 from awiwi_gen.hand.measure import Measure
 from awiwi_gen.hand.names import FingerName, JointName, Over, Prefix, Source, Title
-from awiwi_gen.hand.part import Angle, Keys, Length, Moment, Part, Point, Size, covers, join
+from awiwi_gen.hand.part import Angle, Direction, Keys, Length, Moment, Part, Point, Size, covers, join
 from awiwi_gen.units import Quantity
 
 # fmt: off
 __all__ = [
     "MOST", "PALM", "Angle", "Base", "Coupling", "Finger", "FingerName", "FourBar", "Inertia", "Keys", "Length",
-    "Limits", "Link", "Measure", "Moment", "Part", "PathPoint", "Point", "Prefix", "Pulley", "ReturnSpring", "Size",
+    "Limits", "Link", "Measure", "Moment", "Part", "PathPoint", "Point", "Prefix", "Pulley", "ReturnSpring", "Run", "Size",
     "Source", "Span", "Tendon", "Title", "covers", "join",
 ]
 # fmt: on
@@ -49,10 +50,68 @@ class Span(Part):
 
 
 class PathPoint(Part):
-    """A point that a tendon passes, fixed in a link: in the frame after that joint's rotation, or in the base frame."""
+    """What a tendon passes, fixed in a link: in the frame after that joint's rotation, or in the base frame.
+
+    Without a radius it is a point. With one it is a body that the tendon wraps round where a straight line would cut it:
+    a sphere about `at`, or, with a direction `axis`, an endless cylinder whose axis runs through `at`. The tendon passes
+    the body on the side of the point `side`, or by the shorter way.
+
+    A point with a `divisor` begins a new branch of the tendon, behind a pulley: nothing leads there from the point before,
+    and the lines from there on count divided by it.
+    """
 
     link: Annotated[JointName, Field(examples=['"palm"', '"flexion"'])]
     at: Point
+    radius: Size | None = None
+    axis: Direction | None = None
+    side: Point | None = None
+    divisor: Annotated[Quantity, Measure("2", "0.01", "100")] | None = None
+
+    @property
+    def kind(self) -> str:
+        """ "point", "sphere" or "cylinder"."""
+        if self.radius is None:
+            return "point"
+        return "sphere" if self.axis is None else "cylinder"
+
+    def structure(self) -> str | list[Any]:
+        """Everything but the numbers."""
+        if self.kind == "point":
+            return self.link if self.divisor is None else [self.link, "branch"]
+        return [self.link, self.kind, self.side is not None]
+
+
+@dataclass(frozen=True)
+class Run:
+    """A piece of a path, from one point to the next by their indices, and the body between them.
+
+    Behind a pulley its length counts divided by `divisor`.
+    """
+
+    path: tuple[PathPoint, ...]
+    first: int
+    between: int | None
+    last: int
+    divisor: Quantity | None = None
+
+    def counted(self, length: Any) -> Any:
+        """What a length, or a derivative of it, adds to that of the tendon."""
+        return length if self.divisor is None else length / self.divisor
+
+    @property
+    def start(self) -> PathPoint:
+        """The point where it begins."""
+        return self.path[self.first]
+
+    @property
+    def end(self) -> PathPoint:
+        """The point where it ends."""
+        return self.path[self.last]
+
+    @property
+    def body(self) -> PathPoint | None:
+        """The sphere or cylinder that it wraps round; None for a straight line."""
+        return None if self.between is None else self.path[self.between]
 
 
 class ReturnSpring(Part):
@@ -66,8 +125,8 @@ class Tendon(Part):
     """Path length in the finger: a sum of all that its keys describe.
 
     These are the rest, sense * radius * angle over the pulleys, arm * angle of joints with an arm of this tendon's own,
-    the length of the span, and the straight lines from point to point of the path. A motor pulls it unless it has a
-    spring.
+    the length of the span, and the lines from point to point of the path, straight or round bodies. A motor pulls it
+    unless it has a spring.
     """
 
     rest: Length
@@ -78,11 +137,27 @@ class Tendon(Part):
     spring: ReturnSpring | None = None
     source: Source
 
+    @property
+    def runs(self) -> list[Run]:
+        """The path from point to point, with the body between two points if there is one."""
+        found: list[Run] = []
+        start, body, divisor = None, None, None
+        for index, each in enumerate(self.path):
+            if each.radius is not None:
+                body = index
+                continue
+            if each.divisor is not None:
+                divisor = each.divisor
+            elif start is not None:
+                found.append(Run(self.path, start, body, index, divisor))
+            start, body = index, None
+        return found
+
     def structure(self) -> list[Any]:
         """Everything but the numbers."""
         more = {
             "arms": list(self.arms),
-            "path": [point.link for point in self.path],
+            "path": [point.structure() for point in self.path],
             "spring": self.spring is not None,
         }
         found = {key: value for key, value in more.items() if value}

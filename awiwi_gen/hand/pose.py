@@ -9,14 +9,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
-from itertools import pairwise
 from typing import NamedTuple
 
 from awiwi_gen.hand.parts import MOST, PALM, Finger, FourBar, Link, Tendon
+from awiwi_gen.hand.wraps import Body, Vector
 
-__all__ = ["Chain", "Spot", "point"]
+__all__ = ["Chain", "Line", "Spot", "point"]
 
-Vector = tuple[float, float, float]
 Axes = tuple[Vector, Vector, Vector]  # unit vectors of a frame, in base axes
 Frame = tuple[Axes, Vector]  # with its origin
 
@@ -34,6 +33,15 @@ class Spot(NamedTuple):
     link: int
     rotated: bool
     at: Vector
+
+
+class Line(NamedTuple):
+    """A piece of a tendon from point to point, straight or round a body; its length counts divided by `divisor`."""
+
+    start: Spot
+    end: Spot
+    body: Body | None
+    divisor: float = 1.0
 
 
 class Chain:
@@ -56,7 +64,7 @@ class Chain:
         ]
         self._order = {link.joint: index for index, link in enumerate(finger.links)}
         self._radii = radii
-        # The straight lines of every tendon: that of its span, if it has one, then those of its path.
+        # The lines of every tendon: that of its span, if it has one, then those of its path.
         self.lines = [self._lines_of(tendon) for tendon in finger.tendons]
 
     def poses(self) -> list[list[float]]:
@@ -82,14 +90,17 @@ class Chain:
                     ends = [list(q), list(q)]
                     ends[0][column] -= _STEP
                     ends[1][column] += _STEP
-                    before, after = (sum(self.distance(end, line) for line in lines) for end in ends)
+                    before, after = (sum(self.distance(end, line) / line.divisor for line in lines) for end in ends)
                     row[column] += (after - before) / (2 * _STEP)
             rows.append(row)
         return rows
 
-    def shortest(self, line: tuple[Spot, Spot]) -> tuple[float, list[float]]:
-        """The shortest length of a straight line over the range [m], and the joint angles of it [rad]."""
-        distance = partial(self.distance, line=line)
+    def shortest(self, line: Line) -> tuple[float, list[float]]:
+        """The shortest length of a line over the range [m], and the joint angles of it [rad]."""
+        return self.least(partial(self.distance, line=line))
+
+    def least(self, distance: Callable[[Sequence[float]], float]) -> tuple[float, list[float]]:
+        """The least value over the range of what is a length [m] or a distance, and the joint angles of it [rad]."""
         found = sorted((distance(q), q) for q in self.poses())
         length, q = found[0]
         if length > _SHORTENING * sum(each for each, _ in found) / len(found):
@@ -110,7 +121,7 @@ class Chain:
     def _length(self, number: int, q: Sequence[float]) -> float:
         """Length of a tendon [m]."""
         tendon = self.finger.tendons[number]
-        length = float(tendon.rest) + sum(self.distance(q, line) for line in self.lines[number])
+        length = float(tendon.rest) + sum(self.distance(q, line) / line.divisor for line in self.lines[number])
         for joint, arm in self._arms(tendon):
             column, factor, offset = self._angles[self._order[joint]]
             length += arm * (factor * q[column] + offset)
@@ -121,19 +132,36 @@ class Chain:
         signed = [(over[1:], math.copysign(self._radii[over[1:]], float(f"{over[0]}1"))) for over in tendon.over]
         return signed + [(joint, float(arm)) for joint, arm in tendon.arms.items()]
 
-    def distance(self, q: Sequence[float], line: tuple[Spot, Spot]) -> float:
-        """Length of a straight line [m]."""
-        start, end = (point(*self._frame(q, spot.link, spot.rotated), spot.at) for spot in line)
-        return math.dist(start, end)
+    def distance(self, q: Sequence[float], line: Line) -> float:
+        """Length of a line [m]."""
+        start, end = (self.place(q, spot) for spot in (line.start, line.end))
+        return math.dist(start, end) if line.body is None else line.body.length(*self.seen_by(line.body, q, line))
 
-    def _lines_of(self, tendon: Tendon) -> list[tuple[Spot, Spot]]:
+    def seen_by(self, body: Body, q: Sequence[float], line: Line) -> tuple[Vector, Vector]:
+        """Both ends of a line [m], in the frame of a body."""
+        axes, origin = self._frame(q, body.link, True)
+        first, last = (self.place(q, spot) for spot in (line.start, line.end))
+        return seen(axes, origin, first), seen(axes, origin, last)
+
+    def place(self, q: Sequence[float], spot: Spot) -> Vector:
+        """A point of the chain in base axes [m]."""
+        return point(*self._frame(q, spot.link, spot.rotated), spot.at)
+
+    def _lines_of(self, tendon: Tendon) -> list[Line]:
         """A span begins in the base frame and ends before a rotation; points of a path move with their links."""
         span, number = tendon.span, {PALM: -1, **self._order}
-        straight = []
+        lines = []
         if span:
-            straight.append((Spot(-1, True, _floats(span.from_)), Spot(number[span.joint], False, _floats(span.to))))
-        spots = [Spot(number[each.link], True, _floats(each.at)) for each in tendon.path]
-        return straight + list(pairwise(spots))
+            end = Spot(number[span.joint], False, _floats(span.to))
+            lines.append(Line(Spot(-1, True, _floats(span.from_)), end, None))
+        for run in tendon.runs:
+            first, last = (Spot(number[each.link], True, _floats(each.at)) for each in (run.start, run.end))
+            body = None
+            if run.body is not None:
+                axis, side = (None if each is None else _floats(each) for each in (run.body.axis, run.body.side))
+                body = Body(number[run.body.link], _floats(run.body.at), float(run.body.radius or 0), axis, side)
+            lines.append(Line(first, last, body, float(run.divisor or 1)))
+        return lines
 
     def _frame(self, q: Sequence[float], joint: int, rotated: bool) -> Frame:
         """The frame of a joint after its fixed turn, before or after its rotation; that of the base for joint -1."""
@@ -181,6 +209,12 @@ def point(axes: Axes, origin: Vector, local: Vector) -> Vector:
         origin[1] + x * a[1] + y * b[1] + z * c[1],
         origin[2] + x * a[2] + y * b[2] + z * c[2],
     )
+
+
+def seen(axes: Axes, origin: Vector, place: Vector) -> Vector:
+    """A point in base axes [m], in those of a frame."""
+    x, y, z = (sum(a * (p - o) for a, p, o in zip(axis, place, origin, strict=True)) for axis in axes)
+    return x, y, z
 
 
 def _rotated(axes: Axes, angle: float, about: int = 2) -> Axes:

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from awiwi_gen import extras
 from awiwi_gen.errors import InputError, printable
+
+if TYPE_CHECKING:
+    from awiwi_gen.interchange.draft import DraftHand
 
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for programs.")]
 Replace = Annotated[bool, typer.Option("--replace", help="Replace a file that exists.")]
@@ -42,7 +46,7 @@ def import_(
     text = hand_text(
         hand, " ".join(["awiwi-gen import", *(["--exact"] if exact else []), *(["--fit-wraps"] if fit else [])])
     )
-    faults = _faults(text, str(target))
+    faults = [_with_tendon(fault, hand) for fault in _faults(text, str(target))]
     write_whole(target, text, replace)
     joints = sum(len(each.links) - len(each.followed) for each in hand.fingers)
     tendons = sum(len(each.tendons) for each in hand.fingers)
@@ -115,6 +119,16 @@ def _named(options: list[str]) -> dict[str, str]:
             raise InputError(f"--finger {option}: expected NAME=BODY, each name once")
         found[name] = body
     return found
+
+
+def _with_tendon(fault: str, hand: DraftHand) -> str:
+    """A fault of a hand file, with the name that the model has for the tendon in it."""
+    place = re.search(r"fingers\.(\w+)\.tendons\[(\d+)\]", fault)
+    if place is None:
+        return fault
+    finger = next(each for each in hand.fingers if each.name == place[1])
+    name = finger.tendons[int(place[2])].name
+    return f"{fault}; it is the tendon {name}, which --without {name} leaves out"
 
 
 def _faults(text: str, name: str) -> list[str]:

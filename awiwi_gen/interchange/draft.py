@@ -12,7 +12,7 @@ from awiwi_gen.hand.parts import PALM
 from awiwi_gen.interchange.fingers import Chain, Segment, composite, find, palm_of, wrist_joints
 from awiwi_gen.interchange.frames import Axis, Frame, base_frame, link_frames
 from awiwi_gen.interchange.mimics import Followed, followed
-from awiwi_gen.interchange.model import Array, Joint, Loss, Model, Tendon
+from awiwi_gen.interchange.model import Array, Joint, Loss, Model, Place, Tendon
 from awiwi_gen.interchange.names import check_finger, finger_names, joint_names, prefix_of
 
 __all__ = ["DraftFinger", "DraftHand", "DraftLink", "DraftPalm", "DraftTendon", "draft"]
@@ -38,12 +38,12 @@ class DraftLink:
 
 @dataclass(frozen=True, eq=False)
 class DraftTendon:
-    """A tendon of the hand file; points of a path are in the frame of the link of that joint, or of the "palm"."""
+    """A tendon of the hand file; each place of a path is in the frame of the link of that joint, or of the "palm"."""
 
     name: str
     rest: float
     arms: dict[str, float]
-    path: tuple[tuple[str, Array], ...]
+    path: tuple[tuple[str, Place], ...]
     stiffness: float
     slack: float
 
@@ -255,7 +255,7 @@ def _routed(model: Model, chains: list[Chain], owner: Mapping[str, str]) -> tupl
     routed: dict[str, list[Tendon]] = {chain.name: [] for chain in chains}
     elsewhere, held = [], []
     for tendon in model.tendons:
-        ends = [owner.get(joint) for joint in tendon.arms] + [bodies.get(body) for body, _ in tendon.path]
+        ends = [owner.get(joint) for joint in tendon.arms] + [bodies.get(place.body) for place in tendon.path]
         fingers = sorted({name for name in ends if name})
         if len(fingers) > 1:
             message = f"runs over the fingers {' and '.join(fingers)}; a tendon of the hand file is of one finger"
@@ -265,7 +265,7 @@ def _routed(model: Model, chains: list[Chain], owner: Mapping[str, str]) -> tupl
             elsewhere.append(tendon.name)
             continue
         routed[fingers[0]].append(tendon)
-        far = [body for body, _ in tendon.path if body not in bodies and moving & set(model.above(body))]
+        far = [each.body for each in tendon.path if each.body not in bodies and moving & set(model.above(each.body))]
         if any(joint not in owner for joint in tendon.arms) or (far and moving & set(model.above(far[0]))):
             held.append(tendon.name)
     losses = [
@@ -287,9 +287,9 @@ def _tendon(
         else:
             rest += arm * reference[joint]
     path = []
-    for body, local in tendon.path:
-        axes, position = model.poses[body]
-        link = places.get(body)
+    for place in tendon.path:
+        axes, position = model.poses[place.body]
+        link = places.get(place.body)
         own_axes, origin = (link.frame.axes, link.frame.origin) if link else base
-        path.append((link.joint if link else "palm", own_axes.T @ (position + axes @ local - origin)))
+        path.append((link.joint if link else PALM, place.seen(axes.T @ own_axes, axes.T @ (origin - position))))
     return DraftTendon(tendon.name, rest, arms, tuple(path), tendon.stiffness, tendon.rest)

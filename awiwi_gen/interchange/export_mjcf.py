@@ -11,7 +11,7 @@ from xml.etree.ElementTree import Element, SubElement
 import numpy as np
 
 from awiwi_gen.hand import Finger, Hand
-from awiwi_gen.hand.parts import PALM, Tendon
+from awiwi_gen.hand.parts import PALM, PathPoint, Tendon
 from awiwi_gen.interchange.export import (
     Part,
     common_losses,
@@ -156,7 +156,12 @@ class _Writer:
         for number, points in enumerate(self._lines(tendon)):
             full = name if not written else f"{name}.line{number}"
             written.append(SubElement(self.sections["tendon"], "spatial", name=full))
-            for place, (link, at) in enumerate(points):
+            for place, (link, at, passed) in enumerate(points):
+                if passed is not None and passed.radius is not None:
+                    self._wrap(written[-1], f"{full}.geom{place}", passed)
+                    continue
+                if passed is not None and passed.divisor is not None:
+                    SubElement(written[-1], "pulley", divisor=text(float(passed.divisor)))
                 SubElement(self.bodies[link], "site", name=f"{full}.site{place}", pos=text(at))
                 SubElement(written[-1], "site", site=f"{full}.site{place}")
         if len(written) > 1:
@@ -166,16 +171,31 @@ class _Writer:
         for each in written:
             self._pull(each, tendon, alone=len(written) == 1)
 
-    def _lines(self, tendon: Tendon) -> list[list[tuple[str, Array]]]:
-        """The points of the span and of the path, each as (link, position in its frame)."""
-        found = []
+    def _wrap(self, tendon: Element, name: str, body: PathPoint) -> None:
+        """A geom that the tendon wraps round, and the site on its side."""
+        geom = SubElement(self.bodies[body.link], "geom", name=name, type=body.kind, pos=text(vector(body.at)),
+                          contype="0", conaffinity="0", mass="0")  # fmt: skip
+        size = [float(body.radius or 0)]
+        if body.axis is not None:
+            size.append(size[0])  # MuJoCo's cylinders have ends, which wraps do not know
+            geom.set("zaxis", text(vector(body.axis)))
+        geom.set("size", text(size))
+        step = SubElement(tendon, "geom", geom=name)
+        if body.side is not None:
+            SubElement(self.bodies[body.link], "site", name=f"{name}.side", pos=text(vector(body.side)))
+            step.set("sidesite", f"{name}.side")
+
+    def _lines(self, tendon: Tendon) -> list[list[tuple[str, Array, PathPoint | None]]]:
+        """What the span and the path pass, each as (link, position in its frame, entry of the path or None)."""
+        found: list[list[tuple[str, Array, PathPoint | None]]] = []
         if tendon.span is not None:
             order = [part.link.joint for part in self.parts]
             part = self.parts[order.index(tendon.span.joint)]
             fixed = part.position + part.axes @ vector(tendon.span.to)
-            found.append([(PALM, vector(tendon.span.from_)), (self._before(tendon.span.joint), fixed)])
+            before = self._before(tendon.span.joint)
+            found.append([(PALM, vector(tendon.span.from_), None), (before, fixed, None)])
         if tendon.path:
-            found.append([(point.link, vector(point.at)) for point in tendon.path])
+            found.append([(each.link, vector(each.at), each) for each in tendon.path])
         return found
 
     def _pull(self, element: Element, tendon: Tendon, alone: bool) -> None:

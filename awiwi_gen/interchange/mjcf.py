@@ -18,7 +18,7 @@ from awiwi_gen.errors import Fault, InputError
 from awiwi_gen.interchange.model import LEAST_MASS, Array, Body, Joint, Loss, Mimic, Model, Site, Tendon
 from awiwi_gen.interchange.quarter import quarter_angle, quarter_axis, quarter_rotation
 from awiwi_gen.interchange.urdf import require_tree
-from awiwi_gen.interchange.wraps import fitted
+from awiwi_gen.interchange.wraps import fitted, path_of
 
 KINDS = ("free", "ball", "slide", "hinge")
 _INCLUDE = re.compile(r'<include\s[^>]*?file\s*=\s*"([^"]+)"')
@@ -307,8 +307,9 @@ def _mimics(compiled: Any) -> tuple[Mimic, ...]:
 
 
 def _tendons(compiled: Any, driven: set[str], fit: bool) -> tuple[tuple[Tendon, ...], list[Loss]]:
-    found, wraps, fits, pushed, poly, both = [], [], [], [], [], []
-    joint_wrap, site_wrap = mujoco.mjtWrap.mjWRAP_JOINT, mujoco.mjtWrap.mjWRAP_SITE
+    found, fits, pushed, poly, both = [], [], [], [], []
+    losses: dict[str, list[str]] = {}
+    joint_wrap = mujoco.mjtWrap.mjWRAP_JOINT
     for index in range(compiled.ntendon):
         name = compiled.tendon(index).name or f"tendon{index}"
         first = int(compiled.tendon_adr[index])
@@ -327,18 +328,18 @@ def _tendons(compiled: Any, driven: set[str], fit: bool) -> tuple[tuple[Tendon, 
         if kinds == {int(joint_wrap)}:
             arms = {compiled.joint(int(compiled.wrap_objid[k])).name: float(compiled.wrap_prm[k]) for k in places}
             found.append(Tendon(name, arms=arms, **spring))
-        elif kinds == {int(site_wrap)}:
-            sites = [int(compiled.wrap_objid[k]) for k in places]
-            path = tuple((int(compiled.site_bodyid[s]), compiled.site_pos[s].copy()) for s in sites)
-            found.append(Tendon(name, path=path, **spring))
-        elif fit:
+        elif fit and kinds != {int(mujoco.mjtWrap.mjWRAP_SITE)}:
             tendon, error = fitted(compiled, Tendon(name, **spring), _mimics(compiled))
             found.append(tendon)
             fits.append(f"{name} by {error * 1e3:.2g} mm")
         else:
-            wraps.append(name)
-    losses = [
-        Loss("tendons that wrap around geoms or branch at pulleys: left out (--fit-wraps)", tuple(wraps)),
+            path, lost = path_of(compiled, places)
+            if path:
+                found.append(Tendon(name, path=path, **spring))
+            for what in lost:
+                losses.setdefault(what, []).append(name)
+    all_losses = [
+        *(Loss(what, tuple(names)) for what, names in losses.items()),
         Loss("wraps of tendons: constant arms fitted, lengths differ at most", tuple(fits)),
         Loss("springs of tendons that also push: the hand's springs only pull", tuple(pushed)),
         Loss("springs of tendons that a motor pulls: the hand's tendons have one or the other", tuple(both)),
@@ -356,4 +357,4 @@ def _tendons(compiled: Any, driven: set[str], fit: bool) -> tuple[tuple[Tendon, 
             ),
         ),
     ]
-    return tuple(found), [loss for loss in losses if loss.places]
+    return tuple(found), [loss for loss in all_losses if loss.places]

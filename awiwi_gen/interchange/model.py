@@ -9,12 +9,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["LEAST_MASS", "Array", "Body", "Joint", "Loss", "Mimic", "Model", "Site", "Tendon"]
+__all__ = ["LEAST_MASS", "Array", "Body", "Joint", "Loss", "Mimic", "Model", "Place", "Site", "Tendon"]
 
 Array = NDArray[np.float64]
 
@@ -60,9 +60,30 @@ class Joint:
     spring_reference: float = 0.0
 
 
+class Place(NamedTuple):
+    """What a tendon passes, in the frame of a body: a point `at` (3), or with a radius a sphere or cylinder to wrap round.
+
+    A cylinder has a unit vector `axis` (3). The tendon passes on the side of the point `side` (3), or by the shorter way.
+    A point with a `divisor` begins a branch behind a pulley.
+    """
+
+    body: int
+    at: Array
+    radius: float | None = None
+    axis: Array | None = None
+    side: Array | None = None
+    divisor: float | None = None
+
+    def seen(self, turn: Array, origin: Array) -> Place:
+        """The same in another frame: its axes (3 x 3) are the columns of `turn`, its `origin` (3) is in this frame."""
+        side = None if self.side is None else turn.T @ (self.side - origin)
+        axis = None if self.axis is None else turn.T @ self.axis
+        return self._replace(at=turn.T @ (self.at - origin), axis=axis, side=side)
+
+
 @dataclass(frozen=True, eq=False)
 class Tendon:
-    """A tendon: either `arms`, length per angle by joint, or a `path` through points (body, position in its frame).
+    """A tendon: either `arms`, length per angle by joint, or a `path` from place to place.
 
     Its length also has a `constant` part [m]. An elastic string has a `stiffness` [N/m] and no force where it is as long
     as `rest`.
@@ -70,7 +91,7 @@ class Tendon:
 
     name: str
     arms: dict[str, float] = field(default_factory=dict)
-    path: tuple[tuple[int, Array], ...] = ()
+    path: tuple[Place, ...] = ()
     stiffness: float = 0.0
     rest: float = 0.0
     constant: float = 0.0

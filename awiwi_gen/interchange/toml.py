@@ -11,7 +11,7 @@ from awiwi_gen.interchange.draft import DraftFinger, DraftHand, DraftLink, Draft
 from awiwi_gen.interchange.frames import rpy_of
 from awiwi_gen.interchange.loss import loss_lines
 from awiwi_gen.interchange.mimics import Followed
-from awiwi_gen.interchange.model import Array
+from awiwi_gen.interchange.model import Array, Place
 
 NOISE = 2e-15
 """What rounding leaves of a number, relative to the largest in its vector."""
@@ -135,12 +135,25 @@ def _tendon_lines(tendon: DraftTendon, file: str) -> list[str]:
         lines += [f"arms = {{ {arms} }}"]
     if tendon.path:
         lines += ["path = ["]
-        lines += [f'    {{ link = "{link}", at = {_lengths(at)} }},' for link, at in tendon.path]
+        lines += [f"    {_place(link, place)}," for link, place in tendon.path]
         lines += ["]"]
     if tendon.stiffness:
         stiffness, rest = quantity(tendon.stiffness, "N/m"), length(tendon.slack)
         lines += [f'spring = {{ stiffness = "{stiffness}", rest = "{rest}" }}']
     return [*lines, f"source = {_text(cite(f'{file} tendon {tendon.name}'))}"]
+
+
+def _place(link: str, place: Place) -> str:
+    keys = {"link": _text(link), "at": _lengths(place.at)}
+    if place.radius is not None:
+        keys["radius"] = _text(length(place.radius))
+    if place.axis is not None:
+        keys["axis"] = _listed(quantity(each, "").rstrip() for each in tidy(place.axis, 1.0))
+    if place.side is not None:
+        keys["side"] = _lengths(place.side)
+    if place.divisor is not None:
+        keys["divisor"] = _text(quantity(place.divisor, "").rstrip())
+    return f"{{ {', '.join(f'{key} = {value}' for key, value in keys.items())} }}"
 
 
 def _sources(special: dict[str, str], default: str) -> str:

@@ -1,18 +1,73 @@
-"""Tendons that wrap around geoms, as constant moment arms: fitted to MuJoCo's lengths over the joints' range."""
+"""Paths of MuJoCo's tendons: sites and the geoms between them, or constant moment arms that are fitted instead.
+
+The arms are fitted to MuJoCo's lengths over the joints' range.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import Any
 
 import mujoco
 import numpy as np
 
-from awiwi_gen.interchange.model import Array, Mimic, Tendon
+from awiwi_gen.interchange.model import Array, Mimic, Place, Tendon
 
 _STATES = 400
 _LEAST_ARM = 1e-6  # m; what MuJoCo's solver of wraps leaves of a joint that the tendon does not cross
+
+
+def path_of(compiled: Any, places: Iterable[int]) -> tuple[tuple[Place, ...], list[str]]:
+    """The path of the tendon at these places of MuJoCo's list, empty if a hand file cannot hold it, and what is lost."""
+    site = mujoco.mjtWrap.mjWRAP_SITE
+    path: list[Place] = []
+    lost: list[str] = []
+    divisor = None
+    for k in places:
+        target = int(compiled.wrap_objid[k])
+        if compiled.wrap_type[k] == mujoco.mjtWrap.mjWRAP_PULLEY:
+            divisor = float(compiled.wrap_prm[k])
+            continue
+        if compiled.wrap_type[k] == site:
+            body = Place(int(compiled.site_bodyid[target]), compiled.site_pos[target].copy(), divisor=divisor)
+            path.append(body)
+            divisor = None
+            continue
+        body, side = _body(compiled, target), int(compiled.wrap_prm[k])
+        if side >= 0:
+            if compiled.site_bodyid[side] != body.body:
+                return (), ["tendons whose side site is on another body than the geom: left out (--fit-wraps)"]
+            body = body._replace(side=compiled.site_pos[side].copy())
+            if np.linalg.norm(compiled.site_pos[side] - body.at) < (body.radius or 0):
+                return (), ["tendons that wrap round the inside of a geom: left out (--fit-wraps)"]
+        ends = [int(compiled.wrap_objid[i]) for i in (k - 1, k + 1)]
+        if any(_inside(body, int(compiled.site_bodyid[i]), compiled.site_pos[i]) for i in ends):
+            lost.append("wraps with a site inside the geom: straight there, as in MuJoCo")
+        else:
+            path.append(body)
+    return tuple(path), list(dict.fromkeys(lost))
+
+
+def _body(compiled: Any, geom: int) -> Place:
+    """The sphere or cylinder of a geom."""
+    axis = None
+    if compiled.geom_type[geom] == mujoco.mjtGeom.mjGEOM_CYLINDER:
+        matrix = np.zeros(9)
+        mujoco.mju_quat2Mat(matrix, compiled.geom_quat[geom])
+        axis = matrix.reshape(3, 3)[:, 2].copy()
+    body, radius = int(compiled.geom_bodyid[geom]), float(compiled.geom_size[geom, 0])
+    return Place(body, compiled.geom_pos[geom].copy(), radius, axis)
+
+
+def _inside(round_: Place, body: int, at: Array) -> bool:
+    """Whether a site of the geom's own body is inside the geom, so that the tendon never wraps."""
+    if body != round_.body:
+        return False
+    away = at - round_.at
+    if round_.axis is not None:
+        away = away - round_.axis * (round_.axis @ away)
+    return bool(np.linalg.norm(away) < (round_.radius or 0.0))
 
 
 def fitted(compiled: Any, tendon: Tendon, mimics: tuple[Mimic, ...]) -> tuple[Tendon, float]:

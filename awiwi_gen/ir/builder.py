@@ -185,6 +185,10 @@ class Builder:
             return refs[0]
         return self._intern((operation, *refs))
 
+    def sign(self, ref: Ref) -> Ref:
+        """1 or -1; not a number at zero."""
+        return self.div(ref, self.call("fabs", ref))
+
     def make(self, operation: str, refs: Sequence[Ref]) -> Ref:
         """Any operation by name: what a pass uses to rebuild a node."""
         if operation == "add":

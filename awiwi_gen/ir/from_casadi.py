@@ -56,6 +56,7 @@ def _rules(builder: Builder) -> dict[int, Callable[..., Ref]]:
         ca.OP_INV: builder.inv,
         ca.OP_SQ: lambda a: builder.mul((a, a)),
         ca.OP_TWICE: lambda a: builder.add((a, a)),
+        ca.OP_SIGN: builder.sign,
         ca.OP_ATAN2: lambda a, b: builder.call("atan2", a, b),
         ca.OP_HYPOT: lambda a, b: builder.call("sqrt", builder.add((builder.mul((a, a)), builder.mul((b, b))))),
     }

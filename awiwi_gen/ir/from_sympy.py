@@ -45,6 +45,8 @@ def lower_sympy(builder: Builder, expressions: Iterable[sympy.Expr], leaves: Map
             return builder.mul([lower(a) for a in expression.args])
         if expression.is_Pow:
             return power(lower(expression.base), expression.exp)
+        if expression.func is sympy.sign:
+            return builder.sign(lower(expression.args[0]))
         name = FUNCTIONS.get(expression.func)
         if name is None:
             raise TypeError(f"no C for {expression.func.__name__} in {expression}")

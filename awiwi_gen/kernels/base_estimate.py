@@ -49,6 +49,8 @@ def base_of(finger: Finger) -> Base:
     leaders = [finger.leaders.get(joint, joint) for joint in order[: max(ends, default=0)]]
     joints = tuple(i for i, joint in enumerate(finger.joints) if joint in leaders)
     others = set().union(*(moved(finger, finger.pulled[i]) for i in spans)) - set(leaders)
+    if any(run.body for tendon in finger.pulled for run in tendon.runs):
+        return Base((), ())  # the slopes of wraps do not bound the gradient's steps
     return Base(spans, joints) if not others and len(joints) <= len(spans) else Base((), ())
 
 

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any
 
 from awiwi_gen.hand import Hand
 from awiwi_gen.hand.lever import Lever
 from awiwi_gen.hand.parts import Finger, PathPoint, Tendon
-from awiwi_gen.kernel import Kernel, Port, Solver
+from awiwi_gen.kernel import STOP, Kernel, Port, Solver
 from awiwi_gen.kernels.declare import Family, within
-from awiwi_gen.kernels.routing import groups, moved
-from awiwi_gen.structure import link_number, rolls
+from awiwi_gen.kernels.routing import groups, moved, wraps_hold
+from awiwi_gen.structure import link_number, rolls, wraps
 from awiwi_gen.units import J, N, Unit, kg, m, one, rad, s
 
 
@@ -39,10 +38,18 @@ def finger_kernels(hand: Hand, name: str, finger: Finger) -> list[Kernel]:
 
 
 def guarded(finger: Finger, kernels: list[Kernel]) -> list[Kernel]:
-    """The kernels of a finger; those that depend on where the links are return a status if it has four-bars."""
+    """The kernels of a finger; they return a status if they depend on four-bars, or on tendons round bodies."""
     loops = tuple(f"the four-bar of {link.joint} closes" for link in finger.links if link.four_bar)
+    held = wraps_hold(finger)
     kernels = [kernel for kernel in kernels if kernel.family != "return_torque" or finger.strings]
-    return [within(k, "domain", "loops_close", loops) if loops and moves_the_chain(k) else k for k in kernels]
+    kernels = [within(k, "domain", "loops_close", loops) if loops and moves_the_chain(k) else k for k in kernels]
+    return [within(k, "domain", "wraps_hold", held) if held and moves_tendons(k) else k for k in kernels]
+
+
+def moves_tendons(kernel: Kernel) -> bool:
+    """Whether a kernel depends on the paths of tendons."""
+    rooms = (".tendons", ".joint_estimate")
+    return "q" in kernel.inputs and any(route.module.endswith(rooms) for route in kernel.routes.values())
 
 
 def moves_the_chain(kernel: Kernel) -> bool:
@@ -100,7 +107,7 @@ def limit_paths(finger: Finger) -> dict[str, tuple[str, ...]]:
 
 
 def length_range(finger: Finger, tendon: Tendon) -> tuple[float, float]:
-    """Bounds of a tendon's length over all poses [m]: joints at their limits, straight lines from zero to their longest."""
+    """Bounds of a tendon's length over all poses [m]: joints at their limits, lines from zero to their longest."""
     rest, reach = float(tendon.rest), 0.0
     limits = dict(zip(finger.joints, zip(*joint_limits(finger), strict=True), strict=True))
 
@@ -116,7 +123,14 @@ def length_range(finger: Finger, tendon: Tendon) -> tuple[float, float]:
         else:
             reach += float(finger.radii[joint]) * farthest(joint)
     reach += sum(abs(float(arm)) * farthest(joint) for joint, arm in tendon.arms.items())
-    low, high = rest - reach, rest + reach + sum(longest(finger, a, b) for a, b in pairwise(tendon.path))
+    low, high = rest - reach, rest + reach
+    for run in tendon.runs:
+        if run.body is None:
+            most = longest(finger, run.start, run.end)
+        else:
+            most = longest(finger, run.start, run.body) + longest(finger, run.body, run.end)
+            most += 2 * math.pi * float(run.body.radius or 0)
+        high += most / float(run.divisor or 1)
     if tendon.span is None:
         return low, high
     points = (tendon.span.from_, tendon.span.to, *(link.offset for link in finger.links))
@@ -343,6 +357,9 @@ def nonlinear_estimate(finger: Finger, iterations: int = 24) -> Solver | None:
         iterations=1 + curved * (iterations - 1),
         tolerance={"f64": 1e-12, "f32": 1e-5},
         limits=limit_paths(finger),
+        stop=STOP | {"f64": "1e-13"}
+        if wraps(finger)
+        else STOP,  # steps get shorter more slowly where lengths bend more
     )
 
 

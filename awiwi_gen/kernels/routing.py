@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
-from itertools import pairwise
 
 from awiwi_gen.hand import Finger
 from awiwi_gen.hand.parts import Tendon
-from awiwi_gen.structure import link_number, rolls
+from awiwi_gen.structure import link_number, loose_ends, rolls, wraps
 
 
 def senses(finger: Finger, tendon: Tendon) -> Counter[str]:
@@ -22,9 +21,9 @@ def moved(finger: Finger, tendon: Tendon) -> set[str]:
     """The independent joints that a tendon pulls."""
     order = [link.joint for link in finger.links]
     between = order[: order.index(tendon.span.joint)] if tendon.span else []
-    for ends in pairwise(tendon.path):
-        first, last = sorted(link_number(finger, point.link) for point in ends)
-        between += order[first + 1 : last + 1]
+    for run in tendon.runs:
+        touched = [link_number(finger, each.link) for each in (run.start, run.body, run.end) if each is not None]
+        between += order[min(touched) + 1 : max(touched) + 1]
     return {finger.leaders.get(joint, joint) for joint in (*between, *tendon.arms, *geared(finger, tendon))} | set(
         senses(finger, tendon)
     )
@@ -45,3 +44,13 @@ def groups(finger: Finger) -> list[list[int]]:
 def geared(finger: Finger, tendon: Tendon) -> list[str]:
     """The joints under a tendon that follow others by a ratio or with an offset, not by rolling on pulleys."""
     return [over[1:] for over in tendon.over if over[1:] in finger.leaders and not rolls(finger, over[1:])]
+
+
+def wraps_hold(finger: Finger, owner: str = "") -> tuple[str, ...]:
+    """The conditions under which tendons wrap round bodies as they do in the middle of the joints' ranges."""
+    found = []
+    for number, run in wraps(finger):
+        body = f"path[{run.between}] of {owner}tendons[{number}]"
+        found += [f"path[{index}] is outside {body}" for index in loose_ends(run)]
+        found.append(f"the string passes {body} on the side where it does at the middle of the joints' ranges")
+    return tuple(found)

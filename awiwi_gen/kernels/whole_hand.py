@@ -14,6 +14,7 @@ from awiwi_gen.hand import Hand
 from awiwi_gen.kernel import Kernel, Port
 from awiwi_gen.kernels.declare import Family
 from awiwi_gen.kernels.fingers import Size, input_ports
+from awiwi_gen.kernels.routing import wraps_hold
 from awiwi_gen.kernels.wrist import BARS_CLOSE, wrist_ports
 from awiwi_gen.units import N, m, rad
 
@@ -29,7 +30,8 @@ def hand_kernels(hand: Hand) -> list[Kernel]:
         ports["wrist"] = joined([*wrist_ports(hand.wrist).values()])
     whole = Size(ports["q"].size, ports["f"].size, sum(size.links for size in sizes.values()))
     kernels = of_hand.kernels("hand", hand, "", hand.structure(), ports, whole)
-    return kernels if hand.wrist else [replace(kernel, guards=()) for kernel in kernels]
+    wraps = tuple(each for name, finger in hand.fingers.items() for each in wraps_hold(finger, f"{name}."))
+    return [replace(kernel, guards=(kernel.guards if hand.wrist else ()) + wraps) for kernel in kernels]
 
 
 def joined(ports: list[Port]) -> Port:

@@ -5,7 +5,8 @@ from typing import Any
 import casadi as ca
 from casadi import SX
 
-from awiwi_gen.structure import coordinates, leaders, motion
+from awiwi_gen.structure import coordinates, leaders, loose_ends, middle, motion, wraps
+from awiwi_gen.witnesses.wraps import Wrap
 
 
 def loops_close(finger: Any, q: SX, *_: SX) -> list[SX]:
@@ -22,6 +23,17 @@ def loops_close(finger: Any, q: SX, *_: SX) -> list[SX]:
             squared = (bar.ground - end[0]) ** 2 + end[1] ** 2
             longest, shortest = (bar.coupler + bar.rocker) ** 2, (bar.coupler - bar.rocker) ** 2
             guards.append((longest - squared) * (squared - shortest) / (2 * bar.coupler * bar.rocker) ** 2)
+    return guards
+
+
+def wraps_hold(finger: Any, q: SX, *_: SX) -> list[SX]:
+    """For every body that a tendon wraps round, that points stay outside it, and the side that of the joints' middles."""
+    guards, still = [], ca.vertcat(*middle(finger))
+    for _number, run in wraps(finger):
+        wrap = Wrap.of(finger, run, q)
+        ends = {run.first: wrap.distances[0], run.last: wrap.distances[1]}
+        guards += [(ends[index] / wrap.radius - 1) * (ends[index] / wrap.radius + 1) for index in loose_ends(run)]
+        guards.append(wrap.same_side(Wrap.of(finger, run, still)))
     return guards
 
 

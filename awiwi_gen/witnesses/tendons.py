@@ -1,12 +1,11 @@
 """Tendons of a finger by automatic differentiation: torques and stiffnesses are derivatives of an energy.
 
 The lengths are written down, with points of straight lines from the recursion along the chain. The coupling of a path
-from point to point needs no derivative: a tight string pulls its ends by unit forces, whose moments about the joints'
-axes are its arms.
+from point to point needs no derivative: a tight string pulls its ends by unit forces, and presses on the bodies that it
+wraps round; the moments of these forces about the joints' axes are its arms.
 """
 
 from collections.abc import Iterable, Iterator
-from itertools import pairwise
 from typing import Any
 
 import casadi as ca
@@ -14,6 +13,7 @@ from casadi import SX
 
 from awiwi_gen.structure import Finger, coordinates, leaders, link_number, motion, radius, rolls, sense
 from awiwi_gen.witnesses.kinematics import point_before_joint, point_of_link
+from awiwi_gen.witnesses.wraps import Wrap
 
 Tendon = Any
 
@@ -47,7 +47,8 @@ def _lengths(finger: Finger, tendons: Iterable[Tendon], q: SX, paths: bool = Tru
             end = point_before_joint(finger, q, tendon.span.joint, ca.vertcat(*tendon.span.to))
             length += ca.norm_2(end - ca.vertcat(*tendon.span.from_))
         if paths:
-            length += sum(ca.norm_2(line) for line, _ in _lines(finger, tendon, q))
+            length += sum(run.counted(ca.norm_2(line)) for run, line, _ in _lines(finger, tendon, q))
+            length += sum(run.counted(wrap.length()) for run, wrap in _wraps(finger, tendon, q))
         lengths.append(length)
     return lengths
 
@@ -72,25 +73,36 @@ def return_torque(finger: Finger, q: SX) -> tuple[SX, SX]:
     return ca.densify(tau), ca.dot(stiffness, stretch**2) / 2
 
 
-def _lines(finger: Finger, tendon: Tendon, q: SX) -> Iterator[tuple[SX, SX]]:
-    """The straight lines of a path: the vector (3) [m] from a point to the next one, and its rates (3 x n) [m/rad]."""
-    for ends in pairwise(tendon.path):
-        one, other = (link_number(finger, point.link) for point in ends)
-        start, end = (ca.vertcat(*point.at) for point in ends)
+def _lines(finger: Finger, tendon: Tendon, q: SX) -> Iterator[tuple[Any, SX, SX]]:
+    """The straight runs of a path: the vector (3) [m] from a point to the next one, and its rates (3 x n) [m/rad]."""
+    for run in tendon.runs:
+        if run.body is not None:
+            continue
+        one, other = (link_number(finger, point.link) for point in (run.start, run.end))
+        start, end = (ca.vertcat(*point.at) for point in (run.start, run.end))
         if one == other:
-            yield end - start, SX.zeros(3, q.numel())
+            yield run, end - start, SX.zeros(3, q.numel())
         else:
             (start, start_rates), (end, end_rates) = (
                 point_of_link(finger, q, link, at) for link, at in ((one, start), (other, end))
             )
-            yield end - start, end_rates - start_rates
+            yield run, end - start, end_rates - start_rates
+
+
+def _wraps(finger: Finger, tendon: Tendon, q: SX) -> Iterator[tuple[Any, Wrap]]:
+    """The runs of a path round bodies."""
+    for run in tendon.runs:
+        if run.body is not None:
+            yield run, Wrap.of(finger, run, q)
 
 
 def _arms(finger: Finger, tendon: Tendon, q: SX) -> SX:
     """Arms (1 x n) [m/rad] of a tendon's path: moments of the unit vectors along its lines about the joints' axes."""
     arms = SX.zeros(1, q.numel())
-    for line, rates in _lines(finger, tendon, q):
-        arms += (line / ca.norm_2(line)).T @ rates
+    for run, line, rates in _lines(finger, tendon, q):
+        arms += run.counted((line / ca.norm_2(line)).T @ rates)
+    for run, wrap in _wraps(finger, tendon, q):
+        arms += run.counted(wrap.arms())
     return arms
 
 

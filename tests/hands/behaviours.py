@@ -97,6 +97,34 @@ def a_mimic_joint_is_a_soft_equality() -> bool:
     return bool(model.neq == 1 and model.nv == 2)
 
 
+def _wrapped(cylinder: str, first: str, last: str, side: str) -> float:
+    """Length of a tendon from a site to another, round a cylinder of radius 1 along z."""
+    model, data = _compiled(
+        f'<geom name="g" type="cylinder" size="{cylinder}"/><site name="s" pos="{side}"/>'
+        f'<site name="a" pos="{first}"/><site name="b" pos="{last}"/>',
+        '<tendon><spatial><site site="a"/><geom geom="g" sidesite="s"/><site site="b"/></spatial></tendon>',
+    )
+    mujoco.mj_forward(model, data)
+    return float(data.ten_length[0])
+
+
+def a_tendon_is_straight_through_a_geom_that_a_site_is_inside() -> bool:
+    return _wrapped("1 1", "-2 0 0", "0.9 0 0", "0 2 0") == 2.9 and _wrapped("1 1", "-2 0 0", "1.1 0 0", "0 2 0") > 3.5
+
+
+def a_tendon_wraps_round_a_cylinder_beyond_its_ends() -> bool:
+    return _wrapped("1 1", "-2 0 50", "2 0 50", "0 2 50") == _wrapped("1 1", "-2 0 0", "2 0 0", "0 2 0") > 4.5
+
+
+def a_side_site_near_the_axis_and_far_along_it_is_outside() -> bool:
+    return (
+        _wrapped("1 1", "-2 0.1 0", "2 0.1 0", "0 0.5 0")
+        < 4.1
+        < 4.4
+        < _wrapped("1 1", "-2 0.1 0", "2 0.1 0", "0 0.5 2")
+    )
+
+
 BEHAVIOURS: tuple[Callable[[], bool], ...] = (
     stiffness_polynomials_are_not_odd_and_damping_polynomials_are,
     ranges_of_tendons_and_controls_stay_in_degrees,
@@ -105,6 +133,9 @@ BEHAVIOURS: tuple[Callable[[], bool], ...] = (
     the_force_range_of_a_tendon_limits_the_sum_before_the_gear,
     damping_of_a_tendon_diverges_with_euler_and_not_with_implicitfast,
     a_mimic_joint_is_a_soft_equality,
+    a_tendon_is_straight_through_a_geom_that_a_site_is_inside,
+    a_tendon_wraps_round_a_cylinder_beyond_its_ends,
+    a_side_site_near_the_axis_and_far_along_it_is_outside,
 )
 
 

@@ -64,9 +64,17 @@ def worst_differences(compiled: Any, draft: DraftHand, hand: Hand, finger: str, 
             compare("link_poses", mine[known], theirs[known])
         if hand.fingers[finger].pulled:
             pulled = [number for number, tendon in enumerate(hand.fingers[finger].tendons) if tendon.spring is None]
-            compare("tendon_lengths", library[f"{finger}_tendon_lengths"](q), simulated.lengths()[pulled])
-            compare("coupling", library[f"{finger}_coupling"](q), simulated.arms()[pulled])
+            h, arms = library[f"{finger}_tendon_lengths"](q), library[f"{finger}_coupling"](q)
+            compare("tendon_lengths", within_domain(h, "h"), simulated.lengths()[pulled])
+            compare("coupling", within_domain(arms, "P"), simulated.arms()[pulled])
     return worst.found
+
+
+def within_domain(result: Any, port: str) -> np.ndarray:
+    """An output of a kernel; infinite where it has a status that is not zero, as those of tendons round bodies have."""
+    if not hasattr(result, "status"):
+        return np.asarray(result)
+    return np.asarray(getattr(result, port)) if result.status == 0 else np.array(np.inf)
 
 
 class Worst:
