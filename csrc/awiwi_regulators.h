@@ -12,8 +12,9 @@ enum { AWIWI_MOST_STATES = 4 };
 
 /* Gains K[n] of u = -K x for dx/dt = A x + b u that minimise the integral of x'Q x + R u^2, and the least cost x'S x:
    S is the stabilising solution of S A + A'S - S b b'S/R + Q = 0. Arrays are row by row, n is at most
-   AWIWI_MOST_STATES, only the symmetric part of Q counts. Doubles at most `iterations` times from each of at most 3
-   starts, and refines each at most 12 times in double the precision.
+   AWIWI_MOST_STATES, only the symmetric part of Q counts. Starts from poles that a polynomial tells, if there are four
+   states, then from at most `iterations` doublings in each of at most 3 units of time; refines each start at most 12
+   times in double the precision.
    `residual` is the largest entry of the left side for the returned S, evaluated in double the precision, relative to
    the largest sum of magnitudes of its terms, both in the solver's balanced coordinates. Returns
    AWIWI_OK             the loop A - b K is stable and K is the optimum's but for its last digit;

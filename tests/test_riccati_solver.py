@@ -29,7 +29,7 @@ def compiled(directory, dtype, command, flags):
     """The solver as a C function, in a precision."""
     write_headers(directory, Options("f64" if dtype is np.float64 else "f32"))
     target = directory / f"{dtype.__name__}.so"
-    sources = [str(CSRC / f"{name}.c") for name in ("riccati", "poles", "dense")]
+    sources = [str(CSRC / f"{name}.c") for name in ("riccati", "doubling", "poles", "dense")]
     words = [*command, *flags, f"-I{directory}", f"-I{CSRC}", "-shared", *sources, "-lm", "-o", str(target)]
     subprocess.run(words, check=True)
     return ctypes.CDLL(str(target)).awiwi_riccati
