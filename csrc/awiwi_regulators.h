@@ -39,6 +39,12 @@ typedef struct awiwi_joint {
 int awiwi_joint_gains(const awiwi_joint *joint, const awiwi_real *state_cost, awiwi_real input_cost,
                       const awiwi_real *last, int iterations, awiwi_real *gains);
 
+/* Gains (K_p, K_d, K_3, K_4) of the impedance law that amount to feedback[4] of a joint whose spring's torque is
+   cancelled, all numbers positive: plant (m, b, k), weights (C_t, C_s). At most 10 steps of Newton's method in one unknown
+   from start[4], whose order of roots is kept. Returns 0 unless it converged; gains may have any sign. */
+int awiwi_law_gains(const awiwi_real *feedback, const awiwi_real *plant, const awiwi_real *weights,
+                    const awiwi_real *start, awiwi_real *gains);
+
 /* Returns the status, or AWIWI_NOT_FINITE after setting torques[count] to zero if one of them is not finite. */
 int awiwi_refuse(int status, awiwi_real *torques, int count);
 

@@ -22,6 +22,7 @@ typedef struct sums {
 static void add_up(const awiwi_problem *p, const awiwi_part *b, const awiwi_real *measured, const values *v, sums *s)
 {
     awiwi_real total = 0, terms = 0;
+    vector slope;
     for (int j = 0; j < b->unknowns; j++) {
         s->gradient[j] = 0;
         for (int k = 0; k <= j; k++)
@@ -34,10 +35,10 @@ static void add_up(const awiwi_problem *p, const awiwi_part *b, const awiwi_real
         total += residual * residual;
         terms += awiwi_size(residual) * (awiwi_size(v->h[e]) + awiwi_size(measured[e]));
         for (int j = 0; j < b->unknowns; j++) {
-            const awiwi_real slope = row[b->unknown[j]];
-            s->gradient[j] += slope * residual;
+            slope[j] = row[b->unknown[j]];
+            s->gradient[j] += slope[j] * residual;
             for (int k = 0; k <= j; k++)
-                s->normal[j][k] += slope * row[b->unknown[k]];
+                s->normal[j][k] += slope[j] * slope[k];
         }
     }
     s->blur = 4 * AWIWI_REAL_EPSILON * terms;
