@@ -32,7 +32,7 @@ typedef struct awiwi_joint {
     awiwi_real link, motor, spring, link_friction, motor_friction;
 } awiwi_joint;
 
-/* The same for that joint and Q = diag(state_cost[4]), state (q, dq/dt, theta, dtheta/dt), at a fortieth of the work.
+/* The same for that joint and Q = diag(state_cost[4]), state (q, dq/dt, theta, dtheta/dt), at a fraction of the work.
    `last` are gains to start from; from any finite gains at most `iterations` steps converge. Unless AWIWI_OK is
    returned, the gains are `last`, or zero if those are not finite. AWIWI_OUT_OF_DOMAIN: a parameter has the wrong sign;
    AWIWI_NOT_CONVERGED: the precision does not suffice. */
