@@ -9,20 +9,17 @@
 /* The C library's functions in the scalar type of the build. */
 #if AWIWI_REAL_BITS == 64
 #define awiwi_sqrt sqrt
+#define awiwi_size fabs
 #define awiwi_fmax fmax
 #define awiwi_frexp frexp
 #define awiwi_ldexp ldexp
 #else
 #define awiwi_sqrt sqrtf
+#define awiwi_size fabsf
 #define awiwi_fmax fmaxf
 #define awiwi_frexp frexpf
 #define awiwi_ldexp ldexpf
 #endif
-
-static inline awiwi_real awiwi_size(awiwi_real x)
-{
-    return x < 0 ? -x : x;
-}
 
 static inline awiwi_real awiwi_clamp(awiwi_real x, awiwi_real low, awiwi_real high)
 {
