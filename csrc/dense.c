@@ -2,14 +2,6 @@
 #include "numerics.h"
 #include "dense.h"
 
-awiwi_real awiwi_dot(const awiwi_real *a, const awiwi_real *b, int n)
-{
-    awiwi_real sum = 0;
-    for (int i = 0; i < n; i++)
-        sum += a[i] * b[i];
-    return sum;
-}
-
 awiwi_real awiwi_largest(const awiwi_real *x, int n)
 {
     awiwi_real found = 0;

@@ -35,7 +35,13 @@ static inline int awiwi_ends_with(awiwi_real length, awiwi_real last, awiwi_real
 }
 
 /* a'b of n numbers, summed from the first on. */
-awiwi_real awiwi_dot(const awiwi_real *a, const awiwi_real *b, int n);
+static inline awiwi_real awiwi_dot(const awiwi_real *a, const awiwi_real *b, int n)
+{
+    awiwi_real sum = 0;
+    for (int i = 0; i < n; i++)
+        sum += a[i] * b[i];
+    return sum;
+}
 
 /* The largest magnitude among x[n]; not finite if one of them is not. */
 awiwi_real awiwi_largest(const awiwi_real *x, int n);

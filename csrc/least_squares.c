@@ -21,25 +21,22 @@ typedef struct sums {
 
 static void add_up(const awiwi_problem *p, const awiwi_part *b, const awiwi_real *measured, const values *v, sums *s)
 {
-    awiwi_real total = 0, terms = 0;
-    vector slope;
-    for (int j = 0; j < b->unknowns; j++) {
-        s->gradient[j] = 0;
-        for (int k = 0; k <= j; k++)
-            s->normal[j][k] = 0;
-    }
-    for (int i = 0; i < b->equations; i++) {
+    const int equations = b->equations;
+    awiwi_real total = 0, terms = 0, residual[AWIWI_MOST_EQUATIONS];
+    awiwi_real slope[AWIWI_MOST_UNKNOWNS][AWIWI_MOST_EQUATIONS];
+    for (int i = 0; i < equations; i++) {
         const int e = b->equation[i];
-        const awiwi_real residual = v->h[e] - measured[e];
         const awiwi_real *row = v->P + e * p->unknowns;
-        total += residual * residual;
-        terms += awiwi_size(residual) * (awiwi_size(v->h[e]) + awiwi_size(measured[e]));
-        for (int j = 0; j < b->unknowns; j++) {
-            slope[j] = row[b->unknown[j]];
-            s->gradient[j] += slope[j] * residual;
-            for (int k = 0; k <= j; k++)
-                s->normal[j][k] += slope[j] * slope[k];
-        }
+        residual[i] = v->h[e] - measured[e];
+        total += residual[i] * residual[i];
+        terms += awiwi_size(residual[i]) * (awiwi_size(v->h[e]) + awiwi_size(measured[e]));
+        for (int j = 0; j < b->unknowns; j++)
+            slope[j][i] = row[b->unknown[j]];
+    }
+    for (int j = 0; j < b->unknowns; j++) {
+        s->gradient[j] = awiwi_dot(slope[j], residual, equations);
+        for (int k = 0; k <= j; k++)
+            s->normal[j][k] = awiwi_dot(slope[j], slope[k], equations);
     }
     s->blur = 4 * AWIWI_REAL_EPSILON * terms;
     s->cost = total / 2;
@@ -104,15 +101,15 @@ static int descend(const awiwi_problem *p, const awiwi_part *b, const awiwi_real
     int now = 0; /* which of the two belongs to q; the other is that of the trial */
     values last = *begun, there;
     vector step, trial;
-    awiwi_real damping = 0;
+    awiwi_real damping = 0, last_length = AWIWI_REAL_MAX;
     add_up(p, b, measured, &last, &two[now]);
     if (!(two[now].cost <= AWIWI_REAL_MAX))
         return AWIWI_NOT_FINITE;
     for (int i = 1; i < iterations; i++) {
         sums *here = &two[now];
         int held[AWIWI_MOST_UNKNOWNS];
-        awiwi_real longest = 0;
-        int free = b->linear && !(damping > 0); /* whether the first step ends at the minimum */
+        awiwi_real longest = 0, left = here->cost; /* of the cost after the step, but for curvature */
+        int free = !(damping > 0); /* whether the step is that of Gauss and Newton, within the box */
         for (int j = 0; j < b->unknowns; j++) { /* at a limit and pushed against it */
             const int u = b->unknown[j];
             held[j] = (q[u] <= p->low[u] && here->gradient[j] >= 0) || (q[u] >= p->high[u] && here->gradient[j] <= 0);
@@ -127,11 +124,15 @@ static int descend(const awiwi_problem *p, const awiwi_part *b, const awiwi_real
             trial[u] = awiwi_clamp(aim, p->low[u], p->high[u]);
             free = free && aim >= p->low[u] && aim <= p->high[u];
             step[j] = trial[u] - q[u];
+            left += here->gradient[j] * step[j] / 2;
             longest = awiwi_size(step[j]) > longest ? awiwi_size(step[j]) : longest;
         }
         if (!awiwi_all_finite(trial, p->unknowns))
             return AWIWI_NOT_FINITE;
-        const int ended = longest <= tolerance || free;
+        /* the first step of a linear part ends at the minimum; where nothing is left, steps shorten as Newton's do */
+        const int ended = longest <= tolerance || (free && b->linear) ||
+                          (free && left <= here->blur && awiwi_ends_with(longest, last_length, tolerance / 8));
+        last_length = free ? longest : AWIWI_REAL_MAX;
         if (!ended) {
             if (b->linear)
                 shift(p, b, step, &last, &there);

@@ -259,10 +259,10 @@ static void slopes(const task *s, const model *c, vector gradient)
 
 static void derive(const task *s, const model *c, const moves *m, rates *d)
 {
-    const int count = s->count, moves = m->count;
+    const int count = s->count, n = m->count;
     vector growth, by;
-    d->count = moves;
-    for (int j = 0; j < moves; j++) {
+    d->count = n;
+    for (int j = 0; j < n; j++) {
         d->downhill[j] = 0;
         for (int l = 0; l <= j; l++)
             d->hessian[j][l] = 0;
@@ -279,7 +279,7 @@ static void derive(const task *s, const model *c, const moves *m, rates *d)
             growth[i] = c->slope[i] * both + s->constant[i][at.offset];
             d->stiffer[i] += excess * both;
         }
-        for (int j = 0; j < moves; j++) {
+        for (int j = 0; j < n; j++) {
             by[j] = along(m, m->loose[j], growth);
             d->downhill[j] -= excess * by[j];
             for (int l = 0; l <= j; l++)
