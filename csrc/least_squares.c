@@ -21,22 +21,28 @@ typedef struct sums {
 
 static void add_up(const awiwi_problem *p, const awiwi_part *b, const awiwi_real *measured, const values *v, sums *s)
 {
-    const int equations = b->equations;
-    awiwi_real total = 0, terms = 0, residual[AWIWI_MOST_EQUATIONS];
-    awiwi_real slope[AWIWI_MOST_UNKNOWNS][AWIWI_MOST_EQUATIONS];
-    for (int i = 0; i < equations; i++) {
-        const int e = b->equation[i];
-        const awiwi_real *row = v->P + e * p->unknowns;
-        residual[i] = v->h[e] - measured[e];
-        total += residual[i] * residual[i];
-        terms += awiwi_size(residual[i]) * (awiwi_size(v->h[e]) + awiwi_size(measured[e]));
-        for (int j = 0; j < b->unknowns; j++)
-            slope[j][i] = row[b->unknown[j]];
-    }
-    for (int j = 0; j < b->unknowns; j++) {
-        s->gradient[j] = awiwi_dot(slope[j], residual, equations);
+    const int unknowns = b->unknowns;
+    awiwi_real total = 0, terms = 0;
+    vector slope;
+    for (int j = 0; j < unknowns; j++) {
+        s->gradient[j] = 0;
         for (int k = 0; k <= j; k++)
-            s->normal[j][k] = awiwi_dot(slope[j], slope[k], equations);
+            s->normal[j][k] = 0;
+    }
+    for (int i = 0; i < b->equations; i++) {
+        const int e = b->equation[i];
+        const awiwi_real residual = v->h[e] - measured[e];
+        const awiwi_real *row = v->P + e * p->unknowns;
+        total += residual * residual;
+        terms += awiwi_size(residual) * (awiwi_size(v->h[e]) + awiwi_size(measured[e]));
+        for (int j = 0; j < unknowns; j++) {
+            const awiwi_real here = row[b->unknown[j]];
+            awiwi_real *normal = s->normal[j];
+            slope[j] = here;
+            s->gradient[j] += here * residual;
+            for (int k = 0; k <= j; k++)
+                normal[k] += here * slope[k];
+        }
     }
     s->blur = 4 * AWIWI_REAL_EPSILON * terms;
     s->cost = total / 2;
@@ -131,7 +137,7 @@ static int descend(const awiwi_problem *p, const awiwi_part *b, const awiwi_real
             return AWIWI_NOT_FINITE;
         /* the first step of a linear part ends at the minimum; where nothing is left, steps shorten as Newton's do */
         const int ended = longest <= tolerance || (free && b->linear) ||
-                          (free && left <= here->blur && awiwi_ends_with(longest, last_length, tolerance / 8));
+                          (free && left <= here->blur && awiwi_ends_with(longest, last_length, tolerance / 64));
         last_length = free ? longest : AWIWI_REAL_MAX;
         if (!ended) {
             if (b->linear)

@@ -7,7 +7,10 @@
 #include "awiwi_distribution.h"
 #include "dense.h"
 
-typedef awiwi_real vector[AWIWI_MOST_TENDONS];
+enum { MOST_PAIRS = AWIWI_MOST_TENDONS / 2 };
+
+typedef awiwi_real vector[AWIWI_MOST_TENDONS]; /* of all tendons */
+typedef awiwi_real numbers[MOST_PAIRS];         /* of all pairs */
 typedef awiwi_real couple[2];
 
 /* Stiffnesses of all tendons, and their derivatives by the force. */
@@ -18,8 +21,8 @@ typedef struct curves {
 /* Of every pair: the tendons with more and with less force, by how much they differ, and up to where the smaller force
    may be above the limit; the sum of stiffnesses at both ends, and its slope. */
 typedef struct ends {
-    int more[AWIWI_MOST_TENDONS], less[AWIWI_MOST_TENDONS];
-    vector apart, most, least, greatest, slope_least, slope_greatest;
+    int more[MOST_PAIRS], less[MOST_PAIRS];
+    numbers apart, most, least, greatest, slope_least, slope_greatest;
 } ends;
 
 /* The products p'p of the couplings of a pair, p'r with its partner's, and r'r of its partner. */
@@ -70,8 +73,8 @@ static products multiply(const awiwi_tendons *t, int i)
 /* Of pair i and its partner, x in [low, high] with the least |sum x_i v_i - target|, where v_i is p_i or p_i p_i': the
    products of two such are those of their couplings, or the squares of these. `aim` holds the products with the
    target. */
-static void nearest_of_both(const awiwi_pair *pair, int i, products G, const vector aim, const vector low,
-                            const vector high, vector x)
+static void nearest_of_both(const awiwi_pair *pair, int i, products G, const numbers aim, const numbers low,
+                            const numbers high, numbers x)
 {
     const int o = pair[i].partner;
     if (o == i) {
@@ -86,7 +89,7 @@ static void nearest_of_both(const awiwi_pair *pair, int i, products G, const vec
 }
 
 /* The curves at forces of which the smaller ones are x above the lower limit; returns what the curve does. */
-static int place(const awiwi_tendons *t, const ends *e, const vector x, awiwi_real *f, curves *c)
+static int place(const awiwi_tendons *t, const ends *e, const numbers x, awiwi_real *f, curves *c)
 {
     for (int i = 0; i < t->pairs; i++) {
         const awiwi_real less = t->low + x[i], more = less + e->apart[i];
@@ -113,19 +116,20 @@ static awiwi_real guess(const ends *e, int i, awiwi_real wanted)
 }
 
 /* A step to where the sum of stiffnesses, which exceeds the wanted one, is that: Halley's, or Newton's where curvature
-   makes that twice as long or half as short. */
-static awiwi_real step(awiwi_real excess, awiwi_real slope, awiwi_real curvature)
+   makes that twice as long or half as short. `bend` becomes by how much curvature changes the step, at least. */
+static awiwi_real step(awiwi_real excess, awiwi_real slope, awiwi_real curvature, awiwi_real *bend)
 {
-    const awiwi_real twice = 2 * slope * slope, bent = twice - excess * curvature;
-    return 2 * bent > twice && bent < 2 * twice ? 2 * excess * slope / bent : excess / slope;
+    const awiwi_real newton = excess / slope, change = newton * curvature / (2 * slope);
+    *bend = awiwi_size(change) > *bend ? awiwi_size(change) : *bend;
+    return change < (awiwi_real)0.5 && change > -1 ? newton / (1 - change) : newton;
 }
 
 /* x between 0 and most, of all pairs at once, where the sums of stiffnesses are what is wanted, by steps that triple the
    digits; with bisection where they leave the bracket or do not halve what is missing. */
-static int invert(const awiwi_tendons *t, const ends *e, const vector wanted, awiwi_real tolerance, awiwi_real *f)
+static int invert(const awiwi_tendons *t, const ends *e, const numbers wanted, awiwi_real tolerance, awiwi_real *f)
 {
     const awiwi_real near = tolerance * t->high;
-    vector below, above, x, missing;
+    numbers below, above, x, missing;
     awiwi_real last = AWIWI_REAL_MAX;
     for (int i = 0; i < t->pairs; i++) {
         below[i] = wanted[i] < e->greatest[i] ? 0 : e->most[i];
@@ -134,7 +138,7 @@ static int invert(const awiwi_tendons *t, const ends *e, const vector wanted, aw
         missing[i] = AWIWI_REAL_MAX;
     }
     for (int round = 0; round < AWIWI_MOST_INVERSIONS; round++) {
-        awiwi_real longest = 0;
+        awiwi_real longest = 0, bend = 0;
         int bisected = 0;
         curves here;
         if (place(t, e, x, f, &here))
@@ -146,7 +150,7 @@ static int invert(const awiwi_tendons *t, const ends *e, const vector wanted, aw
                 below[i] = from;
             else
                 above[i] = from;
-            awiwi_real to = slope > 0 ? from - step(excess, slope, curvature) : above[i] + 2 * near;
+            awiwi_real to = slope > 0 ? from - step(excess, slope, curvature, &bend) : above[i] + 2 * near;
             if (awiwi_size(to - from) <= near || (to >= below[i] && to <= above[i] && size <= missing[i] / 2)) {
                 to = awiwi_clamp(to, 0, e->most[i]);
             } else {
@@ -157,7 +161,8 @@ static int invert(const awiwi_tendons *t, const ends *e, const vector wanted, aw
             missing[i] = size;
             longest = awiwi_size(to - from) > longest ? awiwi_size(to - from) : longest;
         }
-        if (longest <= near || (!bisected && awiwi_ends_with(longest, last, near))) {
+        const awiwi_real share = longest / last, rate = awiwi_fmax(bend * bend, share * share * share);
+        if (longest <= near || (!bisected && last < AWIWI_REAL_MAX && 64 * rate * longest <= near)) {
             (void)place(t, e, x, f, 0);
             return AWIWI_OK;
         }
@@ -170,9 +175,9 @@ static int distribute_pairs(const awiwi_tendons *t, const awiwi_real *tau, const
                             awiwi_real *f)
 {
     const awiwi_real range = t->high - t->low;
-    vector torque, stiffness, low, high, none, d, wanted;
-    products G[AWIWI_MOST_TENDONS];
-    curves low_end, high_end;
+    numbers torque, stiffness, low, high, none, d, wanted;
+    products G[MOST_PAIRS];
+    curves at;
     ends e;
     for (int i = 0; i < t->pairs; i++) { /* the torque is -sum d_i p_i, the stiffness sum (k_i1 + k_i2) p_i p_i' */
         const awiwi_real *p = t->coupling + t->pair[i].first * t->joints;
@@ -202,13 +207,17 @@ static int distribute_pairs(const awiwi_tendons *t, const awiwi_real *tau, const
         e.apart[i] = awiwi_size(d[i]);
         e.most[i] = range - e.apart[i];
     }
-    if (place(t, &e, none, f, &low_end) || place(t, &e, e.most, f, &high_end))
+    if (place(t, &e, none, f, &at))
         return AWIWI_OUT_OF_DOMAIN;
     for (int i = 0; i < t->pairs; i++) {
-        e.least[i] = both(&e, i, low_end.k);
-        e.greatest[i] = both(&e, i, high_end.k);
-        e.slope_least[i] = both(&e, i, low_end.slope);
-        e.slope_greatest[i] = both(&e, i, high_end.slope);
+        e.least[i] = both(&e, i, at.k);
+        e.slope_least[i] = both(&e, i, at.slope);
+    }
+    if (place(t, &e, e.most, f, &at))
+        return AWIWI_OUT_OF_DOMAIN;
+    for (int i = 0; i < t->pairs; i++) {
+        e.greatest[i] = both(&e, i, at.k);
+        e.slope_greatest[i] = both(&e, i, at.slope);
     }
     for (int i = 0; i < t->pairs; i++) {
         products squares;
