@@ -177,7 +177,7 @@ static void subtract(int n, awiwi_real factor, const awiwi_real *from, awiwi_rea
 static void split(const task *s, int keep_torque, const int *held, moves *m)
 {
     const int count = s->count;
-    int left[AWIWI_MOST_TENDONS]; /* free tendons that are not taken */
+    int left[AWIWI_MOST_TENDONS] = {0}; /* free tendons that are not taken */
     int n = 0;
     for (int i = 0; i < count; i++)
         if (held[i] == FREE)

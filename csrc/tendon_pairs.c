@@ -81,10 +81,10 @@ static void nearest_of_both(const awiwi_pair *pair, int i, products G, const num
         x[i] = awiwi_clamp(aim[i] / G.own, low[i], high[i]);
     } else {
         const couple c = {aim[i], aim[o]}, least = {low[i], low[o]}, most = {high[i], high[o]};
-        couple both;
-        nearest(G.own, G.mixed, G.other, c, least, most, both);
-        x[i] = both[0];
-        x[o] = both[1];
+        couple found;
+        nearest(G.own, G.mixed, G.other, c, least, most, found);
+        x[i] = found[0];
+        x[o] = found[1];
     }
 }
 

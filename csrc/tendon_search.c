@@ -284,7 +284,7 @@ int awiwi_search_forces(const awiwi_tendons *t, const awiwi_real *tau, const awi
 {
     const int held[AWIWI_MOST_TENDONS] = {0};
     awiwi_real least = 0;
-    vector first, best;
+    vector first = {0}, best;
     moves all;
     rates d;
     task s;
