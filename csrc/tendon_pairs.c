@@ -93,8 +93,8 @@ static int place(const awiwi_tendons *t, const ends *e, const numbers x, awiwi_r
 {
     for (int i = 0; i < t->pairs; i++) {
         const awiwi_real less = t->low + x[i], more = less + e->apart[i];
-        f[e->less[i]] = less < t->high ? less : t->high;
-        f[e->more[i]] = more < t->high ? more : t->high;
+        f[e->less[i]] = less > t->high ? t->high : less;
+        f[e->more[i]] = more > t->high ? t->high : more;
     }
     return c ? t->curve(t->context, f, c->k, c->slope, c->curvature) : 0;
 }
