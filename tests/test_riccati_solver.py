@@ -116,6 +116,13 @@ def test_without_doublings_the_best_known_is_returned_with_its_residual(solve):
     assert (residual < 1e-10) == (status == OK)
 
 
+@pytest.mark.parametrize("dtype", ROUNDING, ids=lambda dtype: dtype.__name__)
+def test_nearly_all_plants_of_four_states_need_no_doubling(solve, dtype):
+    found = [solve(dtype, *rounded(dtype, plant), doublings=0)[0] for plant in random_plants(400, seed=23)]
+
+    assert found.count(OK) >= 390
+
+
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="the flags are those of x86")
 @pytest.mark.parametrize("program", ["gcc", "clang"])
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
