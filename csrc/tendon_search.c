@@ -232,26 +232,34 @@ static int begin(task *s, const moves *m, vector f, rates *d)
     return descend(s, &each, AWIWI_MOST_TORQUE_STEPS, f, &found, d);
 }
 
-/* Move f to where one limit after the other stops the sum of forces from growing by `sense`, at the same torque. */
-static void drive(const task *s, awiwi_real sense, vector f)
+/* Move f to where one limit after the other stops the sum of forces from growing by `sense`, at the same torque. Each
+   limit takes one of the moves; `all` are those while no tendon is held. */
+static void drive(const task *s, const moves *all, awiwi_real sense, vector f)
 {
     int held[AWIWI_MOST_TENDONS] = {0}, stopped = 0;
     const awiwi_real range = s->t->high - s->t->low;
-    while (stopped >= 0) {
-        vector one, x, step;
-        moves m;
-        split(s, s->keep_torque, held, &m);
-        for (int i = 0; i < s->count; i++)
-            one[i] = 1;
-        for (int j = 0; j < m.count; j++)
-            x[j] = along(&m, m.loose[j], one);
-        combine(s, &m, x, 2 * sense * range, step);
-        const awiwi_real share = awiwi_largest(x, m.count) > 0 ? reach(s, f, step, &stopped) : 0;
-        if (!(awiwi_largest(x, m.count) > 0) || stopped < 0)
+    const moves *m = all;
+    moves own;
+    vector one;
+    for (int i = 0; i < s->count; i++)
+        one[i] = 1;
+    while (m->count > 0) {
+        vector x, step;
+        for (int j = 0; j < m->count; j++)
+            x[j] = along(m, m->loose[j], one);
+        if (!(awiwi_largest(x, m->count) > 0))
+            return;
+        combine(s, m, x, 2 * sense * range, step);
+        const awiwi_real share = reach(s, f, step, &stopped);
+        if (stopped < 0)
             return;
         for (int i = 0; i < s->count; i++)
             f[i] = awiwi_clamp(f[i] + share * step[i], s->t->low, s->t->high);
+        if (m->count == 1)
+            return;
         held[stopped] = AT_LOW;
+        split(s, s->keep_torque, held, &own);
+        m = &own;
     }
 }
 
@@ -303,7 +311,7 @@ int awiwi_search_forces(const awiwi_tendons *t, const awiwi_real *tau, const awi
         for (int i = 0; i < s.count; i++)
             trial[i] = first[i];
         if (start > 0)
-            drive(&s, start == 1 ? -1 : 1, trial);
+            drive(&s, &all, start == 1 ? -1 : 1, trial);
         if (start > 0 && status == AWIWI_OK && is_near(&s, trial, best))
             continue;
         const int ended = descend(&s, &all, AWIWI_MOST_STIFFNESS_STEPS, trial, &found, &d);
