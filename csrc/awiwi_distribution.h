@@ -11,7 +11,7 @@ extern "C" {
 enum {
     AWIWI_MOST_JOINTS = 8,
     AWIWI_MOST_TENDONS = 16,
-    AWIWI_MOST_INVERSIONS = 64,      /* rounds that invert k(f) + k(f + d); smooth springs take 7 */
+    AWIWI_MOST_INVERSIONS = 64,      /* rounds that invert k(f) + k(f + d); smooth springs take 4 */
     AWIWI_MOST_TORQUE_STEPS = 64,    /* of the search for forces that give the torque */
     AWIWI_MOST_STIFFNESS_STEPS = 96, /* and of that for the stiffness, from each of 3 starts */
     AWIWI_MOST_CURVES = 2 + AWIWI_MOST_INVERSIONS + 3 * (1 + AWIWI_MOST_STIFFNESS_STEPS)
@@ -48,8 +48,8 @@ typedef struct awiwi_tendons {
 /* Forces [tendons] within the limits whose torque is nearest to torque[joints] and, among those, whose stiffness is
    nearest to stiffness[joints][joints] in the Frobenius norm. AWIWI_INFEASIBLE where the limits forbid the torque.
    Pairs: the optimum in closed form, up to one inversion of the curve for each. Other tendons: an active-set Newton
-   method, from three starts where the first end may not be the nearest. `tolerance` is that of forces, relative to the upper limit. The curve is evaluated at most
-   AWIWI_MOST_CURVES times.
+   method, from three starts where the first end may not be the nearest. `tolerance` is that of forces, relative to the
+   upper limit. The curve is evaluated at most AWIWI_MOST_CURVES times.
    Returns an awiwi_status. After AWIWI_OUT_OF_DOMAIN (a limit is outside the curve, or low > high) and AWIWI_NOT_FINITE
    all forces are equal: in the middle of the limits if both are on the curve, at the lower limit if only that is, else
    zero. Otherwise they are within the limits. */

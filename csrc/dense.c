@@ -2,14 +2,6 @@
 #include "numerics.h"
 #include "dense.h"
 
-awiwi_real awiwi_dot(const awiwi_real *a, const awiwi_real *b, int n)
-{
-    awiwi_real sum = 0;
-    for (int i = 0; i < n; i++)
-        sum += a[i] * b[i];
-    return sum;
-}
-
 awiwi_real awiwi_largest(const awiwi_real *x, int n)
 {
     awiwi_real found = 0;
@@ -53,30 +45,52 @@ static void subtract(int m, awiwi_real f, const awiwi_real *b, awiwi_real *a)
         a[j] -= f * b[j];
 }
 
-int awiwi_solve(int n, int m, awiwi_real *A, awiwi_real *B)
+int awiwi_factor(int n, awiwi_real *A, int *order)
 {
     for (int k = 0; k < n; k++) {
         int pivot = k;
         for (int i = k + 1; i < n; i++)
             if (awiwi_size(A[i * n + k]) > awiwi_size(A[pivot * n + k]))
                 pivot = i;
+        order[k] = pivot;
         if (!(awiwi_size(A[pivot * n + k]) > 0))
             return 0;
-        exchange(n, A + k * n, A + pivot * n);
-        exchange(m, B + k * m, B + pivot * m);
+        if (pivot != k)
+            exchange(n, A + k * n, A + pivot * n);
         for (int i = k + 1; i < n; i++) {
-            const awiwi_real f = A[i * n + k] / A[k * n + k];
-            subtract(n - k, f, A + k * n + k, A + i * n + k);
-            subtract(m, f, B + k * m, B + i * m);
+            awiwi_real *row = A + i * n + k;
+            row[0] /= A[k * n + k];
+            if (row[0] < 0 || !(row[0] <= 0)) /* not 0 */
+                subtract(n - k - 1, row[0], A + k * n + k + 1, row + 1);
         }
     }
-    for (int i = n - 1; i >= 0; i--) {
-        for (int k = i + 1; k < n; k++)
-            subtract(m, A[i * n + k], B + k * m, B + i * m);
-        for (int j = 0; j < m; j++)
-            B[i * m + j] /= A[i * n + i];
-    }
     return 1;
+}
+
+void awiwi_substitute(int n, int m, const awiwi_real *A, const int *order, awiwi_real *B)
+{
+    for (int k = 0; k < n; k++)
+        if (order[k] != k)
+            exchange(m, B + k * m, B + order[k] * m);
+    for (int j = 0; j < m; j++) {
+        for (int i = 1; i < n; i++)
+            for (int k = 0; k < i; k++)
+                B[i * m + j] -= A[i * n + k] * B[k * m + j];
+        for (int i = n - 1; i >= 0; i--) {
+            for (int k = i + 1; k < n; k++)
+                B[i * m + j] -= A[i * n + k] * B[k * m + j];
+            B[i * m + j] /= A[i * n + i];
+        }
+    }
+}
+
+int awiwi_solve(int n, int m, awiwi_real *A, awiwi_real *B)
+{
+    int order[AWIWI_MOST_ROWS];
+    const int regular = awiwi_factor(n, A, order);
+    if (regular)
+        awiwi_substitute(n, m, A, order, B);
+    return regular;
 }
 
 awiwi_real awiwi_solve_positive(int n, int width, awiwi_real *H, awiwi_real least, const awiwi_real *b, awiwi_real *x)
@@ -109,23 +123,26 @@ awiwi_real awiwi_solve_positive(int n, int width, awiwi_real *H, awiwi_real leas
 }
 
 /* By elimination: a pivot that vanishes must have nothing beside it. */
-int awiwi_is_semidefinite(int n, const awiwi_real *Q)
+int awiwi_semidefinite_rank(int n, const awiwi_real *Q)
 {
     const awiwi_real rounding = 64 * AWIWI_REAL_EPSILON;
+    const awiwi_real surely = 32 * awiwi_sqrt(AWIWI_REAL_EPSILON); /* pivots after it err by rounding over this */
     awiwi_real left[4][4];
+    int rank = n;
     for (int i = 0; i < n; i++)
         for (int j = 0; j < n; j++)
             left[i][j] = Q[i * n + j];
     for (int k = 0; k < n; k++) {
         if (!(left[k][k] >= -rounding * Q[k * n + k]))
-            return 0;
+            return -1;
         const int vanishes = left[k][k] <= rounding * Q[k * n + k];
+        rank -= !(left[k][k] > surely * Q[k * n + k]);
         for (int i = k + 1; i < n; i++) {
             if (vanishes && left[i][k] * left[i][k] > rounding * Q[k * n + k] * Q[i * n + i])
-                return 0;
+                return -1;
             for (int j = k + 1; j < n && !vanishes; j++)
                 left[i][j] -= left[i][k] / left[k][k] * left[k][j];
         }
     }
-    return 1;
+    return rank;
 }

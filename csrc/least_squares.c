@@ -21,8 +21,10 @@ typedef struct sums {
 
 static void add_up(const awiwi_problem *p, const awiwi_part *b, const awiwi_real *measured, const values *v, sums *s)
 {
+    const int unknowns = b->unknowns;
     awiwi_real total = 0, terms = 0;
-    for (int j = 0; j < b->unknowns; j++) {
+    vector slope;
+    for (int j = 0; j < unknowns; j++) {
         s->gradient[j] = 0;
         for (int k = 0; k <= j; k++)
             s->normal[j][k] = 0;
@@ -33,11 +35,13 @@ static void add_up(const awiwi_problem *p, const awiwi_part *b, const awiwi_real
         const awiwi_real *row = v->P + e * p->unknowns;
         total += residual * residual;
         terms += awiwi_size(residual) * (awiwi_size(v->h[e]) + awiwi_size(measured[e]));
-        for (int j = 0; j < b->unknowns; j++) {
-            const awiwi_real slope = row[b->unknown[j]];
-            s->gradient[j] += slope * residual;
+        for (int j = 0; j < unknowns; j++) {
+            const awiwi_real here = row[b->unknown[j]];
+            awiwi_real *normal = s->normal[j];
+            slope[j] = here;
+            s->gradient[j] += here * residual;
             for (int k = 0; k <= j; k++)
-                s->normal[j][k] += slope * row[b->unknown[k]];
+                normal[k] += here * slope[k];
         }
     }
     s->blur = 4 * AWIWI_REAL_EPSILON * terms;
@@ -103,15 +107,15 @@ static int descend(const awiwi_problem *p, const awiwi_part *b, const awiwi_real
     int now = 0; /* which of the two belongs to q; the other is that of the trial */
     values last = *begun, there;
     vector step, trial;
-    awiwi_real damping = 0;
+    awiwi_real damping = 0, last_length = AWIWI_REAL_MAX;
     add_up(p, b, measured, &last, &two[now]);
     if (!(two[now].cost <= AWIWI_REAL_MAX))
         return AWIWI_NOT_FINITE;
     for (int i = 1; i < iterations; i++) {
         sums *here = &two[now];
         int held[AWIWI_MOST_UNKNOWNS];
-        awiwi_real longest = 0;
-        int free = b->linear && !(damping > 0); /* whether the first step ends at the minimum */
+        awiwi_real longest = 0, left = here->cost; /* of the cost after the step, but for curvature */
+        int free = !(damping > 0); /* whether the step is that of Gauss and Newton, within the box */
         for (int j = 0; j < b->unknowns; j++) { /* at a limit and pushed against it */
             const int u = b->unknown[j];
             held[j] = (q[u] <= p->low[u] && here->gradient[j] >= 0) || (q[u] >= p->high[u] && here->gradient[j] <= 0);
@@ -126,11 +130,15 @@ static int descend(const awiwi_problem *p, const awiwi_part *b, const awiwi_real
             trial[u] = awiwi_clamp(aim, p->low[u], p->high[u]);
             free = free && aim >= p->low[u] && aim <= p->high[u];
             step[j] = trial[u] - q[u];
+            left += here->gradient[j] * step[j] / 2;
             longest = awiwi_size(step[j]) > longest ? awiwi_size(step[j]) : longest;
         }
         if (!awiwi_all_finite(trial, p->unknowns))
             return AWIWI_NOT_FINITE;
-        const int ended = longest <= tolerance || free;
+        /* the first step of a linear part ends at the minimum; where nothing is left, steps shorten as Newton's do */
+        const int ended = longest <= tolerance || (free && b->linear) ||
+                          (free && left <= here->blur && awiwi_ends_with(longest, last_length, tolerance / 64));
+        last_length = free ? longest : AWIWI_REAL_MAX;
         if (!ended) {
             if (b->linear)
                 shift(p, b, step, &last, &there);

@@ -2,10 +2,27 @@
 #include "numerics.h"
 #include "dense.h"
 
-enum { N = 4 };
+enum { N = 4, FACTORINGS = 32 };
 
 /* After Faddeev and LeVerrier. */
-void awiwi_characteristic(int n, const awiwi_twofold *A, awiwi_twofold *c)
+void awiwi_characteristic(int n, const awiwi_real *A, awiwi_real *c)
+{
+    awiwi_real M[N * N] = {0}, AM[N * N];
+    for (int k = 1; k <= n; k++) {
+        awiwi_real trace = 0;
+        for (int i = 0; i < n; i++)
+            M[i * (n + 1)] += k == 1 ? 1 : c[n - k + 1];
+        awiwi_product(n, A, M, AM);
+        for (int i = 0; i < n; i++)
+            trace += AM[i * (n + 1)];
+        c[n - k] = -trace / (awiwi_real)k;
+        for (int i = 0; i < n * n; i++)
+            M[i] = AM[i];
+    }
+}
+
+/* The same with twice the digits. */
+static void characteristic(int n, const awiwi_twofold *A, awiwi_twofold *c)
 {
     awiwi_twofold M[N * N] = {{0, 0}}, AM[N * N];
     for (int k = 1; k <= n; k++) {
@@ -27,11 +44,11 @@ void awiwi_characteristic(int n, const awiwi_twofold *A, awiwi_twofold *c)
     }
 }
 
-/* By Hurwitz' determinants. */
-int awiwi_is_stable(int n, const awiwi_twofold *A)
+/* Whether all eigenvalues of A have negative real parts, by Hurwitz' determinants. */
+static int is_stable(int n, const awiwi_twofold *A)
 {
     awiwi_twofold c[N], left, right;
-    awiwi_characteristic(n, A, c);
+    characteristic(n, A, c);
     for (int i = 0; i < n; i++)
         if (!(c[i].high > 0))
             return 0;
@@ -45,6 +62,43 @@ int awiwi_is_stable(int n, const awiwi_twofold *A)
                                   awiwi_twofold_multiply(c[0], awiwi_twofold_multiply(c[3], c[3])));
     }
     return awiwi_twofold_add(left, awiwi_twofold_minus(right)).high > 0;
+}
+
+int awiwi_is_stable(int n, const awiwi_real *A, const awiwi_real *b, const awiwi_real *K)
+{
+    awiwi_twofold loop[N * N];
+    for (int i = 0; i < n * n; i++)
+        loop[i] = awiwi_twofold_add(awiwi_twofold_of(A[i]), awiwi_exact_product(-b[i / n], K[i % n]));
+    return is_stable(n, loop);
+}
+
+/* In the unit of time that makes c0 = 1: c3^2 = g3 + 2 c2, c1^2 = g1 + 2 c2, and c2 is the largest zero of the convex
+   F(c2) = c2^2 + 2 - g2 - 2 c1 c3. Since 2 c1 c3 is at most t c3^2 + c1^2/t, a zero of a parabola bounds it from above
+   for any t > 0, closely if t is near c1/c3. From there Newton's method converges from above. */
+int awiwi_stable_factor(const awiwi_real *g, awiwi_real *c)
+{
+    const awiwi_real c0 = awiwi_sqrt(g[0]), square = awiwi_sqrt(c0), rate = awiwi_sqrt(square);
+    const awiwi_real g1 = g[1] / (c0 * square), g2 = g[2] / c0, g3 = g[3] / square;
+    const awiwi_real about = 2 * awiwi_sqrt(1 + awiwi_size(g2));
+    awiwi_real t = awiwi_sqrt((awiwi_size(g1) + about) / (awiwi_size(g3) + about));
+    awiwi_real half = t + 1 / t, c2, c1 = 0, c3 = 0;
+    c2 = half * half - 2 + g2 + t * g3 + g1 / t;
+    c2 = half + (c2 > 0 ? awiwi_sqrt(c2) : 0);
+    for (int i = 0; i < FACTORINGS; i++) {
+        c3 = awiwi_sqrt(g3 + 2 * c2);
+        c1 = awiwi_sqrt(g1 + 2 * c2);
+        const awiwi_real slope = c2 - c1 / c3 - c3 / c1, step = (c2 * c2 + 2 - g2 - 2 * c1 * c3) / (2 * slope);
+        if (!(slope > 0))
+            return 0;
+        if (!(step * step > AWIWI_REAL_EPSILON * c2 * c2))
+            break;
+        c2 -= step;
+    }
+    c[0] = c0;
+    c[1] = c1 * square * rate;
+    c[2] = c2 * square;
+    c[3] = c3 * rate;
+    return awiwi_all_finite(c, 4);
 }
 
 /* A vector, and how far rounding may have moved its elements. An element that is zero by itself has no error. */
@@ -83,6 +137,8 @@ static int extend(int n, int count, known *directions, known v, awiwi_real least
 {
     awiwi_real error, unused;
     int is_new = 0;
+    if (count == n)
+        return n;
     for (int k = 0; k < 2 * count; k++) {
         const known *along = &directions[k % count];
         const awiwi_real share = product(n, &v, along, k < count ? &error : &unused);
@@ -96,7 +152,7 @@ static int extend(int n, int count, known *directions, known v, awiwi_real least
     const awiwi_real length = awiwi_sqrt(awiwi_dot(v.value, v.value, n));
     for (int i = 0; i < n; i++)
         is_new = is_new || awiwi_size(v.value[i]) > v.error[i];
-    if (count == n || !is_new || !(length > least))
+    if (!is_new || !(length > least))
         return count;
     for (int i = 0; i < n; i++) {
         directions[count].value[i] = v.value[i] / length;
@@ -120,9 +176,11 @@ int awiwi_rest_decays(int n, const awiwi_real *A, int starts, const awiwi_real *
             v.error[i] = ROUNDING * awiwi_size(v.value[i]);
         found = extend(n, found, directions, v, 0);
     }
-    for (int k = 0; k < found; k++)
+    for (int k = 0; k < found && found < n; k++)
         found = extend(n, found, directions, image(n, A, &directions[k]), 0);
     const int left = n - found;
+    if (left == 0)
+        return 1;
     for (int i = 0, count = found; i < n; i++) { /* fill up with unit vectors: some remainder is at least a half */
         known unit = {{0}, {0}};
         unit.value[i] = 1;
@@ -138,5 +196,5 @@ int awiwi_rest_decays(int n, const awiwi_real *A, int starts, const awiwi_real *
     }
     for (int i = 0; i < left; i++)
         rest[i * (left + 1)] = awiwi_twofold_add(rest[i * (left + 1)], awiwi_twofold_of((awiwi_real)left * margin));
-    return awiwi_is_stable(left, rest);
+    return is_stable(left, rest);
 }

@@ -1,6 +1,6 @@
-/* The algebraic Riccati equation S A + A'S - S b b'S/R + Q = 0 of one input (eq. 13.5), by structure-preserving
-   doubling: a Cayley transform makes it a discrete one, whose closed loop is squared until it vanishes. Then Newton's
-   method, after Kleinman, from residuals with twice the digits: so gains are right to the last one. */
+/* The algebraic Riccati equation S A + A'S - S b b'S/R + Q = 0 of one input (eq. 13.5), by Newton's method, after
+   Kleinman, from residuals with twice the digits: so gains are right to the last one. Four states start from the gains
+   that a polynomial tells, the stable factor of the optimal loop's. Others, and those that fail, start from doubling. */
 #include "numerics.h"
 #include "awiwi_regulators.h"
 #include "dense.h"
@@ -12,18 +12,26 @@ enum {
     REFINEMENTS = 12 /* steps of Newton at the end, at most */
 };
 
+static const awiwi_real SHORT = (awiwi_real)1 / 1048576; /* step of Newton, against the largest gain */
+
 /* A plant and its costs in coordinates z with x = diag(d) z, whose entries are of like size. */
 typedef struct plant {
     int n;
     awiwi_real d[N], A[N * N], b[N], Q[N * N], R;
+    awiwi_halves halves[N * N]; /* of A */
 } plant;
 
-/* A candidate in double the precision: S, its gains, the closed loop A - b K of the returned gains; the equation's
-   left side E, and how large that is against its terms; how far the last step moved K, against its largest. */
+/* A candidate in double the precision: S, its gains; the closed loop A - b K; the equation's left side E, its terms, and
+   how large it is against them; how far from the solution's K is from it, by the last step, against its largest. */
 typedef struct solution {
-    awiwi_twofold S[N * N], K[N], loop[N * N];
-    awiwi_real E[N * N], residual, moved;
+    awiwi_twofold S[N * N], K[N];
+    awiwi_real loop[N * N], E[N * N], terms[N], residual, left;
 } solution;
+
+/* What tells the poles of the optimal loop: det(s - A) = s^n + c[n-1] s^(n-1) + ... and adj(s - A) b = sum v[k] s^k. */
+typedef struct polynomials {
+    awiwi_real c[N], v[N][N];
+} polynomials;
 
 /* Scale every coordinate by a power of two, so that its row and its column of the Hamiltonian matrix weigh alike. */
 static void balance(plant *p)
@@ -31,18 +39,22 @@ static void balance(plant *p)
     const int n = p->n;
     for (int i = 0; i < n; i++)
         p->d[i] = 1;
-    for (int step = 0; step < SWEEPS * n; step++) {
+    for (int step = 0, still = 0; step < SWEEPS * n && still < n; step++) {
         const int i = step % n;
-        awiwi_real row = 0, column = 0;
+        awiwi_real row = 0, column = 0, inputs = 0;
         int exponent;
         for (int j = 0; j < n; j++) {
-            row += awiwi_size(p->b[i] * p->b[j]) / p->R + (j == i ? 0 : awiwi_size(p->A[i * n + j]));
+            inputs += awiwi_size(p->b[i] * p->b[j]);
+            row += j == i ? 0 : awiwi_size(p->A[i * n + j]);
             column += awiwi_size(p->Q[j * n + i]) + (j == i ? 0 : awiwi_size(p->A[j * n + i]));
         }
-        const awiwi_real ratio = row / column;
+        const awiwi_real ratio = (row + inputs / p->R) / column;
         if (!(ratio > 0 && ratio <= AWIWI_REAL_MAX))
             continue;
         (void)awiwi_frexp(ratio, &exponent);
+        still = exponent / 2 == 0 ? still + 1 : 0;
+        if (still > 0)
+            continue;
         const awiwi_real f = awiwi_ldexp((awiwi_real)1, exponent / 2);
         p->d[i] *= f;
         p->b[i] /= f;
@@ -55,100 +67,96 @@ static void balance(plant *p)
     }
 }
 
+static void find_polynomials(const plant *p, polynomials *y)
+{
+    const int n = p->n;
+    awiwi_characteristic(n, p->A, y->c);
+    for (int i = 0; i < n; i++)
+        y->v[n - 1][i] = p->b[i];
+    for (int k = n - 1; k > 0; k--)
+        for (int i = 0; i < n; i++)
+            y->v[k - 1][i] = y->c[k] * p->b[i] + awiwi_dot(p->A + i * n, y->v[k], n);
+}
+
+/* v[j]'Q v[k]/R */
+static awiwi_real weight(const plant *p, const polynomials *y, int j, int k)
+{
+    awiwi_real sum = 0;
+    for (int i = 0; i < p->n; i++)
+        sum += y->v[j][i] * awiwi_dot(p->Q + i * p->n, y->v[k], p->n);
+    return sum / p->R;
+}
+
 /* The geometric mean of the optimal loop's poles, to a power of two. The square of their product is known beforehand:
    det(A)^2 + v'Q v/R with v = adj(A) b. Where that is out of range the norm will do, for doubling succeeds with any
    number, only later. */
-static awiwi_real mean_pole(const plant *p)
+static awiwi_real mean_pole(const plant *p, const polynomials *y)
 {
-    const int n = p->n;
-    awiwi_twofold A[N * N], c[N];
-    awiwi_real v[N], next[N], square;
+    const awiwi_real square = y->c[0] * y->c[0] + weight(p, y, 0, 0);
     int exponent;
-    for (int i = 0; i < n * n; i++)
-        A[i] = awiwi_twofold_of(p->A[i]);
-    awiwi_characteristic(n, A, c);
-    for (int i = 0; i < n; i++)
-        v[i] = p->b[i];
-    for (int k = n - 1; k > 0; k--) {
-        for (int i = 0; i < n; i++)
-            next[i] = c[k].high * p->b[i] + awiwi_dot(p->A + i * n, v, n);
-        for (int i = 0; i < n; i++)
-            v[i] = next[i];
-    }
-    square = c[0].high * c[0].high;
-    for (int i = 0; i < n; i++)
-        square += v[i] * awiwi_dot(p->Q + i * n, v, n) / p->R;
     if (!(square > 0 && square <= AWIWI_REAL_MAX))
-        return awiwi_largest(p->A, n * n);
+        return awiwi_largest(p->A, p->n * p->n);
     (void)awiwi_frexp(square, &exponent);
-    return awiwi_ldexp((awiwi_real)1, exponent / (2 * n));
+    return awiwi_ldexp((awiwi_real)1, exponent / (2 * p->n));
 }
 
-/* Cayley transform: the discrete equation's A, G and H, which are blocks of the inverse of a Hamiltonian matrix. */
-static int begin(const plant *p, awiwi_real pole, awiwi_real *A, awiwi_real *G, awiwi_real *H)
+/* Gains K of the optimal loop by its polynomial c = det(s - A) + K adj(s - A) b, the stable factor of what the costs add
+   to that of the plant; and what makes the first of Newton's steps find their S. 0 where rounding is in the way. */
+static int place_poles(const plant *p, const polynomials *y, solution *x)
 {
-    const int n = p->n, twice = 2 * n;
-    awiwi_real shifted[4 * N * N], inverse[4 * N * N];
-    for (int i = 0; i < twice * twice; i++)
-        inverse[i] = i % (twice + 1) ? 0 : 1;
-    for (int i = 0; i < n; i++)
-        for (int j = 0; j < n; j++) {
-            const awiwi_real shift = i == j ? pole : 0;
-            shifted[i * twice + j] = p->A[i * n + j] - shift;
-            shifted[i * twice + n + j] = -p->b[i] * p->b[j] / p->R;
-            shifted[(n + i) * twice + j] = -p->Q[i * n + j];
-            shifted[(n + i) * twice + n + j] = shift - p->A[j * n + i];
-        }
-    if (!awiwi_solve(twice, twice, shifted, inverse))
+    const awiwi_real *a = y->c;
+    const awiwi_real g[N] = {
+        a[0] * a[0] + weight(p, y, 0, 0),
+        a[1] * a[1] - 2 * a[0] * a[2] + weight(p, y, 1, 1) - 2 * weight(p, y, 0, 2),
+        a[2] * a[2] + 2 * a[0] - 2 * a[1] * a[3] + weight(p, y, 2, 2) - 2 * weight(p, y, 1, 3),
+        a[3] * a[3] - 2 * a[2] + weight(p, y, 3, 3),
+    };
+    awiwi_real c[N], V[N * N], K[N];
+    if (p->n != N || !awiwi_stable_factor(g, c))
         return 0;
-    for (int i = 0; i < n; i++)
-        for (int j = 0; j < n; j++) {
-            const awiwi_real *above = inverse + i * twice, *below = inverse + (n + i) * twice;
-            A[i * n + j] = (i == j ? 1 : 0) + 2 * pole * above[j];
-            G[i * n + j] = -pole * (above[n + j] + inverse[j * twice + n + i]);
-            H[i * n + j] = -pole * (below[j] + inverse[(n + j) * twice + i]);
+    for (int k = 0; k < N; k++) {
+        const awiwi_real scale = 1 / awiwi_largest(y->v[k], N);
+        K[k] = (c[k] - a[k]) * scale;
+        for (int i = 0; i < N; i++)
+            V[k * N + i] = y->v[k][i] * scale;
+    }
+    if (!awiwi_solve(N, 1, V, K) || !awiwi_all_finite(K, N))
+        return 0;
+    for (int i = 0; i < N; i++) {
+        x->K[i] = awiwi_twofold_of(K[i]);
+        for (int j = 0; j < N; j++) {
+            x->S[i * N + j] = awiwi_twofold_of(0);
+            x->loop[i * N + j] = p->A[i * N + j] - p->b[i] * K[j];
+            x->E[i * N + j] = p->Q[i * N + j] + p->R * K[i] * K[j];
         }
+    }
+    x->residual = x->left = AWIWI_REAL_MAX;
     return 1;
 }
 
-/* X += (Y Z + (Y Z)')/2 */
-static void add_symmetric(int n, const awiwi_real *Y, const awiwi_real *Z, awiwi_real *X)
+/* The gains of S; also S b. */
+static void find_gains(const plant *p, solution *x, awiwi_twofold *Sb)
 {
-    awiwi_real YZ[N * N];
-    awiwi_product(n, Y, Z, YZ);
-    for (int i = 0; i < n; i++)
-        for (int j = 0; j < n; j++)
-            X[i * n + j] += (YZ[i * n + j] + YZ[j * n + i]) / 2;
+    const int n = p->n;
+    for (int i = 0; i < n; i++) {
+        Sb[i] = awiwi_twofold_of(0);
+        for (int k = 0; k < n; k++)
+            if (awiwi_size(p->b[k]) > 0)
+                Sb[i] = awiwi_twofold_add(Sb[i],
+                                          awiwi_twofold_multiply(x->S[i * n + k], awiwi_twofold_of(p->b[k])));
+        x->K[i] = awiwi_twofold_divide(Sb[i], p->R);
+    }
 }
 
-/* One doubling: A <- A W A, G <- G + A W G A', H <- H + A'H W A with W = (1 + G H)^-1. */
-static int redouble(int n, awiwi_real *A, awiwi_real *G, awiwi_real *H)
+/* The residual of the left side E. */
+static void compare(int n, solution *x)
 {
-    awiwi_real W[N * N], right[2 * N * N], WA[N * N], WG[N * N], transposed[N * N], Y[N * N];
-    awiwi_product(n, G, H, W);
-    for (int i = 0; i < n; i++) {
-        W[i * n + i] += 1;
-        for (int j = 0; j < n; j++) {
-            right[2 * i * n + j] = A[i * n + j];
-            right[2 * i * n + n + j] = G[i * n + j];
-            transposed[j * n + i] = A[i * n + j];
-        }
-    }
-    if (!awiwi_solve(n, 2 * n, W, right))
-        return 0;
+    x->residual = 0;
     for (int i = 0; i < n; i++)
-        for (int j = 0; j < n; j++) {
-            WA[i * n + j] = right[2 * i * n + j];
-            WG[i * n + j] = right[2 * i * n + n + j];
+        for (int j = 0; j <= i; j++) {
+            const awiwi_real part = awiwi_size(x->E[i * n + j]), whole = x->terms[i] * x->terms[j];
+            x->residual = part <= x->residual * whole ? x->residual : part / whole;
         }
-    awiwi_product(n, A, WG, Y);
-    add_symmetric(n, Y, transposed, G);
-    awiwi_product(n, transposed, H, Y);
-    add_symmetric(n, Y, WA, H);
-    awiwi_product(n, A, WA, Y);
-    for (int i = 0; i < n * n; i++)
-        A[i] = Y[i];
-    return awiwi_all_finite(A, n * n) && awiwi_all_finite(H, n * n);
 }
 
 /* Gains, loop, left side and residual of S: E almost cancels, so all of its terms have twice the digits. */
@@ -156,37 +164,40 @@ static void weigh(const plant *p, solution *x)
 {
     const int n = p->n;
     awiwi_real terms[N] = {0}, largest;
-    awiwi_twofold Sb[N];
-    for (int j = 0; j < n; j++) {
-        Sb[j] = awiwi_twofold_of(0);
-        for (int i = 0; i < n; i++)
-            Sb[j] = awiwi_twofold_add(Sb[j], awiwi_twofold_multiply(x->S[i * n + j], awiwi_twofold_of(p->b[i])));
-        x->K[j] = awiwi_twofold_divide(Sb[j], p->R);
-    }
-    for (int i = 0; i < n; i++)
-        for (int j = 0; j < n; j++) {
-            awiwi_twofold sum = awiwi_twofold_minus(awiwi_twofold_multiply(x->K[i], Sb[j]));
-            sum = awiwi_twofold_add(sum, awiwi_twofold_of(p->Q[i * n + j]));
-            for (int k = 0; k < n; k++) {
-                const awiwi_twofold SA = awiwi_twofold_multiply(x->S[i * n + k], awiwi_twofold_of(p->A[k * n + j]));
-                const awiwi_twofold AS = awiwi_twofold_multiply(x->S[j * n + k], awiwi_twofold_of(p->A[k * n + i]));
-                sum = awiwi_twofold_add(sum, awiwi_twofold_add(SA, AS));
-                terms[i] += i == j ? awiwi_size(SA.high) + awiwi_size(AS.high) : 0;
+    awiwi_twofold Sb[N], SA[N * N];
+    find_gains(p, x, Sb);
+    for (int i = 0; i < n; i++) {
+        for (int j = 0; j < n; j++)
+            SA[i * n + j] = awiwi_twofold_of(0);
+        for (int k = 0; k < n; k++) {
+            const awiwi_twofold s = x->S[i * n + k];
+            const awiwi_halves halves = awiwi_split(s.high);
+            for (int j = 0; j < n; j++) {
+                const awiwi_real a = p->A[k * n + j];
+                if (!(awiwi_size(a) > 0))
+                    continue;
+                const awiwi_twofold product = awiwi_product_of_halves(halves, p->halves[k * n + j]);
+                const awiwi_twofold term = {product.high, product.low + s.low * a};
+                SA[i * n + j] = awiwi_twofold_add(SA[i * n + j], term);
+                terms[i] += i == j ? 2 * awiwi_size(term.high) : 0;
             }
-            x->E[i * n + j] = sum.high;
-            x->loop[i * n + j] = awiwi_twofold_add(awiwi_twofold_of(p->A[i * n + j]),
-                                                   awiwi_exact_product(-p->b[i], x->K[j].high));
         }
-    for (int i = 0; i < n; i++)
         terms[i] += awiwi_size(p->Q[i * n + i]) + awiwi_size(x->K[i].high * Sb[i].high);
+    }
     largest = awiwi_largest(terms, n);
     for (int i = 0; i < n; i++) /* what costs nothing has no terms but rounding */
-        terms[i] = awiwi_sqrt(terms[i] > AWIWI_REAL_EPSILON * largest ? terms[i] : AWIWI_REAL_EPSILON * largest);
-    x->residual = 0;
-    for (int i = 0; i < n * n; i++) {
-        const awiwi_real part = awiwi_size(x->E[i]), whole = terms[i / n] * terms[i % n];
-        x->residual = part <= x->residual * whole ? x->residual : part / whole;
-    }
+        x->terms[i] = awiwi_sqrt(terms[i] > AWIWI_REAL_EPSILON * largest ? terms[i] : AWIWI_REAL_EPSILON * largest);
+    for (int i = 0; i < n; i++)
+        for (int j = 0; j <= i; j++) {
+            const awiwi_twofold left = awiwi_twofold_add(SA[i * n + j], SA[j * n + i]);
+            const awiwi_twofold spent = awiwi_twofold_minus(awiwi_twofold_multiply(x->K[i], Sb[j]));
+            const awiwi_twofold sum = awiwi_twofold_add(left, awiwi_twofold_of(p->Q[i * n + j]));
+            x->E[i * n + j] = x->E[j * n + i] = awiwi_twofold_add(sum, spent).high;
+        }
+    compare(n, x);
+    for (int i = 0; i < n; i++)
+        for (int j = 0; j < n; j++)
+            x->loop[i * n + j] = p->A[i * n + j] - p->b[i] * x->K[j].high;
 }
 
 static int place(int i, int j)
@@ -194,113 +205,152 @@ static int place(int i, int j)
     return i > j ? i * (i + 1) / 2 + j : j * (j + 1) / 2 + i;
 }
 
-/* One step of Newton: S += X with loop'X + X loop = -E; 0 if there is no such X. */
-static int refine(int n, solution *s)
+/* The equations loop'X + X loop = -E of a step, factored; 0 if they have no solution. */
+static int prepare(int n, const awiwi_real *loop, awiwi_real *L, int *order)
 {
-    awiwi_real L[UNKNOWNS * UNKNOWNS] = {0}, X[UNKNOWNS];
     const int unknowns = n * (n + 1) / 2;
+    for (int i = 0; i < unknowns * unknowns; i++)
+        L[i] = 0;
     for (int i = 0; i < n; i++)
         for (int j = 0; j <= i; j++) {
             awiwi_real *row = L + place(i, j) * unknowns;
-            X[place(i, j)] = -s->E[i * n + j];
             for (int k = 0; k < n; k++) {
-                row[place(k, j)] += s->loop[k * n + i].high;
-                row[place(i, k)] += s->loop[k * n + j].high;
+                row[place(k, j)] += loop[k * n + i];
+                row[place(i, k)] += loop[k * n + j];
             }
         }
-    if (!awiwi_solve(unknowns, 1, L, X) || !awiwi_all_finite(X, unknowns))
-        return 0;
+    return awiwi_all_finite(loop, n * n) && awiwi_factor(unknowns, L, order);
+}
+
+/* One step of Newton: S += X. */
+static int refine(int n, const awiwi_real *L, const int *order, solution *s)
+{
+    awiwi_real X[UNKNOWNS];
+    const int unknowns = n * (n + 1) / 2;
+    for (int i = 0; i < n; i++)
+        for (int j = 0; j <= i; j++)
+            X[place(i, j)] = -s->E[i * n + j];
+    awiwi_substitute(unknowns, 1, L, order, X);
     for (int i = 0; i < n; i++)
         for (int j = 0; j < n; j++)
             s->S[i * n + j] = awiwi_twofold_add(s->S[i * n + j], awiwi_twofold_of(X[place(i, j)]));
-    return 1;
+    return awiwi_all_finite(X, unknowns);
 }
 
 /* Whether the costs are costs, some feedback stabilises the plant, and no motion that lasts is for nothing. */
 static int is_sound(const plant *p)
 {
-    const int n = p->n;
+    const int n = p->n, rank = awiwi_semidefinite_rank(n, p->Q);
     awiwi_real transposed[N * N], seen[N * N]; /* by the costs: the rows of Q, in parts of their own */
-    for (int i = 0; i < n * n; i++) {
+    if (rank < 0 || !awiwi_rest_decays(n, p->A, 1, p->b))
+        return 0;
+    for (int i = 0; i < n * n && rank < n; i++) {
         const awiwi_real own = p->Q[i / n * (n + 1)];
         transposed[i] = p->A[i % n * n + i / n];
         seen[i] = own > 0 ? p->Q[i] / awiwi_sqrt(own) : 0;
     }
-    return awiwi_is_semidefinite(n, p->Q) && awiwi_rest_decays(n, p->A, 1, p->b) &&
-           awiwi_rest_decays(n, transposed, n, seen);
+    return rank == n || awiwi_rest_decays(n, transposed, n, seen);
 }
 
-/* Double until the closed loop vanishes; 0 where that leaves the numbers. */
-static int double_up(const plant *p, awiwi_real pole, int iterations, solution *x)
-{
-    const int n = p->n;
-    awiwi_real A[N * N], G[N * N], S[N * N], left = 1;
-    if (!begin(p, pole, A, G, S))
-        return 0;
-    for (int i = 0; i < iterations && left * left > AWIWI_REAL_EPSILON; i++) {
-        if (!redouble(n, A, G, S))
-            return 0;
-        left = awiwi_largest(A, n * n);
-    }
-    for (int i = 0; i < n * n; i++)
-        x->S[i] = awiwi_twofold_of(S[i]);
-    weigh(p, x);
-    return 1;
-}
-
-/* Newton's method for as long as it comes nearer. From a stable loop it does, but perhaps for its first step. */
+/* Newton's method for as long as it comes nearer. From a stable loop it does, but perhaps for its first step. Errors
+   shrink like residuals; after steps that are short and shrink them a lot, the equations of the next are the same. Where
+   they tell that the step after this one would not change K, this one is the last, and leaves nothing of E. */
 static void refine_all(const plant *p, solution *x)
 {
+    const int n = p->n;
+    awiwi_real L[UNKNOWNS * UNKNOWNS];
+    awiwi_twofold Sb[N];
+    int order[UNKNOWNS], prepared = 0;
     solution here = *x;
-    x->moved = AWIWI_REAL_MAX;
-    for (int k = 0; k < REFINEMENTS && refine(p->n, &here); k++) {
-        awiwi_real before[N], after[N];
-        for (int i = 0; i < p->n; i++)
-            before[i] = here.K[i].high;
-        weigh(p, &here);
-        for (int i = 0; i < p->n; i++) {
-            after[i] = here.K[i].high;
-            before[i] -= after[i];
+    for (int k = 0; k < REFINEMENTS; k++) {
+        awiwi_real step[N], gains[N];
+        const awiwi_real before = here.residual;
+        if (!prepared && !prepare(n, here.loop, L, order))
+            return;
+        for (int i = 0; i < n; i++)
+            step[i] = here.K[i].high;
+        if (!refine(n, L, order, &here))
+            return;
+        if (here.left <= SHORT * AWIWI_REAL_EPSILON) {
+            for (int i = 0; i < n * n; i++)
+                here.E[i] = 0;
+            find_gains(p, &here, Sb);
+            *x = here;
+            return;
         }
-        here.moved = awiwi_largest(before, p->n);
-        if (here.moved > 0)
-            here.moved /= awiwi_largest(after, p->n);
-        x->moved = here.moved;
+        weigh(p, &here);
+        for (int i = 0; i < n; i++) {
+            gains[i] = here.K[i].high;
+            step[i] -= gains[i];
+        }
+        const awiwi_real longest = awiwi_largest(step, n), ratio = here.residual / before;
+        const awiwi_real moved = longest > 0 ? longest / awiwi_largest(gains, n) : 0;
+        prepared = moved <= SHORT && ratio <= SHORT;
+        const awiwi_real share = ratio > moved ? ratio : moved; /* that the next step leaves of the error, about */
+        here.left = moved > AWIWI_REAL_EPSILON ? moved : AWIWI_REAL_EPSILON;
+        here.left *= before < AWIWI_REAL_MAX && share < 1 ? share : 1;
+        x->left = here.left;
         if (here.residual < x->residual)
             *x = here;
         else if (k > 0)
-            break;
+            return;
     }
 }
 
-/* A step as short as that leaves K right but for rounding, for each is much shorter than the one before it. */
+/* Whether K is right but for rounding and the loop stable. It is where S is positive, for no motion that lasts costs
+   nothing. */
 static int holds(const plant *p, const solution *x)
 {
-    return x->moved <= AWIWI_REAL_EPSILON && x->residual <= 16 * AWIWI_REAL_EPSILON && awiwi_is_stable(p->n, x->loop);
+    awiwi_real S[N * N], K[N];
+    for (int i = 0; i < p->n * p->n; i++)
+        S[i] = x->S[i].high;
+    for (int i = 0; i < p->n; i++)
+        K[i] = x->K[i].high;
+    return x->left <= AWIWI_REAL_EPSILON && x->residual <= 16 * AWIWI_REAL_EPSILON &&
+           (awiwi_semidefinite_rank(p->n, S) == p->n || awiwi_is_stable(p->n, p->A, p->b, K));
+}
+
+/* Doubling, from units of time that differ by 2^exponent; 0 where it leaves the numbers. */
+static int double_up(const plant *p, const polynomials *y, int exponent, int iterations, solution *x)
+{
+    const awiwi_real pole = awiwi_ldexp(mean_pole(p, y), exponent);
+    awiwi_real S[N * N];
+    if (!awiwi_double_up(p->n, p->A, p->b, p->Q, p->R, pole, iterations, S))
+        return 0;
+    for (int i = 0; i < p->n * p->n; i++)
+        x->S[i] = awiwi_twofold_of(S[i]);
+    weigh(p, x);
+    x->left = AWIWI_REAL_MAX;
+    return 1;
 }
 
 static int search(plant *p, int iterations, solution *x)
 {
     static const int exponents[] = {0, 2, -2};
+    const int n = p->n;
+    polynomials y;
     int found = 0;
     balance(p);
     if (!is_sound(p))
         return AWIWI_OUT_OF_DOMAIN;
-    const awiwi_real pole = mean_pole(p);
-    for (int k = 0; k < 3 && !found; k++) {
+    for (int i = 0; i < n * n; i++)
+        p->halves[i] = awiwi_split(p->A[i]);
+    find_polynomials(p, &y);
+    for (int k = -1; k < 3 && !found; k++) {
         solution here;
-        if (!double_up(p, awiwi_ldexp(pole, exponents[k]), iterations, &here))
+        if (!(k < 0 ? place_poles(p, &y, &here) : double_up(p, &y, exponents[k], iterations, &here)))
             continue;
         refine_all(p, &here);
         found = holds(p, &here);
         if (found || here.residual < x->residual)
             *x = here;
     }
-    solution rounded = *x;
-    for (int i = 0; i < p->n * p->n; i++)
-        rounded.S[i].low = 0;
-    weigh(p, &rounded);
-    x->residual = rounded.residual; /* of the S that is returned */
+    for (int i = 0; i < n && x->residual < 1; i++) /* of the S that is returned, less what rounding takes from S */
+        for (int j = 0; j <= i; j++)
+            for (int k = 0; k < n; k++)
+                x->E[i * n + j] -= x->S[i * n + k].low * x->loop[k * n + j] + x->S[j * n + k].low * x->loop[k * n + i];
+    if (x->residual < 1)
+        compare(n, x);
     return found ? AWIWI_OK : AWIWI_NOT_CONVERGED;
 }
 

@@ -137,25 +137,29 @@ static int follow_curve(const task *s, const vector f, vector k, model *c)
 /* The cost at forces f. What is within rounding of its terms counts as zero. */
 static int cost(const task *s, const vector f, model *c)
 {
+    const int count = s->count;
     vector k;
     c->cost = c->blur = 0;
-    for (int i = 0; i < s->count; i++)
-        k[i] = c->slope[i] = c->curvature[i] = 0;
-    if (s->keep_torque && follow_curve(s, f, k, c))
-        return AWIWI_OUT_OF_DOMAIN;
+    if (s->keep_torque) {
+        if (follow_curve(s, f, k, c))
+            return AWIWI_OUT_OF_DOMAIN;
+    } else {
+        for (int i = 0; i < count; i++)
+            k[i] = c->slope[i] = c->curvature[i] = 0;
+    }
     for (int e = 0; e < s->entries; e++) {
-        const place *at = s->at + e;
+        const place at = s->at[e];
         awiwi_real excess = -s->wanted[e], terms = awiwi_size(excess);
-        for (int i = 0; i < s->count; i++) {
-            const awiwi_real elastic = k[i] * s->p[i][at->a] * s->p[i][at->b];
-            const awiwi_real other = f[i] * s->constant[i][at->offset];
+        for (int i = 0; i < count; i++) {
+            const awiwi_real elastic = k[i] * s->p[i][at.a] * s->p[i][at.b];
+            const awiwi_real other = f[i] * s->constant[i][at.offset];
             excess += elastic + other;
             terms += awiwi_size(elastic) + awiwi_size(other);
         }
-        const awiwi_real rounding = 4 * AWIWI_REAL_EPSILON * terms;
-        c->excess[e] = awiwi_size(excess) <= rounding ? 0 : excess;
+        const awiwi_real rounding = 4 * AWIWI_REAL_EPSILON * terms, size = awiwi_size(excess);
+        c->excess[e] = size <= rounding ? 0 : excess;
         c->cost += s->times[e] * c->excess[e] * c->excess[e] / 2;
-        c->blur += s->times[e] * rounding * (awiwi_size(excess) + rounding);
+        c->blur += s->times[e] * rounding * (size + rounding);
     }
     return 0;
 }
@@ -172,37 +176,44 @@ static void subtract(int n, awiwi_real factor, const awiwi_real *from, awiwi_rea
 /* Find the moves by elimination: every joint gets the free tendon that is left with the largest coupling. */
 static void split(const task *s, int keep_torque, const int *held, moves *m)
 {
-    int taken[AWIWI_MOST_TENDONS] = {0};
-    m->rank = m->count = 0;
-    for (int a = 0; keep_torque && a < s->joints; a++) {
+    const int count = s->count;
+    int left[AWIWI_MOST_TENDONS] = {0}; /* free tendons that are not taken */
+    int n = 0;
+    for (int i = 0; i < count; i++)
+        if (held[i] == FREE)
+            left[n++] = i;
+    m->rank = 0;
+    for (int a = 0; keep_torque && a < s->joints && n > 0; a++) {
         awiwi_real *row = m->share[m->rank], before = 0, most = 0;
         int pivot = 0;
-        row[s->count] = s->torque[a];
-        for (int i = 0; i < s->count; i++) {
+        row[count] = s->torque[a];
+        for (int i = 0; i < count; i++) {
             row[i] = s->p[i][a];
             before = held[i] == FREE && awiwi_size(row[i]) > before ? awiwi_size(row[i]) : before;
         }
         for (int r = 0; r < m->rank; r++)
-            subtract(s->count + 1, row[m->basic[r]], m->share[r], row);
-        for (int i = 0; i < s->count; i++) {
-            if (held[i] == FREE && !taken[i] && awiwi_size(row[i]) > most) {
-                most = awiwi_size(row[i]);
-                pivot = i;
+            subtract(count + 1, row[m->basic[r]], m->share[r], row);
+        for (int k = 0; k < n; k++) {
+            if (awiwi_size(row[left[k]]) > most) {
+                most = awiwi_size(row[left[k]]);
+                pivot = k;
             }
         }
         if (!(most * most > 64 * AWIWI_REAL_EPSILON * before * before))
             continue;
-        const awiwi_real scale = 1 / row[pivot];
-        for (int i = 0; i <= s->count; i++)
+        const int basic = left[pivot];
+        const awiwi_real scale = 1 / row[basic];
+        for (int i = 0; i <= count; i++)
             row[i] *= scale;
         for (int r = 0; r < m->rank; r++)
-            subtract(s->count + 1, m->share[r][pivot], row, m->share[r]);
-        taken[pivot] = 1;
-        m->basic[m->rank++] = pivot;
+            subtract(count + 1, m->share[r][basic], row, m->share[r]);
+        for (n--; pivot < n; pivot++)
+            left[pivot] = left[pivot + 1];
+        m->basic[m->rank++] = basic;
     }
-    for (int i = 0; i < s->count; i++)
-        if (held[i] == FREE && !taken[i])
-            m->loose[m->count++] = i;
+    m->count = n;
+    for (int k = 0; k < n; k++)
+        m->loose[k] = left[k];
 }
 
 /* How something that grows with each force by v changes as tendon i moves. */
@@ -233,48 +244,47 @@ static void combine(const task *s, const moves *m, const vector x, awiwi_real si
 
 /* -- derivatives --------------------------------------------------------------------------------------------------- */
 
-/* How an entry grows with each force. */
-static void grow(const task *s, const model *c, const place *at, vector growth)
-{
-    for (int i = 0; i < s->count; i++)
-        growth[i] = c->slope[i] * s->p[i][at->a] * s->p[i][at->b] + s->constant[i][at->offset];
-}
-
 /* Slopes of the cost by each force, with all others at rest. */
 static void slopes(const task *s, const model *c, vector gradient)
 {
-    vector growth;
     for (int i = 0; i < s->count; i++)
         gradient[i] = 0;
     for (int e = 0; e < s->entries; e++) {
-        grow(s, c, s->at + e, growth);
-        subtract(s->count, -s->times[e] * c->excess[e], growth, gradient);
+        const place at = s->at[e];
+        const awiwi_real excess = s->times[e] * c->excess[e];
+        for (int i = 0; i < s->count; i++)
+            gradient[i] += excess * (c->slope[i] * s->p[i][at.a] * s->p[i][at.b] + s->constant[i][at.offset]);
     }
 }
 
 static void derive(const task *s, const model *c, const moves *m, rates *d)
 {
+    const int count = s->count, n = m->count;
     vector growth, by;
-    d->count = m->count;
-    for (int j = 0; j < m->count; j++) {
+    d->count = n;
+    for (int j = 0; j < n; j++) {
         d->downhill[j] = 0;
         for (int l = 0; l <= j; l++)
             d->hessian[j][l] = 0;
     }
-    for (int i = 0; i < s->count; i++) {
+    for (int i = 0; i < count; i++) {
         d->stiffer[i] = 0;
         d->bent = c->curvature[i] > d->bent ? c->curvature[i] : d->bent;
     }
     for (int e = 0; e < s->entries; e++) {
-        const awiwi_real excess = s->times[e] * c->excess[e];
-        grow(s, c, s->at + e, growth);
-        for (int j = 0; j < m->count; j++) {
+        const place at = s->at[e];
+        const awiwi_real times = s->times[e], excess = times * c->excess[e];
+        for (int i = 0; i < count; i++) {
+            const awiwi_real both = s->p[i][at.a] * s->p[i][at.b];
+            growth[i] = c->slope[i] * both + s->constant[i][at.offset];
+            d->stiffer[i] += excess * both;
+        }
+        for (int j = 0; j < n; j++) {
             by[j] = along(m, m->loose[j], growth);
             d->downhill[j] -= excess * by[j];
-            subtract(j + 1, -s->times[e] * by[j], by, d->hessian[j]);
+            for (int l = 0; l <= j; l++)
+                d->hessian[j][l] += times * by[j] * by[l];
         }
-        for (int i = 0; i < s->count; i++)
-            d->stiffer[i] += excess * s->p[i][s->at[e].a] * s->p[i][s->at[e].b];
     }
 }
 

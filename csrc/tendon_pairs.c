@@ -7,14 +7,28 @@
 #include "awiwi_distribution.h"
 #include "dense.h"
 
-typedef awiwi_real vector[AWIWI_MOST_TENDONS];
+enum { MOST_PAIRS = AWIWI_MOST_TENDONS / 2 };
+
+typedef awiwi_real vector[AWIWI_MOST_TENDONS]; /* of all tendons */
+typedef awiwi_real numbers[MOST_PAIRS];         /* of all pairs */
 typedef awiwi_real couple[2];
 
-/* Of every pair: the smaller force goes from 0 to `most` above the limit, and the sum of stiffnesses from least to
-   greatest, with these slopes there. */
+/* Stiffnesses of all tendons, and their derivatives by the force. */
+typedef struct curves {
+    vector k, slope, curvature;
+} curves;
+
+/* Of every pair: the tendons with more and with less force, by how much they differ, and up to where the smaller force
+   may be above the limit; the sum of stiffnesses at both ends, and its slope. */
 typedef struct ends {
-    vector most, least, greatest, slope_least, slope_greatest;
+    int more[MOST_PAIRS], less[MOST_PAIRS];
+    numbers apart, most, least, greatest, slope_least, slope_greatest;
 } ends;
+
+/* The products p'p of the couplings of a pair, p'r with its partner's, and r'r of its partner. */
+typedef struct products {
+    awiwi_real own, mixed, other;
+} products;
 
 /* The least of x' G x / 2 - c' x in a box, G = (a, b; b, d) positive definite. Where the least of all lies outside,
    one of the sides it lies beyond holds the answer; the other number is then the best for that side. */
@@ -43,61 +57,52 @@ static void nearest(awiwi_real a, awiwi_real b, awiwi_real d, const couple c, co
     }
 }
 
-/* For all pairs, x_i in [low_i, high_i] with the least |sum x_i v_i - target|, where v_i is p_i or p_i p_i': the
+static products multiply(const awiwi_tendons *t, int i)
+{
+    const awiwi_real *p = t->coupling + t->pair[i].first * t->joints;
+    const awiwi_real *r = t->coupling + t->pair[t->pair[i].partner].first * t->joints;
+    products x = {0, 0, 0};
+    for (int j = 0; j < t->joints; j++) {
+        x.own += p[j] * p[j];
+        x.mixed += p[j] * r[j];
+        x.other += r[j] * r[j];
+    }
+    return x;
+}
+
+/* Of pair i and its partner, x in [low, high] with the least |sum x_i v_i - target|, where v_i is p_i or p_i p_i': the
    products of two such are those of their couplings, or the squares of these. `aim` holds the products with the
    target. */
-static void nearest_of_all(const awiwi_tendons *t, int squared, const vector aim, const vector low, const vector high,
-                           vector x)
+static void nearest_of_both(const awiwi_pair *pair, int i, products G, const numbers aim, const numbers low,
+                            const numbers high, numbers x)
 {
-    for (int i = 0; i < t->pairs; i++) {
-        const int o = t->pair[i].partner;
-        const awiwi_real *p = t->coupling + t->pair[i].first * t->joints;
-        const awiwi_real *r = t->coupling + t->pair[o].first * t->joints;
-        awiwi_real pp = 0, pr = 0, rr = 0;
-        if (o < i)
-            continue;
-        for (int j = 0; j < t->joints; j++) {
-            pp += p[j] * p[j];
-            pr += p[j] * r[j];
-            rr += r[j] * r[j];
-        }
-        if (squared) {
-            pp *= pp;
-            pr *= pr;
-            rr *= rr;
-        }
-        if (o == i) {
-            x[i] = awiwi_clamp(aim[i] / pp, low[i], high[i]);
-        } else {
-            const couple c = {aim[i], aim[o]}, least = {low[i], low[o]}, most = {high[i], high[o]};
-            couple both;
-            nearest(pp, pr, rr, c, least, most, both);
-            x[i] = both[0];
-            x[o] = both[1];
-        }
+    const int o = pair[i].partner;
+    if (o == i) {
+        x[i] = awiwi_clamp(aim[i] / G.own, low[i], high[i]);
+    } else {
+        const couple c = {aim[i], aim[o]}, least = {low[i], low[o]}, most = {high[i], high[o]};
+        couple found;
+        nearest(G.own, G.mixed, G.other, c, least, most, found);
+        x[i] = found[0];
+        x[o] = found[1];
     }
 }
 
-/* Forces whose differences are d and whose smaller ones are x above the lower limit. */
-static void place(const awiwi_tendons *t, const vector d, const vector x, awiwi_real *f)
+/* The curves at forces of which the smaller ones are x above the lower limit; returns what the curve does. */
+static int place(const awiwi_tendons *t, const ends *e, const numbers x, awiwi_real *f, curves *c)
 {
     for (int i = 0; i < t->pairs; i++) {
-        f[t->pair[i].first] = awiwi_clamp(t->low + x[i] + (d[i] > 0 ? d[i] : 0), t->low, t->high);
-        f[t->pair[i].second] = awiwi_clamp(t->low + x[i] - (d[i] < 0 ? d[i] : 0), t->low, t->high);
+        const awiwi_real less = t->low + x[i], more = less + e->apart[i];
+        f[e->less[i]] = less > t->high ? t->high : less;
+        f[e->more[i]] = more > t->high ? t->high : more;
     }
+    return c ? t->curve(t->context, f, c->k, c->slope, c->curvature) : 0;
 }
 
-/* The sums of stiffnesses of such forces, and how they grow with x; returns what the curve does. */
-static int sums(const awiwi_tendons *t, const vector d, const vector x, awiwi_real *f, vector k, vector slope)
+/* The sum of a pair. */
+static awiwi_real both(const ends *e, int i, const vector each)
 {
-    vector each, each_slope, unused;
-    place(t, d, x, f);
-    const int off = t->curve(t->context, f, each, each_slope, unused);
-    for (int i = 0; i < t->pairs; i++) {
-        k[i] = each[t->pair[i].first] + each[t->pair[i].second];
-        slope[i] = each_slope[t->pair[i].first] + each_slope[t->pair[i].second];
-    }
-    return off;
+    return each[e->more[i]] + each[e->less[i]];
 }
 
 /* Where a pair's sum of stiffnesses, which the two ends of x in [0, most] tell with its slopes, is about the wanted
@@ -110,13 +115,21 @@ static awiwi_real guess(const ends *e, int i, awiwi_real wanted)
     return x >= 0 && x <= e->most[i] ? x : e->most[i];
 }
 
-/* x between 0 and most, of all pairs at once, where the sums of stiffnesses are what is wanted: Newton's method, with
-   bisection where it leaves the bracket or does not halve what is missing. */
-static int invert(const awiwi_tendons *t, const vector d, const ends *e, const vector wanted, awiwi_real tolerance,
-                  awiwi_real *f)
+/* A step to where the sum of stiffnesses, which exceeds the wanted one, is that: Halley's, or Newton's where curvature
+   makes that twice as long or half as short. `bend` becomes by how much curvature changes the step, at least. */
+static awiwi_real step(awiwi_real excess, awiwi_real slope, awiwi_real curvature, awiwi_real *bend)
+{
+    const awiwi_real newton = excess / slope, change = newton * curvature / (2 * slope);
+    *bend = awiwi_size(change) > *bend ? awiwi_size(change) : *bend;
+    return change < (awiwi_real)0.5 && change > -1 ? newton / (1 - change) : newton;
+}
+
+/* x between 0 and most, of all pairs at once, where the sums of stiffnesses are what is wanted, by steps that triple the
+   digits; with bisection where they leave the bracket or do not halve what is missing. */
+static int invert(const awiwi_tendons *t, const ends *e, const numbers wanted, awiwi_real tolerance, awiwi_real *f)
 {
     const awiwi_real near = tolerance * t->high;
-    vector below, above, x, missing, k, slope;
+    numbers below, above, x, missing;
     awiwi_real last = AWIWI_REAL_MAX;
     for (int i = 0; i < t->pairs; i++) {
         below[i] = wanted[i] < e->greatest[i] ? 0 : e->most[i];
@@ -125,29 +138,32 @@ static int invert(const awiwi_tendons *t, const vector d, const ends *e, const v
         missing[i] = AWIWI_REAL_MAX;
     }
     for (int round = 0; round < AWIWI_MOST_INVERSIONS; round++) {
-        awiwi_real longest = 0;
+        awiwi_real longest = 0, bend = 0;
         int bisected = 0;
-        if (sums(t, d, x, f, k, slope))
+        curves here;
+        if (place(t, e, x, f, &here))
             return AWIWI_OUT_OF_DOMAIN;
         for (int i = 0; i < t->pairs; i++) {
-            const awiwi_real here = x[i], excess = k[i] - wanted[i];
+            const awiwi_real from = x[i], excess = both(e, i, here.k) - wanted[i], size = awiwi_size(excess);
+            const awiwi_real slope = both(e, i, here.slope), curvature = both(e, i, here.curvature);
             if (excess < 0)
-                below[i] = here;
+                below[i] = from;
             else
-                above[i] = here;
-            x[i] = slope[i] > 0 ? here - excess / slope[i] : above[i] + 2 * near;
-            if (awiwi_size(x[i] - here) <= near
-                || (x[i] >= below[i] && x[i] <= above[i] && awiwi_size(excess) <= missing[i] / 2)) {
-                x[i] = awiwi_clamp(x[i], 0, e->most[i]);
+                above[i] = from;
+            awiwi_real to = slope > 0 ? from - step(excess, slope, curvature, &bend) : above[i] + 2 * near;
+            if (awiwi_size(to - from) <= near || (to >= below[i] && to <= above[i] && size <= missing[i] / 2)) {
+                to = awiwi_clamp(to, 0, e->most[i]);
             } else {
-                x[i] = below[i] + (above[i] - below[i]) / 2;
+                to = below[i] + (above[i] - below[i]) / 2;
                 bisected = 1;
             }
-            missing[i] = awiwi_size(excess);
-            longest = awiwi_size(x[i] - here) > longest ? awiwi_size(x[i] - here) : longest;
+            x[i] = to;
+            missing[i] = size;
+            longest = awiwi_size(to - from) > longest ? awiwi_size(to - from) : longest;
         }
-        if (longest <= near || (!bisected && awiwi_ends_with(longest, last, near))) {
-            place(t, d, x, f);
+        const awiwi_real share = longest / last, rate = awiwi_fmax(bend * bend, share * share * share);
+        if (longest <= near || (!bisected && last < AWIWI_REAL_MAX && 64 * rate * longest <= near)) {
+            (void)place(t, e, x, f, 0);
             return AWIWI_OK;
         }
         last = bisected ? AWIWI_REAL_MAX : longest;
@@ -159,42 +175,73 @@ static int distribute_pairs(const awiwi_tendons *t, const awiwi_real *tau, const
                             awiwi_real *f)
 {
     const awiwi_real range = t->high - t->low;
-    vector aim = {0}, low = {0}, high = {0}, none = {0}, d, wanted;
+    numbers torque, stiffness, low, high, none, d, wanted;
+    products G[MOST_PAIRS];
+    curves at;
     ends e;
-    for (int i = 0; i < t->pairs; i++) { /* the torque is -sum d_i p_i */
+    for (int i = 0; i < t->pairs; i++) { /* the torque is -sum d_i p_i, the stiffness sum (k_i1 + k_i2) p_i p_i' */
         const awiwi_real *p = t->coupling + t->pair[i].first * t->joints;
-        aim[i] = 0;
+        torque[i] = stiffness[i] = none[i] = 0;
         low[i] = -range;
         high[i] = range;
-        for (int j = 0; j < t->joints; j++)
-            aim[i] -= p[j] * tau[j];
-    }
-    nearest_of_all(t, 0, aim, low, high, d);
-    for (int i = 0; i < t->pairs; i++)
-        e.most[i] = range - awiwi_size(d[i]);
-    if (sums(t, d, none, f, e.least, e.slope_least) || sums(t, d, e.most, f, e.greatest, e.slope_greatest))
-        return AWIWI_OUT_OF_DOMAIN;
-    for (int i = 0; i < t->pairs; i++) { /* the stiffness is sum of (k_i1 + k_i2) p_i p_i' */
-        const awiwi_real *p = t->coupling + t->pair[i].first * t->joints;
-        aim[i] = 0;
-        for (int j = 0; j < t->joints; j++)
+        for (int j = 0; j < t->joints; j++) {
+            if (!(awiwi_size(p[j]) > 0))
+                continue;
+            awiwi_real row = 0;
+            torque[i] -= p[j] * tau[j];
             for (int l = 0; l < t->joints; l++)
-                aim[i] += p[j] * K[j * t->joints + l] * p[l];
+                row += K[j * t->joints + l] * p[l];
+            stiffness[i] += p[j] * row;
+        }
     }
-    nearest_of_all(t, 1, aim, e.least, e.greatest, wanted);
-    return invert(t, d, &e, wanted, tolerance, f);
+    for (int i = 0; i < t->pairs; i++) {
+        if (t->pair[i].partner < i)
+            continue;
+        G[i] = multiply(t, i);
+        nearest_of_both(t->pair, i, G[i], torque, low, high, d);
+    }
+    for (int i = 0; i < t->pairs; i++) {
+        const int first = d[i] > 0;
+        e.more[i] = first ? t->pair[i].first : t->pair[i].second;
+        e.less[i] = first ? t->pair[i].second : t->pair[i].first;
+        e.apart[i] = awiwi_size(d[i]);
+        e.most[i] = range - e.apart[i];
+    }
+    if (place(t, &e, none, f, &at))
+        return AWIWI_OUT_OF_DOMAIN;
+    for (int i = 0; i < t->pairs; i++) {
+        e.least[i] = both(&e, i, at.k);
+        e.slope_least[i] = both(&e, i, at.slope);
+    }
+    if (place(t, &e, e.most, f, &at))
+        return AWIWI_OUT_OF_DOMAIN;
+    for (int i = 0; i < t->pairs; i++) {
+        e.greatest[i] = both(&e, i, at.k);
+        e.slope_greatest[i] = both(&e, i, at.slope);
+    }
+    for (int i = 0; i < t->pairs; i++) {
+        products squares;
+        if (t->pair[i].partner < i)
+            continue;
+        squares.own = G[i].own * G[i].own;
+        squares.mixed = G[i].mixed * G[i].mixed;
+        squares.other = G[i].other * G[i].other;
+        nearest_of_both(t->pair, i, squares, stiffness, e.least, e.greatest, wanted);
+    }
+    return invert(t, &e, wanted, tolerance, f);
 }
 
 /* Whether the forces give the torque, up to rounding. */
 static int gives(const awiwi_tendons *t, const awiwi_real *f, const awiwi_real *tau)
 {
     for (int j = 0; j < t->joints; j++) {
-        awiwi_real missing = tau[j], terms = awiwi_size(tau[j]);
-        for (int i = 0; i < t->tendons; i++) {
-            missing += t->coupling[i * t->joints + j] * f[i];
-            terms += awiwi_size(t->coupling[i * t->joints + j]) * t->high;
+        awiwi_real missing = tau[j], sizes = 0;
+        const awiwi_real *p = t->coupling + j;
+        for (int i = 0; i < t->tendons; i++, p += t->joints) {
+            missing += *p * f[i];
+            sizes += awiwi_size(*p);
         }
-        if (!(awiwi_size(missing) <= 16 * AWIWI_REAL_EPSILON * terms))
+        if (!(awiwi_size(missing) <= 16 * AWIWI_REAL_EPSILON * (awiwi_size(tau[j]) + sizes * t->high)))
             return 0;
     }
     return 1;

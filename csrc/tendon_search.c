@@ -32,7 +32,10 @@ static awiwi_real newton(const task *s, const model *c, const moves *m, rates *d
         pivot = awiwi_solve_positive(n, AWIWI_MOST_TENDONS, d->work[0], least, d->downhill, x);
         if (!(shift > 0) && pivot < -BENT * trace)
             combine(s, m, x, awiwi_dot(d->downhill, x, n) < 0 ? -range : range, bend);
-        shift = shift > 0 ? 16 * shift : (near < flat ? near : flat) + least;
+        const awiwi_real missing = pivot < 0 ? -pivot / awiwi_dot(x, x, n) : 0; /* less shift will not do */
+        do
+            shift = shift > 0 ? 16 * shift : (near < flat ? near : flat) + least;
+        while (shift <= missing && shift < DAMPING * trace);
     } while (!(pivot > least) && shift < DAMPING * trace);
     if (!(pivot > least)) {
         for (int i = 0; i < s->count; i++)
@@ -51,6 +54,11 @@ static int leaving(const task *s, const model *c, const moves *m, const int *hel
 {
     vector gradient;
     int found = -1;
+    if (m->rank + m->count == s->count) { /* none is held */
+        for (int i = 0; i < s->count; i++)
+            d->price[i] = 0;
+        return found;
+    }
     slopes(s, c, gradient);
     awiwi_real most = 256 * AWIWI_REAL_EPSILON * awiwi_largest(gradient, s->count);
     for (int i = 0; i < s->count; i++) {
@@ -70,20 +78,33 @@ static awiwi_real reach(const task *s, const vector f, const vector step, int *s
     awiwi_real share = 1;
     *stopped = -1;
     for (int i = 0; i < s->count; i++) {
-        const awiwi_real room = step[i] < 0 ? s->t->low - f[i] : s->t->high - f[i];
-        if (awiwi_size(step[i]) > 0 && room / step[i] < share) {
-            share = room / step[i];
+        const awiwi_real room = step[i] < 0 ? f[i] - s->t->low : s->t->high - f[i], size = awiwi_size(step[i]);
+        if (size * share > room) {
+            share = room > 0 ? room / size : 0;
             *stopped = i;
         }
     }
-    return share > 0 ? share : 0;
+    return share;
 }
 
-/* Take as much of a step as the limits allow and the cost permits: at most `most` afterwards. Each trial is one of the
-   steps left. */
-static int take(const task *s, const vector step, awiwi_real most, int *steps, vector f, model *here, int *stopped)
+/* Copy what the task uses. */
+static void keep(const task *s, const model *from, model *to)
 {
-    awiwi_real share = reach(s, f, step, stopped);
+    to->cost = from->cost;
+    to->blur = from->blur;
+    for (int e = 0; e < s->entries; e++)
+        to->excess[e] = from->excess[e];
+    for (int i = 0; i < s->count; i++) {
+        to->slope[i] = from->slope[i];
+        to->curvature[i] = from->curvature[i];
+    }
+}
+
+/* Take a share of a step, or as much of that as the cost permits: at most `most` afterwards. Each trial is one of the
+   steps left. */
+static int take(const task *s, const vector step, awiwi_real share, awiwi_real most, int *steps, vector f, model *here,
+                int *stopped)
+{
     while (share > 0) {
         vector trial;
         model there;
@@ -94,7 +115,7 @@ static int take(const task *s, const vector step, awiwi_real most, int *steps, v
         if (there.cost <= most) {
             for (int i = 0; i < s->count; i++)
                 f[i] = trial[i];
-            *here = there;
+            keep(s, &there, here);
             return AWIWI_OK;
         }
         if (--*steps <= 0)
@@ -110,49 +131,52 @@ static int descend(const task *s, const moves *all, int steps, vector f, model *
 {
     int held[AWIWI_MOST_TENDONS] = {0}, left = -1, stopped, straight = 0, changed = 0;
     awiwi_real last = AWIWI_REAL_MAX;
-    moves m = *all;
+    const moves *m = all;
+    moves own;
     if (cost(s, f, here))
         return AWIWI_OUT_OF_DOMAIN;
     while (steps-- > 0 && (s->keep_torque || here->cost > here->blur)) {
         vector step = {0}, bend = {0};
         if (changed) {
-            split(s, s->keep_torque, held, &m);
+            split(s, s->keep_torque, held, &own);
+            m = &own;
             last = AWIWI_REAL_MAX;
             straight = changed = 0;
         }
-        const awiwi_real gain = newton(s, here, &m, d, step, bend), longest = awiwi_largest(step, s->count);
+        const awiwi_real gain = newton(s, here, m, d, step, bend), longest = awiwi_largest(step, s->count);
         if (!(longest <= AWIWI_REAL_MAX))
             return AWIWI_NOT_FINITE;
         const int rounding = gain <= here->blur && 2 * longest >= last; /* nothing to gain, and no nearer */
         const awiwi_real near = s->tolerance * s->t->high;
         /* slopes that decide about a held tendon need the last step */
-        const int none_held = m.rank + m.count == s->count;
+        const int none_held = m->rank + m->count == s->count;
         const int ended = longest <= near || (none_held && awiwi_ends_with(longest, last, near)) || rounding;
         const awiwi_real *way = step;
         last = longest;
         if ((ended || (!straight && gain <= LITTLE * here->cost)) && here->cost > here->blur && steps > BENDS
             && awiwi_largest(bend, s->count) > 0) { /* off a saddle, or from the way to one */
             int trials = BENDS;
-            const int status = take(s, bend, here->cost - here->blur, &trials, f, here, &stopped);
+            const awiwi_real share = reach(s, f, bend, &stopped);
+            const int status = take(s, bend, share, here->cost - here->blur, &trials, f, here, &stopped);
             if (status == AWIWI_OUT_OF_DOMAIN)
                 return status;
             steps -= BENDS - trials;
             straight = status != AWIWI_OK;
             way = straight ? step : bend;
         }
+        const awiwi_real share = way == step ? reach(s, f, step, &stopped) : 0;
         if (way == step && ended) {
-            const awiwi_real share = reach(s, f, step, &stopped);
             for (int i = 0; i < s->count; i++)
                 f[i] = awiwi_clamp(f[i] + share * step[i], s->t->low, s->t->high);
-            left = leaving(s, here, &m, held, d);
+            left = leaving(s, here, m, held, d);
             if (left < 0)
                 return AWIWI_OK;
             held[left] = FREE;
             changed = 1;
             continue;
         }
-        if (way == step && reach(s, f, step, &stopped) > 0) {
-            const int status = take(s, step, here->cost + here->blur, &steps, f, here, &stopped);
+        if (share > 0) {
+            const int status = take(s, step, share, here->cost + here->blur, &steps, f, here, &stopped);
             if (status != AWIWI_OK)
                 return status;
         } else if (way == step && stopped == left) {
@@ -208,26 +232,34 @@ static int begin(task *s, const moves *m, vector f, rates *d)
     return descend(s, &each, AWIWI_MOST_TORQUE_STEPS, f, &found, d);
 }
 
-/* Move f to where one limit after the other stops the sum of forces from growing by `sense`, at the same torque. */
-static void drive(const task *s, awiwi_real sense, vector f)
+/* Move f to where one limit after the other stops the sum of forces from growing by `sense`, at the same torque. Each
+   limit takes one of the moves; `all` are those while no tendon is held. */
+static void drive(const task *s, const moves *all, awiwi_real sense, vector f)
 {
     int held[AWIWI_MOST_TENDONS] = {0}, stopped = 0;
     const awiwi_real range = s->t->high - s->t->low;
-    while (stopped >= 0) {
-        vector one, x, step;
-        moves m;
-        split(s, s->keep_torque, held, &m);
-        for (int i = 0; i < s->count; i++)
-            one[i] = 1;
-        for (int j = 0; j < m.count; j++)
-            x[j] = along(&m, m.loose[j], one);
-        combine(s, &m, x, 2 * sense * range, step);
-        const awiwi_real share = awiwi_largest(x, m.count) > 0 ? reach(s, f, step, &stopped) : 0;
-        if (!(awiwi_largest(x, m.count) > 0) || stopped < 0)
+    const moves *m = all;
+    moves own;
+    vector one;
+    for (int i = 0; i < s->count; i++)
+        one[i] = 1;
+    while (m->count > 0) {
+        vector x, step;
+        for (int j = 0; j < m->count; j++)
+            x[j] = along(m, m->loose[j], one);
+        if (!(awiwi_largest(x, m->count) > 0))
+            return;
+        combine(s, m, x, 2 * sense * range, step);
+        const awiwi_real share = reach(s, f, step, &stopped);
+        if (stopped < 0)
             return;
         for (int i = 0; i < s->count; i++)
             f[i] = awiwi_clamp(f[i] + share * step[i], s->t->low, s->t->high);
+        if (m->count == 1)
+            return;
         held[stopped] = AT_LOW;
+        split(s, s->keep_torque, held, &own);
+        m = &own;
     }
 }
 
@@ -260,7 +292,7 @@ int awiwi_search_forces(const awiwi_tendons *t, const awiwi_real *tau, const awi
 {
     const int held[AWIWI_MOST_TENDONS] = {0};
     awiwi_real least = 0;
-    vector first, best;
+    vector first = {0}, best;
     moves all;
     rates d;
     task s;
@@ -279,7 +311,7 @@ int awiwi_search_forces(const awiwi_tendons *t, const awiwi_real *tau, const awi
         for (int i = 0; i < s.count; i++)
             trial[i] = first[i];
         if (start > 0)
-            drive(&s, start == 1 ? -1 : 1, trial);
+            drive(&s, &all, start == 1 ? -1 : 1, trial);
         if (start > 0 && status == AWIWI_OK && is_near(&s, trial, best))
             continue;
         const int ended = descend(&s, &all, AWIWI_MOST_STIFFNESS_STEPS, trial, &found, &d);

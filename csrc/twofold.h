@@ -38,13 +38,30 @@ static inline awiwi_real awiwi_half(awiwi_real a)
     return a;
 }
 
-/* a b without rounding: the sum of four products of halves. No other product is formed, for a compiler could fuse it
-   with a sum; these are exact, so that fusing them changes nothing. */
+/* A number as a sum of two that have half the digits each. */
+typedef struct awiwi_halves {
+    awiwi_real upper, lower;
+} awiwi_halves;
+
+static inline awiwi_halves awiwi_split(awiwi_real a)
+{
+    const awiwi_real upper = awiwi_half(a);
+    const awiwi_halves x = {upper, a - upper};
+    return x;
+}
+
+/* The product without rounding. The four products of halves are exact, and so are the sum of the middle two, which are
+   multiples of the same power of two and as short, and the sum of the last with what the first two leave. No other
+   product is formed, for a compiler could fuse it with a sum; to fuse these changes nothing. */
+static inline awiwi_twofold awiwi_product_of_halves(awiwi_halves a, awiwi_halves b)
+{
+    const awiwi_twofold x = awiwi_joined(a.upper * b.upper, a.upper * b.lower + a.lower * b.upper);
+    return awiwi_joined(x.high, x.low + a.lower * b.lower);
+}
+
 static inline awiwi_twofold awiwi_exact_product(awiwi_real a, awiwi_real b)
 {
-    const awiwi_real a1 = awiwi_half(a), a2 = a - a1, b1 = awiwi_half(b), b2 = b - b1;
-    const awiwi_twofold first = {a1 * b1, 0}, second = {a1 * b2, 0}, third = {a2 * b1, 0}, fourth = {a2 * b2, 0};
-    return awiwi_twofold_add(awiwi_twofold_add(awiwi_twofold_add(first, second), third), fourth);
+    return awiwi_product_of_halves(awiwi_split(a), awiwi_split(b));
 }
 
 static inline awiwi_twofold awiwi_twofold_multiply(awiwi_twofold x, awiwi_twofold y)

@@ -29,7 +29,7 @@ def compiled(directory, dtype, command, flags):
     """The solver as a C function, in a precision."""
     write_headers(directory, Options("f64" if dtype is np.float64 else "f32"))
     target = directory / f"{dtype.__name__}.so"
-    sources = [str(CSRC / f"{name}.c") for name in ("riccati", "poles", "dense")]
+    sources = [str(CSRC / f"{name}.c") for name in ("riccati", "doubling", "poles", "dense")]
     words = [*command, *flags, f"-I{directory}", f"-I{CSRC}", "-shared", *sources, "-lm", "-o", str(target)]
     subprocess.run(words, check=True)
     return ctypes.CDLL(str(target)).awiwi_riccati
@@ -114,6 +114,13 @@ def test_without_doublings_the_best_known_is_returned_with_its_residual(solve):
     assert status in (OK, NOT_CONVERGED)
     assert np.isfinite(K).all()
     assert (residual < 1e-10) == (status == OK)
+
+
+@pytest.mark.parametrize("dtype", ROUNDING, ids=lambda dtype: dtype.__name__)
+def test_nearly_all_plants_of_four_states_need_no_doubling(solve, dtype):
+    found = [solve(dtype, *rounded(dtype, plant), doublings=0)[0] for plant in random_plants(400, seed=23)]
+
+    assert found.count(OK) >= 390
 
 
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="the flags are those of x86")

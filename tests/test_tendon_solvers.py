@@ -65,8 +65,8 @@ def test_the_work_is_bounded_as_the_header_says_and_small(library):
             assert finger.low <= f.min() <= f.max() <= finger.high
             counts["pairs" if finger.pairs else "search"].append(finger.calls)
 
-    assert max(counts["pairs"]) <= 10
-    assert max(counts["search"]) <= 100
+    assert max(counts["pairs"]) <= 6
+    assert max(counts["search"]) <= 40
 
 
 @pytest.mark.parametrize("kind", ["slack", "steps", "flat", "falling", "saw"])

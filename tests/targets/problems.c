@@ -165,7 +165,7 @@ static void regulator(int number)
     print("riccati", status, K, n);
     print("cost", status, S, n * n);
     print("residual", status, residual, 1);
-    print("semidefinite", awiwi_is_semidefinite(n, Q), 0, 0);
+    print("semidefinite", awiwi_semidefinite_rank(n, Q), 0, 0);
 }
 
 static void joint(int number)
