@@ -16,7 +16,7 @@
  * Cost: the solver's own work and calls, at most: 40 of backstepping_state_gains, 40 of backstepping_state_gains_derivatives.
  */
 #include "numerics.h"
-#include "awiwi_solvers.h"
+#include "awiwi_regulators.h"
 #include "dense.h"
 #include "kernels.h"
 
@@ -40,6 +40,18 @@ static void model(const void *context, const awiwi_real *parts, awiwi_real *h, a
     }
 }
 
+/* The largest relative error of the law's feedback gains, or what is not a number. */
+static awiwi_real miss(const given *g, const awiwi_real *gains)
+{
+    awiwi_real K[4], cancelled[4], external[2], worst = 0;
+    awiwi_backstepping_state_gains(g->plant, gains, g->weights, K, cancelled, external);
+    for (int i = 0; i < 4; i++) {
+        const awiwi_real error = awiwi_size(cancelled[i] / g->K_opt[i] - 1);
+        worst = error <= worst ? worst : error;
+    }
+    return worst;
+}
+
 int awiwi_optimal_backstepping(const double K_opt_in[restrict 4], const double plant_in[restrict 3], const double weights_in[restrict 2], const double start_in[restrict 4], double impedance_out[restrict 2], double rates_out[restrict 2])
 {
     const awiwi_real range = (awiwi_real)1000000.0, exact = 16384 * AWIWI_REAL_EPSILON, tolerance = 1e-11;
@@ -47,26 +59,35 @@ int awiwi_optimal_backstepping(const double K_opt_in[restrict 4], const double p
     const awiwi_real high[4] = {range, range, range, range};
     const given context = {K_opt_in, plant_in, weights_in, start_in};
     const awiwi_problem problem = {model, &context, 4, 4, low, high};
-    awiwi_real parts[4] = {1, 1, 1, 1}, h[4], P[16];
+    awiwi_real parts[4], gains[4];
     const int finite = awiwi_all_finite(K_opt_in, 4) && awiwi_all_finite(plant_in, 3) && awiwi_all_finite(weights_in, 2)
                        && awiwi_all_finite(start_in, 4);
-    int positive = 1, matched = 1, status = AWIWI_OUT_OF_DOMAIN;
+    int positive = 1, status = AWIWI_OK;
 
     for (int i = 0; i < 4; i++)
         positive = positive && start_in[i] > 0 && K_opt_in[i] > 0 && (i == 3 || plant_in[i] > 0) && (i > 1 || weights_in[i] > 0);
-    if (finite && positive)
-        status = awiwi_least_squares(&problem, one, one, 40, tolerance, parts);
+    int matched = finite && positive && awiwi_law_gains(K_opt_in, plant_in, weights_in, start_in, gains);
+    for (int i = 0; i < 4; i++)
+        matched = matched && gains[i] > start_in[i] / range && gains[i] < start_in[i] * range;
+    matched = matched && miss(&context, gains) <= 64 * AWIWI_REAL_EPSILON;
+    if (!matched) {
+        for (int i = 0; i < 4; i++)
+            parts[i] = 1;
+        if (finite && positive)
+            status = awiwi_least_squares(&problem, one, one, 40, tolerance, parts);
+        for (int i = 0; i < 4; i++)
+            gains[i] = finite ? parts[i] * start_in[i] : 0;
+    }
     for (int i = 0; i < 2; i++) {
-        impedance_out[i] = finite ? parts[i] * start_in[i] : 0;
-        rates_out[i] = finite ? parts[i + 2] * start_in[i + 2] : 0;
+        impedance_out[i] = gains[i];
+        rates_out[i] = gains[i + 2];
     }
     if (!finite || !positive)
         return finite ? AWIWI_OUT_OF_DOMAIN : AWIWI_NOT_FINITE;
-    model(&context, parts, h, P);
-    for (int i = 0; i < 4; i++)
-        matched = matched && h[i] - 1 < exact && 1 - h[i] < exact;
     /* K_3 K_4, K_p and K_d only add to what the weights alone make of the third gain */
     if (!(plant_in[2] * K_opt_in[2] > plant_in[1] * (weights_in[0] / weights_in[1] + 1 / (plant_in[0] * weights_in[0]))))
         return AWIWI_OUT_OF_DOMAIN;
-    return status == AWIWI_NOT_FINITE ? status : matched ? AWIWI_OK : AWIWI_NOT_CONVERGED;
+    if (status == AWIWI_NOT_FINITE)
+        return status;
+    return matched || miss(&context, gains) < exact ? AWIWI_OK : AWIWI_NOT_CONVERGED;
 }
