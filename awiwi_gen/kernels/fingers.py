@@ -327,6 +327,10 @@ def estimated_parts(finger: Finger) -> list[tuple[list[int], list[int], bool]]:
     return [part for part in found if part[0]]
 
 
+# Steps get shorter more slowly where lengths bend more, and rounding in single precision leaves them longer than 1e-6.
+ROUND_BODIES = {"f64": "1e-13", "f32": "5e-6"}
+
+
 def nonlinear_estimate(finger: Finger, iterations: int = 24) -> Solver | None:
     """The solver of fingers whose coupling depends on the pose; None for other fingers."""
     if not is_curved(finger):
@@ -357,9 +361,7 @@ def nonlinear_estimate(finger: Finger, iterations: int = 24) -> Solver | None:
         iterations=1 + curved * (iterations - 1),
         tolerance={"f64": 1e-12, "f32": 1e-5},
         limits=limit_paths(finger),
-        stop=STOP | {"f64": "1e-13"}
-        if wraps(finger)
-        else STOP,  # steps get shorter more slowly where lengths bend more
+        stop=ROUND_BODIES if wraps(finger) else STOP,
     )
 
 
