@@ -26,7 +26,7 @@ typedef struct task {
     int joint[AWIWI_MOST_JOINTS];
     awiwi_real p[AWIWI_MOST_TENDONS][AWIWI_MOST_JOINTS]; /* couplings [count][joints] */
     awiwi_real torque[AWIWI_MOST_JOINTS];                /* wanted */
-    int keep_torque;
+    int keep_torque, within_reach; /* by the limits */
     awiwi_real tolerance;
     awiwi_real *f; /* of all tendons */
     awiwi_real times[MOST_ENTRIES], wanted[MOST_ENTRIES];
@@ -67,7 +67,7 @@ static void start_task(task *s, const awiwi_tendons *t, const awiwi_real *torque
     s->t = t;
     s->f = f;
     s->count = t->searched;
-    s->joints = 0;
+    s->joints = s->within_reach = 0;
     for (int j = 0; j < t->joints; j++) {
         int touched = 0;
         for (int i = 0; i < s->count; i++) {

@@ -126,6 +126,16 @@ static int take(const task *s, const vector step, awiwi_real share, awiwi_real m
     return AWIWI_NOT_CONVERGED;
 }
 
+/* Give back by the basic tendons what rounding has taken from a torque within reach. */
+static void settle(const task *s, const moves *m, vector f)
+{
+    for (int r = 0; r < m->rank && s->within_reach; r++) {
+        awiwi_real *basic = f + m->basic[r];
+        *basic += m->share[r][s->count] - awiwi_dot(m->share[r], f, s->count);
+        *basic = awiwi_clamp(*basic, s->t->low, s->t->high);
+    }
+}
+
 /* From f down to where no free move and no leaving tendon lowers the cost. `all` are the moves while none is held. */
 static int descend(const task *s, const moves *all, int steps, vector f, model *here, rates *d)
 {
@@ -169,8 +179,10 @@ static int descend(const task *s, const moves *all, int steps, vector f, model *
             for (int i = 0; i < s->count; i++)
                 f[i] = awiwi_clamp(f[i] + share * step[i], s->t->low, s->t->high);
             left = leaving(s, here, m, held, d);
-            if (left < 0)
+            if (left < 0) {
+                settle(s, m, f);
                 return AWIWI_OK;
+            }
             held[left] = FREE;
             changed = 1;
             continue;
@@ -215,7 +227,7 @@ static int begin(task *s, const moves *m, vector f, rates *d)
 {
     const awiwi_real middle = s->t->low + (s->t->high - s->t->low) / 2;
     const int held[AWIWI_MOST_TENDONS] = {0};
-    int inside = 1;
+    int inside = 1, status = AWIWI_OK;
     moves each;
     model found;
     for (int i = 0; i < s->count; i++)
@@ -224,12 +236,14 @@ static int begin(task *s, const moves *m, vector f, rates *d)
     for (int i = 0; i < s->count; i++)
         inside = inside && f[i] >= s->t->low && f[i] <= s->t->high;
     (void)cost(s, f, &found);
-    if (inside && found.cost <= found.blur)
-        return AWIWI_OK;
-    for (int i = 0; i < s->count; i++)
-        f[i] = middle;
-    split(s, 0, held, &each);
-    return descend(s, &each, AWIWI_MOST_TORQUE_STEPS, f, &found, d);
+    if (!inside || !(found.cost <= found.blur)) {
+        for (int i = 0; i < s->count; i++)
+            f[i] = middle;
+        split(s, 0, held, &each);
+        status = descend(s, &each, AWIWI_MOST_TORQUE_STEPS, f, &found, d);
+    }
+    s->within_reach = found.cost <= found.blur;
+    return status;
 }
 
 /* Move f to where one limit after the other stops the sum of forces from growing by `sense`, at the same torque. Each

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from awiwi_gen.build import load
+from awiwi_gen.emit.options import Options
 from awiwi_gen.errors import InputError
 from awiwi_gen.hand import Hand
 from awiwi_gen.hand.capability import left_out
@@ -187,6 +188,16 @@ def test_forces_are_distributed_over_strings_round_bodies_where_these_have_a_sta
     np.testing.assert_array_equal(outside.f, 1)
     torque = -lib.claw_coupling([-0.3, 0.2]).P.T @ inside.f
     np.testing.assert_allclose(torque, [0.01, 0.02], rtol=1e-9)
+
+
+def test_a_torque_that_takes_a_tendon_to_its_limit_is_within_reach_in_single_precision():
+    job = Job(Hand.parse(FILE), Options("f32"), "claw_tendon_distribution")
+    lib = load(cached_tree(job), job.store)
+    q, tau = [0.6961405, 0.06115133], [1.8636609, -0.44994697]
+    found = lib.claw_tendon_distribution(q, tau, [[10.441851, -4.1569753], [-4.1569753, 2.2416348]], 3.72247, 95.23174)
+
+    assert found.status == 0
+    np.testing.assert_allclose(found.f, [88.69803, 12.83388, 95.23174], atol=2e-4)
 
 
 def test_joint_angles_are_found_from_the_lengths_of_strings_round_bodies():
