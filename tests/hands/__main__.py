@@ -194,8 +194,9 @@ def brief(full: str) -> str:
     head = ("hand", "joints in fingers", "of the wrist", "tendons", "kernels proved", "worst difference", "not held")
     cells = [head, ("---",) * len(head)]
     for name, _, *middle, worst, lost in rows:
-        kinds = "-" if worst.startswith("refused") else f"{len(lost.split('; '))} kinds of elements"
-        cells.append((name, *middle, worst.split(":")[0], kinds))
+        count = len(lost.split("; "))
+        kinds = f"{count} kind{'s' if count > 1 else ''} of elements"
+        cells.append((name, *middle, worst.split(":")[0], kinds if worst[0].isdigit() else "-"))
     return "".join(f"| {' | '.join(each)} |\n" for each in cells)
 
 
