@@ -7,6 +7,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+import random_hands
 from commands import answer, complaint, told
 from hand_numbers import coordinates, fingers_of, link_angles, poses, rpy_matrix, tendon_lengths
 
@@ -14,6 +15,7 @@ from awiwi_gen.hand import Hand
 from awiwi_gen.interchange import export_mjcf, export_urdf
 from awiwi_gen.interchange.draft import draft
 from awiwi_gen.interchange.export_mjcf import quaternion
+from awiwi_gen.interchange.frames import about, turn_matrix
 from awiwi_gen.interchange.model import Body, Joint, Mimic, Model, Place, Site, Tendon
 from awiwi_gen.interchange.toml import hand_text
 
@@ -127,6 +129,53 @@ def test_the_import_of_an_export_is_the_same_hand_again():
     ours, theirs = (hand.fingers["claw"].quantities() for hand in (once, twice))
     for place, number in ours.items():
         assert float(theirs[place]) == pytest.approx(float(number), rel=1e-12, abs=1e-15), place
+
+
+def palm_pose(palm, q: np.ndarray) -> np.ndarray:
+    """The palm's frame (4 x 4) in that of the forearm."""
+
+    def frame(axes: np.ndarray, origin: np.ndarray) -> np.ndarray:
+        return np.block([[axes, origin[:, None]], [np.zeros((1, 3)), np.eye(1)]])
+
+    def metres(point) -> np.ndarray:
+        return np.array([float(x) for x in point])
+
+    def turned_by(rpy) -> np.ndarray:
+        return rpy_matrix([float(angle) for angle in rpy or (0, 0, 0)])
+
+    pose = frame(turned_by(palm.base.rpy), metres(palm.base.position)) if palm.base else np.eye(4)
+    for joint, angle in zip(palm.joints, q, strict=True):
+        turned = angle - float(joint.reference or 0)
+        axes = turn_matrix(joint.turn) @ turned_by(joint.rpy) @ about(2, turned)
+        pose = pose @ frame(axes, np.zeros(3)) @ frame(np.eye(3), metres(joint.offset))
+    return pose @ frame(turned_by(palm.rpy), np.zeros(3))
+
+
+@pytest.mark.parametrize("seed", [3, 4, 5])
+def test_a_wrist_of_joints_in_series_comes_back(seed):
+    hand = Hand.parse(random_hands.hand(seed, 2, {"palm", "base", "references"}))
+    again = Hand.parse(hand_text(draft(read_mjcf(export_mjcf.text_and_losses(hand)[0]), palm="palm")))
+    same = Hand.parse(hand_text(draft(read_mjcf(export_mjcf.text_and_losses(again)[0]), palm="palm")))
+    low, high = (np.array(ends) for ends in hand.palm.range)
+
+    np.testing.assert_allclose(again.palm.range, hand.palm.range, rtol=1e-14)
+    for share in (0, 0.3, 1):
+        q = low + share * (high - low)
+        np.testing.assert_allclose(palm_pose(again.palm, q), palm_pose(hand.palm, q), atol=1e-14)
+    assert same.palm.structure() == again.palm.structure()
+
+
+def test_a_urdf_has_the_joints_of_the_wrist_between_forearm_and_palm():
+    hand = Hand.parse(random_hands.hand(3, 1, {"palm"}))
+    root = ElementTree.fromstring(export_urdf.text_and_losses(hand)[0])  # noqa: S314 our own
+    above = {each.find("child").get("link"): each for each in root.findall("joint")}
+    road, link = [], "palm"
+    while link in above:
+        road.append(above[link].get("name"))
+        link = above[link].find("parent").get("link")
+
+    assert link == "forearm"
+    assert road == ["palm.fixed", *(joint.joint for joint in reversed(hand.palm.joints))]
 
 
 def test_tendons_of_pulleys_are_as_long_as_the_hand_file_says():

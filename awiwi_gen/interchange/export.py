@@ -9,7 +9,8 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from awiwi_gen.hand import Finger, Hand, Link
+from awiwi_gen.hand import Finger, Hand
+from awiwi_gen.hand.palm import Palm
 from awiwi_gen.interchange.frames import about, turn_matrix
 from awiwi_gen.interchange.model import Array, Loss
 
@@ -20,9 +21,9 @@ FRICTION = (
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """A link of a finger: its fixed rotation (3 x 3) and position (3) in the link before, and its joint's reference."""
+    """A link of a finger, or a joint of the wrist: its fixed rotation (3 x 3) and position (3) in the one before."""
 
-    link: Link
+    link: Any  # Link or PalmJoint
     axes: Array
     position: Array
     reference: float
@@ -31,7 +32,6 @@ class Part:
     def inertia(self) -> Array:
         """The tensor (3 x 3) about the centre of mass [kg m^2]."""
         tensor = self.link.inertia
-        assert tensor is not None  # noqa: S101 a link has all of mass, com and inertia or none
         x, y, z, xy, xz, yz = (float(getattr(tensor, key)) for key in ("xx", "yy", "zz", "xy", "xz", "yz"))
         return np.array([[x, xy, xz], [xy, y, yz], [xz, yz, z]])
 
@@ -44,6 +44,42 @@ def parts(finger: Finger) -> list[Part]:
         found.append(Part(link, axes, position, value(link.reference)))
         position = vector(link.offset)
     return found
+
+
+def palm_parts(palm: Palm) -> list[Part]:
+    """The joints of the wrist, from the forearm to the palm; the first stands in the forearm where `base` says."""
+    base = palm.base
+    axes, position = rpy_matrix(base.rpy if base else None), vector(base.position) if base else np.zeros(3)
+    found = []
+    for joint in palm.joints:
+        found.append(
+            Part(joint, axes @ turn_matrix(joint.turn) @ rpy_matrix(joint.rpy), position, value(joint.reference))
+        )
+        axes, position = np.eye(3), vector(joint.offset)
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """Parts one after the other as drawn: the frame of the last, and each joint's axis and anchor, in the parent's frame."""
+
+    axes: Array
+    position: Array
+    seats: list[tuple[Part, Array, Array]]
+
+    @classmethod
+    def of(cls, parts: Iterable[Part]) -> Drawn:
+        """Compose the fixed rotations and positions of parts."""
+        axes, position, seats = np.eye(3), np.zeros(3), []
+        for part in parts:
+            position = position + axes @ part.position
+            axes = axes @ part.axes
+            seats.append((part, axes[:, 2], position))
+        return cls(axes, position, seats)
+
+    def then(self, offset: Array, rotation: Array) -> Drawn:
+        """The same with a frame behind the last."""
+        return Drawn(self.axes @ rotation, self.position + self.axes @ offset, self.seats)
 
 
 def rpy_matrix(rpy: Any) -> Array:
@@ -84,10 +120,6 @@ def common_losses(hand: Hand) -> list[Loss]:
     return [
         Loss("fingers with a four-bar: left out", tuple(four_bars)),
         Loss("the wrist: the palm is the root", ("wrist",) if hand.wrist else ()),
-        Loss(
-            "joints of the wrist: the palm is the root",
-            tuple(joint.joint for joint in hand.palm.joints) if hand.palm else (),
-        ),
         Loss("mechanisms between motor and tendon: friction, ripple, lever springs, fibres", tuple(whole)),
         Loss(FRICTION, tuple(rough)),
     ]

@@ -10,13 +10,15 @@ from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 
-from awiwi_gen.hand import Finger, Hand
+from awiwi_gen.hand import Finger, Hand, Link
 from awiwi_gen.hand.parts import PALM, PathPoint, Tendon
 from awiwi_gen.interchange.export import (
+    Drawn,
     Part,
     common_losses,
     document,
     has_four_bar,
+    palm_parts,
     parts,
     rpy_matrix,
     text,
@@ -31,15 +33,29 @@ def text_and_losses(hand: Hand) -> tuple[str, list[Loss]]:
     root = Element("mujoco", model=hand.name)
     SubElement(root, "compiler", angle="radian", autolimits="true")
     SubElement(root, "option", integrator="implicitfast")
-    palm = SubElement(SubElement(root, "worldbody"), "body", name="palm")
     sections = {name: Element(name) for name in ("tendon", "equality", "actuator")}
     lost: dict[str, list[str]] = {}
+    palm = _palm(SubElement(root, "worldbody"), hand, lost)
     for name, finger in hand.fingers.items():
         if not has_four_bar(finger):
             _Writer(hand, name, finger, sections, lost).write(palm)
     root.extend(section for section in sections.values() if len(section))
     losses = common_losses(hand) + [Loss(what, tuple(places)) for what, places in lost.items()]
     return document(root, hand), [loss for loss in losses if loss.places]
+
+
+def _palm(world: Element, hand: Hand, lost: dict[str, list[str]]) -> Element:
+    """The body that the fingers stand on, with the joints of a wrist in series."""
+    if hand.palm is None:
+        return SubElement(world, "body", name="palm")
+    drawn = Drawn.of(palm_parts(hand.palm))
+    drawn = drawn.then(vector(hand.palm.joints[-1].offset), rpy_matrix(hand.palm.rpy))
+    body = SubElement(SubElement(world, "body", name="forearm"), "body", name="palm")
+    _place(body, drawn.position, drawn.axes)
+    _least_inertia(body, lost)
+    for part, axis, anchor in drawn.seats:
+        _hinge(body, part.link.joint, part, drawn.axes.T @ axis, drawn.axes.T @ (anchor - drawn.position))
+    return body
 
 
 class _Writer:
@@ -96,41 +112,17 @@ class _Writer:
 
     def _body(self, parent: Element, waiting: list[Part]) -> Element:
         """The body of the last of these links, with the joints of all."""
-        axes, position, seats = np.eye(3), np.zeros(3), []
-        for part in waiting:
-            position = position + axes @ part.position
-            axes = axes @ part.axes
-            seats.append((part, axes[:, 2], position))
-        link = waiting[-1].link
+        drawn, link = Drawn.of(waiting), waiting[-1].link
         body = SubElement(parent, "body", name=f"{self.name}_{link.joint}")
-        _place(body, position, axes)
-        if link.mass is None:
-            self._lose(
-                f"links without mass: {LEAST_MASS * 1e6:g} mg, because MuJoCo moves no body without",
-                body.get("name", ""),
-            )
-            SubElement(body, "inertial", pos="0 0 0", mass=text(LEAST_MASS), diaginertia=text([LEAST_MASS * 1e-6] * 3))
-        else:
+        _place(body, drawn.position, drawn.axes)
+        if isinstance(link, Link) and link.mass is not None:
             _inertial(body, float(link.mass), vector(link.com or ()), waiting[-1].inertia)
-        for part, axis, anchor in seats:
-            self._joint(body, part, axes.T @ axis, axes.T @ (anchor - position))
+        else:
+            _least_inertia(body, self.lost)
+        for part, axis, anchor in drawn.seats:
+            name = f"{self.name}_{part.link.joint}"
+            _hinge(body, name, part, drawn.axes.T @ axis, drawn.axes.T @ (anchor - drawn.position))
         return body
-
-    def _joint(self, body: Element, part: Part, axis: Array, anchor: Array) -> None:
-        link = part.link
-        joint = SubElement(body, "joint", name=f"{self.name}_{link.joint}", axis=text(axis), pos=text(anchor))
-        if part.reference:
-            joint.set("ref", text(part.reference))
-        if link.low is not None and link.high is not None:
-            joint.set("range", text((float(link.low), float(link.high))))
-        for key in ("armature", "damping"):
-            if getattr(link, key) is not None:
-                joint.set(key, text(value(getattr(link, key))))
-        if link.friction is not None:
-            joint.set("frictionloss", text(float(link.friction.torque)))
-        if link.spring is not None:
-            joint.set("stiffness", text(float(link.spring.stiffness)))
-            joint.set("springref", text(float(link.spring.reference)))
 
     def _coupling(self, follower: str, leader: str) -> None:
         references = {part.link.joint: part.reference for part in self.parts}
@@ -210,6 +202,33 @@ class _Writer:
             element.set("springlength", text((0, slack)))
         else:
             self._lose("return springs whose rest MuJoCo cannot hold: no spring", name)
+
+
+def _hinge(body: Element, name: str, part: Part, axis: Array, anchor: Array) -> None:
+    """A joint of a finger or of the wrist, by its axis and a point of it in the body's frame."""
+    link = part.link
+    joint = SubElement(body, "joint", name=name, axis=text(axis), pos=text(anchor))
+    if part.reference:
+        joint.set("ref", text(part.reference))
+    if link.low is not None and link.high is not None:
+        joint.set("range", text((float(link.low), float(link.high))))
+    if not isinstance(link, Link):
+        return
+    for key in ("armature", "damping"):
+        if getattr(link, key) is not None:
+            joint.set(key, text(value(getattr(link, key))))
+    if link.friction is not None:
+        joint.set("frictionloss", text(float(link.friction.torque)))
+    if link.spring is not None:
+        joint.set("stiffness", text(float(link.spring.stiffness)))
+        joint.set("springref", text(float(link.spring.reference)))
+
+
+def _least_inertia(body: Element, lost: dict[str, list[str]]) -> None:
+    """The inertia of a body that has none in the hand: MuJoCo moves no body without."""
+    what = f"links without mass: {LEAST_MASS * 1e6:g} mg, because MuJoCo moves no body without"
+    lost.setdefault(what, []).append(body.get("name", ""))
+    SubElement(body, "inertial", pos="0 0 0", mass=text(LEAST_MASS), diaginertia=text([LEAST_MASS * 1e-6] * 3))
 
 
 def _place(body: Element, position: Array, axes: Array) -> None:

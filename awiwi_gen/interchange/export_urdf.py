@@ -12,6 +12,7 @@ from awiwi_gen.interchange.export import (
     common_losses,
     document,
     has_four_bar,
+    palm_parts,
     parts,
     rpy_matrix,
     text,
@@ -25,7 +26,7 @@ from awiwi_gen.interchange.model import Array, Loss
 def text_and_losses(hand: Hand) -> tuple[str, list[Loss]]:
     """The file, and what of the hand it does not hold."""
     root = Element("robot", name=hand.prefix)
-    SubElement(root, "link", name="palm")
+    _palm(root, hand)
     fingers = {name: finger for name, finger in hand.fingers.items() if not has_four_bar(finger)}
     for name, finger in fingers.items():
         _finger(root, hand, name, finger)
@@ -37,6 +38,22 @@ def text_and_losses(hand: Hand) -> tuple[str, list[Loss]]:
         Loss("springs of joints", tuple(f"{name} {link.joint}" for name, link in links if link.spring is not None)),
     ]
     return document(root, hand), [loss for loss in losses if loss.places]
+
+
+def _palm(root: Element, hand: Hand) -> None:
+    """The link that the fingers stand on, behind the joints of a wrist in series."""
+    if hand.palm is None:
+        SubElement(root, "link", name="palm")
+        return
+    parent = "forearm"
+    SubElement(root, "link", name=parent)
+    for part in palm_parts(hand.palm):
+        child = f"wrist_{part.link.joint}"
+        SubElement(root, "link", name=child)
+        limits = value(part.link.low), value(part.link.high)
+        _hinge(root, hand, part.link.joint, part, (parent, child), limits)
+        parent = child
+    _fixed(root, parent, "palm", vector(hand.palm.joints[-1].offset), rpy_matrix(hand.palm.rpy))
 
 
 def _finger(root: Element, hand: Hand, name: str, finger: Finger) -> None:
@@ -72,19 +89,27 @@ def _link(root: Element, name: str, part: Part) -> None:
                ixy=text(t[0, 1]), ixz=text(t[0, 2]), iyz=text(t[1, 2]))  # fmt: skip
 
 
-def _joint(root: Element, hand: Hand, name: str, finger: Finger, part: Part, parent: str) -> None:
-    link = part.link
-    joint = SubElement(root, "joint", name=f"{name}_{link.joint}", type="revolute")
-    SubElement(joint, "parent", link=parent)
-    SubElement(joint, "child", link=f"{name}_{link.joint}")
+def _hinge(
+    root: Element, hand: Hand, name: str, part: Part, ends: tuple[str, str], limits: tuple[float, float]
+) -> Element:
+    """A joint between two links, the parent and the child."""
+    joint = SubElement(root, "joint", name=name, type="revolute")
+    SubElement(joint, "parent", link=ends[0])
+    SubElement(joint, "child", link=ends[1])
     # A joint of URDF stands at zero where it is drawn.
     c, s = np.cos(part.reference), np.sin(part.reference)
     drawn = part.axes @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
     SubElement(joint, "origin", xyz=text(part.position), rpy=text(rpy_of(drawn)))
     SubElement(joint, "axis", xyz="0 0 1")
-    low, high = _range(finger, link.joint)
+    low, high = limits
     SubElement(joint, "limit", lower=text(low), upper=text(high), effort=text(float(hand.limits.joint_torque)),
                velocity=text(float(hand.limits.joint_velocity)))  # fmt: skip
+    return joint
+
+
+def _joint(root: Element, hand: Hand, name: str, finger: Finger, part: Part, parent: str) -> None:
+    link, full = part.link, f"{name}_{part.link.joint}"
+    joint = _hinge(root, hand, full, part, (parent, full), _range(finger, link.joint))
     if link.damping is not None or link.friction is not None:
         friction = value(link.friction.torque) if link.friction else 0.0
         SubElement(joint, "dynamics", damping=text(value(link.damping)), friction=text(friction))

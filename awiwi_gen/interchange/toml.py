@@ -67,7 +67,7 @@ def _palm_lines(palm: DraftPalm, hand: DraftHand) -> list[str]:
 
 
 def _rpy(axes: Array) -> str:
-    return _listed(map(angle, tidy(rpy_of(axes), 1.0)))
+    return _listed(angle(each, NOISE) for each in tidy(rpy_of(axes), 1.0))
 
 
 def _finger_lines(finger: DraftFinger, file: str) -> list[str]:
@@ -191,10 +191,10 @@ def mass(kilograms: float) -> str:
     return quantity(kilograms, "g", 3)
 
 
-def angle(radians: float) -> str:
-    """An angle in degrees if it has at most ten digits there, else in radians."""
+def angle(radians: float, noise: float = 2e-16) -> str:
+    """An angle in degrees if it has at most ten digits there, up to noise, else in radians."""
     degrees = float(f"{math.degrees(radians):.10g}")
-    if abs(math.radians(degrees) - radians) <= 2e-16 * max(1.0, abs(radians)):
+    if abs(math.radians(degrees) - radians) <= noise * max(1.0, abs(radians)):
         return quantity(degrees, "deg")
     return quantity(radians, "rad")
 

@@ -168,12 +168,14 @@ def round_trip(hand: Hand, scratch: Path) -> list[str]:
     file.write_text(export_mjcf.text_and_losses(hand)[0], encoding="utf-8")
     again = Hand.parse(hand_text(draft(read(file, exact=True))))
     faults = []
-    for name, finger in hand.fingers.items():
-        if finger.structure() != again.fingers[name].structure():
+    wrists = {"palm": (hand.palm, again.palm)} if hand.palm else {}
+    pairs = {name: (finger, again.fingers[name]) for name, finger in hand.fingers.items()}
+    for name, (part, other_part) in (pairs | wrists).items():
+        if other_part is None or part.structure() != other_part.structure():
             faults.append(f"the export of {name} has another structure")
             continue
-        other = again.fingers[name].quantities()
-        for place, quantity in finger.quantities().items():
+        other = other_part.quantities()
+        for place, quantity in part.quantities().items():
             ours, theirs = float(quantity), float(other[place])
             scale = 1e-7 if "inertia" in place else 1e-3
             if abs(ours - theirs) > LIMIT * max(scale, abs(ours)):
