@@ -16,6 +16,7 @@ import sympy
 
 from awiwi_gen import definitions, witnesses
 from awiwi_gen.definitions.naming import definitions as meanings
+from awiwi_gen.hand.parts import Tendon
 
 SAMPLES = 3
 BASE = [[f"{a}abduction", f"{b}flexion"] for a, b in ("++", "+-", "-+", "--")]
@@ -103,7 +104,9 @@ def make(kind: str, leaf: Leaf, **special: float) -> Tree:
         return Tree(from_=point(f"from{index}", -0.03, 0.03), to=point(f"to{index}", -0.03, 0.03), joint=joint)
 
     def tendon(rest: Any, **given: Any) -> Tree:
-        return Tree(**{"rest": rest, "over": [], "arms": {}, "span": None, "path": [], "spring": None, **given})
+        found = Tree(**{"rest": rest, "over": [], "arms": {}, "span": None, "path": [], "spring": None, **given})
+        found.runs = Tendon.runs.fget(found)
+        return found
 
     routes = [tendon(number(f"rest{i}", 0, 0.1), over=over) for i, over in enumerate(structure["routes"])]
     spans = [tendon(leaf(f"slack{i}", 0.0), span=span(i, joint)) for i, joint in enumerate(structure.get("spans", []))]
@@ -118,7 +121,10 @@ def make(kind: str, leaf: Leaf, **special: float) -> Tree:
     paths = [
         tendon(
             leaf(f"path{i}", 0.0),
-            path=[Tree(link=link, at=point(f"at{i}{k}", -0.03, 0.03)) for k, link in enumerate(links)],
+            path=[
+                Tree(link=link, at=point(f"at{i}{k}", -0.03, 0.03), radius=None, divisor=None)
+                for k, link in enumerate(links)
+            ],
             arms={finger.links[-1].joint: number(f"arm{i}", 0.004, 0.009)},
         )
         for i, links in enumerate(structure.get("paths", []))

@@ -36,8 +36,9 @@ def results(figures, some_proof):
 
 @pytest.fixture(scope="module")
 def some_results(results):
-    """The same with three figures: drawing all of them takes long."""
-    return replace(results, figures=results.figures[:3])
+    """The same with a few figures, one of whose claims does not hold: drawing all of them takes long."""
+    numbers = ("5.7", "5.16", "6.9")
+    return replace(results, figures=[figure for figure in results.figures if figure.number in numbers])
 
 
 @pytest.fixture(scope="module")

@@ -194,7 +194,8 @@ def long_work(seconds: float) -> None:
 
 
 PARENT = """
-import os, sys
+import os, signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)  # programs in the background ignore it
 from awiwi_gen import exits, parallel
 sys.path.insert(0, sys.argv[1])
 import test_system_errors as test
