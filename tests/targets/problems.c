@@ -1,123 +1,258 @@
 /* Problems that no kernel of the Awiwi hand poses: random tendons and curves, least squares of other sizes, plants of
-   any scale, files of numbers with every kind of damage. `make mutants` runs this program; it prints all results. */
+   any scale, with every kind of degeneracy. `make mutants` runs this program; it prints all results. */
+#include "problems.h"
+
 #include <math.h>
-#include <stdint.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
-#include "awiwi.h"
-#include "awiwi_params_file.h"
-#include "dense.h"
-
-enum { PROBLEMS = 150, JOINTS = 4, TENDONS = 8, NUMBERS = 3, FILE_SIZE = AWIWI_PARAMS_HEADER + NUMBERS * 8 };
-enum { COUNT_AT = 16, SIZE_AT = 20, DIGEST_AT = 24, CRC_AT = 60 };
+enum { PROBLEMS = 900, ARRAYS = 64 };
 
 static uint32_t seed = 1;
+static void *arrays[ARRAYS];
+static int array_count;
 
-static double random_in(double low, double high)
+double random_in(double low, double high)
 {
     seed = seed * 1664525u + 1013904223u;
     return low + (high - low) * (seed >> 8) / 16777216.0;
 }
 
-static void fill(double *x, int count, double low, double high)
+double scaled(void)
 {
-    for (int i = 0; i < count; i++)
-        x[i] = random_in(low, high);
+    return pow(10, random_in(-6, 6));
 }
 
-static void print(const char *name, int status, const double *x, int count)
+static void *array(int count, size_t size)
+{
+    if (array_count == ARRAYS)
+        abort();
+    return arrays[array_count++] = malloc((size_t)count * size);
+}
+
+double *random_array(int count, double low, double high)
+{
+    double *x = array(count, sizeof *x);
+    for (int i = 0; i < count; i++)
+        x[i] = random_in(low, high);
+    return x;
+}
+
+double *copy_of(const double *x, int count)
+{
+    return memcpy(array(count, sizeof *x), x, (size_t)count * sizeof *x);
+}
+
+double *output(int count)
+{
+    return random_array(count, -77, -77);
+}
+
+int *indices(int count, int first, int step)
+{
+    int *x = array(count, sizeof *x);
+    for (int i = 0; i < count; i++)
+        x[i] = first + step * i;
+    return x;
+}
+
+void release(void)
+{
+    while (array_count > 0)
+        free(arrays[--array_count]);
+}
+
+void coarsen(double *x, int count, double grid)
+{
+    for (int i = 0; i < count; i++)
+        x[i] = grid * round(x[i] / grid);
+}
+
+void print(const char *name, int status, const double *x, int count)
 {
     printf("%s %d", name, status);
     for (int i = 0; i < count; i++)
-        printf(" %a", x[i]);
+        if (isnan(x[i]))
+            printf(" nan");
+        else
+            printf(" %a", x[i]);
     printf("\n");
 }
 
-/* Springs that stiffen; beyond 200 N they are refused. */
+void record(calls *c, const double *x, int count)
+{
+    c->count++;
+    for (int i = 0; i < count; i++) {
+        uint64_t bits = 1;
+        if (!isnan(x[i]))
+            memcpy(&bits, &x[i], sizeof bits);
+        c->digest = (c->digest ^ bits) * 0x100000001B3u;
+        c->digest ^= c->digest >> 32;
+    }
+}
+
+void print_calls(const calls *c)
+{
+    printf("calls %d %llx\n", c->count, (unsigned long long)c->digest);
+}
+
+/* -- tendons ------------------------------------------------------------------------------------------------------- */
+
+typedef struct springs {
+    int tendons, kind;
+    calls calls;
+} springs;
+
+/* Springs of 4 kinds: that stiffen, that stiffen a lot at the end, with a constant stiffness at first, or that soften
+   towards the end. All are refused below 0 N and beyond 200 N. */
 static int curve(const void *context, const double *f, double *k, double *slope, double *curvature)
 {
-    const int *tendons = context;
-    for (int i = 0; i < *tendons; i++) {
-        if (!(f[i] >= 0 && f[i] <= 200))
+    springs *s = (springs *)context;
+    record(&s->calls, f, s->tendons);
+    for (int i = 0; i < s->tendons; i++) {
+        const double x = f[i], bend = 0.1 * (i + 1), late = x > 30 ? x - 30 : 0;
+        if (!(x >= 0 && x <= 200))
             return 1;
-        k[i] = 100 + 20 * f[i] + 0.1 * (i + 1) * f[i] * f[i];
-        slope[i] = 20 + 0.2 * (i + 1) * f[i];
-        curvature[i] = 0.2 * (i + 1);
+        k[i] = 100 + 20 * x + bend * x * x;
+        slope[i] = 20 + 2 * bend * x;
+        curvature[i] = 2 * bend;
+        if (s->kind == 1) {
+            k[i] = 100 * exp(x / 20);
+            slope[i] = k[i] / 20;
+            curvature[i] = slope[i] / 20;
+        } else if (s->kind == 2) {
+            k[i] = 100 + 40 * late * late;
+            slope[i] = 80 * late;
+            curvature[i] = late > 0 ? 80 : 0;
+        } else if (s->kind == 3) {
+            k[i] = 50 + 4000 * x / (x + 10);
+            slope[i] = 40000 / ((x + 10) * (x + 10));
+            curvature[i] = -2 * slope[i] / (x + 10);
+        }
     }
     return 0;
 }
 
-/* A finger with tendons in pairs, in no pair, or both; every third one has couplings that change. */
+static double limit(int number, double usual)
+{
+    static const double odd[] = {NAN, INFINITY, -INFINITY, -1, 0, 210, 1e308};
+    return number % 23 ? usual : odd[number / 23 % 7];
+}
+
+/* Fingers with tendons in pairs, in no pair, or both, in any number of each; some with couplings that change. */
 static void tendons(int number)
 {
-    static const int all[TENDONS] = {0, 1, 2, 3, 4, 5, 6, 7};
-    const int n = 1 + number % JOINTS, pairs = number % 3, m = 2 * pairs + 1 + number % (TENDONS - 2 * pairs);
-    double P[TENDONS * JOINTS], dP[TENDONS * JOINTS * JOINTS], K[JOINTS * JOINTS], tau[JOINTS], f[TENDONS];
-    awiwi_pair pair[2] = {{0, 1, 0}, {2, 3, 1}};
-    if (pairs == 2 && number % 4 < 2)
-        pair[0].partner = 1, pair[1].partner = 0;
-    const awiwi_tendons t = {n, m, P, number % 3 ? 0 : dP, curve, &m, number % 5, number % 7 ? 90 : 220, pairs, pair,
-                             m - 2 * pairs, all + 2 * pairs};
-    fill(P, m * n, -0.01, 0.01);
-    fill(dP, m * n * n, -0.002, 0.002);
-    fill(K, n * n, 0, 3);
-    fill(tau, n, -0.3, 0.3);
-    for (int p = 0; p < pairs; p++)
-        for (int j = 0; j < n; j++)
+    const int n = 1 + number % AWIWI_MOST_JOINTS, pairs = number % 5 < 3 ? number % 5 : number / 5 % 9;
+    const int rest = (int)random_in(0, AWIWI_MOST_TENDONS + 0.99 - 2 * pairs), m = 2 * pairs + rest + !(pairs + rest);
+    const int sloped = number % 3 == 0, size = number % 4;
+    springs s = {m, number / 2 % 4, {0, 0}};
+    double *P = random_array(m * n, -0.01, 0.01), *dP = random_array(m * n * n, -0.002, 0.002);
+    double *K = random_array(n * n, 0, 4 * pow(10, -size)), *tau = random_array(n, -0.3 / (1 + size), 0.3);
+    awiwi_pair *pair = malloc((size_t)pairs * sizeof *pair);
+    for (int p = 0; p < pairs; p++) {
+        const int partner = (p ^ 1) < pairs && number % 4 < 3 ? p ^ 1 : p;
+        pair[p] = (awiwi_pair){2 * p, 2 * p + 1, partner};
+        for (int j = 0; j < n; j++) {
+            P[2 * p * n + j] *= number % 4 == 1 || (p - j) / 2 == 0;
             P[(2 * p + 1) * n + j] = -P[2 * p * n + j];
+        }
+    }
+    if (number % 6 == 1)
+        coarsen(P, m * n, 0.005), coarsen(tau, n, 0.1), coarsen(K, n * n, 0.5);
     for (int j = 0; number % 11 == 0 && j < m; j++)
         P[j * n] = 0;
+    for (int j = 0; number % 14 == 3 && m > 1 && j < n; j++)
+        P[(m - 1) * n + j] = P[(m - 2) * n + j] * (number % 4 - 1);
     if (number % 13 == 0)
-        tau[0] = number % 2 ? NAN : 1e3;
+        tau[number % n] = number % 2 ? NAN : 1e3;
     if (number % 17 == 5)
         K[n * n - 1] = NAN;
     if (number % 19 == 6)
         P[m * n - 1] = INFINITY;
-    print("distribute", awiwi_distribute(&t, tau, K, 1e-11, f), f, m);
-    fill(f, m, 0, 90);
-    print("search", awiwi_search_forces(&t, tau, K, 1e-11, f), f, m);
-    fill(f, m, -10, 100);
-    print("gradient", awiwi_gradient_forces(&t, tau, K, number % 40, 1e-3, random_in(0, 1), f), f, m);
+    const awiwi_tendons t = {n, m, P, sloped ? dP : 0, curve, &s, limit(number, number % 5),
+                             limit(number + 11, number % 7 ? 20 * (1 + number % 5) : number % 2 ? 205 : number % 5),
+                             pairs, pair, m - 2 * pairs, indices(m - 2 * pairs, 2 * pairs, 1)};
+    const double tolerance = number % 9 ? 1e-11 : number % 2 ? 0 : 1e-3;
+    double *f = output(m);
+    int status = awiwi_distribute(&t, tau, K, tolerance, f);
+    print("distribute", status, f, m);
+    print_calls(&s.calls);
+    if (number % 23 && (number + 11) % 23 && number % 19 != 6) {
+        f = random_array(m, 0, 90);
+        status = awiwi_search_forces(&t, tau, K, tolerance, f);
+        print("search", status, f, m);
+        print_calls(&s.calls);
+    }
+    f = output(m);
+    status = awiwi_gradient_forces(&t, tau, K, number % 40, pow(10, -number % 5), random_in(0, 1), f);
+    print("gradient", status, f, m);
+    print_calls(&s.calls);
+    free(pair);
 }
+
+/* -- least squares ------------------------------------------------------------------------------------------------- */
+
+/* Equations of two halves of the unknowns: even ones of the first, odd ones of the second, which may be linear. */
+typedef struct halves {
+    int unknowns, equations, linear;
+    calls calls;
+} halves;
 
 static void model(const void *context, const double *x, double *h, double *P)
 {
-    const int *sizes = context; /* unknowns, equations */
-    for (int i = 0; i < sizes[1]; i++) {
+    halves *s = (halves *)context;
+    const int n = s->unknowns, half = (n + 1) / 2;
+    record(&s->calls, x, n);
+    for (int i = 0; i < s->equations; i++) {
+        const int first = i % 2 ? half : 0, count = i % 2 ? n - half : half, linear = i % 2 && s->linear;
         h[i] = 0;
-        for (int j = 0; j < sizes[0]; j++) {
-            h[i] += sin(x[j] * (i + 1)) + 0.3 * x[j] * x[(j + 1) % sizes[0]];
-            P[i * sizes[0] + j] = (i + 1) * cos(x[j] * (i + 1));
-        }
-        for (int j = 0; j < sizes[0]; j++) {
-            P[i * sizes[0] + j] += 0.3 * x[(j + 1) % sizes[0]];
-            P[i * sizes[0] + (j + 1) % sizes[0]] += 0.3 * x[j];
+        for (int j = 0; j < n; j++)
+            P[i * n + j] = 0;
+        for (int j = first; j < first + count; j++) {
+            const int next = first + (j - first + 1) % count;
+            h[i] += linear ? (i + j + 1) % 5 * x[j] : sin(x[j] * (i + 1)) + 0.3 * x[j] * x[next];
+            P[i * n + j] += linear ? (i + j + 1) % 5 : (i + 1) * cos(x[j] * (i + 1)) + 0.3 * x[next];
+            if (!linear)
+                P[i * n + next] += 0.3 * x[j];
         }
     }
 }
 
 static void least_squares(int number)
 {
-    const int sizes[2] = {1 + number % 4, 1 + number % 7};
-    double low[4], high[4], start[4], measured[7], x[4];
-    const awiwi_problem p = {model, sizes, sizes[0], sizes[1], low, high};
-    fill(low, 4, -1, 0);
-    fill(high, 4, 0, 1);
-    fill(start, 4, -1.5, 1.5);
-    fill(measured, 7, -2, 2);
+    const int n = 1 + number % AWIWI_MOST_UNKNOWNS, half = (n + 1) / 2, m = 1 + number % AWIWI_MOST_EQUATIONS;
+    halves s = {n, m, number % 3 != 0, {0, 0}};
+    double *low = random_array(n, -1, 0), *high = random_array(n, 0, 1), *start = random_array(n, -1.5, 1.5);
+    double *measured = random_array(m, -2, 2), *x = output(n);
+    const awiwi_problem p = {model, &s, n, m, low, high};
+    const awiwi_part part[2] = {{half, indices(half, 0, 1), (m + 1) / 2, indices((m + 1) / 2, 0, 2), 0},
+                                {n - half, indices(n - half, half, 1), m / 2, indices(m / 2, 1, 2), s.linear}};
+    if (number % 6 == 1)
+        coarsen(measured, m, 1), coarsen(start, n, 0.5), coarsen(low, n, 0.5), coarsen(high, n, 0.5);
+    if (number % 5 == 1) { /* a solution there is */
+        double *exact = copy_of(start, n), *P = output(m * n);
+        for (int j = 0; j < n; j++)
+            exact[j] = awiwi_clamp(start[j] + 0.1, low[j], high[j]);
+        model(&s, exact, measured, P);
+    }
     if (number % 10 == 0)
-        start[0] = NAN;
+        start[number % n] = number % 4 ? NAN : -INFINITY;
     if (number % 17 == 0)
-        measured[0] = INFINITY;
-    print("least squares", awiwi_least_squares(&p, measured, start, number % 30, 1e-12, x), x, sizes[0]);
-    print("descent", awiwi_gradient_search(&p, measured, start, number % 20, number % 2 ? 0 : 0.05, x), x, sizes[0]);
+        measured[number % m] = number % 2 ? INFINITY : 1e200;
+    if (number % 29 == 3)
+        high[n - 1] = NAN;
+    print("least squares", awiwi_least_squares(&p, measured, start, number % 30, 1e-12, x), x, n);
+    print_calls(&s.calls);
+    x = output(n);
+    print("parts", awiwi_least_squares_in_parts(&p, 2, part, measured, start, number % 20, 1e-9, x), x, n);
+    print_calls(&s.calls);
+    x = output(n);
+    print("descent", awiwi_gradient_search(&p, measured, start, number % 20, number % 2 ? 0 : 0.05, x), x, n);
+    print_calls(&s.calls);
 }
 
-static double scaled(void)
-{
-    return pow(10, random_in(-6, 6));
-}
+/* -- regulators ---------------------------------------------------------------------------------------------------- */
 
 /* Another basis for the first and the last state: what the input does not reach is then zero up to rounding only. */
 static void turn(int n, double *A, double *b, double angle)
@@ -136,13 +271,13 @@ static void turn(int n, double *A, double *b, double angle)
 /* Plants with modes that the input does not reach; costs of any rank and size, or negative by a little. */
 static void regulator(int number)
 {
-    const int n = 1 + number % 4, rank = number % (n + 1), cut = number % 5 < 2 ? number % n : n;
-    double A[16], b[4], B[16], Q[16] = {0}, K[4], S[16], residual[1], size[4];
-    fill(A, n * n, -2, 2);
-    fill(b, n, -1, 1);
-    fill(B, n * n, -1, 1);
+    const int n = 1 + number / 3 % 4, rank = number % (n + 1), cut = number % 5 < 2 ? number % n : n;
+    double *A = random_array(n * n, -2, 2), *b = random_array(n, -1, 1), *B = random_array(n * n, -1, 1), size[4];
+    double *Q = random_array(n * n, 0, 0), *K = output(n), *S = output(n * n), *residual = output(1);
     for (int i = 0; i < n; i++)
         size[i] = number % 6 ? 1 : scaled();
+    if (number % 8 == 1)
+        coarsen(A, n * n, 1), coarsen(b, n, 1), coarsen(B, n * n, 1);
     for (int i = 0; i < n * n; i++)
         for (int k = 0; k < rank; k++)
             Q[i] += size[i / n] * size[i % n] * B[i / n * n + k] * B[i % n * n + k];
@@ -154,98 +289,62 @@ static void regulator(int number)
     }
     if (number % 2)
         turn(n, A, b, random_in(0, 3));
+    for (int i = 0; number % 7 == 6 && i < n * n; i++) /* units that differ */
+        A[i] *= pow(10, 3 * (i % n - i / n));
     for (int i = 0; number % 37 == 1 && i < n; i++)
         b[i] *= 1e-200; /* costs overflow */
     if (number % 9 == 0)
         Q[n * n - 1] -= pow(10, random_in(-18, 0));
     if (number % 29 == 0)
-        A[0] = NAN;
-    const double R = number % 31 ? scaled() : -(number % 2);
+        A[number % (n * n)] = NAN;
+    const double R = number % 31 ? scaled() : number % 3 ? -(number % 2) : INFINITY;
     const int status = awiwi_riccati(n, A, b, Q, R, number % 50, K, S, residual);
     print("riccati", status, K, n);
     print("cost", status, S, n * n);
     print("residual", status, residual, 1);
-    print("semidefinite", awiwi_semidefinite_rank(n, Q), 0, 0);
 }
 
 static void joint(int number)
 {
     const awiwi_joint plant = {1e-3 * scaled(), 1e-3 * scaled(), scaled(), number % 2 ? 0 : 1e-3 * scaled(),
                                number % 3 ? 0 : 1e-3 * scaled()};
-    const double Q[4] = {scaled(), number % 4 ? scaled() : 0, number % 5 ? scaled() : 0, number % 7 ? 1 : -1e-3};
-    double last[4] = {0}, K[4];
+    double *Q = random_array(4, -1e-3, -1e-3), *last = random_array(4, 0, 0), *K = output(4);
+    Q[0] = number % 11 ? scaled() : 0;
+    Q[1] = number % 4 ? scaled() : 0;
+    Q[2] = number % 5 ? scaled() : 0;
+    Q[3] = number % 7 ? 1 : number % 2 ? -1e-3 : 0;
+    const double R = number % 41 ? scaled() : 0;
     if (number % 3 == 0)
-        fill(last, 4, -100, 100);
+        last = random_array(4, -100, 100);
+    if (number % 3 == 1) /* near the optimum */
+        (void)awiwi_joint_gains(&plant, Q, R * 1.1, last, 60, last);
     if (number % 23 == 0)
-        last[1] = NAN;
-    print("joint", awiwi_joint_gains(&plant, Q, number % 41 ? scaled() : 0, last, number % 60, K), K, 4);
+        last[number % 4] = NAN;
+    print("joint", awiwi_joint_gains(&plant, Q, R, last, number % 60, K), K, 4);
 }
 
-static void put(unsigned char *place, uint32_t value)
+/* Gains of the impedance law, what feedback they amount to, and starts beside them, on either side of the roots. */
+static void law(int number)
 {
+    double *gains = random_array(4, 0.2, 3), *plant = random_array(3, 0.3, 3), *weights = random_array(2, 0.3, 3);
+    double *start = copy_of(gains, 4), *feedback = output(4), *found = output(4);
+    if (number % 10 == 3)
+        gains[3] = gains[2];
+    if (number % 12 == 5)
+        gains[1] = plant[0] * (gains[2] + gains[3]);
+    const double m = plant[0], over = plant[1] / plant[2], q = weights[0] / weights[1] + gains[2] * gains[3];
+    const double sum = gains[2] + gains[3], soft = 1 / weights[0];
+    feedback[0] = over * gains[0] * q;
+    feedback[1] = over * (gains[3] * soft + gains[1] * q + gains[0] * sum);
+    feedback[2] = over * (q + (soft + gains[1] * sum + gains[0]) / m);
+    feedback[3] = over * (gains[1] / m + sum);
     for (int i = 0; i < 4; i++)
-        place[i] = (unsigned char)(value >> 8 * i);
-}
-
-static void put_number(unsigned char *file, int index, double value)
-{
-    uint64_t bits;
-    memcpy(&bits, &value, sizeof bits);
-    put(file + AWIWI_PARAMS_HEADER + 8 * index, (uint32_t)bits);
-    put(file + AWIWI_PARAMS_HEADER + 8 * index + 4, (uint32_t)(bits >> 32));
-}
-
-static void seal(unsigned char *file)
-{
-    uint32_t crc = ~UINT32_C(0);
-    for (int i = 0; i < FILE_SIZE; i++)
-        for (int bit = 0; bit < 8 && (i < CRC_AT || i >= CRC_AT + 4); bit++) {
-            const uint32_t low = (crc ^ file[i] >> bit) & 1u;
-            crc = crc >> 1 ^ (low ? UINT32_C(0xEDB88320) : 0u);
-        }
-    put(file + CRC_AT, ~crc);
-}
-
-static void read(const char *name, const unsigned char *file, size_t size)
-{
-    static const unsigned char digest[AWIWI_PARAMS_DIGEST] = {1, 2, 3};
-    static const double low[NUMBERS] = {-1, 0, -AWIWI_REAL_MAX}, high[NUMBERS] = {1, 0, AWIWI_REAL_MAX};
-    const awiwi_params_layout layout = {NUMBERS, digest, low, high};
-    double numbers[NUMBERS] = {7, 7, 7};
-    const int status = awiwi_params_read(file, size, &layout, numbers);
-    print(name, status, numbers, NUMBERS);
-}
-
-static void files(void)
-{
-    static const double tried[] = {0, -0.5, 1, -1, 1.5, -1.5, 1e300, -1e300, AWIWI_REAL_MAX, -AWIWI_REAL_MAX, INFINITY,
-                                   -INFINITY, NAN};
-    unsigned char whole[FILE_SIZE + 1] = "AWIWIPAR", file[FILE_SIZE + 1];
-    put(whole + 8, AWIWI_PARAMS_VERSION);
-    put(whole + 12, 8);
-    put(whole + COUNT_AT, NUMBERS);
-    put(whole + SIZE_AT, FILE_SIZE);
-    memcpy(whole + DIGEST_AT, "\1\2\3", 3);
-    put_number(whole, 0, 0.25);
-    seal(whole);
-    read("nothing", 0, FILE_SIZE);
-    for (size_t size = 0; size <= FILE_SIZE + 1; size++)
-        read("cut", whole, size);
-    for (int i = 0; i < FILE_SIZE; i++) {
-        memcpy(file, whole, sizeof file);
-        file[i] ^= 1;
-        read("damaged", file, FILE_SIZE);
-        seal(file);
-        read("other", file, FILE_SIZE);
-    }
-    for (int i = 0; i < (int)(sizeof tried / sizeof tried[0]) * NUMBERS; i++) {
-        memcpy(file, whole, sizeof file);
-        put_number(file, i % NUMBERS, tried[i / NUMBERS]);
-        seal(file);
-        read("number", file, FILE_SIZE);
-    }
-    for (int i = 0; i < (int)(sizeof tried / sizeof tried[0]); i++)
-        print("finite", awiwi_params_finite(tried, (size_t)i), 0, 0);
+        start[i] = gains[i] * (number % 3 ? random_in(0.9, 1.1) : random_in(0.3, 3));
+    if (number % 7 == 0)
+        start[3] = start[2];
+    if (number % 19 == 0)
+        feedback[number % 4] = number % 2 ? NAN : 1e200;
+    print("law", awiwi_law_gains(feedback, plant, weights, start, found), found, 4);
 }
 
 int main(void)
@@ -253,9 +352,14 @@ int main(void)
     for (int number = 0; number < PROBLEMS; number++) {
         tendons(number);
         least_squares(number);
+        release();
         regulator(number);
         joint(number);
+        law(number);
+        release();
+        try_parts(number);
+        release();
     }
-    files();
+    try_files();
     return 0;
 }
