@@ -9,9 +9,17 @@
 
 enum { PROBLEMS = 900, ARRAYS = 64 };
 
-static uint32_t seed = 1;
+static uint32_t seed;
 static void *arrays[ARRAYS];
 static int array_count;
+
+/* Random numbers that depend on no other problem. */
+static void begin(int number, int kind)
+{
+    seed = 6 * (uint32_t)number + (uint32_t)kind;
+    for (int i = 0; i < 4; i++)
+        (void)random_in(0, 1);
+}
 
 double random_in(double low, double high)
 {
@@ -134,6 +142,24 @@ static int curve(const void *context, const double *f, double *k, double *slope,
     return 0;
 }
 
+/* Ask for the torque of some forces, and for their stiffness or about that. */
+static void ask(const awiwi_tendons *t, double most, double *tau, double *K)
+{
+    const int n = t->joints, m = t->tendons;
+    const double about = t->slope ? 1 : random_in(0.8, 1.2);
+    double *f = random_array(m, 0, most), *k = output(m), *slope = output(m), *curvature = output(m);
+    (void)t->curve(t->context, f, k, slope, curvature);
+    for (int e = 0; e < n * n; e++) {
+        K[e] = 0;
+        tau[e / n] = 0;
+        for (int i = 0; i < m; i++) {
+            const double *p = t->coupling + i * n;
+            tau[e / n] -= p[e / n] * f[i];
+            K[e] += about * k[i] * p[e / n] * p[e % n] + (t->slope ? f[i] * t->slope[i * n * n + e] : 0);
+        }
+    }
+}
+
 static double limit(int number, double usual)
 {
     static const double odd[] = {NAN, INFINITY, -INFINITY, -1, 0, 210, 1e308};
@@ -164,15 +190,17 @@ static void tendons(int number)
         P[j * n] = 0;
     for (int j = 0; number % 14 == 3 && m > 1 && j < n; j++)
         P[(m - 1) * n + j] = P[(m - 2) * n + j] * (number % 4 - 1);
+    const double usual = number % 7 ? 20 * (1 + number % 5) : number % 2 ? 205 : number % 5;
+    const awiwi_tendons t = {n, m, P, sloped ? dP : 0, curve, &s, limit(number, number % 5), limit(number + 11, usual),
+                             pairs, pair, m - 2 * pairs, indices(m - 2 * pairs, 2 * pairs, 1)};
+    if (number % 10 < 7)
+        ask(&t, usual, tau, K);
     if (number % 13 == 0)
         tau[number % n] = number % 2 ? NAN : 1e3;
     if (number % 17 == 5)
         K[n * n - 1] = NAN;
     if (number % 19 == 6)
         P[m * n - 1] = INFINITY;
-    const awiwi_tendons t = {n, m, P, sloped ? dP : 0, curve, &s, limit(number, number % 5),
-                             limit(number + 11, number % 7 ? 20 * (1 + number % 5) : number % 2 ? 205 : number % 5),
-                             pairs, pair, m - 2 * pairs, indices(m - 2 * pairs, 2 * pairs, 1)};
     const double tolerance = number % 9 ? 1e-11 : number % 2 ? 0 : 1e-3;
     double *f = output(m);
     int status = awiwi_distribute(&t, tau, K, tolerance, f);
@@ -349,16 +377,13 @@ static void law(int number)
 
 int main(void)
 {
+    static void (*const tries[])(int) = {tendons, least_squares, regulator, joint, law, try_parts};
     for (int number = 0; number < PROBLEMS; number++) {
-        tendons(number);
-        least_squares(number);
-        release();
-        regulator(number);
-        joint(number);
-        law(number);
-        release();
-        try_parts(number);
-        release();
+        for (int kind = 0; kind < 6; kind++) {
+            begin(number, kind);
+            tries[kind](number);
+            release();
+        }
     }
     try_files();
     return 0;
