@@ -35,6 +35,11 @@ void record(calls *c, const double *x, int count);
 void print_calls(const calls *c);
 
 /* One problem of every kind. */
+void try_tendons(int number);
+void try_least_squares(int number);
+void try_regulator(int number);
+void try_joint(int number);
+void try_law(int number);
 void try_parts(int number);
 void try_files(void);
 
