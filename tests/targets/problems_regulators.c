@@ -55,7 +55,8 @@ void try_regulator(int number)
 
 void try_joint(int number)
 {
-    const awiwi_joint plant = {1e-3 * scaled(), 1e-3 * scaled(), scaled(), number % 2 ? 0 : 1e-3 * scaled(),
+    static const double odd[] = {-1e-3, 0, NAN, INFINITY};
+    awiwi_joint plant = {1e-3 * scaled(), 1e-3 * scaled(), scaled(), number % 2 ? 0 : 1e-3 * scaled(),
                                number % 3 ? 0 : 1e-3 * scaled()};
     double *Q = random_array(4, -1e-3, -1e-3), *last = random_array(4, 0, 0), *K = output(4);
     Q[0] = number % 11 ? scaled() : 0;
@@ -63,6 +64,10 @@ void try_joint(int number)
     Q[2] = number % 5 ? scaled() : 0;
     Q[3] = number % 7 ? 1 : number % 2 ? -1e-3 : 0;
     const double R = number % 41 ? scaled() : 0;
+    double *const parts[] = {&plant.link, &plant.motor, &plant.spring, &plant.link_friction, &plant.motor_friction,
+                             &Q[0], &Q[1], &Q[2], &Q[3]};
+    if (number % 8 == 3)
+        *parts[number / 8 % 9] = odd[number / 72 % 4];
     if (number % 3 == 0)
         last = random_array(4, -100, 100);
     if (number % 3 == 1) /* near the optimum */
