@@ -104,6 +104,19 @@ static void few_states(int number)
     print("double", found, S, found ? n * n : 0);
 }
 
+/* Poles on the imaginary axis, beside others, in numbers that nothing rounds. */
+static void marginal(int n)
+{
+    static const double c[][4] = {{1, 1, 1}, {2, 3, 3, 3}};
+    double *A = random_array(n * n, 0, 0), *none = random_array(n, 0, 0);
+    for (int i = 0; i < n; i++) {
+        A[(n - 1) * n + i] = -c[n - 3][i];
+        if (i + 1 < n)
+            A[i * n + i + 1] = 1;
+    }
+    print("marginal", awiwi_is_stable(n, A, none, none), 0, 0);
+}
+
 static void factor(int number)
 {
     double *g = random_array(4, 0, 5), *c = output(4), a[4];
@@ -128,6 +141,8 @@ void try_parts(int number)
     symmetric(number);
     few_states(number);
     factor(number);
+    if (number < 2)
+        marginal(3 + number);
 }
 
 /* -- files --------------------------------------------------------------------------------------------------------- */
