@@ -23,6 +23,7 @@ void release(void);
 /* x on a grid of a few numbers, so that equal ones occur. */
 void coarsen(double *x, int count, double grid);
 
+/* A line with the status and a digest of all bits of x. */
 void print(const char *name, int status, const double *x, int count);
 
 /* What a function asks a callback for: how often, and a digest of where. */
