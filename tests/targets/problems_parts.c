@@ -115,6 +115,27 @@ static void marginal(int n)
             A[i * n + i + 1] = 1;
     }
     print("marginal", awiwi_is_stable(n, A, none, none), 0, 0);
+    const double g[4] = {1, -3, 4, -3}; /* of (s^2 + 1)(s^2 + s + 1): a double zero */
+    print("double zero", awiwi_stable_factor(copy_of(g, 4), output(4)), 0, 0);
+}
+
+/* Starts in a space of few dimensions and a plant that turns them out of it, both but for rounding or a little more. */
+static void nearly_parallel(int number)
+{
+    const int n = 2 + number % 3, starts = 1 + number / 3 % 4, dimensions = 1 + number / 12 % (n - 1);
+    double *A = random_array(n * n, -1, 1), *basis = random_array(dimensions * n, -1, 1);
+    double *start = random_array(starts * n, -1, 1);
+    for (int i = 0; i < n * n; i++)
+        A[i] = i % (n + 1) ? number % 2 * A[i] * pow(10, random_in(-18, -13)) : number % 5 ? 1 : -1;
+    for (int i = 0; i < starts * n; i++)
+        start[i] *= number % 4 < 2 ? pow(10, random_in(-18, -13)) : 0;
+    for (int s = 0; s < starts; s++)
+        for (int k = 0; k < dimensions; k++) {
+            const double share = random_in(-1, 1);
+            for (int i = 0; i < n; i++)
+                start[s * n + i] += share * basis[k * n + i];
+        }
+    print("nearly", awiwi_rest_decays(n, A, starts, start), 0, 0);
 }
 
 static void factor(int number)
@@ -141,6 +162,7 @@ void try_parts(int number)
     symmetric(number);
     few_states(number);
     factor(number);
+    nearly_parallel(number);
     if (number < 2)
         marginal(3 + number);
 }
