@@ -37,11 +37,11 @@ from .toolchains import HERE, ROOT, Target
 
 Array = np.ndarray[Any, Any]
 HOST = Target("x86-64 gcc -O1", "gcc", ("-O1",))
-PATTERN = "-ftrivial-auto-var-init=pattern"  # a mutant that reads what was never written finds the same huge number
 SANITIZERS = "-fsanitize=address,undefined,float-cast-overflow"  # a mutant that leaves an array is found
+UNWRITTEN = "-ftrivial-auto-var-init="  # what is read but was never written differs between the builds
 BUILDS = (  # most mutants do not survive the first, which costs little
-    Target("plain", "gcc", ("-O0", PATTERN)),
-    Target("sanitized", "gcc", ("-O0", PATTERN, SANITIZERS, "-fno-sanitize-recover=all")),
+    Target("plain", "gcc", ("-O0", f"{UNWRITTEN}zero")),
+    Target("sanitized", "gcc", ("-O0", f"{UNWRITTEN}pattern", SANITIZERS, "-fno-sanitize-recover=all")),
 )
 SURVIVORS = HERE / "survivors.tsv"
 HEADERS = ("dense.h", "tendon_cost.h", "twofold.h")  # with code; that of the others is in the kernels, which are proved
