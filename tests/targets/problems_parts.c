@@ -119,6 +119,28 @@ static void marginal(int n)
     print("double zero", awiwi_stable_factor(copy_of(g, 4), output(4)), 0, 0);
 }
 
+/* Doublings that overflow somewhere, or whose first equations are singular. */
+static void extremes(int number)
+{
+    const int n = 1 + number % 4;
+    double *A = random_array(n * n, -1, 1), *b = random_array(n, -1, 1), *Q = random_array(n * n, 0, 0);
+    double *S = output(n * n);
+    for (int i = 0; i < n * n; i++)
+        A[i] *= number % 3 ? pow(10, random_in(0, 160)) : 1;
+    for (int i = 0; i < n; i++) {
+        b[i] *= pow(10, random_in(-160, 160));
+        Q[i * n + i] = pow(10, random_in(-160, 160));
+        if (number % 30 == 1) {
+            A[i * n + i] = 1;
+            b[i] = Q[i * n + i] = 0;
+        }
+        for (int j = 0; number % 30 == 1 && j < i; j++)
+            A[i * n + j] = 0;
+    }
+    const int found = awiwi_double_up(n, A, b, Q, 1, 1, number / 4 % 4, S);
+    print("extremes", found, S, found ? n * n : 0);
+}
+
 /* Starts in a space of few dimensions and a plant that turns them out of it, both but for rounding or a little more. */
 static void nearly_parallel(int number)
 {
@@ -163,6 +185,7 @@ void try_parts(int number)
     few_states(number);
     factor(number);
     nearly_parallel(number);
+    extremes(number);
     if (number < 2)
         marginal(3 + number);
 }
