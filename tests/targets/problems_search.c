@@ -87,11 +87,14 @@ void try_tendons(int number)
         P[j * n] = 0;
     for (int j = 0; number % 14 == 3 && m > 1 && j < n; j++)
         P[(m - 1) * n + j] = P[(m - 2) * n + j] * (number % 4 - 1);
-    for (int i = 0; number % 8 > 4 && n > 1 && i < m; i++) /* two joints that are coupled, but for rounding or more */
+    for (int i = 0; number % 8 > 4 && n > 1 && i < m; i++) { /* two joints that are coupled, but for rounding or more */
         P[i * n + n - 1] = 0.7 * P[i * n] + (number % 3 ? random_in(-1, 1) * pow(10, -6 - number % 5) * P[i * n] : 0);
+        if (i < 2 * pairs && i % 2)
+            P[i * n + n - 1] = -P[(i - 1) * n + n - 1];
+    }
     for (int i = 0; number % 16 == 9 && i < m * n; i++)
         P[i] *= 1e-6;
-    const double usual = number % 7 ? 20 * (1 + number % 5) : number % 2 ? 205 : number % 5;
+    const double usual = number % 7 ? 20 * (1 + number % 5) : number % 2 ? 205 : number % 5 + 0.25 * (number % 4);
     const awiwi_tendons t = {n, m, P, sloped ? dP : 0, curve, &s, limit(number, number % 5), limit(number + 11, usual),
                              pairs, pair, m - 2 * pairs, indices(m - 2 * pairs, 2 * pairs, 1)};
     if (number % 10 < 7)
