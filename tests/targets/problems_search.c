@@ -46,12 +46,15 @@ static int curve(const void *context, const double *f, double *k, double *slope,
     return 0;
 }
 
-/* Ask for the torque of some forces, and for their stiffness or about that. */
-static void ask(const awiwi_tendons *t, double most, double *tau, double *K)
+/* Ask for the torque of some forces, and for their stiffness or about that; at the edge for the most torque that the
+   limits permit at the first joint, and a little more. */
+static void ask(const awiwi_tendons *t, double most, int edge, double *tau, double *K)
 {
     const int n = t->joints, m = t->tendons;
     const double about = t->slope ? 1 : random_in(0.8, 1.2);
     double *f = random_array(m, 0, most), *k = output(m), *slope = output(m), *curvature = output(m);
+    for (int i = 0; edge && i < m; i++)
+        f[i] = t->coupling[i * n] > 0 ? t->high : t->low;
     (void)t->curve(t->context, f, k, slope, curvature);
     for (int e = 0; e < n * n; e++) {
         K[e] = 0;
@@ -62,6 +65,7 @@ static void ask(const awiwi_tendons *t, double most, double *tau, double *K)
             K[e] += about * k[i] * p[e / n] * p[e % n] + (t->slope ? f[i] * t->slope[i * n * n + e] : 0);
         }
     }
+    tau[0] *= edge ? 1 + pow(10, random_in(-17, -11)) : 1;
 }
 
 static double limit(int number, double usual)
@@ -105,7 +109,7 @@ void try_tendons(int number)
     const awiwi_tendons t = {n, m, P, sloped ? dP : 0, curve, &s, limit(number, number % 5), limit(number + 11, usual),
                              pairs, pair, m - 2 * pairs, indices(m - 2 * pairs, 2 * pairs, 1)};
     if (number % 10 < 7)
-        ask(&t, usual, tau, K);
+        ask(&t, usual, number % 10 == 4, tau, K);
     for (int j = 0; number % 10 == 8 && j < n; j++) /* more than the limits permit */
         tau[j] *= 10;
     if (number % 140 == 0) /* at both limits, and asked for more */
