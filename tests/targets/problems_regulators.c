@@ -47,6 +47,8 @@ void try_regulator(int number)
     if (number % 29 == 0)
         A[number % (n * n)] = NAN;
     const double R = number % 31 ? scaled() : number % 3 ? -(number % 2) : INFINITY;
+    for (int i = 0; number % 43 == 7 && i < n * n; i++) /* products of poles overflow */
+        A[i] *= 1e60;
     const int status = awiwi_riccati(n, A, b, Q, R, number % 50, K, S, residual);
     print("riccati", status, K, n);
     print("cost", status, S, n * n);

@@ -11,7 +11,7 @@ typedef struct springs {
 } springs;
 
 /* Springs of 5 kinds: that stiffen, that stiffen a lot at the end, with a constant stiffness at first, that soften
-   towards the end, or with a jump after 0 N. All are refused below 0 N and beyond 200 N. */
+   towards the end, or with a jump after 1 N. All are refused below 0 N and beyond 200 N. */
 static int curve(const void *context, const double *f, double *k, double *slope, double *curvature)
 {
     springs *s = (springs *)context;
@@ -36,7 +36,7 @@ static int curve(const void *context, const double *f, double *k, double *slope,
             slope[i] = 40000 / ((x + 10) * (x + 10));
             curvature[i] = -2 * slope[i] / (x + 10);
         } else if (s->kind == 4) {
-            k[i] = x > 0 ? 5000 : 100;
+            k[i] = x > 1 ? 5000 : 100;
             slope[i] = curvature[i] = 0;
         }
         k[i] *= s->unit;
@@ -65,7 +65,7 @@ static void ask(const awiwi_tendons *t, double most, int edge, double *tau, doub
             K[e] += about * k[i] * p[e / n] * p[e % n] + (t->slope ? f[i] * t->slope[i * n * n + e] : 0);
         }
     }
-    tau[0] *= edge ? 1 + pow(10, random_in(-17, -11)) : 1;
+    tau[0] *= edge ? 1 + pow(10, random_in(-15, -12)) : 1;
 }
 
 static double limit(int number, double usual)
@@ -80,7 +80,7 @@ void try_tendons(int number)
     const int n = 1 + number % AWIWI_MOST_JOINTS, pairs = number % 5 < 3 ? number % 5 : number / 5 % 9;
     const int rest = (int)random_in(0, AWIWI_MOST_TENDONS + 0.99 - 2 * pairs), m = 2 * pairs + rest + !(pairs + rest);
     const int sloped = number % 3 == 0, size = number % 4;
-    springs s = {m, number / 2 % 9 % 5, number % 15 == 4 ? 1e-4 : 1, {0, 0}};
+    springs s = {m, number / 2 % 9 % 5, number % 11 == 4 ? 1e-4 : 1, {0, 0}};
     double *P = random_array(m * n, -0.01, 0.01), *dP = random_array(m * n * n, -0.002, 0.002);
     double *K = random_array(n * n, 0, 4 * pow(10, -size)), *tau = random_array(n, -0.3 / (1 + size), 0.3);
     awiwi_pair *pair = malloc((size_t)pairs * sizeof *pair);
@@ -89,6 +89,8 @@ void try_tendons(int number)
         pair[p] = (awiwi_pair){2 * p, 2 * p + 1, partner};
         for (int j = 0; j < n; j++) {
             P[2 * p * n + j] *= number % 4 == 1 || (p - j) / 2 == 0;
+            if (number % 20 == 7 && p % 2) /* almost the same as the partner's */
+                P[2 * p * n + j] = P[2 * (p - 1) * n + j] + 0.3 * P[2 * p * n + j];
             P[(2 * p + 1) * n + j] = -P[2 * p * n + j];
         }
     }
@@ -110,8 +112,10 @@ void try_tendons(int number)
                              pairs, pair, m - 2 * pairs, indices(m - 2 * pairs, 2 * pairs, 1)};
     if (number % 10 < 7)
         ask(&t, usual, number % 10 == 4, tau, K);
-    for (int j = 0; number % 10 == 8 && j < n; j++) /* more than the limits permit */
+    for (int j = 0; number % 10 > 6 && number % 3 && j < n; j++) /* more than the limits permit */
         tau[j] *= 10;
+    for (int e = 0; s.kind == 4 && pairs == 1 && e < n * n; e++) /* a stiffness that only the jump passes */
+        K[e] = 7500 * P[e / n] * P[e % n];
     if (number % 140 == 0) /* at both limits, and asked for more */
         K[0] += 50;
     if (number % 13 == 0)
