@@ -46,6 +46,10 @@ void try_regulator(int number)
         Q[n * n - 1] -= pow(10, random_in(-18, 0));
     if (number % 29 == 0)
         A[number % (n * n)] = NAN;
+    if (number % 29 == 1)
+        Q[number / 29 % (n * n)] = number % 2 ? NAN : INFINITY;
+    if (number % 29 == 2)
+        b[number / 29 % n] = NAN;
     const double R = number % 31 ? scaled() : number % 3 ? -(number % 2) : INFINITY;
     for (int i = 0; number % 43 == 7 && i < n * n; i++) /* products of poles overflow */
         A[i] *= 1e60;
