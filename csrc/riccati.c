@@ -21,8 +21,9 @@ typedef struct plant {
     awiwi_halves halves[N * N]; /* of A */
 } plant;
 
-/* A candidate in double the precision: S, its gains; the closed loop A - b K; the lower half of the equation's left side
-   E, its terms, and how large it is against them; how far from the solution's K is from it, by the last step, against its largest. */
+/* A candidate in double the precision: S, its gains; the closed loop A - b K; the equation's left side E, of which the
+   lower half is read, its terms, and how large it is against them; how far from the solution's K is from it, by the last
+   step, against its largest. */
 typedef struct solution {
     awiwi_twofold S[N * N], K[N];
     awiwi_real loop[N * N], E[N * N], terms[N], residual, left;
