@@ -132,11 +132,11 @@ static known image(int n, const awiwi_real *A, const known *v)
 }
 
 /* Add to orthonormal directions what is new in v, twice orthogonal for the sake of rounding. It is new if more of it
-   remains than `least`, and some element is more than its error. Returns how many directions there are. */
+   remains than `least`; if that is 0, if some element is more than its error. Returns how many directions there are. */
 static int extend(int n, int count, known *directions, known v, awiwi_real least)
 {
     awiwi_real error, unused;
-    int is_new = 0;
+    int is_new = least > 0;
     if (count == n)
         return n;
     for (int k = 0; k < 2 * count; k++) {

@@ -123,6 +123,20 @@ def test_nearly_all_plants_of_four_states_need_no_doubling(solve, dtype):
     assert found.count(OK) >= 390
 
 
+def test_what_starts_do_not_reach_depends_on_no_unwritten_memory(root, tmp_path):
+    write_headers(tmp_path, Options("f64"))
+    sources = [root / "tests" / "nearly_parallel.c", CSRC / "poles.c", CSRC / "dense.c"]
+    printed = []
+    for filling in ("uninitialized", "zero", "pattern"):
+        program = tmp_path / filling
+        flags = ("-std=c99", "-O1", f"-ftrivial-auto-var-init={filling}", f"-I{tmp_path}", f"-I{CSRC}")
+        subprocess.run([*compiler().command, *flags, *sources, "-lm", "-o", program], check=True)
+        printed.append(subprocess.run([program], capture_output=True, text=True, check=True).stdout)
+
+    assert set(printed[0]) == {"0", "1"}
+    assert printed[0] == printed[1] == printed[2]
+
+
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="the flags are those of x86")
 @pytest.mark.parametrize("program", ["gcc", "clang"])
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])

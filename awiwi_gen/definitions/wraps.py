@@ -15,9 +15,8 @@ from sympy import Expr, Matrix
 
 from awiwi_gen.definitions.kinematics import Frame
 from awiwi_gen.definitions.naming import Derivation
+from awiwi_gen.hand.wraps import LEAST_ARC
 from awiwi_gen.structure import Finger, link_number
-
-_LAST = sympy.Rational(1, 1000000)  # rad; minus the most negative arc
 
 
 @dataclass(frozen=True)
@@ -68,7 +67,7 @@ def wrapped_length(wrap: Wrap, derivation: Derivation) -> Expr:
     tangents = [name(sympy.sqrt(distance**2 - radius**2)) for distance in distances]
     angle = _angle(wrap, distances, derivation)
     arc = name(angle - sum(sympy.atan2(tangent, radius) for tangent in tangents))
-    touches = name((1 + sympy.sign(arc + _LAST)) / 2)
+    touches = name((1 + sympy.sign(arc - sympy.Rational(LEAST_ARC))) / 2)
     across = name(straight + touches * (sum(tangents) + radius * arc - straight))
     return across if wrap.body.axis is None else name(sympy.sqrt(across**2 + wrap.rise**2))
 

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from fractions import Fraction
 from typing import NamedTuple
 
-__all__ = ["Body", "Vector"]
+__all__ = ["LEAST_ARC", "Body", "Vector"]
+
+LEAST_ARC = Fraction(-1, 1000000)
+"""Arc [rad] down to which kernels compute a string as touching its body; see `definitions/wraps.py`."""
 
 Vector = tuple[float, float, float]
 

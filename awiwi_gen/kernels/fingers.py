@@ -308,12 +308,12 @@ def return_torque(finger: Any, q: Any) -> Any:
 
 
 def is_curved(finger: Finger) -> bool:
-    """Whether the coupling depends on the pose, as that of straight lines does."""
+    """Whether the coupling depends on the pose, as that of lines from link to link does."""
     return any(is_bent(tendon) for tendon in finger.pulled)
 
 
 def is_bent(tendon: Tendon) -> bool:
-    """Whether a tendon has a straight line between points of two links."""
+    """Whether a tendon has lines from point to point, straight or round bodies."""
     return bool(tendon.span or tendon.path)
 
 

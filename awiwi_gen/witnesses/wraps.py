@@ -13,10 +13,9 @@ from typing import Any
 import casadi as ca
 from casadi import SX
 
+from awiwi_gen.hand.wraps import LEAST_ARC
 from awiwi_gen.structure import Finger, link_number
 from awiwi_gen.witnesses.kinematics import point_of_link
-
-_LAST = 1e-6  # rad; minus the most negative arc
 
 Moving = tuple[SX, SX]
 """A vector (3) and its rates (3 x n) [1/rad]."""
@@ -143,7 +142,7 @@ class Wrap:
     @cached_property
     def touches(self) -> SX:
         """1 where the run touches the body, or nearly does, else 0: there the straight line has the same arms."""
-        return (1 + ca.sign(self.arc + _LAST)) / 2
+        return (1 + ca.sign(self.arc - float(LEAST_ARC))) / 2
 
     def _lengths(self) -> tuple[SX, SX, SX]:
         """Lengths [m] across the axis, straight and round the body, and the one that applies."""

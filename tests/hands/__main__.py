@@ -62,7 +62,7 @@ def main() -> int:
             print(" | ".join(results[-1].row), flush=True)
     faults = [*changed(), *wrapped_finger(), *(fault for result in results for fault in result.faults)]
     if not chosen.only:
-        faults += judge_table(table([result.row for result in results]), chosen.accept)
+        faults += judge_tables([result.row for result in results], chosen.accept)
     for fault in faults:
         print(fault, file=sys.stderr)
     return 1 if faults else 0
@@ -190,9 +190,8 @@ def table(rows: list[tuple[str, ...]]) -> str:
     return "".join(f"| {' | '.join(cells)} |\n" for cells in [head, ("---",) * len(head), *rows])
 
 
-def brief(full: str) -> str:
+def brief(rows: list[tuple[str, ...]]) -> str:
     """The table for the README: without packages, and with the number of kinds of elements that are lost."""
-    rows = [line[2:-2].split(" | ") for line in full.splitlines()[2:]]
     head = ("hand", "joints in fingers", "of the wrist", "tendons", "kernels proved", "worst difference", "not held")
     cells = [head, ("---",) * len(head)]
     for name, _, *middle, worst, lost in rows:
@@ -202,10 +201,10 @@ def brief(full: str) -> str:
     return "".join(f"| {' | '.join(each)} |\n" for each in cells)
 
 
-def judge_table(found: str, accept: bool) -> list[str]:
+def judge_tables(rows: list[tuple[str, ...]], accept: bool) -> list[str]:
     """Write the tables into the docs, or say that others are there; differences below the limit may vary."""
     faults = []
-    for path, expected in ((DOCS, found), (README, brief(found))):
+    for path, expected in ((DOCS, table(rows)), (README, brief(rows))):
         text = path.read_text(encoding="utf-8")
         before, _, rest = text.partition(BEGIN)
         known, _, after = rest.partition(END)
