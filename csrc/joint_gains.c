@@ -139,9 +139,9 @@ int awiwi_joint_gains(const awiwi_joint *joint, const awiwi_real *q, awiwi_real 
         return AWIWI_OUT_OF_DOMAIN;
     const scaled p = scale(joint, q, R);
     const awiwi_real once = p.time / joint->motor, twice = p.time * once;
-    const gains before = {.h = K[0] * twice, .g = K[1] * once, .e = K[2] * twice, .f = K[3] * once};
+    const gains before = {.g = K[1] * once, .e = K[2] * twice, .f = K[3] * once};
     awiwi_real c1, c2, c3;
-    const int usable = coefficients(&p, &before, &c1, &c2, &c3) && c1 / c3 <= AWIWI_REAL_MAX;
+    const int usable = coefficients(&p, &before, &c1, &c2, &c3);
     gains x = descend(&p, usable ? c1 / c3 : 1, iterations);
     if (!polish(&p, &x) || !coefficients(&p, &x, &c1, &c2, &c3))
         return AWIWI_NOT_CONVERGED;

@@ -21,8 +21,9 @@ typedef struct plant {
     awiwi_halves halves[N * N]; /* of A */
 } plant;
 
-/* A candidate in double the precision: S, its gains; the closed loop A - b K; the equation's left side E, its terms, and
-   how large it is against them; how far from the solution's K is from it, by the last step, against its largest. */
+/* A candidate in double the precision: S, its gains; the closed loop A - b K; the equation's left side E, of which the
+   lower half is read, its terms, and how large it is against them; how far from the solution's K is from it, by the last
+   step, against its largest. */
 typedef struct solution {
     awiwi_twofold S[N * N], K[N];
     awiwi_real loop[N * N], E[N * N], terms[N], residual, left;
@@ -192,7 +193,7 @@ static void weigh(const plant *p, solution *x)
             const awiwi_twofold left = awiwi_twofold_add(SA[i * n + j], SA[j * n + i]);
             const awiwi_twofold spent = awiwi_twofold_minus(awiwi_twofold_multiply(x->K[i], Sb[j]));
             const awiwi_twofold sum = awiwi_twofold_add(left, awiwi_twofold_of(p->Q[i * n + j]));
-            x->E[i * n + j] = x->E[j * n + i] = awiwi_twofold_add(sum, spent).high;
+            x->E[i * n + j] = awiwi_twofold_add(sum, spent).high;
         }
     compare(n, x);
     for (int i = 0; i < n; i++)
