@@ -107,7 +107,7 @@ static int descend(const awiwi_problem *p, const awiwi_part *b, const awiwi_real
     int now = 0; /* which of the two belongs to q; the other is that of the trial */
     values last = *begun, there;
     vector step, trial;
-    awiwi_real damping = 0, last_length = AWIWI_REAL_MAX;
+    awiwi_real damping = 0, last_length = AWIWI_REAL_MAX, previous = tolerance;
     add_up(p, b, measured, &last, &two[now]);
     if (!(two[now].cost <= AWIWI_REAL_MAX))
         return AWIWI_NOT_FINITE;
@@ -135,10 +135,17 @@ static int descend(const awiwi_problem *p, const awiwi_part *b, const awiwi_real
         }
         if (!awiwi_all_finite(trial, p->unknowns))
             return AWIWI_NOT_FINITE;
-        /* the first step of a linear part ends at the minimum; where nothing is left, steps shorten as Newton's do */
-        const int ended = longest <= tolerance || (free && b->linear) ||
-                          (free && left <= here->blur && awiwi_ends_with(longest, last_length, tolerance / 64));
+        /* Steps shorten by a constant share where lengths are inconsistent: what is left follows from two of them.
+           Short steps that do not shorten are rounding. */
+        const int settled = longest <= tolerance &&
+                            (longest * longest <= tolerance / 16 * previous || longest >= previous);
+        /* Where nothing is left, steps shorten as Newton's do: the next is about the square of this one, or shorter. */
+        const int next_to_nothing = free && left <= here->blur && longest * longest <= tolerance / 64 &&
+                                    awiwi_ends_with(longest, last_length, tolerance / 64);
+        /* the first step of a linear part ends at the minimum */
+        const int ended = settled || next_to_nothing || (free && b->linear);
         last_length = free ? longest : AWIWI_REAL_MAX;
+        previous = longest;
         if (!ended) {
             if (b->linear)
                 shift(p, b, step, &last, &there);

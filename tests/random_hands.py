@@ -130,7 +130,8 @@ source = "assumed"
 
     def actuators(self, tendons: int) -> str:
         b, text = self.between, ""
-        if self.wants("motor"):
+        motor, spring = self.wants("motor"), self.wants("spring")
+        if motor:
             text += f"""
 [motor]
 rotor_inertia = "{b(1e-7, 5e-7):.3g} kg m^2"
@@ -156,7 +157,7 @@ harmonic = {harmonic}
 amplitude = "{b(0.005, 0.08):.3g} N m"
 phase = "{b(-180, 180):.4g} deg"
 """
-        if self.wants("spring"):
+        if spring:
             text += f"""
 [spring]
 motor = {{ centre = ["-10 mm", "0 mm"], radius = "4 mm", winding = 1 }}
@@ -186,7 +187,8 @@ guiding = "{b(0.02, 0.2):.2g}"
 bend = "{b(1, 7):.2g} rad"
 source = "assumed"
 """
-        for tendon in sorted(self.random.choice(tendons, min(2, tendons), False)) if self.wants("gains") else ():
+        gains = motor and spring and self.wants("gains")
+        for tendon in sorted(self.random.choice(tendons, min(2, tendons), False)) if gains else ():
             text += f"""
 [[gains]]
 tendon = {tendon}

@@ -264,10 +264,14 @@ def test_gains_below_the_folder_of_the_hand_are_read_and_their_faults_have_their
     )
     hand = tmp_path / "hand.toml"
     hand.write_text('gains = "below/gains.toml"\n' + ONE_FINGER)
-    assert (
-        load_faults(hand)
-        == f"{tmp_path}/below/gains.toml:2 gains[0].tendon = 9 is no tendon of this hand; expected 0 to 2"
-    )
+    fault = f"{tmp_path}/below/gains.toml:2 gains[0].tendon = 9 is no tendon of this hand; expected 0 to 2"
+    assert fault in load_faults(hand).splitlines()
+
+
+def test_gains_of_a_hand_without_motors_or_springs_are_refused_when_the_hand_is_read() -> None:
+    gains = "[[gains]]\ntendon = 0\n" + "".join(f'{key} = "{value}"\n' for key, value in GAINS.items())
+    message = faults_of(ONE_FINGER + gains + 'source = "x"\n')
+    assert "are checked with the hand's motors and springs; add [motor] and [spring], or leave the gains out" in message
 
 
 GAINS = {

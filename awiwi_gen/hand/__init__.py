@@ -96,7 +96,8 @@ def _checked(file: HandFile) -> Hand:
     found = list(complaints(hand.limits, hand.fingers, hand.wrist))
     found += _palm(hand)
     found += actuator_complaints(hand.motor, hand.spring, hand.tendon, hand.tendons)
-    found += gains_complaints(hand.gains, hand.tendons)
+    lacks = [section for section in ("motor", "spring") if getattr(hand, section) is None]
+    found += gains_complaints(hand.gains, hand.tendons, lacks)
     if found:
         raise file.error(found)
     return hand

@@ -9,7 +9,7 @@ They are numbers of the hand like any other, so the generated parameters carry t
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
@@ -82,8 +82,16 @@ def with_gains(file: HandFile) -> HandFile:
     return replace(file, data=file.data | included.data, included={"gains": included})
 
 
-def gains_complaints(gains: tuple[TendonGains, ...], tendons: int) -> Iterator[tuple[Keys, str]]:
-    """Gains for tendons that the hand does not have, and a second set of gains for one tendon."""
+def gains_complaints(
+    gains: tuple[TendonGains, ...], tendons: int, missing: Sequence[str]
+) -> Iterator[tuple[Keys, str]]:
+    """Gains for tendons that the hand does not have, a second set of gains for one tendon, and gains without a plant.
+
+    `missing` are the sections of the hand file that the plant of a tendon is made of and that the file lacks.
+    """
+    if gains and missing:
+        sections = " and ".join(f"[{section}]" for section in missing)
+        yield ("gains",), f"are checked with the hand's motors and springs; add {sections}, or leave the gains out"
     seen: dict[int, int] = {}
     for index, each in enumerate(gains):
         key = ("gains", index, "tendon")
