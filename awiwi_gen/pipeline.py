@@ -211,7 +211,7 @@ def emit(job: Job, records: Mapping[str, Record], directory: Path) -> dict[str, 
     """All files of the generated directory, by name. Raises BudgetError against the budget that is there."""
     from awiwi_gen.budget import BUDGET, budget_text, require_budget
     from awiwi_gen.emit.batch import batch_files
-    from awiwi_gen.emit.files import shared_files
+    from awiwi_gen.emit.files import room_of, shared_files
     from awiwi_gen.emit.params import params_files, struct_fields
     from awiwi_gen.golden import self_test_files
     from awiwi_gen.parameters import numbers_of
@@ -224,7 +224,7 @@ def emit(job: Job, records: Mapping[str, Record], directory: Path) -> dict[str, 
     functions = [record.function for record in records.values()]
     numbers = numbers_of(job.hand, job.kernels, records) if job.options.params == "runtime" else None
     fields = struct_fields(numbers, job.options) if numbers else ((), ())
-    files |= shared_files(job.hand.prefix, functions, job.hand.digest(), job.options, fields)
+    files |= shared_files(job.hand.prefix, functions, job.hand.digest(), job.options, room_of(job.kernels), fields)
     files |= self_test_files(job.hand, job.kernels, records, job.options)
     if numbers:
         files |= params_files(job.hand.prefix, numbers, job.options)

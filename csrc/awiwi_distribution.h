@@ -9,12 +9,10 @@ extern "C" {
 #endif
 
 enum {
-    AWIWI_MOST_JOINTS = 8,
-    AWIWI_MOST_TENDONS = 16,
     AWIWI_MOST_INVERSIONS = 64,      /* rounds that invert k(f) + k(f + d); smooth springs take 4 */
     AWIWI_MOST_TORQUE_STEPS = 64,    /* of the search for forces that give the torque */
-    AWIWI_MOST_STIFFNESS_STEPS = 96, /* and of that for the stiffness, from each of 3 starts */
-    AWIWI_MOST_CURVES = 2 + AWIWI_MOST_INVERSIONS + 3 * (1 + AWIWI_MOST_STIFFNESS_STEPS)
+    AWIWI_MOST_STIFFNESS_STEPS = 96, /* and of that for the stiffness, from each of 4 starts */
+    AWIWI_MOST_CURVES = 4 + AWIWI_MOST_INVERSIONS + 4 * (1 + AWIWI_MOST_STIFFNESS_STEPS)
 };
 
 /* Stiffnesses [tendons] at forces [tendons], and their first two derivatives by the force. Returns 0 unless a force is

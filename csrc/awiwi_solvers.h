@@ -17,7 +17,7 @@ enum awiwi_status {
     AWIWI_INFEASIBLE = 4     /* limits forbid the demand; outputs are the nearest that they allow */
 };
 
-enum { AWIWI_MOST_UNKNOWNS = 8, AWIWI_MOST_EQUATIONS = 16 };
+enum { AWIWI_MOST_UNKNOWNS = AWIWI_MOST_JOINTS, AWIWI_MOST_EQUATIONS = AWIWI_MOST_TENDONS }; /* of the hand: real.h */
 
 /* Values [equations] at x [unknowns] and their Jacobian [equations][unknowns], row by row. */
 typedef void (*awiwi_model)(const void *context, const awiwi_real *unknowns, awiwi_real *values, awiwi_real *jacobian);

@@ -27,11 +27,12 @@ static inline awiwi_real awiwi_clamp(awiwi_real x, awiwi_real low, awiwi_real hi
 }
 
 /* Whether Newton's method, after steps of length last and this, is within `near` after this one: errors square, and
-   the last two steps tell by how much, with a margin. A first step has no last one, AWIWI_REAL_MAX. */
-static inline int awiwi_ends_with(awiwi_real length, awiwi_real last, awiwi_real near)
+   the last two steps tell by how much, with a margin. A first step has no last one, AWIWI_REAL_MAX. Where lengths bend
+   in one direction only, the last step may have told nothing: bends of 1/unit are always allowed for. */
+static inline int awiwi_ends_with(awiwi_real length, awiwi_real last, awiwi_real near, awiwi_real unit)
 {
     const awiwi_real share = length / last;
-    return last < AWIWI_REAL_MAX && 64 * share * share * length <= near;
+    return last < AWIWI_REAL_MAX && 64 * share * share * length <= near && length * length <= near * unit;
 }
 
 /* a'b of n numbers, summed from the first on. */

@@ -49,11 +49,18 @@ static void add_up(const awiwi_problem *p, const awiwi_part *b, const awiwi_real
 }
 
 /* One part, of all. */
-static awiwi_part whole(const awiwi_problem *p)
+static awiwi_part whole(const awiwi_problem *p, int *every)
 {
-    static const int every[AWIWI_MOST_EQUATIONS] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
     const awiwi_part all = {p->unknowns, every, p->equations, every, 0};
+    for (int i = 0; i < p->equations || i < p->unknowns; i++)
+        every[i] = i;
     return all;
+}
+
+/* Whether local arrays hold the problem: kernels of a larger hand must not run with these objects. */
+static int fits(const awiwi_problem *p)
+{
+    return p->unknowns <= AWIWI_MOST_UNKNOWNS && p->equations <= AWIWI_MOST_EQUATIONS;
 }
 
 /* Solve (A + damping diag A) x = -b for the unknowns not held, by Cholesky without roots; A's lower half is read. */
@@ -139,9 +146,9 @@ static int descend(const awiwi_problem *p, const awiwi_part *b, const awiwi_real
            Short steps that do not shorten are rounding. */
         const int settled = longest <= tolerance &&
                             (longest * longest <= tolerance / 16 * previous || longest >= previous);
-        /* Where nothing is left, steps shorten as Newton's do: the next is about the square of this one, or shorter. */
-        const int next_to_nothing = free && left <= here->blur && longest * longest <= tolerance / 64 &&
-                                    awiwi_ends_with(longest, last_length, tolerance / 64);
+        /* where nothing is left, steps shorten as Newton's do */
+        const int next_to_nothing = free && left <= here->blur &&
+                                    awiwi_ends_with(longest, last_length, tolerance / 64, 1);
         /* the first step of a linear part ends at the minimum */
         const int ended = settled || next_to_nothing || (free && b->linear);
         last_length = free ? longest : AWIWI_REAL_MAX;
@@ -176,6 +183,8 @@ int awiwi_least_squares_in_parts(const awiwi_problem *p, int parts, const awiwi_
 {
     int status = AWIWI_OK;
     values begun;
+    if (!fits(p))
+        return AWIWI_OUT_OF_DOMAIN;
     if (!begin(p, measured, start, q))
         return AWIWI_NOT_FINITE;
     p->model(p->context, q, begun.h, begun.P);
@@ -191,18 +200,24 @@ int awiwi_least_squares_in_parts(const awiwi_problem *p, int parts, const awiwi_
 int awiwi_least_squares(const awiwi_problem *p, const awiwi_real *measured, const awiwi_real *start, int iterations,
                         awiwi_real tolerance, awiwi_real *q)
 {
-    const awiwi_part all = whole(p);
+    int every[AWIWI_MOST_UNKNOWNS + AWIWI_MOST_EQUATIONS];
+    if (!fits(p))
+        return AWIWI_OUT_OF_DOMAIN;
+    const awiwi_part all = whole(p, every);
     return awiwi_least_squares_in_parts(p, 1, &all, measured, start, iterations, tolerance, q);
 }
 
 int awiwi_gradient_search(const awiwi_problem *p, const awiwi_real *measured, const awiwi_real *start, int iterations,
                           awiwi_real step, awiwi_real *q)
 {
-    const awiwi_part all = whole(p);
+    int every[AWIWI_MOST_UNKNOWNS + AWIWI_MOST_EQUATIONS];
     values at;
     vector trial;
     sums here, there;
     awiwi_real curvature = 0;
+    if (!fits(p))
+        return AWIWI_OUT_OF_DOMAIN;
+    const awiwi_part all = whole(p, every);
     if (!begin(p, measured, start, q))
         return AWIWI_NOT_FINITE;
     p->model(p->context, q, at.h, at.P);

@@ -32,6 +32,8 @@ typedef struct task {
     awiwi_real times[MOST_ENTRIES], wanted[MOST_ENTRIES];
     place at[MOST_ENTRIES];
     const awiwi_real *constant[AWIWI_MOST_TENDONS];
+    int by_chords;      /* whether chords take the place of the curve */
+    vector start, rise; /* of the chords: stiffness at the lower limit, and slope */
 } task;
 
 /* The cost, half the sum of squares, and what its derivatives are made of. Costs that differ by less than the blur are
@@ -66,6 +68,7 @@ static void start_task(task *s, const awiwi_tendons *t, const awiwi_real *torque
 {
     s->t = t;
     s->f = f;
+    s->by_chords = 0;
     s->count = t->searched;
     s->joints = s->within_reach = 0;
     for (int j = 0; j < t->joints; j++) {
@@ -123,6 +126,13 @@ static void want_stiffness(task *s, const awiwi_real *K, awiwi_real tolerance)
 static int follow_curve(const task *s, const vector f, vector k, model *c)
 {
     vector all, slope, curvature;
+    for (int i = 0; i < s->count && s->by_chords; i++) {
+        k[i] = s->start[i] + s->rise[i] * (f[i] - s->t->low);
+        c->slope[i] = s->rise[i];
+        c->curvature[i] = 0;
+    }
+    if (s->by_chords)
+        return 0;
     for (int i = 0; i < s->count; i++)
         s->f[s->t->searched_tendons[i]] = f[i];
     const int off = s->t->curve(s->t->context, s->f, all, slope, curvature);
@@ -132,6 +142,24 @@ static int follow_curve(const task *s, const vector f, vector k, model *c)
         c->curvature[i] = curvature[s->t->searched_tendons[i]];
     }
     return off;
+}
+
+/* Let chords between the limits take the place of the curve: with them the cost has no other minimum than the least.
+   Not 0 where a limit is outside the curve. */
+static int take_chords(task *s)
+{
+    vector low, high, top;
+    model unused;
+    for (int i = 0; i < s->count; i++) {
+        low[i] = s->t->low;
+        high[i] = s->t->high;
+    }
+    if (follow_curve(s, low, s->start, &unused) || follow_curve(s, high, top, &unused))
+        return AWIWI_OUT_OF_DOMAIN;
+    for (int i = 0; i < s->count; i++)
+        s->rise[i] = s->t->high > s->t->low ? (top[i] - s->start[i]) / (s->t->high - s->t->low) : 0;
+    s->by_chords = 1;
+    return AWIWI_OK;
 }
 
 /* The cost at forces f. What is within rounding of its terms counts as zero. */

@@ -89,6 +89,8 @@ int awiwi_gradient_forces(const awiwi_tendons *t, const awiwi_real *tau, const a
     vector gradient, trial, trial_gradient;
     awiwi_real best, found;
     const int usable = t->low <= t->high && awiwi_all_finite(&t->low, 1) && awiwi_all_finite(&t->high, 1);
+    if (t->joints > AWIWI_MOST_JOINTS || t->tendons > AWIWI_MOST_TENDONS) /* objects of a smaller hand */
+        return AWIWI_OUT_OF_DOMAIN;
     for (int i = 0; i < t->tendons; i++)
         f[i] = usable ? t->low + (t->high - t->low) / 2 : 0;
     if (!usable)

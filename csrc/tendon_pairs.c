@@ -7,7 +7,7 @@
 #include "awiwi_distribution.h"
 #include "dense.h"
 
-enum { MOST_PAIRS = AWIWI_MOST_TENDONS / 2 };
+enum { MOST_PAIRS = (AWIWI_MOST_TENDONS + 1) / 2 };
 
 typedef awiwi_real vector[AWIWI_MOST_TENDONS]; /* of all tendons */
 typedef awiwi_real numbers[MOST_PAIRS];         /* of all pairs */
@@ -272,6 +272,8 @@ int awiwi_distribute(const awiwi_tendons *t, const awiwi_real *tau, const awiwi_
                      awiwi_real *f)
 {
     int status = AWIWI_OK;
+    if (t->joints > AWIWI_MOST_JOINTS || t->tendons > AWIWI_MOST_TENDONS) /* objects of a smaller hand */
+        return AWIWI_OUT_OF_DOMAIN;
     if (!awiwi_all_finite(&t->low, 1) || !awiwi_all_finite(&t->high, 1) || !awiwi_all_finite(tau, t->joints) ||
         !awiwi_all_finite(K, t->joints * t->joints) || !awiwi_all_finite(t->coupling, t->tendons * t->joints))
         return fall_back(t, AWIWI_NOT_FINITE, f);

@@ -10,7 +10,11 @@ static const awiwi_real DAMPING = (awiwi_real)1 / 4096;       /* of steps where 
 static const awiwi_real BENT = 4096 * AWIWI_REAL_EPSILON;     /* negative curvature, relative to the trace */
 static const awiwi_real MARGIN = 4;                            /* over the greatest curvature met: slopes vary too */
 static const awiwi_real LITTLE = (awiwi_real)1 / 16;          /* gain by a step, relative to the cost */
+static const awiwi_real SAME = (awiwi_real)1 / 1048576;       /* costs of one minimum, found from two starts */
 enum { BENDS = 8 };                                           /* trials along a direction of negative curvature */
+/* Where a search starts: at the middle of the limits, at the answer that chords have, as low and as high as the torque
+   permits. The curve bends, so a search may end at a minimum that is not the least; the next start is for that. */
+enum { FROM_MIDDLE, FROM_CHORDS, FROM_LOW, FROM_HIGH };
 
 /* Newton's step of the free tendons along the moves that are allowed; where the Hessian is not positive, a damped
    Gauss-Newton step. Returns the predicted decrease. `bend` becomes a downhill direction along which the cost curves
@@ -126,13 +130,26 @@ static int take(const task *s, const vector step, awiwi_real share, awiwi_real m
     return AWIWI_NOT_CONVERGED;
 }
 
-/* Give back by the basic tendons what rounding has taken from a torque within reach. */
-static void settle(const task *s, const moves *m, vector f)
+/* Give back by the basic tendons what rounding has taken from a torque within reach. One that is at a limit, but for
+   rounding, is held there, and others are the basic ones. */
+static void settle(const task *s, const moves *m, int *held, vector f)
 {
-    for (int r = 0; r < m->rank && s->within_reach; r++) {
-        awiwi_real *basic = f + m->basic[r];
-        *basic += m->share[r][s->count] - awiwi_dot(m->share[r], f, s->count);
-        *basic = awiwi_clamp(*basic, s->t->low, s->t->high);
+    moves own;
+    for (int again = s->within_reach; again;) {
+        again = 0;
+        for (int r = 0; r < m->rank; r++) {
+            const int i = m->basic[r];
+            const awiwi_real aim = f[i] + m->share[r][s->count] - awiwi_dot(m->share[r], f, s->count);
+            f[i] = awiwi_clamp(aim, s->t->low, s->t->high);
+            if (awiwi_size(aim - f[i]) > 0) {
+                held[i] = aim < f[i] ? AT_LOW : AT_HIGH;
+                again = 1;
+            }
+        }
+        if (again) {
+            split(s, 1, held, &own);
+            m = &own;
+        }
     }
 }
 
@@ -160,7 +177,7 @@ static int descend(const task *s, const moves *all, int steps, vector f, model *
         const awiwi_real near = s->tolerance * s->t->high;
         /* slopes that decide about a held tendon need the last step */
         const int none_held = m->rank + m->count == s->count;
-        const int ended = longest <= near || (none_held && awiwi_ends_with(longest, last, near)) || rounding;
+        const int ended = longest <= near || (none_held && awiwi_ends_with(longest, last, near, s->t->high / 64)) || rounding;
         const awiwi_real *way = step;
         last = longest;
         if ((ended || (!straight && gain <= LITTLE * here->cost)) && here->cost > here->blur && steps > BENDS
@@ -180,7 +197,8 @@ static int descend(const task *s, const moves *all, int steps, vector f, model *
                 f[i] = awiwi_clamp(f[i] + share * step[i], s->t->low, s->t->high);
             left = leaving(s, here, m, held, d);
             if (left < 0) {
-                settle(s, m, f);
+                here->cost = gain < here->cost - here->blur ? here->cost - gain : 0;
+                settle(s, m, held, f);
                 return AWIWI_OK;
             }
             held[left] = FREE;
@@ -277,6 +295,17 @@ static void drive(const task *s, const moves *all, awiwi_real sense, vector f)
     }
 }
 
+/* Move f to the minimum of the cost with chords in place of the curve. */
+static int follow_chords(task *s, const moves *all, vector f, rates *d)
+{
+    model found;
+    int status = take_chords(s);
+    if (status == AWIWI_OK)
+        status = descend(s, all, AWIWI_MOST_STIFFNESS_STEPS, f, &found, d);
+    s->by_chords = 0;
+    return status;
+}
+
 /* Whether forces differ by no more than the tolerance. */
 static int is_near(const task *s, const vector f, const vector other)
 {
@@ -286,13 +315,16 @@ static int is_near(const task *s, const vector f, const vector other)
     return 1;
 }
 
-/* Whether no other forces come as near, as far as the slopes and curvatures at these tell. The cost of others exceeds
+/* Whether no other forces come as near, as far as the slopes and curvatures at these tell. They tell little where there
+   are as many moves as entries: other slopes than these can then undo a change. The cost of others exceeds
    that of these by half the square of what all entries change by, and by the prices of leaving limits, less what tendons
    gain that are asked to be stiffer. A price is paid for at least the share of the range that is left. */
 static int is_nearest_of_all(const task *s, const model *c, const moves *m, rates *d)
 {
     const awiwi_real range = s->t->high - s->t->low;
     vector extra, x;
+    if (s->entries <= m->count)
+        return 0;
     if (d->count < m->count)
         derive(s, c, m, d);
     for (int i = 0; i < s->count; i++)
@@ -319,25 +351,30 @@ int awiwi_search_forces(const awiwi_tendons *t, const awiwi_real *tau, const awi
         first[i] = best[i];
     want_stiffness(&s, K, tolerance);
     int done = status != AWIWI_OK;
-    for (int start = 0; start < 3 && !done; start++) { /* from there, then from as low and high as the torque permits */
+    for (int start = FROM_MIDDLE; start <= FROM_HIGH && !done; start++) {
         vector trial;
         model found;
         for (int i = 0; i < s.count; i++)
             trial[i] = first[i];
-        if (start > 0)
-            drive(&s, &all, start == 1 ? -1 : 1, trial);
-        if (start > 0 && status == AWIWI_OK && is_near(&s, trial, best))
+        if (start == FROM_CHORDS && follow_chords(&s, &all, trial, &d) != AWIWI_OK)
+            continue;
+        if (start >= FROM_LOW)
+            drive(&s, &all, start == FROM_LOW ? -1 : 1, trial);
+        if (start != FROM_MIDDLE && status == AWIWI_OK && is_near(&s, trial, best))
             continue;
         const int ended = descend(&s, &all, AWIWI_MOST_STIFFNESS_STEPS, trial, &found, &d);
         if (ended != AWIWI_OK && ended != AWIWI_NOT_CONVERGED)
             return ended;
-        if (start == 0 || (ended == AWIWI_OK && (status != AWIWI_OK || found.cost < least - found.blur))) {
+        const int again = start == FROM_CHORDS && status == AWIWI_OK && s.entries > all.count &&
+                          awiwi_size(found.cost - least) <= SAME * least;
+        if (start == FROM_MIDDLE || (ended == AWIWI_OK && (status != AWIWI_OK || found.cost < least - found.blur))) {
             status = ended;
             least = found.cost;
             for (int i = 0; i < s.count; i++)
                 best[i] = trial[i];
         }
-        done = status == AWIWI_OK && (least <= found.blur || (start == 0 && is_nearest_of_all(&s, &found, &all, &d)));
+        done = status == AWIWI_OK &&
+               (again || least <= found.blur || (start == FROM_MIDDLE && is_nearest_of_all(&s, &found, &all, &d)));
     }
     for (int i = 0; i < s.count; i++)
         f[t->searched_tendons[i]] = best[i];

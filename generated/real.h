@@ -8,4 +8,8 @@ typedef double awiwi_real;
 #define AWIWI_REAL_MAX 1.7976931348623157e+308
 #define AWIWI_REAL_EPSILON 2.220446049250313e-16
 
+/* The joints and tendons that the solvers have room for: as many as the largest finger needs. */
+#define AWIWI_MOST_JOINTS 4
+#define AWIWI_MOST_TENDONS 8
+
 #endif

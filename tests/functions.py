@@ -10,7 +10,7 @@ import mpmath
 import numpy as np
 
 from awiwi_gen.build import compiler
-from awiwi_gen.emit.files import scalar_files
+from awiwi_gen.emit.files import csrc_headers
 from awiwi_gen.emit.options import Options
 from awiwi_gen.resources import CSRC
 
@@ -47,7 +47,7 @@ def compile_with(directory: Path, options: Options, name: str, text: str, *flags
     """The object of a C text that includes headers of csrc in a scalar type."""
     headers = directory / options.scalar
     headers.mkdir(exist_ok=True)
-    for header, content in scalar_files(options).items():
+    for header, content in csrc_headers(options).items():
         (headers / header).write_text(content)
     source, made = directory / f"{name}.c", directory / f"{name}.o"
     source.write_text(text)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from awiwi_gen.build import FLAGS, compiler
-from awiwi_gen.emit.files import scalar_files
+from awiwi_gen.emit.files import csrc_headers
 from awiwi_gen.emit.options import Options
 from awiwi_gen.resources import CSRC
 
@@ -34,7 +34,7 @@ class Tendons(ctypes.Structure):
 
 def write_headers(directory: Path, options: Options | None = None) -> None:
     """Write the generated headers that csrc includes."""
-    for name, text in scalar_files(options or Options()).items():
+    for name, text in csrc_headers(options or Options()).items():
         (directory / name).write_text(text)
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from awiwi_gen.build import WARNINGS, compiler
-from awiwi_gen.emit.files import scalar_files
+from awiwi_gen.emit.files import csrc_headers
 from awiwi_gen.emit.options import Options
 from awiwi_gen.pipeline import Job, cached_tree
 from awiwi_gen.resources import CSRC
@@ -82,7 +82,7 @@ FINE = [
 
 
 def on_target(macros: dict[str, str], scalar: str, directory: Path) -> tuple[int, str]:
-    for name, text in scalar_files(Options(scalar)).items():
+    for name, text in csrc_headers(Options(scalar)).items():
         (directory / name).write_text(text)
     changes = "".join(f"#undef {name}\n#define {name} {value}\n" for name, value in macros.items())
     (directory / "one.c").write_text(

@@ -24,6 +24,9 @@ SOLVED = (
 )
 WIDTH = 100
 
+Size = tuple[int, int]  # joints and tendons
+LEAST_ROOM = (4, 4)  # what laws solve for, whatever the hand
+
 
 @cache
 def _environment() -> jinja2.Environment:
@@ -101,10 +104,11 @@ def shared_files(
     functions: Sequence[CFunction],
     digest: str,
     options: Options,
+    room: Size,
     fields: tuple[Sequence[str], Sequence[str]] = ((), ()),
 ) -> dict[str, str]:
-    """The header and the model file. ``fields`` are those of the structs of numbers and of derived ones, if any are read."""
-    return scalar_files(options) | {
+    """The headers and the model file; ``room`` is what solvers need. ``fields`` are those of the structs of numbers and of derived ones, if any are read."""
+    return csrc_headers(options, room) | {
         "kernels.h": render(
             "kernels.h.j2",
             banner=banner(),
@@ -126,8 +130,15 @@ def library_functions(options: Options) -> list[str]:
     return sorted(map(options.function, names | (set(OWN) if options.math == "libm" else set())))
 
 
-def scalar_files(options: Options) -> dict[str, str]:
-    """The headers that depend on the scalar type only; csrc needs no others."""
+def room_of(kernels: Sequence[Kernel]) -> Size:
+    """The most joints and tendons that one of these kernels solves for."""
+    sizes = [(len(kernel.solver.unknowns), len(kernel.solver.equations)) for kernel in kernels if kernel.solver]
+    joints, tendons = zip(LEAST_ROOM, *sizes, strict=True)
+    return max(joints), max(tendons)
+
+
+def csrc_headers(options: Options, room: Size = (8, 16)) -> dict[str, str]:
+    """The headers that csrc includes: for the scalar type, and for the joints and tendons that solvers have room for."""
     limits = np.finfo(options.dtype)
     return {
         "math_constants.h": math_constants(options),
@@ -138,6 +149,8 @@ def scalar_files(options: Options) -> dict[str, str]:
             bits=options.bits,
             largest=options.literal(Fraction(float(limits.max))),
             epsilon=options.literal(Fraction(float(limits.eps))),
+            joints=room[0],
+            tendons=room[1],
         ),
     }
 

@@ -25,7 +25,51 @@ Array = np.ndarray[Any, Any]
 NOISE = 2.5e-4  # error of a measured length [m]
 ROUNDS = 100  # of Gauss-Newton at 256 bits, at most: the residual is small, so a round gains a digit or more
 LEAST_EIGENVALUE = 0.01  # of P'P at any pose, relative to the largest at all: below it spans do not determine joints
+SAME_COST = arb(2) ** -200  # a rise of the cost by this share is rounding
 LAST_STEP = 1e-40  # largest step [rad] after which another would not change the result as two doubles
+
+
+class Descent:
+    """One sample on its way to a minimum within limits: angles reached, the next to try, and the step between them."""
+
+    def __init__(self, start: list[arb], low: list[arb], high: list[arb]) -> None:
+        self.low, self.high = low, high
+        self.reached = self.trial = start
+        self.step = [arb(0)] * len(start)
+        self.cost: arb | None = None
+
+    @property
+    def length(self) -> float:
+        """The largest change of an angle [rad] by the next step."""
+        return max(abs(float(a - b)) for a, b in zip(self.trial, self.reached, strict=True))
+
+    def move(self, residual: list[arb], coupling: list[arb]) -> None:
+        """Choose the next trial from lengths (m) [m] that are missing at this one, and the coupling (m n) [m]."""
+        cost = sum((x * x for x in residual), arb(0)).mid()
+        if self.cost is None or cost <= self.cost * (1 + SAME_COST):
+            self.reached, self.cost = self.trial, cost
+            self.step = self._newton(
+                arb_mat(len(residual), len(self.low), coupling), arb_mat(len(residual), 1, residual)
+            )
+        else:
+            self.step = [(x / 2).mid() for x in self.step]
+        ends = zip(self.reached, self.step, self.low, self.high, strict=True)
+        self.trial = [min(max((x + step).mid(), low), high) for x, step, low, high in ends]
+
+    def _newton(self, jacobian: arb_mat, residual: arb_mat) -> list[arb]:
+        """The step of Gauss and Newton; zero for unknowns at a limit that the slope pushes against it."""
+        q, low, high, step = self.reached, self.low, self.high, [arb(0)] * len(self.low)
+        downhill = (jacobian.transpose() * residual).entries()
+        free = [
+            j for j in range(len(q))
+            if not (q[j] <= low[j] and downhill[j] <= 0) and not (q[j] >= high[j] and downhill[j] >= 0)
+        ]  # fmt: skip
+        if free:
+            columns = arb_mat([[jacobian[i, j] for j in free] for i in range(jacobian.nrows())])
+            found = (columns.transpose() * columns).solve(columns.transpose() * residual).entries()
+            for j, change in zip(free, found, strict=True):
+                step[j] = change.mid()
+        return step
 
 
 @dataclass(frozen=True)
@@ -63,39 +107,27 @@ class LeastSquares(Problem):
         return h, P.reshape(len(q), h.shape[1], q.shape[1])
 
     def solve(self, inputs: Mapping[str, Array]) -> Reference:
-        """The minima near the starts, by undamped Gauss-Newton at 256 bits; an unknown pushed against a limit stays.
+        """The minima near the starts, by Gauss-Newton at 256 bits, with steps halved until they lower the cost.
 
-        A noisy length leads past a limit where the joint's range is narrow.
+        An unknown pushed against a limit stays: a noisy length leads past a limit where the joint's range is narrow.
         """
         samples, n = inputs["start"].shape
         q = [[arb(x) for x in column] for column in inputs["start"].T.astype(np.float64).tolist()]
         measured = [[arb(x) for x in column] for column in inputs["h"].T.astype(np.float64).tolist()]
         low, high = ([arb(float(x)) for x in end] for end in self.limits(inputs["start"].dtype))
         at_rest = [arb(0)] * samples
+        minima = [Descent([column[s] for column in q], low, high) for s in range(samples)]
         for _ in range(ROUNDS):
-            largest = 0.0
 
             def leaf(node: Node, q: Any = q) -> list[arb]:
                 return [ball(self.values[node[1]])] * samples if node[0] == "param" else self._angle(node, q, at_rest)
 
             h, P = self._evaluate(Balls(samples), leaf)
-            for s in range(samples):
-                jacobian = arb_mat(len(h), n, [column[s].mid() for column in P])
-                residual = arb_mat(len(h), 1, [(a[s] - b[s]).mid() for a, b in zip(measured, h, strict=True)])
-                downhill = (jacobian.transpose() * residual).entries()
-                free = [
-                    j for j in range(n)
-                    if not (q[j][s] <= low[j] and downhill[j] <= 0) and not (q[j][s] >= high[j] and downhill[j] >= 0)
-                ]  # fmt: skip
-                if not free:
-                    continue
-                columns = arb_mat([[jacobian[i, j] for j in free] for i in range(len(h))])
-                step = (columns.transpose() * columns).solve(columns.transpose() * residual).entries()
-                for j, change in zip(free, step, strict=True):
-                    before = q[j][s]
-                    q[j][s] = min(max((before + change).mid(), low[j]), high[j])
-                    largest = max(largest, abs(float(q[j][s] - before)))
-            if largest < LAST_STEP:
+            for s, minimum in enumerate(minima):
+                residual = [(a[s] - b[s]).mid() for a, b in zip(measured, h, strict=True)]
+                minimum.move(residual, [column[s].mid() for column in P])
+            q = [[minimum.trial[j] for minimum in minima] for j in range(n)]
+            if max(minimum.length for minimum in minima) < LAST_STEP:
                 break
         return reference({"q": q})
 

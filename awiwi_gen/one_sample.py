@@ -1,0 +1,51 @@
+"""The shortest way from Python to a kernel: one sample, in arrays that are as C has them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+Shape = tuple[int, ...]
+
+# Written out for each kernel, as `collections.namedtuple` does it: loops over ports would double what a call costs.
+SOURCE = """
+def call({inputs}):
+    if not ({tests}):
+        return None
+    {allocate}
+    status = c({pointers})
+    return {result}
+"""
+TEST = "type({0}) is ndarray and {0}.shape == {1} and {0}.dtype is dtype and {0}.flags.carray"
+
+
+def direct_call(
+    inputs: Sequence[Shape],
+    outputs: Sequence[Shape],
+    result: Callable[..., Any] | None,
+    c: Callable[..., Any],
+    pointer: Callable[[Any], Any],
+    dtype: Any,
+) -> Callable[..., Any]:
+    """A function of the inputs, arrays of these shapes, that calls the C function `c` and returns what it writes.
+
+    `c` takes what `pointer` makes of each array, and returns a status if `result` has a field for it. `result` makes a
+    named tuple of outputs and status; None is for a single output. The function returns None, and calls nothing, where
+    an argument is no array of the shape and type that C reads: writeable, aligned and in C's order.
+    """
+    given, found = [f"i{k}" for k in range(len(inputs))], [f"o{k}" for k in range(len(outputs))]
+    fields = [*found, "array(status, intc)"][: len(result._fields) if result else 1]  # type: ignore[attr-defined]
+    text = SOURCE.format(
+        inputs=", ".join(given),
+        tests=" and ".join(TEST.format(name, shape) for name, shape in zip(given, inputs, strict=True)) or "True",
+        allocate="; ".join(f"{name} = empty({shape}, dtype)" for name, shape in zip(found, outputs, strict=True)),
+        pointers=", ".join(f"pointer({name})" for name in (*given, *found)),
+        result=f"result({', '.join(fields)})" if result else fields[0],
+    )
+    names = {"ndarray": np.ndarray, "empty": np.empty, "array": np.array, "intc": np.intc}
+    names |= {"c": c, "pointer": pointer, "dtype": dtype, "result": result}
+    exec(text, names)
+    made: Callable[..., Any] = names["call"]
+    return made
