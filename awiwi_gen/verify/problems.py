@@ -168,15 +168,17 @@ class GradientSearch(LeastSquares):
 
         A trial of the length 2 / trace(P'P) times the gradient leaves 1 - 2 lambda / trace of the error along an
         eigenvector of P'P with the eigenvalue lambda; of a single unknown it turns the sign of the error and no more.
-        Where an eigenvalue vanishes inside the range, two poses have the same lengths.
+        Where an eigenvalue vanishes inside the range, two poses have the same lengths. The step is chosen at the start,
+        so the least eigenvalue of any pose counts against the greatest trace, and half of the trials may be lost.
         """
         _, P = self.model(q.astype(np.float64))
         values = np.linalg.eigvalsh(np.swapaxes(P, 1, 2) @ P)
         if not values.min() > LEAST_EIGENVALUE * values.max():
             return False
-        shares = values / values.sum(axis=1, keepdims=True)
-        left = np.abs(1 - 2 * shares) ** self.solver.iterations
-        return bool(left.max() < min(self.solver.tolerance.values()))
+        traces, least = values.sum(axis=1), min(self.solver.tolerance.values())
+        left = np.abs(1 - 2 * values / traces[:, None]) ** self.solver.iterations
+        slowest = (1 - 2 * values.min() / traces.max()) ** (self.solver.iterations // 2)
+        return bool(max(left.max(), slowest) < least)
 
     def observed(self, inputs: Mapping[str, Array], found: Any) -> Mapping[str, Array]:
         """The angles found, and the increase of the cost from the start, relative to the cost of all lengths."""

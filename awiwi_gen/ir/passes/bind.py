@@ -13,6 +13,7 @@ from awiwi_gen.ir.graph import VARIADIC, Graph, Node, Ref
 
 ARITHMETIC = VARIADIC | {"inv", "div"}
 FOLDING_BITS = 400  # the rounding of a folded square root stays far below what the pass checks resolve
+LEAST = arb(2) ** -350  # what is left of the cosine of a right angle, whose pi has as many bits
 
 
 def bind(graph: Graph, values: Mapping[str, Fraction]) -> Graph:
@@ -50,5 +51,7 @@ def _value(operation: str, arguments: list[Fraction]) -> Fraction:
         result = getattr(arb, FLINT_NAMES.get(operation, operation))(*(ball(a) for a in arguments))
         if not result.is_finite():
             raise ZeroDivisionError(f"{operation}({', '.join(str(float(a)) for a in arguments)}) is not a number")
+        if abs(result) < LEAST:
+            return Fraction(0)
         mantissa, exponent = result.mid().man_exp()
     return Fraction(int(mantissa)) * Fraction(2) ** int(exponent)
