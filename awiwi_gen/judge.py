@@ -61,7 +61,10 @@ def judge_record(
         as_computed = problem_of(kernel, used, _rounded(loaded, options))
         mirror = as_computed.mirror(record.inputs, own)
         observed = partial(problem.observed, record.inputs)
-        return judge_solver(kernel.name, record.reference, mirror, observed, record.inputs, function, tolerance, SEED)
+        other = partial(problem.other_reference, record.inputs)
+        return judge_solver(
+            kernel.name, record.reference, mirror, observed, other, record.inputs, function, tolerance, SEED
+        )
     inputs = draw(kernel.inputs, kernel.path, options.dtype)
     examine = partial(
         judge,

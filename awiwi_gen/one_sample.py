@@ -44,8 +44,8 @@ def direct_call(
         pointers=", ".join(f"pointer({name})" for name in (*given, *found)),
         result=f"result({', '.join(fields)})" if result else fields[0],
     )
-    names = {"ndarray": np.ndarray, "empty": np.empty, "array": np.array, "intc": np.intc}
+    names: dict[str, Any] = {"ndarray": np.ndarray, "empty": np.empty, "array": np.array, "intc": np.intc}
     names |= {"c": c, "pointer": pointer, "dtype": dtype, "result": result}
-    exec(text, names)
+    exec(text, names)  # noqa: S102 names and numbers of a checked manifest
     made: Callable[..., Any] = names["call"]
     return made

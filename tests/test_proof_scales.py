@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from functools import partial
 from math import inf
 
 import numpy as np
@@ -98,7 +99,8 @@ def judged(alike, change):
     def observed(found):
         return problem.observed(record.inputs, found)
 
-    return judge_solver("kernel", record.reference, {}, observed, record.inputs, call, 1e-11, 0)
+    other = partial(problem.other_reference, record.inputs)
+    return judge_solver("kernel", record.reference, {}, observed, other, record.inputs, call, 1e-11, 0)
 
 
 def test_forces_that_are_not_unique_are_judged_by_what_they_do(alike):

@@ -107,7 +107,10 @@ def shared_files(
     room: Size,
     fields: tuple[Sequence[str], Sequence[str]] = ((), ()),
 ) -> dict[str, str]:
-    """The headers and the model file; ``room`` is what solvers need. ``fields`` are those of the structs of numbers and of derived ones, if any are read."""
+    """The headers and the model file; ``room`` is what solvers need.
+
+    ``fields`` are those of the structs of numbers and of derived ones, if any are read.
+    """
     return csrc_headers(options, room) | {
         "kernels.h": render(
             "kernels.h.j2",

@@ -37,6 +37,15 @@ class Problem(ABC):
         """What the solver computes in floats, by output, where that is known to the last bit; nothing by default."""
         return {}
 
+    def other_reference(
+        self, inputs: Mapping[str, Array], found: Any, reference: Reference
+    ) -> tuple[Reference, list[str]]:
+        """Exact outputs where a search that missed those of `solve` ended, and why that is not right, if it is not.
+
+        Asked only after a miss. The same reference by default: there is one right answer.
+        """
+        return reference, []
+
     def observed(self, inputs: Mapping[str, Array], found: Any) -> Mapping[str, Array]:
         """What is compared with the exact outputs: the outputs found, or what follows from them."""
         return {name: getattr(found, name) for name in found._fields}

@@ -14,6 +14,7 @@ from awiwi_gen.ir.graph import Graph, prune
 from awiwi_gen.ir.interpret import evaluate
 from awiwi_gen.verify.distribution_answer import System
 from awiwi_gen.verify.nearest_forces import Demands, minima
+from awiwi_gen.verify.other_minima import Found
 from awiwi_gen.verify.problem import Problem
 from awiwi_gen.verify.reference import Reference, reference
 
@@ -33,6 +34,8 @@ SAME_STIFFNESS = 0.1  # of the distance: stiffnesses that differ by less are tho
 SAME_FORCES = 1e-2  # of the upper limit: forces that differ by less are those of one minimum
 DETERMINED = 1e-4  # smallest effect of a pattern of forces, relative to the largest, that still determines forces
 ROUNDS = 8  # of Newton's method with a derivative in floats, at most: each gains ten digits at least
+SAME_DISTANCE = 1e-9  # of the demand: distances that differ by less are those of one minimum
+FARTHER = 0.02  # share of the samples that may end at a minimum which is not the nearest known
 LAST_STEP = 1e-40  # largest step [N] after which the next would change nothing that two doubles show
 
 
@@ -206,8 +209,39 @@ class Distribution(Problem):
 
     def solve(self, inputs: Mapping[str, Array]) -> Reference:
         """Forces whose free components are stationary under changes that keep the torque; the others stay at limits."""
+        return self._exact(inputs, self.answers(inputs["q"], inputs["f_min"], inputs["f_max"]))
+
+    def other_reference(
+        self, inputs: Mapping[str, Array], found: Any, reference: Reference
+    ) -> tuple[Reference, list[str]]:
+        """The same, where the search ended at another minimum: its own exact forces.
+
+        The distance is not convex, and no bounded search is sure to end at the least of its minima. Another one counts
+        as found if it is a minimum; too many that are farther than the nearest known are a fault.
+        """
+        answers = self.answers(inputs["q"], inputs["f_min"], inputs["f_max"])
+        limits = (inputs[end].astype(np.float64) for end in ("f_min", "f_max"))
+        (P, dP), curves = self.tendons(inputs["q"]), ("k", "slope", "curvature")
+        f, symmetric = found.f.astype(np.float64), (inputs["K"] + np.swapaxes(inputs["K"], 1, 2)).astype(np.float64) / 2
+        known = np.array([answer.f for answer in answers])
+        ends, nearest = (
+            [Found(*each) for each in zip(forces, P, dP, *(c.T for c in self.curve(forces.T, *curves)), symmetric, *both,
+                                          strict=True)]
+            for forces, both in zip((f, known), [[*limits]] * 2, strict=True)
+        )  # fmt: skip
+        farther = 0
+        for s, (end, best) in enumerate(zip(ends, nearest, strict=True)):
+            if found.status[s] == (0 if answers[s].feasible else INFEASIBLE) and end.is_minimum():
+                away = end.distance - best.distance
+                if abs(away) > SAME_DISTANCE * float(np.abs(end.K).max()):
+                    farther += away > 0
+                    answers[s] = replace(answers[s], f=end.f, held=end.held)
+        reasons = [f"it ends at a minimum that is not the nearest at {farther} samples"]
+        return self._exact(inputs, answers), reasons if farther > FARTHER * len(answers) else []
+
+    def _exact(self, inputs: Mapping[str, Array], answers: list[Answer]) -> Reference:
+        """The answers at 256 bits."""
         q, samples = inputs["q"], len(inputs["q"])
-        answers = self.answers(q, inputs["f_min"], inputs["f_max"])
         balls = Balls(samples)
         given = [[arb(float(x)) for x in column] for column in q.T]
         P = evaluate(self.graphs["coupling"], balls, lambda node: given[node[2]])["P"]
