@@ -38,7 +38,7 @@ def require_running_gains(hand: Hand, store: Cache) -> None:
 def failing(library: Any, hand: Hand) -> list[Fault]:
     """A fault for each tendon whose gains are unstable."""
     found: dict[int, tuple[str, list[Plant]]] = {}
-    for force in PRETENSIONS:
+    for force in pretensions(library):
         for name, finger in hand.fingers.items():
             first = hand.blocks[name][0].start
             for index, (joint, plant) in enumerate(plants(library, hand, name, finger, force)):
@@ -55,6 +55,12 @@ def failing(library: Any, hand: Hand) -> list[Fault]:
             )
             faults.append(Fault(key=f"gains[{index}].tendon", message=message))
     return faults
+
+
+def pretensions(library: Any) -> list[float]:
+    """Forces [N] at which the springs' stiffness is taken: the nearest that the springs of the hand can have."""
+    (port,) = library.spring_elongation.inputs
+    return [float(np.clip(force, port["low"][0], port["high"][0])) for force in PRETENSIONS]
 
 
 def radius(library: Any, plant: Plant, gains: Mapping[str, float], delay: int = 1) -> float:
