@@ -29,6 +29,7 @@ from typing import Any
 import numpy as np
 
 import awiwi_gen
+from awiwi_gen.emit.files import csrc_headers
 from awiwi_gen.pipeline import Job, cached_tree
 
 from .driver import golden_inputs, write_driver
@@ -115,7 +116,11 @@ class Bench:
         inputs = {name: _with_degenerate(rows) for name, rows in golden_inputs(job, manifest, ROWS).items()}
         driver = ROOT / "build" / "targets" / "mutants"
         write_driver(driver, {**manifest, "kernels": solvers}, {e["name"]: inputs[e["name"]] for e in solvers})
-        self.includes = (generated, CSRC, driver)
+        roomy = driver / "include"  # problems are larger than any finger of the hand
+        roomy.mkdir(parents=True, exist_ok=True)
+        for name, text in csrc_headers(job.options).items():
+            (roomy / name).write_text(text, encoding="utf-8")
+        self.includes = (roomy, generated, CSRC, driver)
         kernels = [*sorted(generated.glob("*.c")), HERE / "run.c", driver / "table.c"]
         problems = sorted(HERE.glob("problems*.c"))
         self.programs = [compile_all(files, self.includes, HOST) for files in (problems, kernels)]
