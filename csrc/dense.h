@@ -53,7 +53,7 @@ int awiwi_all_finite(const awiwi_real *x, int n);
 /* C = A B for n x n matrices. */
 void awiwi_product(int n, const awiwi_real *A, const awiwi_real *B, awiwi_real *C);
 
-enum { AWIWI_MOST_ROWS = 10 }; /* of a matrix that is factored */
+enum { AWIWI_MOST_ROWS = AWIWI_MOST_JOINTS > 10 ? AWIWI_MOST_JOINTS : 10 }; /* of a matrix that is factored */
 
 /* Factor A in its place, L below the diagonal and U from it on, by elimination that exchanges rows k and order[k] at
    step k. Returns 0 if A is singular. */

@@ -44,11 +44,11 @@ typedef struct model {
 } model;
 
 /* The moves of the free tendons that keep the torque: each of the loose tendons by itself, while the basic tendons make
-   up for its torque, basic[r] by -share[r][loose] of the move. Forces give the torque where each row of shares times
+   up for its torque, that of joint[r] first of all, basic[r] by -share[r][loose] of the move. Forces give the torque where each row of shares times
    forces is the last number of the row. Without a torque to keep all free tendons are loose. */
 typedef struct moves {
     int rank, count;
-    int basic[AWIWI_MOST_JOINTS], loose[AWIWI_MOST_TENDONS];
+    int joint[AWIWI_MOST_JOINTS], basic[AWIWI_MOST_JOINTS], loose[AWIWI_MOST_TENDONS];
     awiwi_real share[AWIWI_MOST_JOINTS][AWIWI_MOST_TENDONS + 1];
 } moves;
 
@@ -237,6 +237,7 @@ static void split(const task *s, int keep_torque, const int *held, moves *m)
             subtract(count + 1, m->share[r][basic], row, m->share[r]);
         for (n--; pivot < n; pivot++)
             left[pivot] = left[pivot + 1];
+        m->joint[m->rank] = a;
         m->basic[m->rank++] = basic;
     }
     m->count = n;

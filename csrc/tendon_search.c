@@ -135,11 +135,27 @@ static int take(const task *s, const vector step, awiwi_real share, awiwi_real m
 static void settle(const task *s, const moves *m, int *held, vector f)
 {
     moves own;
-    for (int again = s->within_reach; again;) {
+    for (int again = s->within_reach && !s->by_chords; again;) {
+        awiwi_real A[AWIWI_MOST_JOINTS * AWIWI_MOST_JOINTS], missing[AWIWI_MOST_JOINTS];
+        again = 0;
+        for (int r = 0; r < m->rank; r++) { /* by the couplings: shares have rounding of their own */
+            const int a = m->joint[r];
+            awiwi_real sizes = awiwi_size(s->torque[a]);
+            missing[r] = s->torque[a];
+            for (int i = 0; i < s->count; i++) {
+                missing[r] -= s->p[i][a] * f[i];
+                sizes += awiwi_size(s->p[i][a]) * s->t->high;
+            }
+            for (int l = 0; l < m->rank; l++)
+                A[r * m->rank + l] = s->p[m->basic[l]][a];
+            again = again || awiwi_size(missing[r]) > 2 * AWIWI_REAL_EPSILON * sizes;
+        }
+        if (!again || !awiwi_solve(m->rank, 1, A, missing))
+            return;
         again = 0;
         for (int r = 0; r < m->rank; r++) {
             const int i = m->basic[r];
-            const awiwi_real aim = f[i] + m->share[r][s->count] - awiwi_dot(m->share[r], f, s->count);
+            const awiwi_real aim = f[i] + missing[r];
             f[i] = awiwi_clamp(aim, s->t->low, s->t->high);
             if (awiwi_size(aim - f[i]) > 0) {
                 held[i] = aim < f[i] ? AT_LOW : AT_HIGH;
@@ -177,7 +193,10 @@ static int descend(const task *s, const moves *all, int steps, vector f, model *
         const awiwi_real near = s->tolerance * s->t->high;
         /* slopes that decide about a held tendon need the last step */
         const int none_held = m->rank + m->count == s->count;
-        const int ended = longest <= near || (none_held && awiwi_ends_with(longest, last, near, s->t->high / 64)) || rounding;
+        int cut;
+        const awiwi_real whole = reach(s, f, step, &cut);
+        const int ended = longest <= near || rounding ||
+                          (none_held && cut < 0 && awiwi_ends_with(longest, last, near, s->t->high / 64));
         const awiwi_real *way = step;
         last = longest;
         if ((ended || (!straight && gain <= LITTLE * here->cost)) && here->cost > here->blur && steps > BENDS
@@ -191,7 +210,8 @@ static int descend(const task *s, const moves *all, int steps, vector f, model *
             straight = status != AWIWI_OK;
             way = straight ? step : bend;
         }
-        const awiwi_real share = way == step ? reach(s, f, step, &stopped) : 0;
+        const awiwi_real share = way == step ? whole : 0;
+        stopped = way == step ? cut : stopped;
         if (way == step && ended) {
             for (int i = 0; i < s->count; i++)
                 f[i] = awiwi_clamp(f[i] + share * step[i], s->t->low, s->t->high);

@@ -85,7 +85,7 @@ def test_springs_that_no_spring_is_like_end_within_the_bounds(library, kind):
             tau, K = demand(finger, random, 1.0)
             finger.curve = curves[kind]
             status, f = finger.distribute(tau, K)
-            assert finger.calls <= 2 + 64 + 3 * 97
+            assert finger.calls <= 2 + 64 + 2 + 4 * 97
             assert finger.low <= f.min() <= f.max() <= finger.high
             assert status in (OK, NOT_CONVERGED)
             assert np.abs(finger.P.T @ f + tau).max() < 1e-13
