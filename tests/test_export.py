@@ -18,6 +18,7 @@ from awiwi_gen.interchange.export_mjcf import quaternion
 from awiwi_gen.interchange.frames import about, turn_matrix
 from awiwi_gen.interchange.model import Body, Joint, Mimic, Model, Place, Site, Tendon
 from awiwi_gen.interchange.toml import hand_text
+from awiwi_gen.kernels.fingers_control import distribution
 
 HERE = Path(__file__).parent
 HANDS = ["exported_finger.toml", "../examples/claw.toml", "../awiwi_gen/hand.toml"]
@@ -129,6 +130,17 @@ def test_the_import_of_an_export_is_the_same_hand_again():
     ours, theirs = (hand.fingers["claw"].quantities() for hand in (once, twice))
     for place, number in ours.items():
         assert float(theirs[place]) == pytest.approx(float(number), rel=1e-12, abs=1e-15), place
+
+
+def test_imported_antagonists_share_their_force_in_closed_form_as_before():
+    hand = Hand.load()
+    again = Hand.parse(hand_text(draft(read_mjcf(export_mjcf.text_and_losses(hand)[0]))))
+    for name in ("index", "middle", "ring"):
+        ours, theirs = (each.fingers[name] for each in (hand, again))
+
+        assert [each.structure() for each in theirs.tendons] == [each.structure() for each in ours.tendons]
+        assert distribution(theirs).strings == distribution(ours).strings
+        assert distribution(theirs).strings["searched_count"] == "0"
 
 
 def palm_pose(palm, q: np.ndarray) -> np.ndarray:
