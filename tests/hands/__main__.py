@@ -31,6 +31,7 @@ from awiwi_gen.interchange.toml import hand_text
 from .behaviours import changed
 from .catalog import HANDS, Published
 from .compare import LIMIT, compiled_model, palm_differences, worst_differences
+from .fits import fitted
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 DOCS, README = ROOT / "docs" / "interchange.md", ROOT / "README.md"
@@ -60,7 +61,7 @@ def main() -> int:
         if chosen.only in published.name:
             results.append(examine(published, folder))
             print(" | ".join(results[-1].row), flush=True)
-    faults = [*changed(), *wrapped_finger(), *(fault for result in results for fault in result.faults)]
+    faults = [*changed(), *fitted(), *wrapped_finger(), *(fault for result in results for fault in result.faults)]
     if not chosen.only:
         faults += judge_tables([result.row for result in results], chosen.accept)
     for fault in faults:
