@@ -157,7 +157,7 @@ class _Writer:
     def _coupler(self, link: Link) -> None:
         """The coupler of a four-bar follows the crank by a polynomial."""
         joint, fit = f"{self.name}_{link.joint}", coupler_fit(link, DEGREE)
-        SubElement(self.sections["equality"], "joint", joint1=coupler_of(joint), joint2=joint,
+        SubElement(self.sections["equality"], "joint", name=f"{joint}.four_bar", joint1=coupler_of(joint), joint2=joint,
                    polycoef=text(fit.coefficients))  # fmt: skip
 
     # -- tendons -----------------------------------------------------------------------------------------------------

@@ -15,7 +15,7 @@ from awiwi_gen.hand.lever import Lever
 from awiwi_gen.interchange import export_mjcf
 from awiwi_gen.interchange.export_motors import MOTORS, POSITION, TORQUE
 
-from .compare import LIMIT, STATES, Worst, within_domain
+from .compare import GRAVITY, LIMIT, STATES, Worst, within_domain
 
 _GRID = 301
 
@@ -48,7 +48,7 @@ def four_bar(hand: Hand) -> Iterator[str]:
     (equality,) = (i for i in range(model.neq) if model.eq_obj1id[i] == model.joint("fifth_hmc.coupler").id)
     at_start = lib.fifth_hmc_four_bar(0.0).coupler
     worst, off = Worst(), 0.0
-    model.opt.gravity[:] = [1.3, -2.1, -9.4]
+    model.opt.gravity[:] = GRAVITY
     random = np.random.default_rng(5)
     angles = [*np.linspace(low, high, _GRID), *random.uniform(low, high, STATES)]
     for number, angle in enumerate(angles):
