@@ -73,15 +73,19 @@ def test_a_lever_spring_rises_from_zero_and_is_off_by_its_error(hand):
 # -- four-bars -------------------------------------------------------------------------------------------------------
 
 
-def test_crank_and_coupler_stand_as_the_linkage_does(hand):
+@pytest.mark.parametrize("low", ["-30 deg", "5 deg"])  # the coupler counts from the angle that is nearest to zero
+def test_crank_and_coupler_stand_as_the_linkage_does(low):
+    text = (HERE.parent / "awiwi_gen" / "hand.toml").read_text(encoding="utf-8")
+    hand = Hand.parse(text.replace('low = "-30 deg"\nhigh = "40 deg"', f'low = "{low}"\nhigh = "40 deg"'))
     link = hand.fingers["fifth"].links[0]
+    assert float(link.low) == pytest.approx(np.radians(float(low.split()[0])))
     model = read_mjcf(export_mjcf.text_and_losses(hand)[0])
     crank, coupler = (next(j for j in model.joints if j.name == f"fifth_hmc{end}") for end in ("", ".coupler"))
     assert crank.body == coupler.body
     axes, origin = model.poses[crank.body]
     base_axes, base = model.poses[model.find("fifth.base")]
     grid = np.linspace(float(link.low), float(link.high), 7)
-    for angle, chi in zip(grid, coupler_motion(link.four_bar, 0.0, grid), strict=True):
+    for angle, chi in zip(grid, coupler_motion(link.four_bar, float(link.start), grid), strict=True):
         _, (expected_axes, expected) = next(iter(Chain(hand.fingers["fifth"]).frames([angle, 0, 0, 0])))
         moved, place = np.eye(3), np.zeros(3)
         for joint, value in ((crank, angle - crank.reference), (coupler, chi)):
