@@ -6,7 +6,7 @@
 # make firmware  every kernel on every target: equal bits, committed figures (ACCEPT=1 writes them, ALL=1: more, QUICK=1: what CI runs)
 # make analysis  gcc -fanalyzer, clang-tidy and cppcheck: no finding without a reason
 # make mutants  change one operator or constant of csrc/ at a time (COUNT=60: some of them); 20 minutes for all
-# make test-hands  published hands: imported, one finger of each proved and compared with MuJoCo (ACCEPT=1: new table)
+# make test-hands  published hands: imported, one finger of each proved, compared with MuJoCo and Pinocchio (ACCEPT=1: new table)
 # make clean  remove what make made (generated/ stays: it is checked in)
 
 PYTHON ?= python3
@@ -56,9 +56,10 @@ mutants: .venv/installed
 	@$(BIN)/python -m tests.targets.mutants $(if $(COUNT),--count $(COUNT))
 
 test-hands: .venv/installed .venv-hands/installed
-	@PYTHONPATH=.venv-hands $(BIN)/python -m tests.hands $(if $(ONLY),--only "$(ONLY)") $(if $(ACCEPT),--accept)
+	@PYTHONPATH="$$(echo .venv-hands .venv-hands/cmeel.prefix/lib/python3*/site-packages | tr ' ' :)" \
+	  $(BIN)/python -m tests.hands $(if $(ONLY),--only "$(ONLY)") $(if $(ACCEPT),--accept)
 
-# MuJoCo beside .venv, whose libraries it uses: nothing else of its requirements is needed to compile a model.
+# MuJoCo and Pinocchio beside .venv, whose NumPy they use; Pinocchio lies in a prefix of its own.
 .venv-hands/installed: tests/hands/requirements.lock .venv/installed
 	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --upgrade --target .venv-hands --requirement $<
 	@touch $@

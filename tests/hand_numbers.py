@@ -117,9 +117,12 @@ def tendon_lengths(finger: dict[str, Any], q: np.ndarray) -> np.ndarray:
     angles = dict(zip([link["joint"] for link in finger["links"]], link_angles(finger, q), strict=True))
     frames = dict(zip(angles, poses(finger, np.array(list(angles.values())))[:-1], strict=True))
     frames["palm"] = (np.eye(3), np.zeros(3))
+    radii = {pulley["joint"]: pulley["radius"] for pulley in finger.get("pulleys", [])}
     lengths = []
     for tendon in finger.get("tendons", []):
         points = [frames[p["link"]][1] + frames[p["link"]][0] @ np.array(p["at"]) for p in tendon.get("path", [])]
         straight = sum(float(np.linalg.norm(b - a)) for a, b in pairwise(points))
-        lengths.append(tendon["rest"] + straight + sum(arm * angles[j] for j, arm in tendon.get("arms", {}).items()))
+        arcs = sum(float(f"{over[0]}1") * radii[over[1:]] * angles[over[1:]] for over in tendon.get("over", []))
+        arcs += sum(arm * angles[j] for j, arm in tendon.get("arms", {}).items())
+        lengths.append(tendon["rest"] + straight + arcs)
     return np.array(lengths)

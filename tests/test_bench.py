@@ -10,7 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench import hands
+import awiwi_gen
+from awiwi_gen.hand import Hand
+from bench import hands, skew
 from bench.counts import count
 from bench.measure import Driver, called_costs
 from bench.objects import build, code_bytes
@@ -131,3 +133,11 @@ def test_the_finger_given_to_peers_is_plain_data():
     finger = hands.spec(hands.packaged())
 
     assert json.loads(json.dumps(finger)) == finger
+
+
+def test_peers_get_the_same_skew_finger_as_we():
+    hand = Hand.parse(skew.skew_hand(2))
+    lib, q = awiwi_gen.build(hand, only="index_mass_matrix"), [0.3, -0.2]
+    theirs = outputs("mass_matrix", skew.plain_finger(hand), {"q": q}, PLAIN)["M"]
+
+    np.testing.assert_allclose(np.reshape(theirs, (2, 2)), lib.index_mass_matrix(q), rtol=1e-13)

@@ -111,6 +111,33 @@ def test_a_body_that_a_tendon_wraps_round_stands_where_the_tree_has_it():
     assert body["radius"] == 0.002
 
 
+# -- pulleys ---------------------------------------------------------------------------------------------------------
+
+
+def test_joints_whose_arms_are_equal_and_opposite_have_a_pulley():
+    opposite = (
+        Tendon("a", arms={"IF:Spread": 0.009, "IF:Bend": 0.0065}),
+        Tendon("b", arms={"IF:Spread": 0.009, "IF:Bend": -0.0065, "IF:Tip": 0.004}),
+        Tendon("c", arms={"IF:Spread": -0.009, "IF:Tip": -0.005}),
+    )
+    hand, _ = imported(finger(tendons=opposite))
+    (made,) = hand.fingers.values()
+
+    assert {joint: float(radius) for joint, radius in made.radii.items()} == {"spread": 0.009, "bend": 0.0065}
+    assert [tendon.over for tendon in made.tendons] == [("+spread", "+bend"), ("+spread", "-bend"), ("-spread",)]
+    assert [list(tendon.arms) for tendon in made.tendons] == [[], ["tip"], ["tip"]]
+
+
+def test_arms_in_one_sense_or_on_a_follower_stay_arms():
+    mimics = (Mimic("IF:Tip", "IF:Bend", 0.5),)
+    arms = [{"IF:Spread": 0.009, "IF:Tip": 0.004}, {"IF:Spread": 0.009, "IF:Tip": -0.004}]
+    hand, _ = imported(finger(tendons=tuple(Tendon("ab"[i], arms=each) for i, each in enumerate(arms)), mimics=mimics))
+    (made,) = hand.fingers.values()
+
+    assert not made.pulleys
+    assert [list(tendon.arms) for tendon in made.tendons] == [["spread", "tip"]] * 2
+
+
 # -- couplings -------------------------------------------------------------------------------------------------------
 
 

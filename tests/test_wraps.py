@@ -144,7 +144,7 @@ def test_arms_are_the_slopes_of_lengths(lib, q):
 def test_a_string_round_a_cylinder_pulls_by_its_stretch(lib, q):
     found = lib.claw_return_torque(q)
     chain = Chain(Hand.parse(FILE).fingers["claw"])
-    stretch = np.array([max(0.0, chain._length(3, each) - 25e-3) for each in q])
+    stretch = np.array([max(0.0, chain.length(3, each) - 25e-3) for each in q])
 
     np.testing.assert_allclose(found.energy, 150 * stretch**2, rtol=1e-9)
 

@@ -112,13 +112,13 @@ class Chain:
 
     def longest(self, tendon: int) -> float:
         """The longest length of a tendon [m]: at the best ends of the ranges, lines being searched joint by joint."""
-        found = max(self.poses(), key=partial(self._length, tendon))
+        found = max(self.poses(), key=partial(self.length, tendon))
         for _ in range(_SWEEPS):
             for column, ends in enumerate(zip(self.low, self.high, strict=True)):
-                found = _least(lambda q: -self._length(tendon, q), found, column, ends)
-        return self._length(tendon, found)
+                found = _least(lambda q: -self.length(tendon, q), found, column, ends)
+        return self.length(tendon, found)
 
-    def _length(self, number: int, q: Sequence[float]) -> float:
+    def length(self, number: int, q: Sequence[float]) -> float:
         """Length of a tendon [m]."""
         tendon = self.finger.tendons[number]
         length = float(tendon.rest) + sum(self.distance(q, line) / line.divisor for line in self.lines[number])
@@ -184,7 +184,7 @@ class Chain:
             if bar:
                 reference = float(bar.reference)
                 origin = point(_rotated(axes, angle + reference), origin, (float(bar.crank), 0.0, 0.0))
-                angle = _coupler(bar, angle + reference) - _coupler(bar, start + reference)
+                angle = coupler_angle(bar, angle + reference) - coupler_angle(bar, start + reference)
             axes, offset = _rotated(axes, angle - drawn), following
             yield seat, (axes, origin)
 
@@ -227,7 +227,7 @@ def _rotated(axes: Axes, angle: float, about: int = 2) -> Axes:
     return new[0], new[1], new[2]
 
 
-def _coupler(bar: FourBar, crank: float) -> float:
+def coupler_angle(bar: FourBar, crank: float) -> float:
     """Angle of a four-bar's coupler [rad]; where the bars do not close, of bars that are stretched to close."""
     coupler, rocker = float(bar.coupler), float(bar.rocker)
     east, north = float(bar.ground) - float(bar.crank) * math.cos(crank), -float(bar.crank) * math.sin(crank)

@@ -71,6 +71,7 @@ def export(
     form: Annotated[str, typer.Argument(metavar="FORMAT", help="mjcf or urdf")],
     hand: Annotated[Path | None, typer.Option("--hand", help="Hand file; the Awiwi hand if left out.")] = None,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="File to write.")] = None,
+    motors: Annotated[str, typer.Option("--motors", help="mjcf: force, torque or position.")] = "",
     replace: Replace = False, as_json: Json = False,
 ) -> int:  # fmt: skip
     """Write the hand as a model of MuJoCo (mjcf) or as URDF, and say what the format cannot hold."""
@@ -78,13 +79,17 @@ def export(
     from awiwi_gen.interchange import export_mjcf, export_urdf
     from awiwi_gen.interchange.loss import loss_lines, write_whole
 
-    writers = {"mjcf": (export_mjcf.text_and_losses, ".xml"), "urdf": (export_urdf.text_and_losses, ".urdf")}
-    if form not in writers:
+    endings = {"mjcf": ".xml", "urdf": ".urdf"}
+    if form not in endings:
         raise InputError(f"{form} is no format of export; expected mjcf or urdf")
-    writer, ending = writers[form]
+    if motors and form == "urdf":
+        raise InputError(f"--motors {motors}: URDF has no motors; expected mjcf")
     loaded = Hand.load(hand)
-    text, losses = writer(loaded)
-    target = output or Path(f"{loaded.prefix}{ending}")
+    if form == "mjcf":
+        text, losses = export_mjcf.text_and_losses(loaded, motors or export_mjcf.MOTORS[0])
+    else:
+        text, losses = export_urdf.text_and_losses(loaded)
+    target = output or Path(f"{loaded.prefix}{endings[form]}")
     write_whole(target, text, replace)
     if as_json:
         _print_json({"file": str(target), "losses": [loss.as_dict() for loss in losses]})

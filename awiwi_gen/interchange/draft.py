@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -38,10 +38,14 @@ class DraftLink:
 
 @dataclass(frozen=True, eq=False)
 class DraftTendon:
-    """A tendon of the hand file; each place of a path is in the frame of the link of that joint, or of the "palm"."""
+    """A tendon of the hand file; each place of a path is in the frame of the link of that joint, or of the "palm".
+
+    Length per angle of a joint [m] is `arms`; of joints with a pulley, the sense is in `over` ("+flexion").
+    """
 
     name: str
     rest: float
+    over: tuple[str, ...]
     arms: dict[str, float]
     path: tuple[tuple[str, Place], ...]
     stiffness: float
@@ -50,13 +54,17 @@ class DraftTendon:
 
 @dataclass(frozen=True, eq=False)
 class DraftFinger:
-    """A finger of the hand file: its base in the palm (`position`, `axes`), links, tendons, and joints that follow."""
+    """A finger of the hand file: its base in the palm (`position`, `axes`), links, tendons, and joints that follow.
+
+    `pulleys` are the radii [m] of the joints that have one.
+    """
 
     name: str
     position: Array
     axes: Array
     carrier: str
     links: tuple[DraftLink, ...]
+    pulleys: dict[str, float]
     tendons: tuple[DraftTendon, ...]
     followed: tuple[Followed, ...]
 
@@ -164,14 +172,18 @@ def _finger(
             mimic = mimics.get(joint.name)
             links.append(_link(model, segment, joint, names[joint.name], frame, end, holds, mimic, marks))
     places = {body: links[_last(chain, segment)] for segment in chain.segments for body in segment.members}
+    strings = [_tendon(model, tendon, names, mimics, places, (base, axes[0].anchor)) for tendon in tendons]
+    followers = tuple(mimics[joint.name] for joint in chain.joints if joint.name in mimics)
+    pulleys = _pulleys(strings, {each.follower for each in followers})
     return DraftFinger(
         name=chain.name,
         position=pose_axes.T @ (axes[0].anchor - pose_origin),
         axes=pose_axes.T @ base,
         carrier=model.bodies[carrier].name,
         links=tuple(links),
-        tendons=tuple(_tendon(model, tendon, names, mimics, places, (base, axes[0].anchor)) for tendon in tendons),
-        followed=tuple(mimics[joint.name] for joint in chain.joints if joint.name in mimics),
+        pulleys=pulleys,
+        tendons=tuple(_on_pulleys(string, pulleys) for string in strings),
+        followed=followers,
     )
 
 
@@ -292,4 +304,25 @@ def _tendon(
         link = places.get(place.body)
         own_axes, origin = (link.frame.axes, link.frame.origin) if link else base
         path.append((link.joint if link else PALM, place.seen(axes.T @ own_axes, axes.T @ (origin - position))))
-    return DraftTendon(tendon.name, rest, arms, tuple(path), tendon.stiffness, tendon.rest)
+    return DraftTendon(tendon.name, rest, (), arms, tuple(path), tendon.stiffness, tendon.rest)
+
+
+def _pulleys(tendons: Iterable[DraftTendon], followers: set[str]) -> dict[str, float]:
+    """Joint -> radius [m] where the arms of all tendons are equal and have both senses.
+
+    Of such tendons the structure says that they are antagonists, so that their forces have a closed form.
+    """
+    arms: dict[str, set[float]] = {}
+    for tendon in tendons:
+        for joint, arm in tendon.arms.items():
+            arms.setdefault(joint, set()).add(arm)
+    return {
+        joint: max(found)
+        for joint, found in arms.items()
+        if joint not in followers and len(found) == 2 and sum(found) == 0
+    }
+
+
+def _on_pulleys(tendon: DraftTendon, pulleys: Mapping[str, float]) -> DraftTendon:
+    over = tuple(f"{'+' if arm > 0 else '-'}{joint}" for joint, arm in tendon.arms.items() if joint in pulleys)
+    return replace(tendon, over=over, arms={joint: arm for joint, arm in tendon.arms.items() if joint not in pulleys})

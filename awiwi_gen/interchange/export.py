@@ -9,11 +9,13 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from awiwi_gen.hand import Finger, Hand
+from awiwi_gen.hand import Finger, Hand, Link
 from awiwi_gen.hand.palm import Palm
+from awiwi_gen.interchange.fits import coupler_fit
 from awiwi_gen.interchange.frames import about, turn_matrix
 from awiwi_gen.interchange.model import Array, Loss
 
+_OF_JOINTS = ("low", "high", "four_bar", "armature", "damping", "friction", "spring")
 FRICTION = (
     "dry friction is a smooth curve in the hand: the format has its torque, without the velocity at which it rises"
 )
@@ -41,9 +43,31 @@ def parts(finger: Finger) -> list[Part]:
     found, position = [], np.zeros(3)
     for link in finger.links:
         axes = turn_matrix(link.turn) @ rpy_matrix(link.rpy)
-        found.append(Part(link, axes, position, value(link.reference)))
+        if link.four_bar is None:
+            found.append(Part(link, axes, position, value(link.reference)))
+        else:
+            found += _crank_and_coupler(link, axes, position)
         position = vector(link.offset)
     return found
+
+
+def coupler_of(joint: str) -> str:
+    """The name of the hinge between the crank and the coupler of a joint with a four-bar."""
+    return f"{joint}.coupler"
+
+
+def _crank_and_coupler(link: Link, axes: Array, position: Array) -> list[Part]:
+    """A link with a four-bar as two in series: a crank without mass, which is the joint, and its coupler, the body.
+
+    They are drawn where the coupler is parallel to the turned frame. The rocker is a function of the crank's angle.
+    """
+    bar, start = link.four_bar, float(link.start)
+    if bar is None:
+        raise ValueError(f"{link.joint} has no four-bar")
+    turned = about(2, float(bar.reference) + start)
+    crank = link.model_copy(update=dict.fromkeys(("mass", "com", "inertia")))
+    coupler = link.model_copy(update=dict.fromkeys(_OF_JOINTS) | {"joint": coupler_of(link.joint)})
+    return [Part(crank, axes @ turned, position, start), Part(coupler, turned.T, vector((bar.crank, 0, 0)), 0.0)]
 
 
 def palm_parts(palm: Palm) -> list[Part]:
@@ -114,17 +138,17 @@ def document(root: ElementTree.Element, hand: Hand) -> str:
 
 def common_losses(hand: Hand) -> list[Loss]:
     """What neither format holds."""
-    four_bars = [name for name, finger in hand.fingers.items() if has_four_bar(finger)]
-    whole = [key for key in ("motor", "spring", "tendon") if getattr(hand, key) is not None]
     rough = [f"{n} {link.joint}" for n, f in hand.fingers.items() for link in f.links if link.friction is not None]
-    return [
-        Loss("fingers with a four-bar: left out", tuple(four_bars)),
-        Loss("the wrist: the palm is the root", ("wrist",) if hand.wrist else ()),
-        Loss("mechanisms between motor and tendon: friction, ripple, lever springs, fibres", tuple(whole)),
-        Loss(FRICTION, tuple(rough)),
+    return [Loss(FRICTION, tuple(rough))]
+
+
+def coupler_losses(hand: Hand, degree: int) -> Loss:
+    """How far the couplers of four-bars are from polynomials of this degree."""
+    places = [
+        f"{name} {link.joint} by {coupler_fit(link, degree).error:.2g} rad"
+        for name, finger in hand.fingers.items()
+        for link in finger.links
+        if link.four_bar is not None
     ]
-
-
-def has_four_bar(finger: Finger) -> bool:
-    """Whether a joint turns a crank."""
-    return any(link.four_bar is not None for link in finger.links)
+    polynomial = "a line" if degree == 1 else f"a polynomial of degree {degree}"
+    return Loss(f"four-bars: the coupler's angle is {polynomial} in the crank's, and differs at most", tuple(places))

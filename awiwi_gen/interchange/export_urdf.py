@@ -6,12 +6,13 @@ from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 
-from awiwi_gen.hand import Finger, Hand
+from awiwi_gen.hand import Finger, Hand, Link
 from awiwi_gen.interchange.export import (
     Part,
     common_losses,
+    coupler_losses,
+    coupler_of,
     document,
-    has_four_bar,
     palm_parts,
     parts,
     rpy_matrix,
@@ -19,21 +20,27 @@ from awiwi_gen.interchange.export import (
     value,
     vector,
 )
+from awiwi_gen.interchange.fits import coupler_fit
 from awiwi_gen.interchange.frames import rpy_of
 from awiwi_gen.interchange.model import Array, Loss
+
+_DRIVES = ("motor", "spring", "tendon")
 
 
 def text_and_losses(hand: Hand) -> tuple[str, list[Loss]]:
     """The file, and what of the hand it does not hold."""
     root = Element("robot", name=hand.prefix)
     _palm(root, hand)
-    fingers = {name: finger for name, finger in hand.fingers.items() if not has_four_bar(finger)}
-    for name, finger in fingers.items():
+    for name, finger in hand.fingers.items():
         _finger(root, hand, name, finger)
-    links = [(name, link) for name, finger in fingers.items() for link in finger.links]
+    links = [(name, link) for name, finger in hand.fingers.items() for link in finger.links]
+    tendons = [f"{name} {i}" for name, finger in hand.fingers.items() for i in range(len(finger.tendons))]
     losses = [
         *common_losses(hand),
-        Loss("tendons", tuple(f"{name} {i}" for name, finger in fingers.items() for i in range(len(finger.tendons)))),
+        coupler_losses(hand, 1),
+        Loss("the wrist, a closed loop of bars: the palm is the root", ("wrist",) if hand.wrist else ()),
+        Loss("motors, springs and fibres of tendons", tuple(key for key in _DRIVES if getattr(hand, key) is not None)),
+        Loss("tendons", tuple(tendons)),
         Loss("armature", tuple(f"{name} {link.joint}" for name, link in links if value(link.armature))),
         Loss("springs of joints", tuple(f"{name} {link.joint}" for name, link in links if link.spring is not None)),
     ]
@@ -61,10 +68,14 @@ def _finger(root: Element, hand: Hand, name: str, finger: Finger) -> None:
     position = vector(base.position) if base else np.zeros(3)
     _fixed(root, "palm", f"{name}.base", position, rpy_matrix(base.rpy if base else None))
     parent = f"{name}.base"
+    couplers = {coupler_of(link.joint): link for link in finger.links if link.four_bar is not None}
     for part in parts(finger):
         child = f"{name}_{part.link.joint}"
         _link(root, child, part)
-        _joint(root, hand, name, finger, part, parent)
+        if part.link.joint in couplers:
+            _coupler(root, hand, name, couplers[part.link.joint], part, parent)
+        else:
+            _joint(root, hand, name, finger, part, parent)
         parent = child
     _fixed(root, parent, f"{name}.tip", vector(finger.links[-1].offset), np.eye(3))
 
@@ -117,6 +128,15 @@ def _joint(root: Element, hand: Hand, name: str, finger: Finger, part: Part, par
         leader = f"{name}_{finger.leaders[link.joint]}"
         ratio, offset = finger.motion(link.joint)
         SubElement(joint, "mimic", joint=leader, multiplier=text(ratio), offset=text(offset))
+
+
+def _coupler(root: Element, hand: Hand, name: str, link: Link, part: Part, parent: str) -> None:
+    """The joint of a four-bar's coupler, which follows the crank in proportion."""
+    full, fit = f"{name}_{part.link.joint}", coupler_fit(link, 1)
+    rest, slope = fit.coefficients[0] - fit.coefficients[1] * fit.origin, fit.coefficients[1]
+    low, high = sorted(rest + slope * value(end) for end in (link.low, link.high))
+    joint = _hinge(root, hand, full, part, (parent, full), (low, high))
+    SubElement(joint, "mimic", joint=f"{name}_{link.joint}", multiplier=text(slope), offset=text(rest))
 
 
 def _range(finger: Finger, joint: str) -> tuple[float, float]:

@@ -55,18 +55,13 @@ def read(path: Path, exact: bool = False, without: Iterable[str] = (), fit: bool
 
 def parse(path: Path, exact: bool) -> tuple[Any, list[str]]:
     """The MjSpec of a file, with quarter turns where they are meant, and notes about these."""
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = (error.strerror if isinstance(error, OSError) else None) or "is not UTF-8 text"
-        raise InputError(Fault(file=str(path), message=f"cannot be read: {reason}")) from None
-    notes: list[str] = []
+    text, notes = urdf_text(path, exact)
     is_urdf = re.search(r"<robot\b", text) is not None
     if is_urdf:
         require_tree(text, path.name)
     try:
         if is_urdf:
-            spec = mujoco.MjSpec.from_string(text if exact else _RPY.sub(lambda m: _quarter_rpy(m, notes), text))
+            spec = mujoco.MjSpec.from_string(text)
         elif path.suffix == ".xml":
             spec = mujoco.MjSpec.from_file(str(path))
         else:  # MuJoCo decodes only .xml and .urdf
@@ -81,11 +76,28 @@ def parse(path: Path, exact: bool) -> tuple[Any, list[str]]:
     return spec, notes
 
 
+def urdf_text(path: Path, exact: bool) -> tuple[str, list[str]]:
+    """The text of a file; in a URDF with rotations by quarter turns where they are meant, and notes about these."""
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = (error.strerror if isinstance(error, OSError) else None) or "is not UTF-8 text"
+        raise InputError(Fault(file=str(path), message=f"cannot be read: {reason}")) from None
+    notes: list[str] = []
+    if exact or re.search(r"<robot\b", text) is None:
+        return text, notes
+    return _RPY.sub(lambda match: _quarter_rpy(match, notes), text), notes
+
+
 def _weigh(spec: Any) -> None:
-    """Give moving links of a URDF that have no inertial the least that MuJoCo accepts."""
+    """Links of a URDF without inertial have no mass, though MuJoCo would compute one from their geometry.
+
+    Those that move get the least that MuJoCo accepts.
+    """
     for body in spec.bodies[1:]:
-        if body.joints and not body.mass and not body.geoms:
-            body.mass, body.inertia, body.explicitinertial = LEAST_MASS, [LEAST_MASS * 1e-6] * 3, True
+        if not (body.explicitinertial or body.mass):
+            least = LEAST_MASS if body.joints else 0.0
+            body.mass, body.inertia, body.explicitinertial = least, [least * 1e-6] * 3, True
 
 
 def _includes(text: str, folder: Path) -> dict[str, bytes]:

@@ -75,6 +75,10 @@ def _finger_lines(finger: DraftFinger, file: str) -> list[str]:
     lines = [f"# {finger.name}: {len(finger.links)} links, {len(finger.tendons)} tendons", "", f"[{head}]"]
     if finger.followed:
         lines += ["couplings = [", *(f"    {{ {_coupling(each)} }}," for each in finger.followed), "]"]
+    if finger.pulleys:
+        source = _text(cite(f"{file} arms of tendons"))
+        rows = (f"joint = {_text(joint)}, radius = {_text(length(r))}" for joint, r in finger.pulleys.items())
+        lines += ["pulleys = [", *(f"    {{ {row}, source = {source} }}," for row in rows), "]"]
     lines += ["", f"[{head}.base]", f"position = {_lengths(finger.position)}"]
     lines += [f"rpy = {_rpy(finger.axes)}"]
     lines += [f"source = {_text(cite(f'{file} body {finger.carrier}'))}"]
@@ -130,6 +134,8 @@ def _link_lines(link: DraftLink, file: str) -> list[str]:
 
 def _tendon_lines(tendon: DraftTendon, file: str) -> list[str]:
     lines = [f"rest = {_text(length(tidy([tendon.rest], 0.1)[0]))}"]
+    if tendon.over:
+        lines += [f"over = {_listed(tendon.over)}"]
     if tendon.arms:
         arms = ", ".join(f"{joint} = {_text(length(arm))}" for joint, arm in tendon.arms.items())
         lines += [f"arms = {{ {arms} }}"]

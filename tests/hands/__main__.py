@@ -1,4 +1,5 @@
-"""`make test-hands`: published hands are imported, one finger of each is generated, proved and compared with MuJoCo.
+"""`make test-hands`: published hands are imported, one finger of each is generated, proved and compared with MuJoCo,
+and those of URDF with Pinocchio.
 
 python -m tests.hands                       all hands
 python -m tests.hands --only LEAP           the hands whose names contain this
@@ -30,11 +31,15 @@ from awiwi_gen.interchange.toml import hand_text
 
 from .behaviours import changed
 from .catalog import HANDS, Published
-from .compare import LIMIT, compiled_model, palm_differences, worst_differences
+from .compare import LIMIT, compiled_model, palm_differences, pinocchio_model, worst_differences
+from .fits import fitted
+from .mujoco_finger import MujocoFinger
+from .pinocchio_finger import PinocchioFinger
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 DOCS, README = ROOT / "docs" / "interchange.md", ROOT / "README.md"
 BEGIN, END = "<!-- table of hands: make test-hands ACCEPT=1 -->\n", "<!-- end -->\n"
+_WORST = ("worst difference from MuJoCo", "from Pinocchio")
 KERNELS = "{}_[bcgilmpt]*"  # all but solvers and what they need: seconds for a finger instead of minutes
 
 
@@ -60,7 +65,7 @@ def main() -> int:
         if chosen.only in published.name:
             results.append(examine(published, folder))
             print(" | ".join(results[-1].row), flush=True)
-    faults = [*changed(), *wrapped_finger(), *(fault for result in results for fault in result.faults)]
+    faults = [*changed(), *fitted(), *wrapped_finger(), *(fault for result in results for fault in result.faults)]
     if not chosen.only:
         faults += judge_tables([result.row for result in results], chosen.accept)
     for fault in faults:
@@ -107,18 +112,25 @@ def examine(published: Published, folder: Path) -> Result:
         except AwiwiError as error:
             text = str(error).splitlines()[0].split("; ")[0].replace(str(path), path.name).replace(str(file), path.name)
             text = re.sub(r"^(\S+):\d+ ", r"\1 ", text)  # lines move with every sentence of the importer
-            return Result((published.name, published.package, "-", "-", "-", "-", f"refused: {text}", "-"), [])
+            return Result((published.name, published.package, *"----", f"refused: {text}", "-", "-"), [])
         faults = [f"{published.name}: {fault}" for fault in prove(file, published.finger, generated)]
         compiled = compiled_model(path, exact=False, without=frozenset(published.without))
-        found = worst_differences(compiled, drafted, hand, published.finger, generated)
+        drafted_finger = next(each for each in drafted.fingers if each.name == published.finger)
+        found = worst_differences(MujocoFinger(compiled, drafted, drafted_finger), hand, generated)
         if drafted.wrist is not None:
             wrist = Path(scratch) / "wrist"
             faults += [f"{published.name}: {fault}" for fault in prove(file, "palm", wrist, "{}_*")]
             found |= palm_differences(compiled, drafted, drafted.wrist, wrist)
-        faults += [f"{published.name}: {kernel} differs by {x:.1e}" for kernel, x in found.items() if x > LIMIT]
+        others: dict[str, float] = {}
+        if path.suffix == ".urdf":
+            others = worst_differences(PinocchioFinger(pinocchio_model(path), drafted, drafted_finger), hand, generated)
+        for engine, differences in (("MuJoCo", found), ("Pinocchio", others)):
+            apart = {kernel: x for kernel, x in differences.items() if x > LIMIT}
+            faults += [f"{published.name}: {kernel} differs from {engine} by {x:.1e}" for kernel, x in apart.items()]
         faults += [f"{published.name}: {fault}" for fault in round_trip(hand, Path(scratch))]
         kernels = sum(1 for _ in generated.glob(f"{published.finger}_*.c"))
-        return Result(row(published, drafted, kernels, max(found.values())), faults)
+        worst = tuple(f"{max(each.values()):.0e}" if each else "-" for each in (found, others))
+        return Result(row(published, drafted, kernels, worst), faults)
 
 
 def wrapped_finger() -> list[str]:
@@ -130,21 +142,22 @@ def wrapped_finger() -> list[str]:
         (finger,) = (each.name for each in drafted.fingers)
         file.write_text(hand_text(drafted), encoding="utf-8")
         faults = prove(file, finger, generated)
-        found = worst_differences(compiled_model(model, exact=True), drafted, Hand.load(file), finger, generated)
+        simulated = MujocoFinger(compiled_model(model, exact=True), drafted, drafted.fingers[0])
+        found = worst_differences(simulated, Hand.load(file), generated)
     return [
         f"wraps: {each}"
         for each in faults + [f"{kernel} differs by {x:.1e}" for kernel, x in found.items() if x > LIMIT]
     ]
 
 
-def row(published: Published, drafted: DraftHand, kernels: int, worst: float) -> tuple[str, ...]:
-    """The table's row of a hand."""
+def row(published: Published, drafted: DraftHand, kernels: int, worst: tuple[str, ...]) -> tuple[str, ...]:
+    """The table's row of a hand; `worst` are the differences from MuJoCo and from Pinocchio."""
     joints = sum(len(finger.links) - len(finger.followed) for finger in drafted.fingers)
     tendons = sum(len(finger.tendons) for finger in drafted.fingers)
     lost = "; ".join(f"{len(loss.places)} {loss.what.split(':')[0]}" for loss in drafted.losses)
     wrist = str(len(drafted.wrist.joints)) if drafted.wrist else "-"
     return (published.name, published.package, f"{joints} in {len(drafted.fingers)}", wrist, str(tendons),
-            f"{kernels} of `{published.finger}`", f"{worst:.0e}", lost or "nothing")  # fmt: skip
+            f"{kernels} of `{published.finger}`", *worst, lost or "nothing")  # fmt: skip
 
 
 def prove(file: Path, part: str, generated: Path, kernels: str = KERNELS) -> list[str]:
@@ -185,19 +198,19 @@ def round_trip(hand: Hand, scratch: Path) -> list[str]:
 
 def table(rows: list[tuple[str, ...]]) -> str:
     """The table of hands for the docs."""
-    head = ("hand", "package", "joints in fingers", "of the wrist", "tendons", "kernels proved", "worst difference",
+    head = ("hand", "package", "joints in fingers", "of the wrist", "tendons", "kernels proved", *_WORST,
             "not held")  # fmt: skip
     return "".join(f"| {' | '.join(cells)} |\n" for cells in [head, ("---",) * len(head), *rows])
 
 
 def brief(rows: list[tuple[str, ...]]) -> str:
     """The table for the README: without packages, and with the number of kinds of elements that are lost."""
-    head = ("hand", "joints in fingers", "of the wrist", "tendons", "kernels proved", "worst difference", "not held")
+    head = ("hand", "joints in fingers", "of the wrist", "tendons", "kernels proved", *_WORST, "not held")
     cells = [head, ("---",) * len(head)]
-    for name, _, *middle, worst, lost in rows:
+    for name, _, *middle, mujoco, pinocchio, lost in rows:
         count = len(lost.split("; "))
         kinds = f"{count} kind{'s' if count > 1 else ''} of elements"
-        cells.append((name, *middle, worst.split(":")[0], kinds if worst[0].isdigit() else "-"))
+        cells.append((name, *middle, mujoco.split(":")[0], pinocchio, kinds if mujoco[0].isdigit() else "-"))
     return "".join(f"| {' | '.join(each)} |\n" for each in cells)
 
 

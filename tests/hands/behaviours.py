@@ -10,6 +10,9 @@ from collections.abc import Callable
 
 import mujoco
 import numpy as np
+import pinocchio
+
+from .pinocchio_behaviours import BEHAVIOURS as OF_PINOCCHIO
 
 _BODY = '<inertial mass="1" pos="0 0 0.1" diaginertia="1 1 1"/>'
 
@@ -125,6 +128,13 @@ def a_side_site_near_the_axis_and_far_along_it_is_outside() -> bool:
     )
 
 
+def a_link_of_a_urdf_without_inertial_weighs_what_its_geometry_does() -> bool:
+    box = '<link name="b"><collision><geometry><box size="1 1 1"/></geometry></collision></link>'
+    hinge = '<joint name="j" type="continuous"><parent link="a"/><child link="b"/></joint>'
+    model = mujoco.MjModel.from_xml_string(f'<robot name="r"><link name="a"/>{box}{hinge}</robot>')
+    return bool(model.body("b").mass[0] == 1000)
+
+
 BEHAVIOURS: tuple[Callable[[], bool], ...] = (
     stiffness_polynomials_are_not_odd_and_damping_polynomials_are,
     ranges_of_tendons_and_controls_stay_in_degrees,
@@ -136,9 +146,11 @@ BEHAVIOURS: tuple[Callable[[], bool], ...] = (
     a_tendon_is_straight_through_a_geom_that_a_site_is_inside,
     a_tendon_wraps_round_a_cylinder_beyond_its_ends,
     a_side_site_near_the_axis_and_far_along_it_is_outside,
+    a_link_of_a_urdf_without_inertial_weighs_what_its_geometry_does,
 )
 
 
 def changed() -> list[str]:
-    """The behaviours that this MuJoCo does not have."""
-    return [f"MuJoCo {mujoco.__version__}: not so any more: {each.__name__}" for each in BEHAVIOURS if not each()]
+    """The behaviours that these versions of MuJoCo and Pinocchio do not have."""
+    engines = ((f"MuJoCo {mujoco.__version__}", BEHAVIOURS), (f"Pinocchio {pinocchio.__version__}", OF_PINOCCHIO))
+    return [f"{name}: not so any more: {each.__name__}" for name, known in engines for each in known if not each()]

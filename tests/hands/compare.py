@@ -1,4 +1,4 @@
-"""Generated kernels of one finger against MuJoCo, at random states within the finger's range."""
+"""Generated kernels of one finger against MuJoCo and Pinocchio, at random states within the finger's range."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ from typing import Any
 
 import mujoco
 import numpy as np
+import pinocchio
 
 import awiwi_gen
 from awiwi_gen.hand import Hand
 from awiwi_gen.interchange import mjcf
 from awiwi_gen.interchange.draft import DraftHand, DraftPalm
 
-from .mujoco_finger import MujocoFinger
-
 STATES = 200
+GRAVITY = (1.3, -2.1, -9.4)
 LIMIT = 1e-12
 """Largest difference, relative to the largest entry of the result (or 1 mm, 1 mN m, ... where all are small)."""
 _SCALES = {"link_poses": 1.0, "bias": 1e-3, "inverse_dynamics": 1e-3, "mass_matrix": 1e-9, "tendon_lengths": 1e-3,
@@ -31,15 +31,21 @@ def compiled_model(path: Path, exact: bool, without: frozenset[str] = frozenset(
         getattr(compiled, each)[:] = 0
     for each in ("jnt_stiffnesspoly", "dof_dampingpoly"):
         getattr(compiled, each)[:] = 0
-    compiled.opt.gravity[:] = [1.3, -2.1, -9.4]
+    compiled.opt.gravity[:] = GRAVITY
     return compiled
 
 
-def worst_differences(compiled: Any, draft: DraftHand, hand: Hand, finger: str, generated: Path) -> dict[str, float]:
-    """Kernel -> its worst difference from MuJoCo."""
-    drafted = next(each for each in draft.fingers if each.name == finger)
+def pinocchio_model(path: Path) -> Any:
+    """The model of a URDF in Pinocchio, with quarter turns where the importer has them."""
+    model = pinocchio.buildModelFromXML(mjcf.urdf_text(path, exact=False)[0])
+    model.gravity.linear[:] = GRAVITY
+    return model
+
+
+def worst_differences(simulated: Any, hand: Hand, generated: Path) -> dict[str, float]:
+    """Kernel -> its worst difference from a finger in MuJoCo or Pinocchio."""
+    finger = simulated.finger.name
     library = awiwi_gen.load(generated)
-    simulated = MujocoFinger(compiled, draft, drafted)
     links = {link.joint: link for link in hand.fingers[finger].links}
     ends = np.array([[float(links[j].low), float(links[j].high)] for j in hand.fingers[finger].joints])
     random = np.random.default_rng(13)

@@ -11,6 +11,18 @@ import numpy as np
 from awiwi_gen.interchange.draft import DraftFinger, DraftHand
 
 
+def motions(finger: DraftFinger) -> tuple[np.ndarray, np.ndarray]:
+    """Angles of all joints for independent ones q: matrix (joints x n) and offset (joints) in matrix q + offset."""
+    mimics = {mimic.published: mimic for mimic in finger.followed}
+    free = [link.joint for link in finger.links if link.published.name not in mimics]
+    matrix, offset = np.zeros((len(finger.links), len(free))), np.zeros(len(finger.links))
+    for row, link in enumerate(finger.links):
+        mimic = mimics.get(link.published.name)
+        matrix[row, free.index(mimic.leader if mimic else link.joint)] = mimic.ratio if mimic else 1.0
+        offset[row] = mimic.offset if mimic else 0.0
+    return matrix, offset
+
+
 @dataclass
 class MujocoFinger:
     """A compiled model, and the finger of it that a draft describes.
@@ -24,19 +36,10 @@ class MujocoFinger:
 
     def __post_init__(self) -> None:
         self.data = mujoco.MjData(self.compiled)
-        mimics = {mimic.published: mimic for mimic in self.finger.followed}
         joints = [link.published.name for link in self.finger.links]
-        names = {link.published.name: link.joint for link in self.finger.links}
-        self.free = [name for name in joints if name not in mimics]
         self.qpos = [int(self.compiled.joint(name).qposadr[0]) for name in joints]
         self.dofs = [int(self.compiled.joint(name).dofadr[0]) for name in joints]
-        self.matrix = np.zeros((len(joints), len(self.free)))
-        self.offset = np.zeros(len(joints))
-        free = [names[name] for name in self.free]
-        for row, name in enumerate(joints):
-            mimic = mimics.get(name)
-            self.matrix[row, free.index(mimic.leader if mimic else names[name])] = mimic.ratio if mimic else 1.0
-            self.offset[row] = mimic.offset if mimic else 0.0
+        self.matrix, self.offset = motions(self.finger)
         self.last = [self._is_last(link.published.name) for link in self.finger.links]
         mujoco.mj_resetData(self.compiled, self.data)
         self.data.qpos[:] = self.compiled.qpos0

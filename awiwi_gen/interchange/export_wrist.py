@@ -1,0 +1,50 @@
+"""The wrist of crossed bars in MJCF: four hinges in series, and two bars that are tendons of constant length.
+
+The palm hangs from the forearm by bar BB0: q71 turns the plane of the side bars about B0C0, q73 turns the bar in that
+plane, and two hinges at B turn the palm in the plane and about BC. The bars CC0 and AA0 leave two degrees of freedom.
+"""
+
+from __future__ import annotations
+
+from xml.etree.ElementTree import Element, SubElement
+
+import numpy as np
+
+from awiwi_gen.hand import Wrist
+from awiwi_gen.interchange.export import text, vector
+from awiwi_gen.interchange.export_motors import Lost, Sections
+from awiwi_gen.interchange.mjcf_elements import least_inertia, place
+
+SOLREF, SOLIMP = "0.004 1", "0.999 0.9999 0.0001"  # under the weight of the hand, bars of 5 cm give way by 2 um
+SOFT = "bars of the wrist: soft constraints in MuJoCo"
+RUNS = "runs of tendons through the wrist: not in MuJoCo's lengths, so that no tendon pulls the wrist"
+
+
+def wrist_of_bars(forearm: Element, wrist: Wrist, sections: Sections, lost: Lost) -> Element:
+    """The palm in its neutral pose, in the forearm's frame {0}."""
+    b, origin = vector(wrist.b), vector(wrist.palm)
+    palm = SubElement(forearm, "body", name="palm")
+    place(palm, origin, np.eye(3))
+    least_inertia(palm, lost)
+    (q71, q73), (low, high) = wrist.neutral, wrist.range
+    normal = np.array([-np.sin(q71), 0.0, np.cos(q71)])
+    across, b0 = np.array([0.0, 1.0, 0.0]), np.zeros(3)
+    hinges = [("q71", -across, b0, q71, (low[0], high[0])), ("q73", -normal, b0, q73, (low[1], high[1])),
+              ("b.normal", normal, b, 0.0, None), ("b.side", across, b, 0.0, None)]  # fmt: skip
+    for name, axis, anchor, angle, ends in hinges:
+        joint = SubElement(palm, "joint", name=f"wrist_{name}", axis=text(axis), pos=text(anchor - origin))
+        if angle:
+            joint.set("ref", text(angle))
+        if ends is not None:
+            joint.set("range", text(ends))
+    c0, c = np.array([0.0, b[1], 0.0]), np.array([b[0], 0.0, b[2]])
+    for name, start, end in (("cc0", c0, c), ("aa0", vector(wrist.a0), vector(wrist.a))):
+        SubElement(forearm, "site", name=f"wrist.{name}.forearm", pos=text(start))
+        SubElement(palm, "site", name=f"wrist.{name}.palm", pos=text(end - origin))
+        bar = SubElement(sections["tendon"], "spatial", name=f"wrist.{name}")
+        for end_of in ("forearm", "palm"):
+            SubElement(bar, "site", site=f"wrist.{name}.{end_of}")
+        SubElement(sections["equality"], "tendon", tendon1=f"wrist.{name}", solref=SOLREF, solimp=SOLIMP)
+        lost.setdefault(SOFT, []).append(name)
+    lost[RUNS] = [str(number) for number in range(len(wrist.tendons))]
+    return palm
