@@ -46,7 +46,8 @@ typedef struct awiwi_tendons {
 /* Forces [tendons] within the limits whose torque is nearest to torque[joints] and, among those, whose stiffness is
    nearest to stiffness[joints][joints] in the Frobenius norm. AWIWI_INFEASIBLE where the limits forbid the torque.
    Pairs: the optimum in closed form, up to one inversion of the curve for each. Other tendons: an active-set Newton
-   method, from three starts where the first end may not be the nearest. `tolerance` is that of forces, relative to the
+   method, from four starts where the first end may not be the nearest; what no small change of forces brings nearer is
+   a minimum, but not surely the least. `tolerance` is that of forces, relative to the
    upper limit. The curve is evaluated at most AWIWI_MOST_CURVES times.
    Returns an awiwi_status. After AWIWI_OUT_OF_DOMAIN (a limit is outside the curve, or low > high) and AWIWI_NOT_FINITE
    all forces are equal: in the middle of the limits if both are on the curve, at the lower limit if only that is, else

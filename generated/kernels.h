@@ -301,7 +301,7 @@ void awiwi_thumb_joint_estimate_error(const double q_in[4], const double noise_i
  * Tendon forces from f_min to f_max for the joint torque tau and the nearest possible joint stiffness
  * to K. The torque is exact if the limits allow it, otherwise the nearest possible one (status
  * AWIWI_INFEASIBLE). Of all forces with that torque, the result has the least error of the stiffness
- * in the Frobenius norm.
+ * in the Frobenius norm: of pairs surely, of others as far as a search from four starts finds it.
  * Source: eq. 7.2, 7.6, mended.
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   in   tau[4] in N m, -1 to 1
@@ -311,7 +311,7 @@ void awiwi_thumb_joint_estimate_error(const double q_in[4], const double noise_i
  *   out  f[8] in N
  * Returns an awiwi_status, see awiwi_solvers.h, never 0 if an input is not finite; the outputs are
  * always defined.
- * Cost: the solver's own work and calls, at most: 1 of thumb_coupling, 357 of thumb_tendon_stiffness, 1 of thumb_coupling_derivative.
+ * Cost: the solver's own work and calls, at most: 1 of thumb_coupling, 456 of thumb_tendon_stiffness, 1 of thumb_coupling_derivative.
  */
 AWIWI_MUST_CHECK int awiwi_thumb_tendon_distribution(const double q_in[4], const double tau_in[4], const double K_in[16], const double f_min_in[1], const double f_max_in[1], double f_out[8]);
 
@@ -568,7 +568,7 @@ void awiwi_index_joint_estimate_error(const double q_in[4], const double noise_i
  * Tendon forces from f_min to f_max for the joint torque tau and the nearest possible joint stiffness
  * to K. The torque is exact if the limits allow it, otherwise the nearest possible one (status
  * AWIWI_INFEASIBLE). Of all forces with that torque, the result has the least error of the stiffness
- * in the Frobenius norm.
+ * in the Frobenius norm: of pairs surely, of others as far as a search from four starts finds it.
  * Source: eq. 7.2, 7.6, mended.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   tau[4] in N m, -1 to 1
@@ -823,7 +823,7 @@ void awiwi_middle_joint_estimate_error(const double q_in[4], const double noise_
  * Tendon forces from f_min to f_max for the joint torque tau and the nearest possible joint stiffness
  * to K. The torque is exact if the limits allow it, otherwise the nearest possible one (status
  * AWIWI_INFEASIBLE). Of all forces with that torque, the result has the least error of the stiffness
- * in the Frobenius norm.
+ * in the Frobenius norm: of pairs surely, of others as far as a search from four starts finds it.
  * Source: eq. 7.2, 7.6, mended.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   tau[4] in N m, -1 to 1
@@ -1078,7 +1078,7 @@ void awiwi_ring_joint_estimate_error(const double q_in[3], const double noise_in
  * Tendon forces from f_min to f_max for the joint torque tau and the nearest possible joint stiffness
  * to K. The torque is exact if the limits allow it, otherwise the nearest possible one (status
  * AWIWI_INFEASIBLE). Of all forces with that torque, the result has the least error of the stiffness
- * in the Frobenius norm.
+ * in the Frobenius norm: of pairs surely, of others as far as a search from four starts finds it.
  * Source: eq. 7.2, 7.6, mended.
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   in   tau[3] in N m, -1 to 1
@@ -1359,7 +1359,7 @@ void awiwi_fifth_joint_estimate_error(const double q_in[4], const double noise_i
  * Tendon forces from f_min to f_max for the joint torque tau and the nearest possible joint stiffness
  * to K. The torque is exact if the limits allow it, otherwise the nearest possible one (status
  * AWIWI_INFEASIBLE). Of all forces with that torque, the result has the least error of the stiffness
- * in the Frobenius norm.
+ * in the Frobenius norm: of pairs surely, of others as far as a search from four starts finds it.
  * Source: eq. 7.2, 7.6, mended.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   in   tau[4] in N m, -1 to 1

@@ -3,7 +3,7 @@
  * Tendon forces from f_min to f_max for the joint torque tau and the nearest possible joint stiffness
  * to K. The torque is exact if the limits allow it, otherwise the nearest possible one (status
  * AWIWI_INFEASIBLE). Of all forces with that torque, the result has the least error of the stiffness
- * in the Frobenius norm.
+ * in the Frobenius norm: of pairs surely, of others as far as a search from four starts finds it.
  * Source: eq. 7.2, 7.6, mended.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   tau[4] in N m, -1 to 1

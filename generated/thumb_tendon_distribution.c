@@ -3,7 +3,7 @@
  * Tendon forces from f_min to f_max for the joint torque tau and the nearest possible joint stiffness
  * to K. The torque is exact if the limits allow it, otherwise the nearest possible one (status
  * AWIWI_INFEASIBLE). Of all forces with that torque, the result has the least error of the stiffness
- * in the Frobenius norm.
+ * in the Frobenius norm: of pairs surely, of others as far as a search from four starts finds it.
  * Source: eq. 7.2, 7.6, mended.
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   in   tau[4] in N m, -1 to 1
@@ -13,7 +13,7 @@
  *   out  f[8] in N
  * Returns an awiwi_status, see awiwi_solvers.h, never 0 if an input is not finite; the outputs are
  * always defined.
- * Cost: the solver's own work and calls, at most: 1 of thumb_coupling, 357 of thumb_tendon_stiffness, 1 of thumb_coupling_derivative.
+ * Cost: the solver's own work and calls, at most: 1 of thumb_coupling, 456 of thumb_tendon_stiffness, 1 of thumb_coupling_derivative.
  */
 #include "numerics.h"
 #include "awiwi_distribution.h"

@@ -32,15 +32,15 @@ class Tendons(ctypes.Structure):
     )  # fmt: skip
 
 
-def write_headers(directory: Path, options: Options | None = None) -> None:
+def write_headers(directory: Path, options: Options | None = None, room: tuple[int, int] = (8, 16)) -> None:
     """Write the generated headers that csrc includes."""
-    for name, text in csrc_headers(options or Options()).items():
+    for name, text in csrc_headers(options or Options(), room).items():
         (directory / name).write_text(text)
 
 
-def compiled(directory: Path) -> ctypes.CDLL:
-    """The solvers in double precision as a library."""
-    write_headers(directory)
+def compiled(directory: Path, room: tuple[int, int] = (8, 16)) -> ctypes.CDLL:
+    """The solvers in double precision as a library, with room for so many joints and tendons."""
+    write_headers(directory, room=room)
     target = directory / "distribution.so"
     sources = [str(CSRC / f"{name}.c") for name in ("tendon_pairs", "tendon_search", "tendon_gradient", "dense")]
     compiler().run(*FLAGS, f"-I{directory}", f"-I{CSRC}", "-shared", *sources, "-o", str(target))

@@ -13,7 +13,7 @@ from awiwi_gen.ir.graph import VARIADIC, Graph, Node, Ref
 
 ARITHMETIC = VARIADIC | {"inv", "div"}
 FOLDING_BITS = 400  # the rounding of a folded square root stays far below what the pass checks resolve
-LEAST = arb(2) ** -350  # what is left of the cosine of a right angle, whose pi has as many bits
+LEAST = arb(2) ** -300  # what is left of the cosine of a right angle: pi has 100 digits
 
 
 def bind(graph: Graph, values: Mapping[str, Fraction]) -> Graph:
