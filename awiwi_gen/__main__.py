@@ -47,6 +47,7 @@ from awiwi_gen.arguments import (
     ParamsOption,
     Scalar,
     ScalarOption,
+    Version,
 )
 from awiwi_gen.interchange.command import export, import_
 
@@ -57,6 +58,11 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
+
+
+@app.callback()
+def options(version: Version = False) -> None:
+    """What holds for all commands."""
 
 
 def command(*needs: str) -> Callable[[Callable[..., int | None]], Callable[..., None]]:

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from enum import StrEnum
+from importlib import metadata
 from pathlib import Path
 from typing import Annotated
 
 import typer
+
+from awiwi_gen.resources import CSRC
 
 
 class Scalar(StrEnum):
@@ -39,3 +43,20 @@ MathOption = Annotated[Math, typer.Option("--math", help="Own sine, arcus tangen
 ParamsOption = Annotated[Params, typer.Option("--params", help="Numbers as constants or in a struct.")]
 GENERATED = Path("generated")
 PAGE = Path("build/report/index.html")
+
+
+def show_version(wanted: bool) -> None:
+    """Print the version of the generator and that of the C interface, and end."""
+    if wanted:
+        header = (CSRC / "awiwi_version.h").read_text(encoding="utf-8")
+        numbers = re.findall(r"define AWIWI_API_(?:MAJOR|MINOR|PATCH) (\d+)", header)
+        print(f"awiwi-gen {metadata.version('awiwi_gen')}, C interface {'.'.join(numbers)}")
+        raise typer.Exit
+
+
+Version = Annotated[
+    bool,
+    typer.Option(
+        "--version", callback=show_version, is_eager=True, help="Show the versions of generator and C interface."
+    ),
+]

@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 import re
 import shlex
+from importlib import metadata
 from pathlib import Path
 
 import pytest
 from commands import ONE_FINGER, answer, complaint, run, small, told
 
 import awiwi_gen
+from awiwi_gen.resources import CSRC
 
 __all__ = ["small"]
 
@@ -317,3 +319,11 @@ def test_an_explanation_in_json_has_all_its_parts():
 
 def test_a_kernel_that_iterates_is_explained_by_its_problem():
     assert "least squares, by iteration" in told("explain", "thumb_joint_estimate")
+
+
+def test_the_versions_of_generator_and_c_interface_are_told():
+    header = (CSRC / "awiwi_version.h").read_text()
+    c = ".".join(re.search(rf"AWIWI_API_{part} (\d+)", header)[1] for part in ("MAJOR", "MINOR", "PATCH"))
+    result = run("--version")
+    assert result.exit_code == 0
+    assert result.output == f"awiwi-gen {metadata.version('awiwi_gen')}, C interface {c}\n"

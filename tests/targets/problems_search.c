@@ -74,6 +74,17 @@ static double limit(int number, double usual)
     return number % 23 ? usual : odd[number / 23 % 7];
 }
 
+static void try_large_fingers(const awiwi_tendons *fitting, const double *tau, const double *K, double *f)
+{
+    for (int more = 0; more < 2; more++) {
+        awiwi_tendons t = *fitting;
+        t.joints = more ? AWIWI_MOST_JOINTS + 1 : t.joints;
+        t.tendons = more ? t.tendons : AWIWI_MOST_TENDONS + 1;
+        print("large", awiwi_distribute(&t, tau, K, 1e-12, f), f, 0);
+        print("large", awiwi_gradient_forces(&t, tau, K, 1, 1, 1, f), f, 0);
+    }
+}
+
 /* Fingers with tendons in pairs, in no pair, or both, in any number of each; some with couplings that change. */
 void try_tendons(int number)
 {
@@ -110,6 +121,8 @@ void try_tendons(int number)
     const double usual = number % 7 ? 20 * (1 + number % 5) : number % 2 ? 205 : number % 5 + 0.25 * (number % 4);
     const awiwi_tendons t = {n, m, P, sloped ? dP : 0, curve, &s, limit(number, number % 5), limit(number + 11, usual),
                              pairs, pair, m - 2 * pairs, indices(m - 2 * pairs, 2 * pairs, 1)};
+    if (number % 37 == 0)
+        try_large_fingers(&t, tau, K, output(m));
     if (number % 10 < 7)
         ask(&t, usual, number % 10 == 4, tau, K);
     for (int j = 0; number % 10 > 6 && number % 3 && j < n; j++) /* more than the limits permit */
@@ -174,6 +187,19 @@ static void model(const void *context, const double *x, double *h, double *P)
     }
 }
 
+/* Problems for which the arrays of csrc have no room. */
+static void try_large_problems(const awiwi_problem *fitting, const double *measured, const double *start, double *x)
+{
+    for (int more = 0; more < 2; more++) {
+        awiwi_problem p = *fitting;
+        p.unknowns = more ? AWIWI_MOST_UNKNOWNS + 1 : p.unknowns;
+        p.equations = more ? p.equations : AWIWI_MOST_EQUATIONS + 1;
+        print("large", awiwi_least_squares(&p, measured, start, 3, 1e-9, x), x, 0);
+        print("large", awiwi_least_squares_in_parts(&p, 0, 0, measured, start, 3, 1e-9, x), x, 0);
+        print("large", awiwi_gradient_search(&p, measured, start, 3, 0, x), x, 0);
+    }
+}
+
 void try_least_squares(int number)
 {
     const int n = 1 + number % AWIWI_MOST_UNKNOWNS, half = (n + 1) / 2, m = 1 + number % AWIWI_MOST_EQUATIONS;
@@ -193,6 +219,8 @@ void try_least_squares(int number)
         for (int i = 0; number % 2 && i < m; i++)
             measured[i] += random_in(-1, 1) * pow(10, -3 - number % 7);
     }
+    if (number % 37 == 0)
+        try_large_problems(&p, measured, start, output(n));
     if (number % 10 == 0)
         start[number % n] = number % 4 ? NAN : -INFINITY;
     if (number % 17 == 0)
