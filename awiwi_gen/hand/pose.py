@@ -159,7 +159,14 @@ class Chain:
             body = None
             if run.body is not None:
                 axis, side = (None if each is None else _floats(each) for each in (run.body.axis, run.body.side))
-                body = Body(number[run.body.link], _floats(run.body.at), float(run.body.radius or 0), axis, side)
+                body = Body(
+                    number[run.body.link],
+                    _floats(run.body.at),
+                    float(run.body.radius or 0),
+                    axis,
+                    side,
+                    run.body.inside,
+                )
             lines.append(Line(first, last, body, float(run.divisor or 1)))
         return lines
 

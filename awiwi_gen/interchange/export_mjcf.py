@@ -173,8 +173,9 @@ class _Writer:
             geom.set("zaxis", text(vector(body.axis)))
         geom.set("size", text(size))
         step = SubElement(tendon, "geom", geom=name)
-        if body.side is not None:
-            SubElement(self.bodies[body.link], "site", name=f"{name}.side", pos=text(vector(body.side)))
+        if body.side is not None or body.inside:
+            side = body.at if body.side is None else body.side
+            SubElement(self.bodies[body.link], "site", name=f"{name}.side", pos=text(vector(side)))
             step.set("sidesite", f"{name}.side")
 
     def _lines(self, tendon: Tendon) -> list[list[tuple[str, Array, PathPoint | None]]]:

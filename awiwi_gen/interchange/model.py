@@ -64,7 +64,7 @@ class Place(NamedTuple):
     """What a tendon passes, in the frame of a body: a point `at` (3), or with a radius a sphere or cylinder to wrap round.
 
     A cylinder has a unit vector `axis` (3). The tendon passes on the side of the point `side` (3), or by the shorter way.
-    A point with a `divisor` begins a branch behind a pulley.
+    With `inside` it runs through the inside. A point with a `divisor` begins a branch behind a pulley.
     """
 
     body: int
@@ -72,6 +72,7 @@ class Place(NamedTuple):
     radius: float | None = None
     axis: Array | None = None
     side: Array | None = None
+    inside: bool = False
     divisor: float | None = None
 
     def seen(self, turn: Array, origin: Array) -> Place:

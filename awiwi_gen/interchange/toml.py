@@ -151,6 +151,8 @@ def _place(link: str, place: Place) -> str:
         keys["axis"] = _listed(quantity(each, "").rstrip() for each in tidy(place.axis, 1.0))
     if place.side is not None:
         keys["side"] = _lengths(place.side)
+    if place.inside:
+        keys["inside"] = "true"
     if place.divisor is not None:
         keys["divisor"] = _text(quantity(place.divisor, "").rstrip())
     return f"{{ {', '.join(f'{key} = {value}' for key, value in keys.items())} }}"

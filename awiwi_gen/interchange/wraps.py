@@ -38,9 +38,10 @@ def path_of(compiled: Any, places: Iterable[int]) -> tuple[tuple[Place, ...], li
         if side >= 0:
             if compiled.site_bodyid[side] != body.body:
                 return (), ["tendons whose side site is on another body than the geom: left out (--fit-wraps)"]
-            body = body._replace(side=compiled.site_pos[side].copy())
             if np.linalg.norm(compiled.site_pos[side] - body.at) < (body.radius or 0):
-                return (), ["tendons that wrap round the inside of a geom: left out (--fit-wraps)"]
+                body = body._replace(inside=True)
+            else:
+                body = body._replace(side=compiled.site_pos[side].copy())
         ends = [int(compiled.wrap_objid[i]) for i in (k - 1, k + 1)]
         if any(_inside(body, int(compiled.site_bodyid[i]), compiled.site_pos[i]) for i in ends):
             lost.append("wraps with a site inside the geom: straight there, as in MuJoCo")

@@ -6,6 +6,7 @@ import casadi as ca
 from casadi import SX
 
 from awiwi_gen.structure import coordinates, leaders, loose_ends, middle, motion, wraps
+from awiwi_gen.witnesses.inside_wraps import InsideWrap
 from awiwi_gen.witnesses.wraps import Wrap
 
 
@@ -27,9 +28,15 @@ def loops_close(finger: Any, q: SX, *_: SX) -> list[SX]:
 
 
 def wraps_hold(finger: Any, q: SX, *_: SX) -> list[SX]:
-    """For every body that a tendon wraps round, that points stay outside it, and the side that of the joints' middles."""
+    """For every body that a tendon wraps round, that points stay outside it, and the side that of the joints' middles.
+
+    For every body that a string bends inside of, that its ends are away from the surface, or the string is straight.
+    """
     guards, still = [], ca.vertcat(*middle(finger))
     for _number, run in wraps(finger):
+        if run.body.inside:
+            guards.append(InsideWrap.of(finger, run, q).converges())
+            continue
         wrap = Wrap.of(finger, run, q)
         ends = {run.first: wrap.distances[0], run.last: wrap.distances[1]}
         guards += [(ends[index] / wrap.radius - 1) * (ends[index] / wrap.radius + 1) for index in loose_ends(run)]

@@ -12,6 +12,7 @@ import casadi as ca
 from casadi import SX
 
 from awiwi_gen.structure import Finger, coordinates, leaders, link_number, motion, radius, rolls, sense
+from awiwi_gen.witnesses.inside_wraps import InsideWrap
 from awiwi_gen.witnesses.kinematics import point_before_joint, point_of_link
 from awiwi_gen.witnesses.wraps import Wrap
 
@@ -93,7 +94,7 @@ def _wraps(finger: Finger, tendon: Tendon, q: SX) -> Iterator[tuple[Any, Wrap]]:
     """The runs of a path round bodies."""
     for run in tendon.runs:
         if run.body is not None:
-            yield run, Wrap.of(finger, run, q)
+            yield run, (InsideWrap if run.body.inside else Wrap).of(finger, run, q)
 
 
 def _arms(finger: Finger, tendon: Tendon, q: SX) -> SX:

@@ -10,6 +10,8 @@ import numpy as np
 
 from awiwi_gen.interchange.draft import DraftFinger, DraftHand
 
+from .inside_wraps import corrections
+
 
 @dataclass
 class MujocoFinger:
@@ -71,7 +73,7 @@ class MujocoFinger:
         return self.matrix.T @ (self.data.qfrc_damper + self.data.qfrc_spring)[self.dofs]
 
     def lengths(self) -> np.ndarray:
-        return self.data.ten_length[self.tendons]
+        return (self.data.ten_length + corrections(self.compiled, self.data)[0])[self.tendons]
 
     def arms(self) -> np.ndarray:
         full = np.zeros((self.compiled.ntendon, self.compiled.nv))
@@ -83,6 +85,7 @@ class MujocoFinger:
                 for t in range(self.compiled.ntendon):
                     at, count = int(self.compiled.ten_J_rowadr[t]), int(self.compiled.ten_J_rownnz[t])
                     full[t, self.compiled.ten_J_colind[at : at + count]] = rows[at : at + count]
+        full = full + corrections(self.compiled, self.data)[1]
         return full[np.ix_(self.tendons, self.dofs)] @ self.matrix
 
     def gravity(self) -> np.ndarray:
