@@ -7,8 +7,8 @@ A finger is anything with these attributes (the hand file's `Finger` and its sym
     pulleys[i]    joint, radius
     tendons[i]    rest, over (senses and joints: "+flexion", "-pip"), arms (joint -> arm), span (None or from_[3], to[3],
                   joint), path (points: link, at[3]; bodies also radius, axis (None or [3]), side (None or [3]),
-                  inside, and kind), runs (path from point to point: start, body or None, end,
-                  counted()), spring (None or stiffness, rest)
+                  carrier of the side (None or a link), inside, and kind), runs (path from point to point:
+                  start, body or None, end, counted()), spring (None or stiffness, rest)
     pulled, strings   the tendons without a spring, and those with one
     couplings[i]  follower, leader, ratio (or None), offset (or None)
     base          None or position[3], turn, quarters[3], rpy[3]

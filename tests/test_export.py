@@ -36,6 +36,16 @@ def rotation(quat: np.ndarray) -> np.ndarray:
     return np.eye(3) + 2 * w * skew + 2 * skew @ skew
 
 
+def beside(body: Place, site: Place | None) -> Place:
+    """A body with its side site, as MuJoCo understands it."""
+    if site is None:
+        return body
+    if site.body != body.body:
+        return body._replace(side=site.at, carrier=site.body)
+    inside = np.linalg.norm(site.at - body.at) < body.radius
+    return body._replace(inside=True) if inside else body._replace(side=site.at)
+
+
 def read_mjcf(text: str) -> Model:
     """The part of MJCF that the export writes."""
     root = ElementTree.fromstring(text)  # noqa: S314 our own
@@ -82,8 +92,7 @@ def read_mjcf(text: str) -> Model:
                 path.append(places[step.get("site")]._replace(divisor=divisor))
                 divisor = None
             elif step.tag == "geom":
-                side = places[step.get("sidesite")].at if step.get("sidesite") else None
-                path.append(round_[step.get("geom")]._replace(side=side))
+                path.append(beside(round_[step.get("geom")], places.get(step.get("sidesite"))))
             elif step.tag == "pulley":
                 divisor = float(step.get("divisor"))
         tendons.append(Tendon(each.get("name"), arms, tuple(path), **spring))

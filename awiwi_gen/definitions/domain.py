@@ -39,6 +39,7 @@ def wraps_hold(finger: Any, q: Matrix, *_: Matrix) -> list[Expr]:
             continue
         ends = {run.first: wrap.start, run.last: wrap.end}
         guards += [clearance(wrap, ends[index]) for index in loose_ends(run)]
+        guards += [clearance(wrap, wrap.side)] if run.body.carrier else []
         guards.append(same_side(wrap, seen_from_body(finger, run, there, derivation)))
     return guards
 

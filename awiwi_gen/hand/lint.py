@@ -131,6 +131,9 @@ def _names(finger: Finger) -> Iterator[Complaint]:
         for index, point in enumerate(tendon.path):
             keys = ("tendons", number, "path", index, "link")
             yield from _known(keys, point.link, point.link, [*joints, PALM], "link")
+            if point.side_link is not None:
+                side_keys = (*keys[:-1], "side_link")
+                yield from _known(side_keys, point.side_link, point.side_link, [*joints, PALM], "link")
             if point.link == PALM in joints:
                 yield keys, f'= "{PALM}" is the base frame, and a joint of this finger; rename the joint'
         yield from below(("tendons", number), misplaced(tendon))

@@ -8,7 +8,7 @@ from functools import partial
 
 from awiwi_gen.hand.parts import Finger, Keys, PathPoint, Run, Tendon
 from awiwi_gen.hand.pose import Chain, Line
-from awiwi_gen.hand.wraps import INSIDE_CLEARANCE, Body
+from awiwi_gen.hand.wraps import INSIDE_CLEARANCE, Body, Turn
 
 __all__ = ["misplaced", "told", "without_length"]
 
@@ -25,7 +25,7 @@ def misplaced(tendon: Tendon) -> Iterator[Complaint]:
         after = tendon.path[index + 1] if index + 1 < len(tendon.path) else None
         ends = after is None or after.divisor is not None
         if each.radius is None:
-            for key in ("axis", "side", "inside"):
+            for key in ("axis", "side", "side_link", "inside"):
                 if getattr(each, key) not in (None, False):
                     yield (*keys, key), 'is at a point; expected a radius such as "6.2 mm" beside it'
             if ends and (index == 0 or each.divisor is not None):
@@ -39,9 +39,11 @@ def misplaced(tendon: Tendon) -> Iterator[Complaint]:
             yield keys, f"is a {each.kind} with another body after it; expected a point between the two"
         if each.axis is not None and math.hypot(*map(float, each.axis)) < _NO_DIRECTION:
             yield (*keys, "axis"), 'has no direction; expected such as ["0", "0", "1"]'
+        elif each.side_link is not None and each.side is None:
+            yield (*keys, "side_link"), "is without a side; expected the point that it carries beside it"
         elif each.side is not None and each.inside:
             yield (*keys, "inside"), "is beside a side; expected one of the two"
-        elif each.side is not None:
+        elif each.side is not None and each.carrier is None:
             yield from ((("path", index, "side"), message) for message in _side(each))
 
 
@@ -88,13 +90,29 @@ def _touching(chain: Chain, run: Run, line: Line, body: Body) -> Iterator[Compla
             inside = f"lies {depth:.2g} mm inside the {kind} path[{run.between}] at {pose}"
             yield ("path", index), f"{inside}; expected a point outside it in every pose"
             return
+    if line.side is not None:
+        depth, q = chain.least(partial(_side_distance, chain, body, line))
+        if depth < body.radius:
+            found = f"comes within {depth * 1e3:.2g} mm of the {kind}'s centre at {told(chain.finger, q)}"
+            yield ("path", run.between or 0, "side"), f"{found}; expected a point outside the radius in every pose"
+            return
     middle, *poses = chain.poses()
-    there = body.turn(*chain.seen_by(body, middle, line))
+    there = _turn(chain, body, middle, line)
     for q in poses:
-        if not body.turn(*chain.seen_by(body, q, line)).is_like(there):
+        if not _turn(chain, body, q, line).is_like(there):
             jump = f"is passed on the other side at {told(chain.finger, q)} than at {told(chain.finger, middle)}"
             yield ("path", run.between or 0), f"{jump}; the tendon would jump over the {kind}: expected one side"
             return
+
+
+def _side_distance(chain: Chain, body: Body, line: Line, q: Sequence[float]) -> float:
+    """Distance [m] of a line's side point from the centre of its body."""
+    return math.dist(chain.posed(body, q, line).side or body.centre, body.centre)
+
+
+def _turn(chain: Chain, body: Body, q: Sequence[float], line: Line) -> Turn:
+    """How a line passes its body in a pose."""
+    return chain.posed(body, q, line).turn(*chain.seen_by(body, q, line))
 
 
 def _too_near(chain: Chain, run: Run, line: Line, body: Body) -> Iterator[Complaint]:

@@ -54,7 +54,8 @@ class PathPoint(Part):
 
     Without a radius it is a point. With one it is a body that the tendon wraps round where a straight line would cut it:
     a sphere about `at`, or, with a direction `axis`, an endless cylinder whose axis runs through `at`. The tendon passes
-    the body on the side of the point `side`, or by the shorter way. With `inside` it runs through the inside of the body
+    the body on the side of the point `side`, or by the shorter way. The side point moves with the body's link, or with
+    `side_link`. With `inside` it runs through the inside of the body
     instead, as through a ring: where a straight line would miss the body, it bends at one point of the surface.
 
     A point with a `divisor` begins a new branch of the tendon, behind a pulley: nothing leads there from the point before,
@@ -66,6 +67,7 @@ class PathPoint(Part):
     radius: Size | None = None
     axis: Direction | None = None
     side: Point | None = None
+    side_link: JointName | None = None
     inside: bool = False
     divisor: Annotated[Quantity, Measure("2", "0.01", "100")] | None = None
 
@@ -76,11 +78,16 @@ class PathPoint(Part):
             return "point"
         return "sphere" if self.axis is None else "cylinder"
 
+    @property
+    def carrier(self) -> str | None:
+        """The link that carries the side point, if it is not that of the body."""
+        return None if self.side_link == self.link else self.side_link
+
     def structure(self) -> str | list[Any]:
         """Everything but the numbers."""
         if self.kind == "point":
             return self.link if self.divisor is None else [self.link, "branch"]
-        return [self.link, self.kind, "inside" if self.inside else self.side is not None]
+        return [self.link, self.kind, "inside" if self.inside else self.carrier or self.side is not None]
 
 
 @dataclass(frozen=True)

@@ -42,6 +42,7 @@ class Line(NamedTuple):
     end: Spot
     body: Body | None
     divisor: float = 1.0
+    side: Spot | None = None  # the body's side point, where another link carries it
 
 
 class Chain:
@@ -134,14 +135,21 @@ class Chain:
 
     def distance(self, q: Sequence[float], line: Line) -> float:
         """Length of a line [m]."""
-        start, end = (self.place(q, spot) for spot in (line.start, line.end))
-        return math.dist(start, end) if line.body is None else line.body.length(*self.seen_by(line.body, q, line))
+        if line.body is None:
+            return math.dist(self.place(q, line.start), self.place(q, line.end))
+        return self.posed(line.body, q, line).length(*self.seen_by(line.body, q, line))
 
     def seen_by(self, body: Body, q: Sequence[float], line: Line) -> tuple[Vector, Vector]:
         """Both ends of a line [m], in the frame of a body."""
         axes, origin = self._frame(q, body.link, True)
         first, last = (self.place(q, spot) for spot in (line.start, line.end))
         return seen(axes, origin, first), seen(axes, origin, last)
+
+    def posed(self, body: Body, q: Sequence[float], line: Line) -> Body:
+        """The body of a line, with its side point where that is in a pose."""
+        if line.side is None:
+            return body
+        return body._replace(side=seen(*self._frame(q, body.link, True), self.place(q, line.side)))
 
     def place(self, q: Sequence[float], spot: Spot) -> Vector:
         """A point of the chain in base axes [m]."""
@@ -156,7 +164,7 @@ class Chain:
             lines.append(Line(Spot(-1, True, _floats(span.from_)), end, None))
         for run in tendon.runs:
             first, last = (Spot(number[each.link], True, _floats(each.at)) for each in (run.start, run.end))
-            body = None
+            body = moving = None
             if run.body is not None:
                 axis, side = (None if each is None else _floats(each) for each in (run.body.axis, run.body.side))
                 body = Body(
@@ -167,7 +175,9 @@ class Chain:
                     side,
                     run.body.inside,
                 )
-            lines.append(Line(first, last, body, float(run.divisor or 1)))
+                if run.body.carrier and side is not None:
+                    moving = Spot(number[run.body.carrier], True, side)
+            lines.append(Line(first, last, body, float(run.divisor or 1), moving))
         return lines
 
     def _frame(self, q: Sequence[float], joint: int, rotated: bool) -> Frame:

@@ -92,7 +92,8 @@ class _Writer:
     # -- bodies ------------------------------------------------------------------------------------------------------
 
     def _links(self, parent: Element) -> None:
-        held = {point.link for tendon in self.finger.tendons for point in tendon.path}
+        points = [point for tendon in self.finger.tendons for point in tendon.path]
+        held = {link for point in points for link in (point.link, point.side_link)}
         held |= {joint for tendon in self.finger.tendons if tendon.span for joint in [self._before(tendon.span.joint)]}
         waiting: list[Part] = []
         for part in self.parts:
@@ -175,7 +176,8 @@ class _Writer:
         step = SubElement(tendon, "geom", geom=name)
         if body.side is not None or body.inside:
             side = body.at if body.side is None else body.side
-            SubElement(self.bodies[body.link], "site", name=f"{name}.side", pos=text(vector(side)))
+            carrier = self.bodies[body.side_link or body.link]
+            SubElement(carrier, "site", name=f"{name}.side", pos=text(vector(side)))
             step.set("sidesite", f"{name}.side")
 
     def _lines(self, tendon: Tendon) -> list[list[tuple[str, Array, PathPoint | None]]]:

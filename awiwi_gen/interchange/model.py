@@ -64,6 +64,7 @@ class Place(NamedTuple):
     """What a tendon passes, in the frame of a body: a point `at` (3), or with a radius a sphere or cylinder to wrap round.
 
     A cylinder has a unit vector `axis` (3). The tendon passes on the side of the point `side` (3), or by the shorter way.
+    The side is in the frame of the body `carrier`, if that is another one.
     With `inside` it runs through the inside. A point with a `divisor` begins a branch behind a pulley.
     """
 
@@ -72,12 +73,14 @@ class Place(NamedTuple):
     radius: float | None = None
     axis: Array | None = None
     side: Array | None = None
+    carrier: int | None = None
     inside: bool = False
     divisor: float | None = None
 
     def seen(self, turn: Array, origin: Array) -> Place:
         """The same in another frame: its axes (3 x 3) are the columns of `turn`, its `origin` (3) is in this frame."""
-        side = None if self.side is None else turn.T @ (self.side - origin)
+        moves = self.side is not None and self.carrier is None
+        side = turn.T @ (self.side - origin) if moves else self.side
         axis = None if self.axis is None else turn.T @ self.axis
         return self._replace(at=turn.T @ (self.at - origin), axis=axis, side=side)
 

@@ -135,7 +135,7 @@ def _tendon_lines(tendon: DraftTendon, file: str) -> list[str]:
         lines += [f"arms = {{ {arms} }}"]
     if tendon.path:
         lines += ["path = ["]
-        lines += [f"    {_place(link, place)}," for link, place in tendon.path]
+        lines += [f"    {_place(*each)}," for each in tendon.path]
         lines += ["]"]
     if tendon.stiffness:
         stiffness, rest = quantity(tendon.stiffness, "N/m"), length(tendon.slack)
@@ -143,7 +143,7 @@ def _tendon_lines(tendon: DraftTendon, file: str) -> list[str]:
     return [*lines, f"source = {_text(cite(f'{file} tendon {tendon.name}'))}"]
 
 
-def _place(link: str, place: Place) -> str:
+def _place(link: str, place: Place, side_link: str | None) -> str:
     keys = {"link": _text(link), "at": _lengths(place.at)}
     if place.radius is not None:
         keys["radius"] = _text(length(place.radius))
@@ -151,6 +151,8 @@ def _place(link: str, place: Place) -> str:
         keys["axis"] = _listed(quantity(each, "").rstrip() for each in tidy(place.axis, 1.0))
     if place.side is not None:
         keys["side"] = _lengths(place.side)
+    if side_link is not None:
+        keys["side_link"] = _text(side_link)
     if place.inside:
         keys["inside"] = "true"
     if place.divisor is not None:

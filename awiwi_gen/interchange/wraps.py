@@ -36,9 +36,10 @@ def path_of(compiled: Any, places: Iterable[int]) -> tuple[tuple[Place, ...], li
             continue
         body, side = _body(compiled, target), int(compiled.wrap_prm[k])
         if side >= 0:
-            if compiled.site_bodyid[side] != body.body:
-                return (), ["tendons whose side site is on another body than the geom: left out (--fit-wraps)"]
-            if np.linalg.norm(compiled.site_pos[side] - body.at) < (body.radius or 0):
+            carrier = int(compiled.site_bodyid[side])
+            if carrier != body.body:
+                body = body._replace(side=compiled.site_pos[side].copy(), carrier=carrier)
+            elif np.linalg.norm(compiled.site_pos[side] - body.at) < (body.radius or 0):
                 body = body._replace(inside=True)
             else:
                 body = body._replace(side=compiled.site_pos[side].copy())

@@ -55,5 +55,6 @@ def wraps_hold(finger: Finger, owner: str = "") -> tuple[str, ...]:
             found.append(f"the ends of the string are away from the surface of {body}, or it is straight there")
             continue
         found += [f"path[{index}] is outside {body}" for index in loose_ends(run)]
+        found += [f"path[{run.between}].side is outside {body}"] if run.body.carrier else []
         found.append(f"the string passes {body} on the side where it does at the middle of the joints' ranges")
     return tuple(found)

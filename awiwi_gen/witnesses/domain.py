@@ -40,6 +40,7 @@ def wraps_hold(finger: Any, q: SX, *_: SX) -> list[SX]:
         wrap = Wrap.of(finger, run, q)
         ends = {run.first: wrap.distances[0], run.last: wrap.distances[1]}
         guards += [(ends[index] / wrap.radius - 1) * (ends[index] / wrap.radius + 1) for index in loose_ends(run)]
+        guards += [ca.sumsqr(wrap.side / wrap.radius) - 1] if run.body.carrier else []
         guards.append(wrap.same_side(Wrap.of(finger, run, still)))
     return guards
 
