@@ -35,8 +35,8 @@ def corrections(compiled: Any, data: Any) -> tuple[np.ndarray, np.ndarray]:
 
 def _bend(compiled: Any, data: Any, tendon: int, k: int) -> np.ndarray | None:
     """The point (3) in the world where a tendon bends inside the geom at a place of its path."""
-    side = int(compiled.wrap_prm[k])
-    if compiled.wrap_type[k] not in (mujoco.mjtWrap.mjWRAP_SPHERE, mujoco.mjtWrap.mjWRAP_CYLINDER) or side < 0:
+    side, round_ = int(compiled.wrap_prm[k]), (mujoco.mjtWrap.mjWRAP_SPHERE, mujoco.mjtWrap.mjWRAP_CYLINDER)
+    if int(compiled.wrap_type[k]) not in map(int, round_) or side < 0:
         return None
     geom, at = int(compiled.wrap_objid[k]), int(data.ten_wrapadr[tendon])
     if np.linalg.norm(data.site_xpos[side] - data.geom_xpos[geom]) >= compiled.geom_size[geom, 0]:
