@@ -1,7 +1,6 @@
 """What MuJoCo leaves of tendons that bend inside a geom: it stops iterating 1e-6 rad from the point of the bend.
 
-From its point a few steps more lead to the shortest string, to rounding. Within about 1 mrad of a straight string MuJoCo
-does not iterate and takes the middle direction between both ends.
+From its point a few steps more lead to the shortest string, to rounding.
 """
 
 from __future__ import annotations
@@ -13,8 +12,6 @@ import numpy as np
 
 STOP = 2e-6
 """Largest error [rad] of the angle between string and normal that MuJoCo's iteration may leave."""
-NEARLY_STRAIGHT = 2e-3
-"""Angle [rad] by which both ends are nearer to each other than the ends of a straight string that touches."""
 
 
 def corrections(compiled: Any, data: Any) -> tuple[np.ndarray, np.ndarray]:
@@ -71,8 +68,7 @@ def _missing(compiled: Any, data: Any, k: int, bend: np.ndarray) -> tuple[float,
             slope += sine
             curvature += distance * np.cos(angle) / piece - radius * sine**2 / piece
         turned -= slope / curvature
-    spare = sum(np.arccos(radius / distance) for distance in distances) - between
-    assert abs(turned - theirs) < STOP or spare < NEARLY_STRAIGHT, f"MuJoCo bends {turned - theirs:.1e} rad off"
+    assert abs(turned - theirs) < STOP, f"MuJoCo bends {turned - theirs:.1e} rad off"
     place = radius * (np.cos(turned) * one + np.sin(turned) * other)
     pieces = [np.linalg.norm(place - each) for each in flat]
     heights = (
