@@ -10,6 +10,7 @@ import pytest
 import random_hands
 from commands import answer, complaint, told
 from hand_numbers import coordinates, fingers_of, link_angles, poses, rpy_matrix, tendon_lengths
+from numpy.polynomial import Polynomial
 
 from awiwi_gen.hand import Hand
 from awiwi_gen.interchange import export_mjcf, export_urdf
@@ -97,9 +98,9 @@ def read_mjcf(text: str) -> Model:
                 divisor = float(step.get("divisor"))
         tendons.append(Tendon(each.get("name"), arms, tuple(path), **spring))
     for each in root.findall("equality/joint"):
-        constant, ratio = numbers(each.get("polycoef"))[:2]
         follower, leader = each.get("joint1"), each.get("joint2")
-        mimics.append(Mimic(follower, leader, ratio, references[follower] + constant - ratio * references[leader]))
+        curve = Polynomial(numbers(each.get("polycoef")))(Polynomial([-references[leader], 1.0]))
+        mimics.append(Mimic.of(follower, leader, curve + references[follower]))
     return Model(
         root.get("model"), "export.xml", tuple(bodies), tuple(joints), tuple(tendons), tuple(mimics), tuple(sites)
     )

@@ -155,7 +155,9 @@ def _couplings(finger: Finger, joints: list[str], pulleys: list[str]) -> Iterato
             yield from _known(keys, joint, joint, joints, "joint")
             if joint in joints and coupling.ratio is None:
                 yield from _known(keys, joint, joint, pulleys, "pulley")
-        if coupling.ratio is not None and coupling.ratio.value == 0:
+        if coupling.powers and coupling.ratio is None:
+            yield ("couplings", index), 'has powers without a ratio; expected one, such as "1", or "0"'
+        if coupling.ratio is not None and coupling.ratio.value == 0 and not coupling.powers:
             yield ("couplings", index, "ratio"), f'= "{coupling.ratio}" holds the follower; expected another number'
         if coupling.follower in followers[:index]:
             yield ("couplings", index, "follower"), f'= "{coupling.follower}" follows another joint already'

@@ -26,6 +26,7 @@ __all__ = [
 # fmt: on
 
 MOST = 32  # fingers of a hand; links, pulleys, tendons and couplings of a finger
+_POWERS = ("square", "cube", "fourth")
 PALM = "palm"  # in place of a joint: the finger's base frame
 
 
@@ -174,7 +175,7 @@ class Tendon(Part):
 
 
 class Coupling(Part):
-    """A joint that follows another: q_follower = ratio q_leader + offset.
+    """A joint that follows another: q_follower = offset + ratio q + square q^2 + cube q^3 + fourth q^4, by its leader's q.
 
     Without a ratio, a passive tendon rolls on two pulleys: the ratio is r_leader / r_follower.
     """
@@ -183,10 +184,20 @@ class Coupling(Part):
     leader: JointName
     ratio: Annotated[Quantity, Measure("0.8", "-100", "100")] | None = None
     offset: Angle | None = None
+    square: Annotated[Quantity, Measure("0.1 1/rad", "-100 1/rad", "100 1/rad")] | None = None
+    cube: Annotated[Quantity, Measure("0.1 1/rad^2", "-100 1/rad^2", "100 1/rad^2")] | None = None
+    fourth: Annotated[Quantity, Measure("0.1 1/rad^3", "-100 1/rad^3", "100 1/rad^3")] | None = None
+
+    @property
+    def powers(self) -> tuple[Any, ...]:
+        """The coefficients of the second, third and fourth power, zero for those that are missing; none without any."""
+        found = [getattr(self, key) for key in _POWERS]
+        return tuple(0 if each is None else each for each in found) if any(each is not None for each in found) else ()
 
     def structure(self) -> list[str]:
         """Everything but the numbers."""
-        return [self.follower, self.leader, *(key for key in ("ratio", "offset") if getattr(self, key) is not None)]
+        keys = ("ratio", "offset", *_POWERS)
+        return [self.follower, self.leader, *(key for key in keys if getattr(self, key) is not None)]
 
 
 class Finger(Part):
@@ -208,15 +219,20 @@ class Finger(Part):
         """The n independent joints, base to tip: those that follow no other joint. Their angles are the finger's q."""
         return tuple(link.joint for link in self.links if link.joint not in self.leaders)
 
-    def motion(self, joint: str) -> tuple[float, float]:
-        """(ratio, offset [rad]) of a joint: its angle is ratio times its leader's, or its own, + offset."""
+    def motion(self, joint: str) -> tuple[float, ...]:
+        """Coefficients of a joint's angle by powers of its leader's, or of its own: offset [rad], ratio, and others."""
         for coupling in self.couplings:
             if coupling.follower == joint:
-                offset = float(coupling.offset or 0)
+                offset, powers = float(coupling.offset or 0), map(float, coupling.powers)
                 if coupling.ratio is not None:
-                    return float(coupling.ratio), offset
-                return float(self.radii[coupling.leader]) / float(self.radii[joint]), offset
-        return 1.0, 0.0
+                    return offset, float(coupling.ratio), *powers
+                return offset, float(self.radii[coupling.leader]) / float(self.radii[joint])
+        return 0.0, 1.0
+
+    @property
+    def curved(self) -> bool:
+        """Whether a joint follows another by more than a ratio and an offset."""
+        return any(coupling.powers for coupling in self.couplings)
 
     @property
     def has_armature(self) -> bool:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
+from numpy.polynomial import Polynomial
 
 from awiwi_gen.hand import Finger, Hand, Link
 from awiwi_gen.hand.parts import PALM, PathPoint, Tendon
@@ -127,10 +128,10 @@ class _Writer:
 
     def _coupling(self, follower: str, leader: str) -> None:
         references = {part.link.joint: part.reference for part in self.parts}
-        slope, offset = self.finger.motion(follower)
-        constant = slope * references[leader] + offset - references[follower]
+        # MuJoCo counts both angles from where the model is drawn.
+        curve = Polynomial(self.finger.motion(follower))(Polynomial([references[leader], 1.0])) - references[follower]
         SubElement(self.sections["equality"], "joint", joint1=f"{self.name}_{follower}", joint2=f"{self.name}_{leader}",
-                   polycoef=text((constant, slope, 0, 0, 0)))  # fmt: skip
+                   polycoef=text([*curve.coef, 0.0, 0.0, 0.0][:5]))  # fmt: skip
         self._lose("couplings of joints: soft constraints in MuJoCo", f"{self.name} {follower}")
 
     # -- tendons -----------------------------------------------------------------------------------------------------

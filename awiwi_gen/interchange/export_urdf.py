@@ -34,6 +34,15 @@ def text_and_losses(hand: Hand) -> tuple[str, list[Loss]]:
     losses = [
         *common_losses(hand),
         Loss("tendons", tuple(f"{name} {i}" for name, finger in fingers.items() for i in range(len(finger.tendons)))),
+        Loss(
+            "couplings by a curve: its offset and ratio only",
+            tuple(
+                f"{name} {each.follower}"
+                for name, finger in fingers.items()
+                for each in finger.couplings
+                if each.powers
+            ),
+        ),
         Loss("armature", tuple(f"{name} {link.joint}" for name, link in links if value(link.armature))),
         Loss("springs of joints", tuple(f"{name} {link.joint}" for name, link in links if link.spring is not None)),
     ]
@@ -115,13 +124,13 @@ def _joint(root: Element, hand: Hand, name: str, finger: Finger, part: Part, par
         SubElement(joint, "dynamics", damping=text(value(link.damping)), friction=text(friction))
     if link.joint in finger.leaders:
         leader = f"{name}_{finger.leaders[link.joint]}"
-        ratio, offset = finger.motion(link.joint)
+        offset, ratio, *_ = finger.motion(link.joint)
         SubElement(joint, "mimic", joint=leader, multiplier=text(ratio), offset=text(offset))
 
 
 def _range(finger: Finger, joint: str) -> tuple[float, float]:
     """Limits of a joint [rad]; those of a follower are where its leader's limits take it."""
-    ratio, offset = finger.motion(joint)
+    offset, ratio, *_ = finger.motion(joint)
     leader = finger.leaders.get(joint, joint)
     link = next(link for link in finger.links if link.joint == leader)
     low, high = sorted(ratio * value(end) + offset for end in (link.low, link.high))

@@ -12,6 +12,7 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
 __all__ = ["LEAST_MASS", "Array", "Body", "Joint", "Loss", "Mimic", "Model", "Place", "Site", "Tendon"]
@@ -103,12 +104,26 @@ class Tendon:
 
 @dataclass(frozen=True)
 class Mimic:
-    """A joint that follows another one: follower angle = ratio * leader angle + offset."""
+    """A joint that follows another one: its angle is offset + ratio * leader angle + `powers` of it, from the square on."""
 
     follower: str
     leader: str
     ratio: float
     offset: float = 0.0
+    powers: tuple[float, ...] = ()
+
+    @property
+    def curve(self) -> Polynomial:
+        """The follower's angle [rad] over its leader's."""
+        return Polynomial([self.offset, self.ratio, *self.powers])
+
+    @classmethod
+    def of(cls, follower: str, leader: str, curve: Polynomial) -> Mimic:
+        """A joint that follows another one by a curve."""
+        offset, ratio, *powers = map(float, [*curve.coef, 0.0][: max(2, len(curve.coef))])
+        while powers and not powers[-1]:
+            powers.pop()
+        return cls(follower, leader, ratio, offset, tuple(powers))
 
 
 @dataclass(frozen=True, eq=False)

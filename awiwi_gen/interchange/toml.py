@@ -25,6 +25,7 @@ _LIMITS = {
     "gravity": "9.81 m/s^2",
 }
 _FRICTION_VELOCITY = "0.05 rad/s"
+_POWERS = {"square": "1/rad", "cube": "1/rad^2", "fourth": "1/rad^3"}
 _RULE = "# " + "-" * 100
 
 
@@ -86,9 +87,11 @@ def _finger_lines(finger: DraftFinger, file: str) -> list[str]:
 
 
 def _coupling(mimic: Followed) -> str:
-    ratio = quantity(mimic.ratio, "").strip()
-    offset = f', offset = "{angle(mimic.offset)}"' if mimic.offset else ""
-    return f'follower = "{mimic.follower}", leader = "{mimic.leader}", ratio = "{ratio}"{offset}'
+    ratio, offset = quantity(mimic.mimic.ratio, "").strip(), mimic.mimic.offset
+    more = f', offset = "{angle(offset)}"' if offset else ""
+    for (key, unit), power in zip(_POWERS.items(), mimic.mimic.powers, strict=False):
+        more += f', {key} = "{quantity(power, unit)}"' if power else ""
+    return f'follower = "{mimic.follower}", leader = "{mimic.leader}", ratio = "{ratio}"{more}'
 
 
 def _place_lines(link: DraftLink) -> list[str]:

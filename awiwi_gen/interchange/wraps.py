@@ -90,7 +90,7 @@ def fitted(compiled: Any, tendon: Tendon, mimics: tuple[Mimic, ...]) -> tuple[Te
         for mimic in mimics:
             if mimic.follower in order and mimic.leader in order:
                 leader = data.qpos[places[order[mimic.leader]]]
-                data.qpos[places[order[mimic.follower]]] = mimic.ratio * leader + mimic.offset
+                data.qpos[places[order[mimic.follower]]] = mimic.curve(leader)
         mujoco.mj_kinematics(compiled, data)
         mujoco.mj_tendon(compiled, data)
         return float(data.ten_length[index])

@@ -5,21 +5,19 @@ from typing import Any
 import casadi as ca
 from casadi import SX
 
-from awiwi_gen.structure import coordinates, leaders, loose_ends, middle, motion, wraps
+from awiwi_gen.structure import coordinates, loose_ends, middle, wraps
 from awiwi_gen.witnesses.inside_wraps import InsideWrap
+from awiwi_gen.witnesses.joints import followed
 from awiwi_gen.witnesses.wraps import Wrap
 
 
 def loops_close(finger: Any, q: SX, *_: SX) -> list[SX]:
     """For every four-bar of a finger, the squared area of its triangle by its sides (Heron), relative to the largest."""
-    place, leader, guards = coordinates(finger), leaders(finger), []
+    place, guards = coordinates(finger), []
     for link in finger.links:
         bar = link.four_bar
         if bar is not None:
-            angle = q[place[link.joint]]
-            if link.joint in leader:
-                ratio, rest = motion(finger, link.joint)
-                angle = angle * ratio + rest
+            angle = followed(finger, link.joint, q[place[link.joint]])[0]
             end = bar.crank * ca.cos(angle + bar.reference), bar.crank * ca.sin(angle + bar.reference)
             squared = (bar.ground - end[0]) ** 2 + end[1] ** 2
             longest, shortest = (bar.coupler + bar.rocker) ** 2, (bar.coupler - bar.rocker) ** 2

@@ -11,8 +11,9 @@ from typing import Any
 import casadi as ca
 from casadi import SX
 
-from awiwi_gen.structure import Finger, coordinates, leaders, link_number, motion, radius, rolls, sense
+from awiwi_gen.structure import Finger, coordinates, leaders, link_number, radius, rolls, sense
 from awiwi_gen.witnesses.inside_wraps import InsideWrap
+from awiwi_gen.witnesses.joints import followed
 from awiwi_gen.witnesses.kinematics import point_before_joint, point_of_link
 from awiwi_gen.witnesses.wraps import Wrap
 
@@ -29,8 +30,7 @@ def _lengths(finger: Finger, tendons: Iterable[Tendon], q: SX, paths: bool = Tru
     position, follows = coordinates(finger), leaders(finger)
 
     def angle(joint: str) -> SX:
-        ratio, offset = motion(finger, joint) if joint in follows else (1, 0)
-        return ratio * q[position[joint]] + offset
+        return followed(finger, joint, q[position[joint]])[0]
 
     lengths = []
     for tendon in tendons:

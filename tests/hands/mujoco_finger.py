@@ -7,6 +7,7 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from numpy.polynomial import Polynomial
 
 from awiwi_gen.interchange.draft import DraftFinger, DraftHand
 
@@ -32,13 +33,11 @@ class MujocoFinger:
         self.free = [name for name in joints if name not in mimics]
         self.qpos = [int(self.compiled.joint(name).qposadr[0]) for name in joints]
         self.dofs = [int(self.compiled.joint(name).dofadr[0]) for name in joints]
-        self.matrix = np.zeros((len(joints), len(self.free)))
-        self.offset = np.zeros(len(joints))
         free = [names[name] for name in self.free]
-        for row, name in enumerate(joints):
-            mimic = mimics.get(name)
-            self.matrix[row, free.index(mimic.leader if mimic else names[name])] = mimic.ratio if mimic else 1.0
-            self.offset[row] = mimic.offset if mimic else 0.0
+        self.curves = []  # of every joint: the coordinate that moves it, and its angle over that coordinate
+        for name in joints:
+            curve = mimics[name].mimic.curve if name in mimics else Polynomial([0.0, 1.0])
+            self.curves.append((free.index(mimics[name].leader if name in mimics else names[name]), curve))
         self.last = [self._is_last(link.published.name) for link in self.finger.links]
         mujoco.mj_resetData(self.compiled, self.data)
         self.data.qpos[:] = self.compiled.qpos0
@@ -56,17 +55,25 @@ class MujocoFinger:
         """Move the finger; everything else stands as drawn."""
         mujoco.mj_resetData(self.compiled, self.data)
         self.data.qpos[:] = self.compiled.qpos0
-        self.data.qpos[self.qpos] = self.matrix @ q + self.offset
+        self.matrix, self.drift = np.zeros((len(self.curves), len(q))), np.zeros(len(self.curves))
+        for row, (column, curve) in enumerate(self.curves):
+            self.data.qpos[self.qpos[row]] = curve(q[column])
+            self.matrix[row, column] = curve.deriv()(q[column])
+            self.drift[row] = curve.deriv(2)(q[column]) * qd[column] ** 2
         self.data.qvel[self.dofs] = self.matrix @ qd
         mujoco.mj_forward(self.compiled, self.data)
 
     def mass_matrix(self) -> np.ndarray:
+        return self.matrix.T @ self._full_mass_matrix() @ self.matrix
+
+    def _full_mass_matrix(self) -> np.ndarray:
         full = np.zeros((self.compiled.nv, self.compiled.nv))
         mujoco.mj_fullM(self.compiled, self.data, full)
-        return self.matrix.T @ full[np.ix_(self.dofs, self.dofs)] @ self.matrix
+        return full[np.ix_(self.dofs, self.dofs)]
 
     def bias(self) -> np.ndarray:
-        return self.matrix.T @ self.data.qfrc_bias[self.dofs]
+        """Torques without acceleration of the coordinates: followers accelerate where their curves bend."""
+        return self.matrix.T @ (self.data.qfrc_bias[self.dofs] + self._full_mass_matrix() @ self.drift)
 
     def passive(self) -> np.ndarray:
         """Torques of joint dampers and springs, as they act on the joints."""
