@@ -80,8 +80,9 @@ class Place(NamedTuple):
 
     def seen(self, turn: Array, origin: Array) -> Place:
         """The same in another frame: its axes (3 x 3) are the columns of `turn`, its `origin` (3) is in this frame."""
-        moves = self.side is not None and self.carrier is None
-        side = turn.T @ (self.side - origin) if moves else self.side
+        side = self.side
+        if side is not None and self.carrier is None:
+            side = turn.T @ (side - origin)
         axis = None if self.axis is None else turn.T @ self.axis
         return self._replace(at=turn.T @ (self.at - origin), axis=axis, side=side)
 

@@ -55,7 +55,7 @@ class InsideWrap(Wrap):
         angle = self.touches * ca.atan2(ca.norm_2(product), ca.dot(first, last))
         p = -_larger(-angle / (2 - one - other), SX(-ca.pi / 2))
         for _ in range(_STEPS):
-            sines, slope = [ratio * ca.sin(p) for ratio in (one, other)], 2
+            sines, slope = [ratio * ca.sin(p) for ratio in (one, other)], SX(2)
             for ratio, sine in zip((one, other), sines, strict=True):
                 slope -= ratio * ca.cos(p) / ca.sqrt(1 - sine**2)
             p -= (2 * p - _arc_sine(sines[0]) - _arc_sine(sines[1]) - angle) / slope

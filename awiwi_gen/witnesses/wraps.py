@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import casadi as ca
 from casadi import SX
@@ -37,7 +37,7 @@ class Wrap:
     home: SX
 
     @classmethod
-    def of(cls, finger: Finger, run: Any, q: SX) -> Wrap:
+    def of(cls, finger: Finger, run: Any, q: SX) -> Self:
         """A run at joint angles q (n) [rad]."""
 
         def place(link: str, local: SX) -> Moving:
