@@ -115,7 +115,7 @@ def test_followers_of_followers_are_composed_up_to_the_fourth_power():
 
     assert not losses
     assert found[1].leader == "a"
-    assert found[1].mimic.curve(0.7) == pytest.approx(2 * square.curve(0.7) + 0.1 * square.curve(0.7) ** 2, rel=1e-15)
+    assert found[1].curve(0.7) == pytest.approx(2 * square.curve(0.7) + 0.1 * square.curve(0.7) ** 2, rel=1e-15)
     assert [loss.what for loss in lost] == ["couplings of joints over others by more than the fourth power"]
 
 

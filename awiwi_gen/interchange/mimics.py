@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from awiwi_gen.interchange.model import Loss, Mimic
 
@@ -11,21 +11,10 @@ MOST_POWERS = 3  # from the second power to the fourth
 
 
 @dataclass(frozen=True)
-class Followed:
-    """A follower by its published name, and how it follows by both names in the hand file."""
+class Followed(Mimic):
+    """How a joint follows another one, by their names in the hand file, and the published name of the follower."""
 
-    published: str
-    mimic: Mimic
-
-    @property
-    def follower(self) -> str:
-        """Its name in the hand file."""
-        return self.mimic.follower
-
-    @property
-    def leader(self) -> str:
-        """The name of the joint that it follows, in the hand file."""
-        return self.mimic.leader
+    published: str = ""
 
 
 def followed(
@@ -45,11 +34,11 @@ def followed(
         curve, leader = mimic.curve, mimic.leader
         while leader in direct:
             curve, leader = curve(direct[leader].curve), direct[leader].leader
-        follows = Mimic.of(names[name], names[leader], curve)
+        follows = Followed.of(names[name], names[leader], curve)
         if len(follows.powers) > MOST_POWERS:
             steep.append(f"{name} to {leader}")
         else:
-            found.append(Followed(name, follows))
+            found.append(replace(follows, published=name))
     losses = [
         Loss("couplings of joints that are in two fingers, in none, or in a loop", tuple(lost)),
         Loss("couplings of joints over others by more than the fourth power", tuple(steep)),

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.polynomial import Polynomial
@@ -119,7 +119,7 @@ class Mimic:
         return Polynomial([self.offset, self.ratio, *self.powers])
 
     @classmethod
-    def of(cls, follower: str, leader: str, curve: Polynomial) -> Mimic:
+    def of(cls, follower: str, leader: str, curve: Polynomial) -> Self:
         """A joint that follows another one by a curve."""
         offset, ratio, *powers = map(float, [*curve.coef, 0.0][: max(2, len(curve.coef))])
         while powers and not powers[-1]:

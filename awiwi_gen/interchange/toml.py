@@ -87,9 +87,9 @@ def _finger_lines(finger: DraftFinger, file: str) -> list[str]:
 
 
 def _coupling(mimic: Followed) -> str:
-    ratio, offset = quantity(mimic.mimic.ratio, "").strip(), mimic.mimic.offset
+    ratio, offset = quantity(mimic.ratio, "").strip(), mimic.offset
     more = f', offset = "{angle(offset)}"' if offset else ""
-    for (key, unit), power in zip(_POWERS.items(), mimic.mimic.powers, strict=False):
+    for (key, unit), power in zip(_POWERS.items(), mimic.powers, strict=False):
         more += f', {key} = "{quantity(power, unit)}"' if power else ""
     return f'follower = "{mimic.follower}", leader = "{mimic.leader}", ratio = "{ratio}"{more}'
 

@@ -36,7 +36,7 @@ class MujocoFinger:
         free = [names[name] for name in self.free]
         self.curves = []  # of every joint: the coordinate that moves it, and its angle over that coordinate
         for name in joints:
-            curve = mimics[name].mimic.curve if name in mimics else Polynomial([0.0, 1.0])
+            curve = mimics[name].curve if name in mimics else Polynomial([0.0, 1.0])
             self.curves.append((free.index(mimics[name].leader if name in mimics else names[name]), curve))
         self.last = [self._is_last(link.published.name) for link in self.finger.links]
         mujoco.mj_resetData(self.compiled, self.data)
