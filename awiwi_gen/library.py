@@ -11,24 +11,21 @@ import warnings
 from collections import namedtuple
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from decimal import Decimal
 from functools import cache, partial
 from itertools import combinations
 from math import prod
-from numbers import Real
 from typing import Any
 
 import numpy as np
 
+from awiwi_gen.arrays import as_numbers, direct_call
 from awiwi_gen.errors import BuildError, InputError, OutputError
 from awiwi_gen.ir.cost import SINCOS
-from awiwi_gen.one_sample import direct_call
 
 Array = np.ndarray[Any, Any]
 Samples = tuple[Array, int, int]  # an array to point at, the steps from sample to sample and element to element
 Place = tuple[Any, int, tuple[int, ...]]  # pointer to the samples, step between them, steps that a loop is given
 
-KINDS = {"c": "complex numbers", "U": "text", "S": "bytes", "M": "dates", "m": "durations", "V": "records"}
 C_TYPES = {"d": "double", "f": "float", "i": "int"}  # by NumPy's characters
 VECTORISE_AFTER = 100_000  # samples of a kernel
 CALL = 20  # operations that a call is worth
@@ -243,22 +240,6 @@ class KernelFunction:
             wanted = ", ".join(["...", *map(str, shape)])
             raise InputError(f"{self.name}: {name} has shape {array.shape}, expected ({wanted})")
         return array
-
-
-def as_numbers(value: Any) -> Array:
-    """An array of real numbers. Raises TypeError or ValueError for all that NumPy would silently make numbers of."""
-    if isinstance(value, np.ma.MaskedArray):
-        raise TypeError("it is masked; fill it, or choose the samples that are not")
-    array = np.asarray(value)
-    kind = array.dtype.kind
-    if kind == "O":  # numbers of Python and SymPy, but neither None nor dates nor texts
-        for one in array.flat:
-            if not isinstance(one, (Real, Decimal)):
-                raise TypeError(f"it holds a {type(one).__name__}")
-        return array.astype(float)
-    if kind not in "fiub":
-        raise TypeError(f"it holds {KINDS.get(kind, array.dtype.name)}")
-    return array
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:

@@ -7,10 +7,11 @@ A finger is anything with these attributes (the hand file's `Finger` and its sym
     pulleys[i]    joint, radius
     tendons[i]    rest, over (senses and joints: "+flexion", "-pip"), arms (joint -> arm), span (None or from_[3], to[3],
                   joint), path (points: link, at[3]; bodies also radius, axis (None or [3]), side (None or [3]),
-                  and kind), runs (path from point to point: start, body or None, end,
-                  counted()), spring (None or stiffness, rest)
+                  carrier of the side (None or a link), inside, and kind), runs (path from point to point:
+                  start, body or None, end, counted()), spring (None or stiffness, rest)
     pulled, strings   the tendons without a spring, and those with one
-    couplings[i]  follower, leader, ratio (or None), offset (or None)
+    couplings[i]  follower, leader, ratio (or None), offset (or None), powers (none, or the coefficients of the second
+                  to the fourth)
     base          None or position[3], turn, quarters[3], rpy[3]
 
 A palm on joints in series has `joints` (also called `links`) with joint, turn, quarters[3], rpy[3], reference and
@@ -75,16 +76,16 @@ def radius(finger: Finger, joint: str) -> Any:
     return next(pulley.radius for pulley in finger.pulleys if pulley.joint == joint)
 
 
-def motion(finger: Finger, follower: str) -> tuple[Any, Any]:
-    """(ratio, offset) of a joint that follows another: its angle is ratio * angle of the leader + offset [rad].
+def motion(finger: Finger, follower: str) -> tuple[Any, ...]:
+    """Coefficients of the angle of a joint that follows another, by powers of its leader's: offset [rad], ratio, ...
 
     A coupling tendon on pulleys keeps its length: r_leader q_leader = r_follower q_follower.
     """
     coupling = next(coupling for coupling in finger.couplings if coupling.follower == follower)
     offset = 0 if coupling.offset is None else coupling.offset
     if coupling.ratio is not None:
-        return coupling.ratio, offset
-    return radius(finger, coupling.leader) / radius(finger, follower), offset
+        return offset, coupling.ratio, *coupling.powers
+    return offset, radius(finger, coupling.leader) / radius(finger, follower)
 
 
 def rolls(finger: Finger, joint: str) -> bool:

@@ -4,5 +4,5 @@
 #include "awiwi_version.h"
 #include "kernels.h"
 
-const char awiwi_model_digest[65] = "e36685c11a8bee9620f93e97f96255277ffdd237f2b005f8fc72568fbc0b1494";
+const char awiwi_model_digest[65] = "cf12d1c70fa564324ae0bb9593c1bfff3327ccef3897f22847f4926cea706439";
 const int awiwi_api_version = AWIWI_API_VERSION;

@@ -5,6 +5,7 @@ from __future__ import annotations
 from xml.etree import ElementTree
 
 import numpy as np
+from numpy.polynomial import Polynomial
 
 from awiwi_gen.interchange.model import LEAST_MASS, Body, Joint, Mimic, Model, Place, Site, Tendon
 
@@ -20,6 +21,16 @@ def rotation(quat: np.ndarray) -> np.ndarray:
     w, v = quat[0], quat[1:]
     skew = np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
     return np.eye(3) + 2 * w * skew + 2 * skew @ skew
+
+
+def beside(body: Place, site: Place | None) -> Place:
+    """A body with its side site, as MuJoCo understands it."""
+    if site is None:
+        return body
+    if site.body != body.body:
+        return body._replace(side=site.at, carrier=site.body)
+    inside = np.linalg.norm(site.at - body.at) < body.radius
+    return body._replace(inside=True) if inside else body._replace(side=site.at)
 
 
 def read_mjcf(text: str) -> Model:
@@ -68,17 +79,14 @@ def read_mjcf(text: str) -> Model:
                 path.append(places[step.get("site")]._replace(divisor=divisor))
                 divisor = None
             elif step.tag == "geom":
-                side = places[step.get("sidesite")].at if step.get("sidesite") else None
-                path.append(round_[step.get("geom")]._replace(side=side))
+                path.append(beside(round_[step.get("geom")], places.get(step.get("sidesite"))))
             elif step.tag == "pulley":
                 divisor = float(step.get("divisor"))
         tendons.append(Tendon(each.get("name"), arms, tuple(path), **spring))
     for each in root.findall("equality/joint"):
-        constant, ratio, *more = numbers(each.get("polycoef"))
-        if any(more):
-            continue  # the importer takes couplings in proportion only
         follower, leader = each.get("joint1"), each.get("joint2")
-        mimics.append(Mimic(follower, leader, ratio, references[follower] + constant - ratio * references[leader]))
+        curve = Polynomial(numbers(each.get("polycoef")))(Polynomial([-references[leader], 1.0]))
+        mimics.append(Mimic.of(follower, leader, curve + references[follower]))
     return Model(
         root.get("model"), "export.xml", tuple(bodies), tuple(joints), tuple(tendons), tuple(mimics), tuple(sites)
     )

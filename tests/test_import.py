@@ -147,7 +147,7 @@ def test_a_follower_turns_with_its_leader_as_published():
     model = finger(tendons=(arms,), mimics=(mimic,))
     hand, tables = imported(model)
     (written,) = tables.values()
-    assert next(iter(hand.fingers.values())).motion("tip") == (-0.5, 0.1)
+    assert next(iter(hand.fingers.values())).motion("tip") == (0.1, -0.5)
     for spread, bend in ((0.1, 0.3), (-0.4, 1.1)):
         q = np.array([spread, bend])
         angles = {"IF:Spread": spread, "IF:Bend": bend, "IF:Tip": mimic.ratio * bend + mimic.offset}

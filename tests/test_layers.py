@@ -26,7 +26,7 @@ COMPILER = [
     ["kernel", "cache", "sources"],
     ["ir"],
     ["emit"],
-    ["library", "compiler"],
+    ["library", "arrays", "compiler"],
     ["build"],
     ["verify"],
 ]

@@ -5,6 +5,7 @@ from typing import Any
 import sympy
 from sympy import Expr, Matrix
 
+from awiwi_gen.definitions.inside_wraps import converges
 from awiwi_gen.definitions.kinematics import frames, joint_angles
 from awiwi_gen.definitions.naming import Derivation
 from awiwi_gen.definitions.wraps import clearance, same_side, seen_from_body
@@ -24,14 +25,21 @@ def loops_close(finger: Any, q: Matrix, *_: Matrix) -> list[Expr]:
 
 
 def wraps_hold(finger: Any, q: Matrix, *_: Matrix) -> list[Expr]:
-    """For every body that a tendon wraps round, that points stay outside it, and the side that of the joints' middles."""
+    """For every body that a tendon wraps round, that points stay outside it, and the side that of the joints' middles.
+
+    For every body that a string bends inside of, that its ends are away from the surface, or the string is straight.
+    """
     derivation = Derivation()
     here, there = (frames(finger, each, derivation)[:-1] for each in (q, Matrix(middle(finger))))
     guards = []
     for _number, run in wraps(finger):
         wrap = seen_from_body(finger, run, here, derivation)
+        if run.body.inside:
+            guards.append(converges(wrap))
+            continue
         ends = {run.first: wrap.start, run.last: wrap.end}
         guards += [clearance(wrap, ends[index]) for index in loose_ends(run)]
+        guards += [clearance(wrap, wrap.side)] if run.body.carrier else []
         guards.append(same_side(wrap, seen_from_body(finger, run, there, derivation)))
     return guards
 

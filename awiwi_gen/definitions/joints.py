@@ -1,7 +1,8 @@
 """What acts in the joints themselves, by energies: rotors, springs, and Rayleigh's dissipation of damping and friction.
 
-Angles and velocities are those of all joints, so followers count with their ratio; a four-bar's joint is its crank. Dry
-friction is torque * 2/pi * atan(velocity of the joint / velocity), smooth at rest like that of motors (eq. 3.8).
+Angles and velocities are those of all joints, so followers count with what they move per motion of their leaders; a
+four-bar's joint is its crank. Dry friction is torque * 2/pi * atan(velocity of the joint / velocity), smooth at rest like
+that of motors (eq. 3.8).
 """
 
 from typing import Any
@@ -14,9 +15,9 @@ from awiwi_gen.definitions.naming import Derivation
 from awiwi_gen.structure import Finger
 
 
-def rotor_energy(finger: Finger, qd: Matrix) -> Expr:
+def rotor_energy(finger: Finger, q: Matrix, qd: Matrix) -> Expr:
     """Kinetic energy [J] of the rotors that joints see as their armature."""
-    rates = joint_rates(finger, qd)
+    rates = joint_rates(finger, q, qd)
     return sum((k.armature * rates[k.joint] ** 2 / 2 for k in finger.links if k.armature is not None), sympy.S.Zero)
 
 
@@ -27,9 +28,9 @@ def spring_energy(finger: Finger, q: Matrix) -> Expr:
     return sum((spring.stiffness * (angle - spring.reference) ** 2 / 2 for spring, angle in springs), sympy.S.Zero)
 
 
-def dissipation(finger: Finger, qd: Matrix) -> Expr:
+def dissipation(finger: Finger, q: Matrix, qd: Matrix) -> Expr:
     """Rayleigh's function [W], whose gradient by qd are the torques of damping and friction."""
-    rates, total = joint_rates(finger, qd), sympy.S.Zero
+    rates, total = joint_rates(finger, q, qd), sympy.S.Zero
     for link in finger.links:
         if link.damping is not None:
             total += link.damping * rates[link.joint] ** 2 / 2
@@ -40,7 +41,7 @@ def dissipation(finger: Finger, qd: Matrix) -> Expr:
 
 def passive_torque(finger: Finger, q: Matrix, qd: Matrix) -> Matrix:
     """Joint torques (n) [N m] that damping, friction and springs take up: on the side of M qdd."""
-    derive, springs, lost = Derivation(), spring_energy(finger, q), dissipation(finger, qd)
+    derive, springs, lost = Derivation(), spring_energy(finger, q), dissipation(finger, q, qd)
     pairs = zip(q, qd, strict=True)
     return Matrix([derive.partial(springs, angle) + derive.partial(lost, rate) for angle, rate in pairs])
 

@@ -42,15 +42,15 @@ def joint_angles(finger: Finger, q: Matrix) -> dict[str, Expr]:
     position = coordinates(finger)
     angles = {link.joint: q[position[link.joint]] for link in finger.links}
     for follower, leader in leaders(finger).items():
-        ratio, offset = motion(finger, follower)
-        angles[follower] = angles[leader] * ratio + offset
+        terms = enumerate(motion(finger, follower))
+        angles[follower] = sympy.Add(*(coefficient * angles[leader] ** power for power, coefficient in terms))
     return angles
 
 
-def joint_rates(finger: Finger, qd: Matrix) -> dict[str, Expr]:
-    """Velocity [rad/s] of every joint by name: angles are linear in q, so a follower's offset drops out."""
-    at_rest = joint_angles(finger, sympy.zeros(*qd.shape))
-    return {joint: angle - at_rest[joint] for joint, angle in joint_angles(finger, qd).items()}
+def joint_rates(finger: Finger, q: Matrix, qd: Matrix) -> dict[str, Expr]:
+    """Velocity [rad/s] of every joint by name."""
+    derivation, rates = Derivation(), dict(zip(q, qd, strict=True))
+    return {joint: derivation.along(angle, rates) for joint, angle in joint_angles(finger, q).items()}
 
 
 def link_poses(finger: Finger, q: Matrix) -> list[Matrix]:

@@ -24,6 +24,12 @@ class Named(sympy.Dummy):  # type: ignore[misc]
         return named
 
 
+class Held(Named):
+    """A named subexpression that counts as constant in derivatives."""
+
+    __slots__ = ()
+
+
 class Derivation:
     """The names and the derivatives of one derivation.
 
@@ -44,6 +50,13 @@ class Derivation:
             self._names[expr] = Named(f"{self._prefix}{len(self._names):05d}", expr)
         return self._names[expr]
 
+    def hold(self, expr: Expr) -> Expr:
+        """A symbol that stands for `expr` and counts as constant in derivatives."""
+        key = sympy.Function("held")(expr)
+        if key not in self._names:
+            self._names[key] = Held(f"{self._prefix}{len(self._names):05d}", expr)
+        return self._names[key]
+
     def name_all(self, matrix: sympy.Matrix) -> sympy.Matrix:
         """`name` applied to each entry of a matrix."""
         return matrix.applyfunc(self.name)
@@ -63,6 +76,8 @@ class Derivation:
         return known[expr]
 
     def _chain_rule(self, expr: Expr, known: dict[Expr, Expr]) -> Expr:
+        if isinstance(expr, Held):
+            return sympy.S.Zero
         if isinstance(expr, Named):
             return self.name(self._rate(expr.definition, known))
         rates = [self._rate(arg, known) for arg in expr.args]

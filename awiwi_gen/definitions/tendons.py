@@ -11,6 +11,7 @@ from typing import Any
 import sympy
 from sympy import Expr, Matrix
 
+from awiwi_gen.definitions.inside_wraps import bent_length
 from awiwi_gen.definitions.kinematics import frames, joint_angles, joint_frames
 from awiwi_gen.definitions.naming import Derivation
 from awiwi_gen.definitions.wraps import seen_from_body, wrapped_length
@@ -76,7 +77,8 @@ def _lengths(finger: Finger, tendons: Iterable[Tendon], q: Matrix, derivation: D
 
     def length_of(run: Any) -> Expr:
         if run.body is not None:
-            return wrapped_length(seen_from_body(finger, run, links, derivation), derivation)
+            length = bent_length if run.body.inside else wrapped_length
+            return length(seen_from_body(finger, run, links, derivation), derivation)
         one, other = link_number(finger, run.start.link), link_number(finger, run.end.link)
         start, end = Matrix(run.start.at), Matrix(run.end.at)
         line = end - start if one == other else links[other + 1].point(end) - links[one + 1].point(start)

@@ -23,13 +23,15 @@ from awiwi_gen.structure import Finger, link_number
 class Wrap:
     """A run of tendon in the frame of the body's link: `start` and `end` (3 x 1) [m] from its centre, across the axis.
 
-    `rise` [m] is the distance from the start to the end along the axis, zero for a sphere.
+    `rise` [m] is the distance from the start to the end along the axis, zero for a sphere; `side` (3 x 1) [m] leads from
+    the centre to the side point, if there is one.
     """
 
     body: Any
     start: Matrix
     end: Matrix
     rise: Expr
+    side: Matrix | None
 
     @property
     def directions(self) -> tuple[Matrix, Matrix]:
@@ -42,21 +44,22 @@ def seen_from_body(finger: Finger, run: Any, links: list[Frame], derivation: Der
     body = run.body
     home = links[link_number(finger, body.link) + 1]
 
-    def relative(point: Any) -> Matrix:
-        if point.link == body.link:
-            return Matrix(point.at) - Matrix(body.at)
-        place = links[link_number(finger, point.link) + 1].point(Matrix(point.at))
+    def relative(link: str, at: Any) -> Matrix:
+        if link == body.link:
+            return Matrix(at) - Matrix(body.at)
+        place = links[link_number(finger, link) + 1].point(Matrix(at))
         return home.axes.T * derivation.name_all(place - home.origin) - Matrix(body.at)
 
-    start, end = (derivation.name_all(relative(point)) for point in (run.start, run.end))
+    start, end = (derivation.name_all(relative(point.link, point.at)) for point in (run.start, run.end))
+    side = None if body.side is None else derivation.name_all(relative(body.carrier or body.link, body.side))
     if body.axis is None:
-        return Wrap(body, start, end, sympy.S.Zero)
+        return Wrap(body, start, end, sympy.S.Zero, side)
     axis = _unit(body.axis)
     heights = [derivation.name(axis.dot(point)) for point in (start, end)]
     start, end = (
         derivation.name_all(point - axis * height) for point, height in zip((start, end), heights, strict=True)
     )
-    return Wrap(body, start, end, derivation.name(heights[1] - heights[0]))
+    return Wrap(body, start, end, derivation.name(heights[1] - heights[0]), side)
 
 
 def wrapped_length(wrap: Wrap, derivation: Derivation) -> Expr:
@@ -80,7 +83,7 @@ def clearance(wrap: Wrap, point: Matrix) -> Expr:
 def passing(wrap: Wrap) -> Expr:
     """On which side the run passes the body: positive where the side point is, or with the same turn about the axis."""
     first, last = wrap.directions
-    side = (Matrix(wrap.body.side) - Matrix(wrap.body.at)) / wrap.body.radius
+    side = wrap.side / wrap.body.radius
     if wrap.body.axis is None:
         return side.dot(first + last)
     return _unit(wrap.body.axis).dot(side.cross(last - first))

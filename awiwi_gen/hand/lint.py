@@ -131,6 +131,9 @@ def _names(finger: Finger) -> Iterator[Complaint]:
         for index, point in enumerate(tendon.path):
             keys = ("tendons", number, "path", index, "link")
             yield from _known(keys, point.link, point.link, [*joints, PALM], "link")
+            if point.side_link is not None:
+                side_keys = (*keys[:-1], "side_link")
+                yield from _known(side_keys, point.side_link, point.side_link, [*joints, PALM], "link")
             if point.link == PALM in joints:
                 yield keys, f'= "{PALM}" is the base frame, and a joint of this finger; rename the joint'
         yield from below(("tendons", number), misplaced(tendon))
@@ -152,7 +155,9 @@ def _couplings(finger: Finger, joints: list[str], pulleys: list[str]) -> Iterato
             yield from _known(keys, joint, joint, joints, "joint")
             if joint in joints and coupling.ratio is None:
                 yield from _known(keys, joint, joint, pulleys, "pulley")
-        if coupling.ratio is not None and coupling.ratio.value == 0:
+        if coupling.powers and coupling.ratio is None:
+            yield ("couplings", index), 'has powers without a ratio; expected one, such as "1", or "0"'
+        if coupling.ratio is not None and coupling.ratio.value == 0 and not coupling.powers:
             yield ("couplings", index, "ratio"), f'= "{coupling.ratio}" holds the follower; expected another number'
         if coupling.follower in followers[:index]:
             yield ("couplings", index, "follower"), f'= "{coupling.follower}" follows another joint already'

@@ -26,7 +26,7 @@ def without_inertia(finger: Finger) -> tuple[str, list[float]] | None:
 
     chain = Chain(finger)
     for q in chain.poses():
-        moved = np.vstack([_velocities(chain, q), _rotors(finger)])
+        moved = np.vstack([_velocities(chain, q), _rotors(chain, q)])
         lengths = np.linalg.norm(moved, axis=0)
         if not lengths.all():
             return finger.joints[int(np.argmin(lengths))], q
@@ -66,13 +66,12 @@ def _places(chain: Chain, q: Sequence[float]) -> Any:
     return np.array(found)
 
 
-def _rotors(finger: Finger) -> Any:
+def _rotors(chain: Chain, q: Sequence[float]) -> Any:
     """The same for the rotors of the joints' armature."""
     import numpy as np
 
-    rows = np.zeros((len(finger.links), len(finger.joints)))
-    for row, link in enumerate(finger.links):
-        leader = finger.leaders.get(link.joint, link.joint)
-        ratio, _ = finger.motion(link.joint)
-        rows[row, finger.joints.index(leader)] = ratio * math.sqrt(float(link.armature or 0))
+    rows = np.zeros((len(chain.finger.links), len(q)))
+    for row, link in enumerate(chain.finger.links):
+        column, slope = chain.slope(link.joint, q)
+        rows[row, column] = slope * math.sqrt(float(link.armature or 0))
     return rows

@@ -26,6 +26,7 @@ __all__ = [
 # fmt: on
 
 MOST = 32  # fingers of a hand; links, pulleys, tendons and couplings of a finger
+_POWERS = ("square", "cube", "fourth")
 PALM = "palm"  # in place of a joint: the finger's base frame
 
 
@@ -54,7 +55,9 @@ class PathPoint(Part):
 
     Without a radius it is a point. With one it is a body that the tendon wraps round where a straight line would cut it:
     a sphere about `at`, or, with a direction `axis`, an endless cylinder whose axis runs through `at`. The tendon passes
-    the body on the side of the point `side`, or by the shorter way.
+    the body on the side of the point `side`, or by the shorter way. The side point moves with the body's link, or with
+    `side_link`. With `inside` it runs through the inside of the body
+    instead, as through a ring: where a straight line would miss the body, it bends at one point of the surface.
 
     A point with a `divisor` begins a new branch of the tendon, behind a pulley: nothing leads there from the point before,
     and the lines from there on count divided by it.
@@ -65,6 +68,8 @@ class PathPoint(Part):
     radius: Size | None = None
     axis: Direction | None = None
     side: Point | None = None
+    side_link: JointName | None = None
+    inside: bool = False
     divisor: Annotated[Quantity, Measure("2", "0.01", "100")] | None = None
 
     @property
@@ -74,11 +79,16 @@ class PathPoint(Part):
             return "point"
         return "sphere" if self.axis is None else "cylinder"
 
+    @property
+    def carrier(self) -> str | None:
+        """The link that carries the side point, if it is not that of the body."""
+        return None if self.side_link == self.link else self.side_link
+
     def structure(self) -> str | list[Any]:
         """Everything but the numbers."""
         if self.kind == "point":
             return self.link if self.divisor is None else [self.link, "branch"]
-        return [self.link, self.kind, self.side is not None]
+        return [self.link, self.kind, "inside" if self.inside else self.carrier or self.side is not None]
 
 
 @dataclass(frozen=True)
@@ -165,7 +175,7 @@ class Tendon(Part):
 
 
 class Coupling(Part):
-    """A joint that follows another: q_follower = ratio q_leader + offset.
+    """A joint that follows another: q_follower = offset + ratio q + square q^2 + cube q^3 + fourth q^4, by its leader's q.
 
     Without a ratio, a passive tendon rolls on two pulleys: the ratio is r_leader / r_follower.
     """
@@ -174,10 +184,20 @@ class Coupling(Part):
     leader: JointName
     ratio: Annotated[Quantity, Measure("0.8", "-100", "100")] | None = None
     offset: Angle | None = None
+    square: Annotated[Quantity, Measure("0.1 1/rad", "-100 1/rad", "100 1/rad")] | None = None
+    cube: Annotated[Quantity, Measure("0.1 1/rad^2", "-100 1/rad^2", "100 1/rad^2")] | None = None
+    fourth: Annotated[Quantity, Measure("0.1 1/rad^3", "-100 1/rad^3", "100 1/rad^3")] | None = None
+
+    @property
+    def powers(self) -> tuple[Any, ...]:
+        """The coefficients of the second, third and fourth power, zero for those that are missing; none without any."""
+        found = [getattr(self, key) for key in _POWERS]
+        return tuple(0 if each is None else each for each in found) if any(each is not None for each in found) else ()
 
     def structure(self) -> list[str]:
         """Everything but the numbers."""
-        return [self.follower, self.leader, *(key for key in ("ratio", "offset") if getattr(self, key) is not None)]
+        keys = ("ratio", "offset", *_POWERS)
+        return [self.follower, self.leader, *(key for key in keys if getattr(self, key) is not None)]
 
 
 class Finger(Part):
@@ -199,15 +219,20 @@ class Finger(Part):
         """The n independent joints, base to tip: those that follow no other joint. Their angles are the finger's q."""
         return tuple(link.joint for link in self.links if link.joint not in self.leaders)
 
-    def motion(self, joint: str) -> tuple[float, float]:
-        """(ratio, offset [rad]) of a joint: its angle is ratio times its leader's, or its own, + offset."""
+    def motion(self, joint: str) -> tuple[float, ...]:
+        """Coefficients of a joint's angle by powers of its leader's, or of its own: offset [rad], ratio, and others."""
         for coupling in self.couplings:
             if coupling.follower == joint:
-                offset = float(coupling.offset or 0)
+                offset, powers = float(coupling.offset or 0), map(float, coupling.powers)
                 if coupling.ratio is not None:
-                    return float(coupling.ratio), offset
-                return float(self.radii[coupling.leader]) / float(self.radii[joint]), offset
-        return 1.0, 0.0
+                    return offset, float(coupling.ratio), *powers
+                return offset, float(self.radii[coupling.leader]) / float(self.radii[joint])
+        return 0.0, 1.0
+
+    @property
+    def curved(self) -> bool:
+        """Whether a joint follows another by more than a ratio and an offset."""
+        return any(coupling.powers for coupling in self.couplings)
 
     @property
     def has_armature(self) -> bool:

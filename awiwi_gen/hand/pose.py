@@ -14,7 +14,7 @@ from typing import NamedTuple
 from awiwi_gen.hand.parts import MOST, PALM, Finger, FourBar, Link, Tendon
 from awiwi_gen.hand.wraps import Body, Vector
 
-__all__ = ["Chain", "Line", "Spot", "point"]
+__all__ = ["Chain", "Line", "Spot", "point", "polynomial"]
 
 Axes = tuple[Vector, Vector, Vector]  # unit vectors of a frame, in base axes
 Frame = tuple[Axes, Vector]  # with its origin
@@ -42,6 +42,7 @@ class Line(NamedTuple):
     end: Spot
     body: Body | None
     divisor: float = 1.0
+    side: Spot | None = None  # the body's side point, where another link carries it
 
 
 class Chain:
@@ -54,10 +55,10 @@ class Chain:
         self.low = [float(link.low or 0) for link in free]
         self.high = [float(link.high or 0) for link in free]
         radii = {joint: float(radius) for joint, radius in finger.radii.items()}
-        self._angles = []  # of every link: column in q, its angle per angle in that column, and its angle at zero
+        self._angles = []  # of every link: column in q, and coefficients of its angle by powers of that in the column
         for link in finger.links:
             leader = finger.leaders.get(link.joint, link.joint)
-            self._angles.append((self.joints.index(leader), *finger.motion(link.joint)))
+            self._angles.append((self.joints.index(leader), finger.motion(link.joint)))
         self._links = [
             (_elementary(link), _floats(link.offset), float(link.reference or 0), float(link.start), link.four_bar)
             for link in finger.links
@@ -74,8 +75,9 @@ class Chain:
         return [[a + (b - a) * x for a, b, x in zip(self.low, self.high, each, strict=True)] for each in shares]
 
     def couplings(self) -> Iterator[list[list[float]]]:
-        """The coupling in all `poses`; once if no line is straight, for pulleys have the same arms everywhere."""
-        yield from map(self.coupling, self.poses() if any(self.lines) else self.poses()[:1])
+        """The coupling in all `poses`; once if it is the same everywhere, as that of pulleys on proportional joints."""
+        changes = any(self.lines) or self.finger.curved
+        yield from map(self.coupling, self.poses() if changes else self.poses()[:1])
 
     def coupling(self, q: Sequence[float]) -> list[list[float]]:
         """dh/dq [m/rad], a row for each tendon of the file: senses times radii, arms, and central differences of lines."""
@@ -83,8 +85,8 @@ class Chain:
         for tendon, lines in zip(self.finger.tendons, self.lines, strict=True):
             row = [0.0] * len(self.joints)
             for joint, arm in self._arms(tendon):
-                column, factor, _ = self._angles[self._order[joint]]
-                row[column] += arm * factor
+                column, slope = self.slope(joint, q)
+                row[column] += arm * slope
             if lines:
                 for column in range(len(row)):
                     ends = [list(q), list(q)]
@@ -123,9 +125,14 @@ class Chain:
         tendon = self.finger.tendons[number]
         length = float(tendon.rest) + sum(self.distance(q, line) / line.divisor for line in self.lines[number])
         for joint, arm in self._arms(tendon):
-            column, factor, offset = self._angles[self._order[joint]]
-            length += arm * (factor * q[column] + offset)
+            column, coefficients = self._angles[self._order[joint]]
+            length += arm * polynomial(coefficients, q[column])
         return length
+
+    def slope(self, joint: str, q: Sequence[float]) -> tuple[int, float]:
+        """The column in q that moves a joint, and its angle per angle in that column."""
+        column, coefficients = self._angles[self._order[joint]]
+        return column, polynomial([k * each for k, each in enumerate(coefficients)][1:], q[column])
 
     def _arms(self, tendon: Tendon) -> list[tuple[str, float]]:
         """Joints and the length per angle [m/rad] that a tendon has there: signed radii of pulleys, and its own arms."""
@@ -134,14 +141,21 @@ class Chain:
 
     def distance(self, q: Sequence[float], line: Line) -> float:
         """Length of a line [m]."""
-        start, end = (self.place(q, spot) for spot in (line.start, line.end))
-        return math.dist(start, end) if line.body is None else line.body.length(*self.seen_by(line.body, q, line))
+        if line.body is None:
+            return math.dist(self.place(q, line.start), self.place(q, line.end))
+        return self.posed(line.body, q, line).length(*self.seen_by(line.body, q, line))
 
     def seen_by(self, body: Body, q: Sequence[float], line: Line) -> tuple[Vector, Vector]:
         """Both ends of a line [m], in the frame of a body."""
         axes, origin = self._frame(q, body.link, True)
         first, last = (self.place(q, spot) for spot in (line.start, line.end))
         return seen(axes, origin, first), seen(axes, origin, last)
+
+    def posed(self, body: Body, q: Sequence[float], line: Line) -> Body:
+        """The body of a line, with its side point where that is in a pose."""
+        if line.side is None:
+            return body
+        return body._replace(side=seen(*self._frame(q, body.link, True), self.place(q, line.side)))
 
     def place(self, q: Sequence[float], spot: Spot) -> Vector:
         """A point of the chain in base axes [m]."""
@@ -156,11 +170,20 @@ class Chain:
             lines.append(Line(Spot(-1, True, _floats(span.from_)), end, None))
         for run in tendon.runs:
             first, last = (Spot(number[each.link], True, _floats(each.at)) for each in (run.start, run.end))
-            body = None
+            body = moving = None
             if run.body is not None:
                 axis, side = (None if each is None else _floats(each) for each in (run.body.axis, run.body.side))
-                body = Body(number[run.body.link], _floats(run.body.at), float(run.body.radius or 0), axis, side)
-            lines.append(Line(first, last, body, float(run.divisor or 1)))
+                body = Body(
+                    number[run.body.link],
+                    _floats(run.body.at),
+                    float(run.body.radius or 0),
+                    axis,
+                    side,
+                    run.body.inside,
+                )
+                if run.body.carrier and side is not None:
+                    moving = Spot(number[run.body.carrier], True, side)
+            lines.append(Line(first, last, body, float(run.divisor or 1), moving))
         return lines
 
     def _frame(self, q: Sequence[float], joint: int, rotated: bool) -> Frame:
@@ -174,13 +197,11 @@ class Chain:
         axes: Axes = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
         origin: Vector = (0.0, 0.0, 0.0)
         offset: Vector = (0.0, 0.0, 0.0)
-        for (turns, following, drawn, start, bar), (column, factor, rest) in zip(
-            self._links, self._angles, strict=True
-        ):
+        for (turns, following, drawn, start, bar), (column, followed) in zip(self._links, self._angles, strict=True):
             origin = point(axes, origin, offset)
             for axis, angle in turns:
                 axes = _rotated(axes, angle, axis)
-            seat, angle = (axes, origin), q[column] * factor + rest
+            seat, angle = (axes, origin), polynomial(followed, q[column])
             if bar:
                 reference = float(bar.reference)
                 origin = point(_rotated(axes, angle + reference), origin, (float(bar.crank), 0.0, 0.0))
@@ -194,6 +215,14 @@ def _elementary(link: Link) -> list[tuple[int, float]]:
     turn = [] if link.turn == "none" else [("xyz".index(link.turn[0]), math.radians(float(link.turn[1:])))]
     roll, pitch, yaw = link.rpy or (0, 0, 0)
     return [*turn, *((axis, float(angle)) for axis, angle in ((2, yaw), (1, pitch), (0, roll)) if angle)]
+
+
+def polynomial(coefficients: Sequence[float], x: float) -> float:
+    """The sum of coefficients times powers of x, from the zeroth on."""
+    total = 0.0
+    for coefficient in reversed(coefficients):
+        total = total * x + coefficient
+    return total
 
 
 def _floats(point: Sequence[object]) -> Vector:

@@ -7,12 +7,21 @@ from collections.abc import Sequence
 from fractions import Fraction
 from typing import NamedTuple
 
-__all__ = ["LEAST_ARC", "Body", "Vector"]
+__all__ = ["INSIDE_CLEARANCE", "LEAST_ARC", "Body", "Vector"]
 
 LEAST_ARC = Fraction(-1, 1000000)
 """Arc [rad] down to which kernels compute a string as touching its body; see `definitions/wraps.py`."""
 
+INSIDE_CLEARANCE = Fraction(1, 64)
+"""Least (distance / radius)^2 - 1 of both ends where a string bends inside a body, a power of two.
+
+Down to there the fixed number of iterations converges; see `definitions/inside_wraps.py`.
+"""
+
 Vector = tuple[float, float, float]
+
+
+_SECTIONS = 60  # of a search: down to rounding
 
 
 class Turn(NamedTuple):
@@ -36,6 +45,7 @@ class Body(NamedTuple):
     radius: float
     axis: Vector | None
     side: Vector | None
+    inside: bool = False
 
     def across(self, place: Vector) -> tuple[list[float], float]:
         """A point of the frame from the centre, across the axis, and its height along the axis [m]."""
@@ -62,12 +72,51 @@ class Body(NamedTuple):
         passing = _dot(side, [a + b for a, b in zip(one, other, strict=True)])
         return Turn(passing, 0.0, [math.copysign(1, passing) * each for each in _cross(one, other)])
 
+    def clearance(self, start: Vector, end: Vector) -> float:
+        """(distance / radius)^2 - 1 of the nearer one of two points."""
+        return (min(self.distance(start), self.distance(end)) / self.radius) ** 2 - 1
+
+    def bends(self, start: Vector, end: Vector) -> bool:
+        """Whether a string through the inside of the body bends there: both ends are outside, and a straight line misses."""
+        if self.clearance(start, end) <= 0:
+            return False
+        seen = sum(math.acos(self.radius / self.distance(each)) for each in (start, end))
+        return self._angle(start, end) < seen
+
+    def _angle(self, start: Vector, end: Vector) -> float:
+        """The smaller angle [rad] between two points, seen from the body."""
+        first, last = self.across(start)[0], self.across(end)[0]
+        return math.atan2(math.hypot(*_cross(first, last)), _dot(first, last))
+
+    def _bent(self, start: Vector, end: Vector) -> float:
+        """Length [m], across the axis, of a string that bends inside the body: as short as the surface permits.
+
+        On the side that both ends see, the length is a convex function of the point's angle.
+        """
+        angle, radius = self._angle(start, end), self.radius
+        first, last = self.distance(start), self.distance(end)
+
+        def length(turned: float) -> float:
+            squares = (
+                first**2 - 2 * first * radius * math.cos(turned),
+                last**2 - 2 * last * radius * math.cos(angle - turned),
+            )
+            return sum(math.sqrt(square + radius**2) for square in squares)
+
+        low, high = max(0.0, angle - math.acos(radius / last)), min(angle, math.acos(radius / first))
+        for _ in range(_SECTIONS):
+            third = (high - low) / 3
+            low, high = (low, high - third) if length(low + third) < length(high - third) else (low + third, high)
+        return length((low + high) / 2)
+
     def length(self, start: Vector, end: Vector) -> float:
-        """Length [m] of the line round the body between two points of the frame; straight where one is inside."""
+        """Length [m] of the line past the body between two points of the frame; straight where one is inside."""
         (first, low), (last, high) = self.across(start), self.across(end)
         distances = math.hypot(*first), math.hypot(*last)
         straight = math.dist(first, last)
-        if min(distances) <= self.radius:
+        if self.inside and self.bends(start, end):
+            return math.hypot(self._bent(start, end), high - low)
+        if self.inside or min(distances) <= self.radius:
             return math.hypot(straight, high - low)
         one, other = ([x / distance for x in each] for each, distance in zip((first, last), distances, strict=True))
         middle = [a + b for a, b in zip(one, other, strict=True)]

@@ -40,14 +40,15 @@ class DraftLink:
 class DraftTendon:
     """A tendon of the hand file; each place of a path is in the frame of the link of that joint, or of the "palm".
 
-    Length per angle of a joint [m] is `arms`; of joints with a pulley, the sense is in `over` ("+flexion").
+    Length per angle of a joint [m] is `arms`; of joints with a pulley, the sense is in `over` ("+flexion"). The third entry
+    of a place is the link of a side point that another link carries, else None.
     """
 
     name: str
     rest: float
     over: tuple[str, ...]
     arms: dict[str, float]
-    path: tuple[tuple[str, Place], ...]
+    path: tuple[tuple[str, Place, str | None], ...]
     stiffness: float
     slack: float
 
@@ -267,7 +268,8 @@ def _routed(model: Model, chains: list[Chain], owner: Mapping[str, str]) -> tupl
     routed: dict[str, list[Tendon]] = {chain.name: [] for chain in chains}
     elsewhere, held = [], []
     for tendon in model.tendons:
-        ends = [owner.get(joint) for joint in tendon.arms] + [bodies.get(place.body) for place in tendon.path]
+        passed = [body for place in tendon.path for body in (place.body, place.carrier) if body is not None]
+        ends = [owner.get(joint) for joint in tendon.arms] + [bodies.get(body) for body in passed]
         fingers = sorted({name for name in ends if name})
         if len(fingers) > 1:
             message = f"runs over the fingers {' and '.join(fingers)}; a tendon of the hand file is of one finger"
@@ -277,7 +279,7 @@ def _routed(model: Model, chains: list[Chain], owner: Mapping[str, str]) -> tupl
             elsewhere.append(tendon.name)
             continue
         routed[fingers[0]].append(tendon)
-        far = [each.body for each in tendon.path if each.body not in bodies and moving & set(model.above(each.body))]
+        far = [body for body in passed if body not in bodies and moving & set(model.above(body))]
         if any(joint not in owner for joint in tendon.arms) or (far and moving & set(model.above(far[0]))):
             held.append(tendon.name)
     losses = [
@@ -298,12 +300,22 @@ def _tendon(
             arms[names[joint]] = arm
         else:
             rest += arm * reference[joint]
+
+    def frame_of(body: int) -> tuple[str, Array, Array]:
+        """The link that a body is in, and that link's frame in the body's."""
+        axes, position = model.poses[body]
+        link = places.get(body)
+        own_axes, origin = (link.frame.axes, link.frame.origin) if link else base
+        return link.joint if link else PALM, axes.T @ own_axes, axes.T @ (origin - position)
+
     path = []
     for place in tendon.path:
-        axes, position = model.poses[place.body]
-        link = places.get(place.body)
-        own_axes, origin = (link.frame.axes, link.frame.origin) if link else base
-        path.append((link.joint if link else PALM, place.seen(axes.T @ own_axes, axes.T @ (origin - position))))
+        link, turn, origin = frame_of(place.body)
+        seen, side_link = place.seen(turn, origin), None
+        if place.carrier is not None and place.side is not None:
+            side_link, turn, origin = frame_of(place.carrier)
+            seen = seen._replace(side=turn.T @ (place.side - origin))
+        path.append((link, seen, side_link))
     return DraftTendon(tendon.name, rest, (), arms, tuple(path), tendon.stiffness, tendon.rest)
 
 

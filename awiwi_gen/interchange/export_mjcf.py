@@ -9,6 +9,7 @@ from __future__ import annotations
 from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
+from numpy.polynomial import Polynomial
 
 from awiwi_gen.hand import Finger, Hand, Link
 from awiwi_gen.hand.parts import PALM, PathPoint, Tendon
@@ -110,7 +111,8 @@ class _Writer:
     # -- bodies ------------------------------------------------------------------------------------------------------
 
     def _links(self, parent: Element) -> None:
-        held = {point.link for tendon in self.finger.tendons for point in tendon.path}
+        points = [point for tendon in self.finger.tendons for point in tendon.path]
+        held = {link for point in points for link in (point.link, point.side_link)}
         held |= {joint for tendon in self.finger.tendons if tendon.span for joint in [self._before(tendon.span.joint)]}
         waiting: list[Part] = []
         for part in self.parts:
@@ -148,10 +150,10 @@ class _Writer:
 
     def _coupling(self, follower: str, leader: str) -> None:
         references = {part.link.joint: part.reference for part in self.parts}
-        slope, offset = self.finger.motion(follower)
-        constant = slope * references[leader] + offset - references[follower]
+        # MuJoCo counts both angles from where the model is drawn.
+        curve = Polynomial(self.finger.motion(follower))(Polynomial([references[leader], 1.0])) - references[follower]
         SubElement(self.sections["equality"], "joint", joint1=f"{self.name}_{follower}", joint2=f"{self.name}_{leader}",
-                   polycoef=text((constant, slope, 0, 0, 0)))  # fmt: skip
+                   polycoef=text([*curve.coef, 0.0, 0.0, 0.0][:5]))  # fmt: skip
         self._lose("couplings of joints: soft constraints in MuJoCo", f"{self.name} {follower}")
 
     def _coupler(self, link: Link) -> None:
@@ -214,8 +216,10 @@ class _Writer:
             geom.set("zaxis", text(vector(body.axis)))
         geom.set("size", text(size))
         step = SubElement(tendon, "geom", geom=name)
-        if body.side is not None:
-            SubElement(self.bodies[body.link], "site", name=f"{name}.side", pos=text(vector(body.side)))
+        if body.side is not None or body.inside:
+            side = body.at if body.side is None else body.side
+            carrier = self.bodies[body.side_link or body.link]
+            SubElement(carrier, "site", name=f"{name}.side", pos=text(vector(side)))
             step.set("sidesite", f"{name}.side")
 
     def _lines(self, tendon: Tendon) -> list[list[tuple[str, Array, PathPoint | None]]]:

@@ -41,10 +41,18 @@ def text_and_losses(hand: Hand) -> tuple[str, list[Loss]]:
         Loss("the wrist, a closed loop of bars: the palm is the root", ("wrist",) if hand.wrist else ()),
         Loss("motors, springs and fibres of tendons", tuple(key for key in _DRIVES if getattr(hand, key) is not None)),
         Loss("tendons", tuple(tendons)),
+        Loss("couplings by a curve: its offset and ratio only", tuple(_curved(hand))),
         Loss("armature", tuple(f"{name} {link.joint}" for name, link in links if value(link.armature))),
         Loss("springs of joints", tuple(f"{name} {link.joint}" for name, link in links if link.spring is not None)),
     ]
     return document(root, hand), [loss for loss in losses if loss.places]
+
+
+def _curved(hand: Hand) -> list[str]:
+    """The joints that follow others by more than URDF's ratio and offset."""
+    return [
+        f"{name} {each.follower}" for name, finger in hand.fingers.items() for each in finger.couplings if each.powers
+    ]
 
 
 def _palm(root: Element, hand: Hand) -> None:
@@ -126,7 +134,7 @@ def _joint(root: Element, hand: Hand, name: str, finger: Finger, part: Part, par
         SubElement(joint, "dynamics", damping=text(value(link.damping)), friction=text(friction))
     if link.joint in finger.leaders:
         leader = f"{name}_{finger.leaders[link.joint]}"
-        ratio, offset = finger.motion(link.joint)
+        offset, ratio, *_ = finger.motion(link.joint)
         SubElement(joint, "mimic", joint=leader, multiplier=text(ratio), offset=text(offset))
 
 
@@ -141,7 +149,7 @@ def _coupler(root: Element, hand: Hand, name: str, link: Link, part: Part, paren
 
 def _range(finger: Finger, joint: str) -> tuple[float, float]:
     """Limits of a joint [rad]; those of a follower are where its leader's limits take it."""
-    ratio, offset = finger.motion(joint)
+    offset, ratio, *_ = finger.motion(joint)
     leader = finger.leaders.get(joint, joint)
     link = next(link for link in finger.links if link.joint == leader)
     low, high = sorted(ratio * value(end) + offset for end in (link.low, link.high))

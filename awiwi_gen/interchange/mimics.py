@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from awiwi_gen.interchange.model import Loss, Mimic
 
+MOST_POWERS = 3  # from the second power to the fourth
+
 
 @dataclass(frozen=True)
-class Followed:
-    """A follower by its published name and both names in the hand file: its angle is ratio * leader + offset [rad]."""
+class Followed(Mimic):
+    """How a joint follows another one, by their names in the hand file, and the published name of the follower."""
 
-    published: str
-    follower: str
-    leader: str
-    ratio: float
-    offset: float
+    published: str = ""
 
 
 def followed(
@@ -27,19 +25,25 @@ def followed(
     lost = []
     for mimic in mimics:
         together = mimic.follower in owner and owner[mimic.follower] == owner.get(mimic.leader)
-        if not together or not mimic.ratio or mimic.follower in direct or _loops(mimic, direct):
+        if not together or not mimic.curve.deriv().coef.any() or mimic.follower in direct or _loops(mimic, direct):
             lost.append(f"{mimic.follower} to {mimic.leader}")
         else:
             direct[mimic.follower] = mimic
-    found = []
+    found, steep = [], []
     for name, mimic in direct.items():
-        ratio, offset, leader = mimic.ratio, mimic.offset, mimic.leader
+        curve, leader = mimic.curve, mimic.leader
         while leader in direct:
-            further = direct[leader]
-            ratio, offset, leader = ratio * further.ratio, offset + ratio * further.offset, further.leader
-        found.append(Followed(name, names[name], names[leader], ratio, offset))
-    what = "couplings of joints that are in two fingers, in none, or in a loop"
-    return found, [Loss(what, tuple(lost))] if lost else []
+            curve, leader = curve(direct[leader].curve), direct[leader].leader
+        follows = Followed.of(names[name], names[leader], curve)
+        if len(follows.powers) > MOST_POWERS:
+            steep.append(f"{name} to {leader}")
+        else:
+            found.append(replace(follows, published=name))
+    losses = [
+        Loss("couplings of joints that are in two fingers, in none, or in a loop", tuple(lost)),
+        Loss("couplings of joints over others by more than the fourth power", tuple(steep)),
+    ]
+    return found, [loss for loss in losses if loss.places]
 
 
 def _loops(mimic: Mimic, direct: Mapping[str, Mimic]) -> bool:

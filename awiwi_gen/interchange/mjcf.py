@@ -13,6 +13,7 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from numpy.polynomial import Polynomial
 
 from awiwi_gen.errors import Fault, InputError
 from awiwi_gen.interchange.model import LEAST_MASS, Array, Body, Joint, Loss, Mimic, Model, Site, Tendon
@@ -231,9 +232,8 @@ def _is_geom(wrap: Any) -> bool:
 
 
 def is_lock(equality: Any) -> bool:
-    """Whether an equality makes one joint follow another in proportion."""
-    linear = not any(equality.data[2:5])
-    return bool(equality.type == mujoco.mjtEq.mjEQ_JOINT and equality.name2 and equality.active and linear)
+    """Whether an equality makes one joint follow another."""
+    return bool(equality.type == mujoco.mjtEq.mjEQ_JOINT and equality.name2 and equality.active)
 
 
 def _loss(what: str, elements: Iterable[Any], counts: Any = lambda each: True) -> Loss:
@@ -310,11 +310,9 @@ def _mimics(compiled: Any) -> tuple[Mimic, ...]:
     for index in range(compiled.neq):
         follower, leader = int(compiled.eq_obj1id[index]), int(compiled.eq_obj2id[index])
         zeros = [float(compiled.qpos0[compiled.jnt_qposadr[joint]]) for joint in (follower, leader)]
-        constant, ratio = map(float, compiled.eq_data[index, :2])
-        # MuJoCo: follower - its zero = constant + ratio * (leader - its zero).
-        offset = zeros[0] + constant - ratio * zeros[1]
-        names = [compiled.joint(joint).name for joint in (follower, leader)]
-        found.append(Mimic(names[0], names[1], ratio, offset))
+        # MuJoCo: the follower, from its zero, is a polynomial of the leader, from its own.
+        curve = Polynomial(compiled.eq_data[index, :5])(Polynomial([-zeros[1], 1.0])) + zeros[0]
+        found.append(Mimic.of(compiled.joint(follower).name, compiled.joint(leader).name, curve))
     return tuple(found)
 
 

@@ -9,9 +9,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
+from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
 __all__ = ["LEAST_MASS", "Array", "Body", "Joint", "Loss", "Mimic", "Model", "Place", "Site", "Tendon"]
@@ -64,7 +65,8 @@ class Place(NamedTuple):
     """What a tendon passes, in the frame of a body: a point `at` (3), or with a radius a sphere or cylinder to wrap round.
 
     A cylinder has a unit vector `axis` (3). The tendon passes on the side of the point `side` (3), or by the shorter way.
-    A point with a `divisor` begins a branch behind a pulley.
+    The side is in the frame of the body `carrier`, if that is another one.
+    With `inside` it runs through the inside. A point with a `divisor` begins a branch behind a pulley.
     """
 
     body: int
@@ -72,11 +74,15 @@ class Place(NamedTuple):
     radius: float | None = None
     axis: Array | None = None
     side: Array | None = None
+    carrier: int | None = None
+    inside: bool = False
     divisor: float | None = None
 
     def seen(self, turn: Array, origin: Array) -> Place:
         """The same in another frame: its axes (3 x 3) are the columns of `turn`, its `origin` (3) is in this frame."""
-        side = None if self.side is None else turn.T @ (self.side - origin)
+        side = self.side
+        if side is not None and self.carrier is None:
+            side = turn.T @ (side - origin)
         axis = None if self.axis is None else turn.T @ self.axis
         return self._replace(at=turn.T @ (self.at - origin), axis=axis, side=side)
 
@@ -99,12 +105,26 @@ class Tendon:
 
 @dataclass(frozen=True)
 class Mimic:
-    """A joint that follows another one: follower angle = ratio * leader angle + offset."""
+    """A joint that follows another one: its angle is offset + ratio * leader angle + `powers` of it, from the square on."""
 
     follower: str
     leader: str
     ratio: float
     offset: float = 0.0
+    powers: tuple[float, ...] = ()
+
+    @property
+    def curve(self) -> Polynomial:
+        """The follower's angle [rad] over its leader's."""
+        return Polynomial([self.offset, self.ratio, *self.powers])
+
+    @classmethod
+    def of(cls, follower: str, leader: str, curve: Polynomial) -> Self:
+        """A joint that follows another one by a curve."""
+        offset, ratio, *powers = map(float, [*curve.coef, 0.0][: max(2, len(curve.coef))])
+        while powers and not powers[-1]:
+            powers.pop()
+        return cls(follower, leader, ratio, offset, tuple(powers))
 
 
 @dataclass(frozen=True, eq=False)

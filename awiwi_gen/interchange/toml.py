@@ -25,6 +25,7 @@ _LIMITS = {
     "gravity": "9.81 m/s^2",
 }
 _FRICTION_VELOCITY = "0.05 rad/s"
+_POWERS = {"square": "1/rad", "cube": "1/rad^2", "fourth": "1/rad^3"}
 _RULE = "# " + "-" * 100
 
 
@@ -90,9 +91,11 @@ def _finger_lines(finger: DraftFinger, file: str) -> list[str]:
 
 
 def _coupling(mimic: Followed) -> str:
-    ratio = quantity(mimic.ratio, "").strip()
-    offset = f', offset = "{angle(mimic.offset)}"' if mimic.offset else ""
-    return f'follower = "{mimic.follower}", leader = "{mimic.leader}", ratio = "{ratio}"{offset}'
+    ratio, offset = quantity(mimic.ratio, "").strip(), mimic.offset
+    more = f', offset = "{angle(offset)}"' if offset else ""
+    for (key, unit), power in zip(_POWERS.items(), mimic.powers, strict=False):
+        more += f', {key} = "{quantity(power, unit)}"' if power else ""
+    return f'follower = "{mimic.follower}", leader = "{mimic.leader}", ratio = "{ratio}"{more}'
 
 
 def _place_lines(link: DraftLink) -> list[str]:
@@ -141,7 +144,7 @@ def _tendon_lines(tendon: DraftTendon, file: str) -> list[str]:
         lines += [f"arms = {{ {arms} }}"]
     if tendon.path:
         lines += ["path = ["]
-        lines += [f"    {_place(link, place)}," for link, place in tendon.path]
+        lines += [f"    {_place(*each)}," for each in tendon.path]
         lines += ["]"]
     if tendon.stiffness:
         stiffness, rest = quantity(tendon.stiffness, "N/m"), length(tendon.slack)
@@ -149,7 +152,7 @@ def _tendon_lines(tendon: DraftTendon, file: str) -> list[str]:
     return [*lines, f"source = {_text(cite(f'{file} tendon {tendon.name}'))}"]
 
 
-def _place(link: str, place: Place) -> str:
+def _place(link: str, place: Place, side_link: str | None) -> str:
     keys = {"link": _text(link), "at": _lengths(place.at)}
     if place.radius is not None:
         keys["radius"] = _text(length(place.radius))
@@ -157,6 +160,10 @@ def _place(link: str, place: Place) -> str:
         keys["axis"] = _listed(quantity(each, "").rstrip() for each in tidy(place.axis, 1.0))
     if place.side is not None:
         keys["side"] = _lengths(place.side)
+    if side_link is not None:
+        keys["side_link"] = _text(side_link)
+    if place.inside:
+        keys["inside"] = "true"
     if place.divisor is not None:
         keys["divisor"] = _text(quantity(place.divisor, "").rstrip())
     return f"{{ {', '.join(f'{key} = {value}' for key, value in keys.items())} }}"

@@ -36,11 +36,13 @@ def path_of(compiled: Any, places: Iterable[int]) -> tuple[tuple[Place, ...], li
             continue
         body, side = _body(compiled, target), int(compiled.wrap_prm[k])
         if side >= 0:
-            if compiled.site_bodyid[side] != body.body:
-                return (), ["tendons whose side site is on another body than the geom: left out (--fit-wraps)"]
-            body = body._replace(side=compiled.site_pos[side].copy())
-            if np.linalg.norm(compiled.site_pos[side] - body.at) < (body.radius or 0):
-                return (), ["tendons that wrap round the inside of a geom: left out (--fit-wraps)"]
+            carrier = int(compiled.site_bodyid[side])
+            if carrier != body.body:
+                body = body._replace(side=compiled.site_pos[side].copy(), carrier=carrier)
+            elif np.linalg.norm(compiled.site_pos[side] - body.at) < (body.radius or 0):
+                body = body._replace(inside=True)
+            else:
+                body = body._replace(side=compiled.site_pos[side].copy())
         ends = [int(compiled.wrap_objid[i]) for i in (k - 1, k + 1)]
         if any(_inside(body, int(compiled.site_bodyid[i]), compiled.site_pos[i]) for i in ends):
             lost.append("wraps with a site inside the geom: straight there, as in MuJoCo")
@@ -88,7 +90,7 @@ def fitted(compiled: Any, tendon: Tendon, mimics: tuple[Mimic, ...]) -> tuple[Te
         for mimic in mimics:
             if mimic.follower in order and mimic.leader in order:
                 leader = data.qpos[places[order[mimic.leader]]]
-                data.qpos[places[order[mimic.follower]]] = mimic.ratio * leader + mimic.offset
+                data.qpos[places[order[mimic.follower]]] = mimic.curve(leader)
         mujoco.mj_kinematics(compiled, data)
         mujoco.mj_tendon(compiled, data)
         return float(data.ten_length[index])

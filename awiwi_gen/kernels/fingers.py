@@ -9,6 +9,7 @@ from typing import Any
 from awiwi_gen.hand import Hand
 from awiwi_gen.hand.lever import Lever
 from awiwi_gen.hand.parts import Finger, PathPoint, Tendon
+from awiwi_gen.hand.pose import polynomial
 from awiwi_gen.kernel import STOP, Kernel, Port, Solver
 from awiwi_gen.kernels.declare import Family, within
 from awiwi_gen.kernels.routing import groups, moved, wraps_hold
@@ -112,8 +113,10 @@ def length_range(finger: Finger, tendon: Tendon) -> tuple[float, float]:
     limits = dict(zip(finger.joints, zip(*joint_limits(finger), strict=True), strict=True))
 
     def farthest(joint: str) -> float:
-        ratio, offset = finger.motion(joint)
-        return max(abs(ratio * limit + offset) for limit in limits[finger.leaders.get(joint, joint)])
+        coefficients, ends = finger.motion(joint), limits[finger.leaders.get(joint, joint)]
+        if len(coefficients) > 2:  # the terms of a curve may cancel at both ends
+            return polynomial([abs(each) for each in coefficients], max(map(abs, ends)))
+        return max(abs(polynomial(coefficients, end)) for end in ends)
 
     for over in tendon.over:
         joint = over[1:]
@@ -309,12 +312,13 @@ def return_torque(finger: Any, q: Any) -> Any:
 
 def is_curved(finger: Finger) -> bool:
     """Whether the coupling depends on the pose, as that of lines from link to link does."""
-    return any(is_bent(tendon) for tendon in finger.pulled)
+    return any(is_bent(finger, tendon) for tendon in finger.pulled)
 
 
-def is_bent(tendon: Tendon) -> bool:
-    """Whether a tendon has lines from point to point, straight or round bodies."""
-    return bool(tendon.span or tendon.path)
+def is_bent(finger: Finger, tendon: Tendon) -> bool:
+    """Whether a tendon has lines from point to point, straight or round bodies, or joints that follow others by a curve."""
+    curves = {coupling.follower for coupling in finger.couplings if coupling.powers}
+    return bool(tendon.span or tendon.path or curves & {*tendon.arms, *(over[1:] for over in tendon.over)})
 
 
 def estimated_parts(finger: Finger) -> list[tuple[list[int], list[int], bool]]:
@@ -323,7 +327,7 @@ def estimated_parts(finger: Finger) -> list[tuple[list[int], list[int], bool]]:
     for tendons in groups(finger):
         pulled = set().union(*(moved(finger, finger.pulled[i]) for i in tendons))
         joints = [i for i, joint in enumerate(finger.joints) if joint in pulled]
-        found.append((joints, tendons, not any(is_bent(finger.pulled[i]) for i in tendons)))
+        found.append((joints, tendons, not any(is_bent(finger, finger.pulled[i]) for i in tendons)))
     return [part for part in found if part[0]]
 
 

@@ -51,6 +51,10 @@ def wraps_hold(finger: Finger, owner: str = "") -> tuple[str, ...]:
     found = []
     for number, run in wraps(finger):
         body = f"path[{run.between}] of {owner}tendons[{number}]"
+        if run.body.inside:
+            found.append(f"the ends of the string are away from the surface of {body}, or it is straight there")
+            continue
         found += [f"path[{index}] is outside {body}" for index in loose_ends(run)]
+        found += [f"path[{run.between}].side is outside {body}"] if run.body.carrier else []
         found.append(f"the string passes {body} on the side where it does at the middle of the joints' ranges")
     return tuple(found)

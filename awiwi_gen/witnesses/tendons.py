@@ -11,7 +11,9 @@ from typing import Any
 import casadi as ca
 from casadi import SX
 
-from awiwi_gen.structure import Finger, coordinates, leaders, link_number, motion, radius, rolls, sense
+from awiwi_gen.structure import Finger, coordinates, leaders, link_number, radius, rolls, sense
+from awiwi_gen.witnesses.inside_wraps import InsideWrap
+from awiwi_gen.witnesses.joints import followed
 from awiwi_gen.witnesses.kinematics import point_before_joint, point_of_link
 from awiwi_gen.witnesses.wraps import Wrap
 
@@ -28,8 +30,7 @@ def _lengths(finger: Finger, tendons: Iterable[Tendon], q: SX, paths: bool = Tru
     position, follows = coordinates(finger), leaders(finger)
 
     def angle(joint: str) -> SX:
-        ratio, offset = motion(finger, joint) if joint in follows else (1, 0)
-        return ratio * q[position[joint]] + offset
+        return followed(finger, joint, q[position[joint]])[0]
 
     lengths = []
     for tendon in tendons:
@@ -93,7 +94,7 @@ def _wraps(finger: Finger, tendon: Tendon, q: SX) -> Iterator[tuple[Any, Wrap]]:
     """The runs of a path round bodies."""
     for run in tendon.runs:
         if run.body is not None:
-            yield run, Wrap.of(finger, run, q)
+            yield run, (InsideWrap if run.body.inside else Wrap).of(finger, run, q)
 
 
 def _arms(finger: Finger, tendon: Tendon, q: SX) -> SX:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import casadi as ca
 from casadi import SX
@@ -37,7 +37,7 @@ class Wrap:
     home: SX
 
     @classmethod
-    def of(cls, finger: Finger, run: Any, q: SX) -> Wrap:
+    def of(cls, finger: Finger, run: Any, q: SX) -> Self:
         """A run at joint angles q (n) [rad]."""
 
         def place(link: str, local: SX) -> Moving:
@@ -57,7 +57,7 @@ class Wrap:
             axis = from_centre(body.radius * direction / ca.norm_2(direction))
             axis = axis[0] / body.radius, axis[1] / body.radius
         if body.side is not None:
-            side = from_centre(ca.vertcat(*body.side) - centre)[0]
+            side = place(body.carrier or body.link, ca.vertcat(*body.side))[0] - middle[0]
         home = ca.horzcat(*(from_centre(body.radius * unit)[0] / body.radius for unit in ca.horzsplit(SX.eye(3))))
         return cls(body, start, end, middle, axis, side, home)
 

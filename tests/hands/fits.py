@@ -42,7 +42,7 @@ def four_bar(hand: Hand) -> Iterator[str]:
     free = [int(model.joint(f"fifth_{joint}").qposadr[0]) for joint in hand.fingers["fifth"].joints]
     coupler, dip = (int(model.joint(name).qposadr[0]) for name in ("fifth_hmc.coupler", "fifth_dip"))
     dofs = [int(model.joint(name).dofadr[0]) for name in [*names, "fifth_hmc.coupler"]]
-    ratio = hand.fingers["fifth"].motion("dip")[0]
+    ratio = hand.fingers["fifth"].motion("dip")[1]
     link = hand.fingers["fifth"].links[0]
     low, high = float(link.low or 0), float(link.high or 0)
     (equality,) = (i for i in range(model.neq) if model.eq_obj1id[i] == model.joint("fifth_hmc.coupler").id)

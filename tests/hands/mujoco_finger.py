@@ -7,20 +7,35 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from numpy.polynomial import Polynomial
 
 from awiwi_gen.interchange.draft import DraftFinger, DraftHand
 
+from .inside_wraps import corrections
 
-def motions(finger: DraftFinger) -> tuple[np.ndarray, np.ndarray]:
-    """Angles of all joints for independent ones q: matrix (joints x n) and offset (joints) in matrix q + offset."""
+Curve = tuple[int, Polynomial]  # the coordinate that moves a joint, and the joint's angle over that coordinate
+
+
+def motions(finger: DraftFinger) -> list[Curve]:
+    """How the independent joints move every joint."""
     mimics = {mimic.published: mimic for mimic in finger.followed}
     free = [link.joint for link in finger.links if link.published.name not in mimics]
-    matrix, offset = np.zeros((len(finger.links), len(free))), np.zeros(len(finger.links))
-    for row, link in enumerate(finger.links):
+    found = []
+    for link in finger.links:
         mimic = mimics.get(link.published.name)
-        matrix[row, free.index(mimic.leader if mimic else link.joint)] = mimic.ratio if mimic else 1.0
-        offset[row] = mimic.offset if mimic else 0.0
-    return matrix, offset
+        curve = mimic.curve if mimic else Polynomial([0.0, 1.0])
+        found.append((free.index(mimic.leader if mimic else link.joint), curve))
+    return found
+
+
+def moved(curves: list[Curve], q: np.ndarray, qd: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Of all joints: angles, rates over those of the coordinates (joints x n), and accelerations while these have none."""
+    angles, rates, drift = np.zeros(len(curves)), np.zeros((len(curves), len(q))), np.zeros(len(curves))
+    for row, (column, curve) in enumerate(curves):
+        angles[row] = curve(q[column])
+        rates[row, column] = curve.deriv()(q[column])
+        drift[row] = curve.deriv(2)(q[column]) * qd[column] ** 2
+    return angles, rates, drift
 
 
 @dataclass
@@ -39,7 +54,7 @@ class MujocoFinger:
         joints = [link.published.name for link in self.finger.links]
         self.qpos = [int(self.compiled.joint(name).qposadr[0]) for name in joints]
         self.dofs = [int(self.compiled.joint(name).dofadr[0]) for name in joints]
-        self.matrix, self.offset = motions(self.finger)
+        self.curves = motions(self.finger)
         self.last = [self._is_last(link.published.name) for link in self.finger.links]
         mujoco.mj_resetData(self.compiled, self.data)
         self.data.qpos[:] = self.compiled.qpos0
@@ -57,24 +72,28 @@ class MujocoFinger:
         """Move the finger; everything else stands as drawn."""
         mujoco.mj_resetData(self.compiled, self.data)
         self.data.qpos[:] = self.compiled.qpos0
-        self.data.qpos[self.qpos] = self.matrix @ q + self.offset
+        self.data.qpos[self.qpos], self.matrix, self.drift = moved(self.curves, q, qd)
         self.data.qvel[self.dofs] = self.matrix @ qd
         mujoco.mj_forward(self.compiled, self.data)
 
     def mass_matrix(self) -> np.ndarray:
+        return self.matrix.T @ self._full_mass_matrix() @ self.matrix
+
+    def _full_mass_matrix(self) -> np.ndarray:
         full = np.zeros((self.compiled.nv, self.compiled.nv))
         mujoco.mj_fullM(self.compiled, self.data, full)
-        return self.matrix.T @ full[np.ix_(self.dofs, self.dofs)] @ self.matrix
+        return full[np.ix_(self.dofs, self.dofs)]
 
     def bias(self) -> np.ndarray:
-        return self.matrix.T @ self.data.qfrc_bias[self.dofs]
+        """Torques without acceleration of the coordinates: followers accelerate where their curves bend."""
+        return self.matrix.T @ (self.data.qfrc_bias[self.dofs] + self._full_mass_matrix() @ self.drift)
 
     def passive(self) -> np.ndarray:
         """Torques of joint dampers and springs, as they act on the joints."""
         return self.matrix.T @ (self.data.qfrc_damper + self.data.qfrc_spring)[self.dofs]
 
     def lengths(self) -> np.ndarray:
-        return self.data.ten_length[self.tendons]
+        return (self.data.ten_length + corrections(self.compiled, self.data)[0])[self.tendons]
 
     def arms(self) -> np.ndarray:
         full = np.zeros((self.compiled.ntendon, self.compiled.nv))
@@ -86,6 +105,7 @@ class MujocoFinger:
                 for t in range(self.compiled.ntendon):
                     at, count = int(self.compiled.ten_J_rowadr[t]), int(self.compiled.ten_J_rownnz[t])
                     full[t, self.compiled.ten_J_colind[at : at + count]] = rows[at : at + count]
+        full = full + corrections(self.compiled, self.data)[1]
         return full[np.ix_(self.tendons, self.dofs)] @ self.matrix
 
     def gravity(self) -> np.ndarray:

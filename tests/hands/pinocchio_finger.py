@@ -10,7 +10,7 @@ import pinocchio
 
 from awiwi_gen.interchange.draft import DraftFinger, DraftHand
 
-from .mujoco_finger import motions
+from .mujoco_finger import motions, moved
 
 
 @dataclass
@@ -23,7 +23,7 @@ class PinocchioFinger:
 
     def __post_init__(self) -> None:
         self.data = self.model.createData()
-        self.matrix, self.offset = motions(self.finger)
+        self.curves = motions(self.finger)
         joints = [link.published.name for link in self.finger.links]
         missing = [name for name in joints if not self.model.existJointName(name)]
         if missing:
@@ -37,14 +37,16 @@ class PinocchioFinger:
 
     def set(self, q: np.ndarray, qd: np.ndarray) -> None:
         """Move the finger; everything else stands as drawn."""
-        position, self.velocity = pinocchio.neutral(self.model), np.zeros(self.model.nv)
-        for joint, angle in zip(self.joints, self.matrix @ q + self.offset, strict=True):
+        position = pinocchio.neutral(self.model)
+        self.velocity, acceleration = np.zeros(self.model.nv), np.zeros(self.model.nv)
+        angles, self.matrix, drift = moved(self.curves, q, qd)
+        for joint, angle in zip(self.joints, angles, strict=True):
             # A continuous joint has the cosine and the sine of its angle.
             values = [angle] if joint.nq == 1 else [np.cos(angle), np.sin(angle)]
             position[joint.idx_q : joint.idx_q + joint.nq] = values
-        self.velocity[self.dofs] = self.matrix @ qd
+        self.velocity[self.dofs], acceleration[self.dofs] = self.matrix @ qd, drift
         self.mass = pinocchio.crba(self.model, self.data, position).copy()
-        self.torque = pinocchio.rnea(self.model, self.data, position, self.velocity, np.zeros(self.model.nv)).copy()
+        self.torque = pinocchio.rnea(self.model, self.data, position, self.velocity, acceleration).copy()
         pinocchio.framesForwardKinematics(self.model, self.data, position)
 
     def mass_matrix(self) -> np.ndarray:
@@ -53,6 +55,7 @@ class PinocchioFinger:
         return self.matrix.T @ full[np.ix_(self.dofs, self.dofs)] @ self.matrix
 
     def bias(self) -> np.ndarray:
+        """Torques without acceleration of the coordinates."""
         return self.matrix.T @ self.torque[self.dofs]
 
     def passive(self) -> np.ndarray:

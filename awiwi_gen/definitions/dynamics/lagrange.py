@@ -126,7 +126,7 @@ class _Lagrangian:
 def _lagrangian(finger: Finger, q: Matrix, qd: Matrix, g: Matrix) -> _Lagrangian:
     derive = Derivation()
     motion = dict(zip(q, qd, strict=True))
-    kinetic, weight = rotor_energy(finger, qd), sympy.S.Zero
+    kinetic, weight = rotor_energy(finger, q, qd), sympy.S.Zero
     for link, frame in zip(finger.links, frames(finger, q, derive)[1:-1], strict=True):
         if link.mass is None:
             continue
@@ -136,7 +136,7 @@ def _lagrangian(finger: Finger, q: Matrix, qd: Matrix, g: Matrix) -> _Lagrangian
         spin = derive.name_all(Matrix(axial(skew)))
         kinetic += (link.mass * velocity.dot(velocity) + spin.dot(_tensor(link.inertia) * spin)) / 2
         weight -= link.mass * g.dot(centre)
-    return _Lagrangian(kinetic, weight, spring_energy(finger, q), dissipation(finger, qd), q, qd, derive)
+    return _Lagrangian(kinetic, weight, spring_energy(finger, q), dissipation(finger, q, qd), q, qd, derive)
 
 
 def _velocities(q: Matrix) -> Matrix:

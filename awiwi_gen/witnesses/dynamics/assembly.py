@@ -21,8 +21,9 @@ from typing import Any
 import casadi as ca
 from casadi import SX
 
-from awiwi_gen.structure import Finger, coordinates, fixed_turns, leaders, motion
+from awiwi_gen.structure import Finger, coordinates, fixed_turns
 from awiwi_gen.witnesses.four_bar import FourBar, Vector
+from awiwi_gen.witnesses.joints import followed
 
 _ZERO, _Z = SX(0), SX([0, 0, 1])
 
@@ -302,15 +303,15 @@ def assemble(finger: Finger, q: SX) -> Assembly:
 
 
 def _parts(finger: Finger, q: SX) -> Iterator[_Part]:
-    position, follows = coordinates(finger), leaders(finger)
+    position = coordinates(finger)
     for index, link in enumerate(finger.links):
         coordinate = position[link.joint]
         angle, offset, body = q[coordinate], ca.vertcat(*link.offset), _body(link)
         turns, yaw = turns_of(link)
         if link.four_bar is None:
-            ratio, rest = (SX(each) for each in (motion(finger, link.joint) if link.joint in follows else (1, 0)))
-            angle = ratio * angle + rest + yaw - (0 if link.reference is None else link.reference)
-            yield _Part(coordinate, turns, angle, None, ratio, SX(0), offset, body, index)
+            own, ratio, change = followed(finger, link.joint, angle)
+            angle = own + yaw - (0 if link.reference is None else link.reference)
+            yield _Part(coordinate, turns, angle, None, ratio, change, offset, body, index)
         else:
             crank = angle + link.four_bar.reference
             start = SX(link.start + link.four_bar.reference)

@@ -15,19 +15,19 @@ from awiwi_gen.witnesses.dynamics.assembly import Assembly, assemble
 from awiwi_gen.witnesses.dynamics.composite_bodies import mass_and_coriolis
 from awiwi_gen.witnesses.dynamics.newton_euler import torques, weight
 from awiwi_gen.witnesses.dynamics.planar_chain import RotatingPlane, rotating_plane
-from awiwi_gen.witnesses.joints import armature, passive_torque, spring_energy
+from awiwi_gen.witnesses.joints import armature, armature_rate, passive_torque, spring_energy
 
 PlanarTorques = Callable[[RotatingPlane, list[SX], list[SX], SX], list[SX]]
 
 
 def mass_matrix(finger: Finger, q: SX) -> SX:
     """M (n x n) [kg m^2] by composite bodies."""
-    return _mass_and_coriolis(finger, assemble(finger, q), SX.zeros(q.numel()))[0]
+    return _mass_and_coriolis(finger, assemble(finger, q), q, SX.zeros(q.numel()))[0]
 
 
 def coriolis_matrix(finger: Finger, q: SX, qd: SX) -> SX:
     """C (n x n) [N m s] by Christoffel symbols, so that dM/dt - 2 C is skew-symmetric."""
-    return _mass_and_coriolis(finger, assemble(finger, q), qd)[1]
+    return _mass_and_coriolis(finger, assemble(finger, q), q, qd)[1]
 
 
 def gravity(finger: Finger, q: SX, g: SX) -> SX:
@@ -37,12 +37,12 @@ def gravity(finger: Finger, q: SX, g: SX) -> SX:
 
 def bias(finger: Finger, q: SX, qd: SX, g: SX) -> SX:
     """Joint torques (n) [N m] of a motion without acceleration: C qd + gravity + passive torques."""
-    return _torques(assemble(finger, q), qd, SX.zeros(q.numel()), g) + passive_torque(finger, q, qd)
+    return _torques(assemble(finger, q), qd, SX.zeros(q.numel()), g) + _at_joints(finger, q, qd)
 
 
 def inverse_dynamics(finger: Finger, q: SX, qd: SX, qdd: SX, g: SX) -> SX:
     """Joint torques (n) [N m] of a motion (eq. 2.4 to 2.15)."""
-    return _torques(assemble(finger, q), qd, qdd, g) + armature(finger) * qdd + passive_torque(finger, q, qd)
+    return _torques(assemble(finger, q), qd, qdd, g) + armature(finger, q) * qdd + _at_joints(finger, q, qd)
 
 
 def inverse_dynamics_derivatives(finger: Finger, q: SX, qd: SX, qdd: SX, g: SX) -> tuple[SX, SX]:
@@ -51,23 +51,23 @@ def inverse_dynamics_derivatives(finger: Finger, q: SX, qd: SX, qdd: SX, g: SX) 
     The torques are written in the form with the shortest derivatives.
     """
     tau = _torques(assemble(finger, q), qd, qdd, g, RotatingPlane.torques_to_differentiate)
-    tau += passive_torque(finger, q, qd)
+    tau += armature(finger, q) * qdd + _at_joints(finger, q, qd)
     return ca.jacobian(tau, q), ca.jacobian(tau, qd)
 
 
 def forward_dynamics(finger: Finger, q: SX, qd: SX, tau: SX, g: SX) -> SX:
     """Joint accelerations (n) [rad/s^2] that joint torques tau cause: M qdd = tau - bias (eq. 2.1)."""
     assembly, zero = assemble(finger, q), SX.zeros(q.numel())
-    plane, tau = rotating_plane(assembly), tau - passive_torque(finger, q, qd)
+    plane, tau = rotating_plane(assembly), tau - _at_joints(finger, q, qd)
     if plane is not None and all(joint.ratio.is_one() for joint in assembly.joints):
-        return _solve_absolute(plane, armature(finger), qd, tau, g)
-    return _solve(_mass_and_coriolis(finger, assembly, zero)[0], tau - _torques(assembly, qd, zero, g))
+        return _solve_absolute(plane, armature(finger, q), qd, tau, g)
+    return _solve(_mass_and_coriolis(finger, assembly, q, zero)[0], tau - _torques(assembly, qd, zero, g))
 
 
 def dynamics(finger: Finger, q: SX, qd: SX, g: SX) -> tuple[SX, SX, SX]:
     """M (n x n) [kg m^2], C (n x n) [N m s] and the gravity torques (n) [N m] of eq. 2.17."""
     assembly = assemble(finger, q)
-    return *_mass_and_coriolis(finger, assembly, qd), _weight(assembly, g, q.numel())
+    return *_mass_and_coriolis(finger, assembly, q, qd), _weight(assembly, g, q.numel())
 
 
 def energy(finger: Finger, q: SX, qd: SX, g: SX) -> tuple[SX, SX]:
@@ -77,7 +77,7 @@ def energy(finger: Finger, q: SX, qd: SX, g: SX) -> tuple[SX, SX]:
     for joint in assembly.joints:
         down = joint.outward(down)
         potential -= ca.dot(down, joint.body.first)
-    kinetic = _kinetic_energy(assembly, qd) + ca.dot(armature(finger), qd**2) / 2
+    kinetic = _kinetic_energy(assembly, qd) + ca.dot(armature(finger, q), qd**2) / 2
     return kinetic, potential + spring_energy(finger, q)
 
 
@@ -90,9 +90,14 @@ def _kinetic_energy(assembly: Assembly, qd: SX) -> SX:
     return ca.dot(qd, each_pair_once @ qd)
 
 
-def _mass_and_coriolis(finger: Finger, assembly: Assembly, qd: SX) -> tuple[SX, SX]:
+def _mass_and_coriolis(finger: Finger, assembly: Assembly, q: SX, qd: SX) -> tuple[SX, SX]:
     mass, coriolis = _of_links(assembly, qd)
-    return mass + ca.diag(armature(finger)), coriolis
+    return mass + ca.diag(armature(finger, q)), coriolis + ca.diag(armature_rate(finger, q, qd))
+
+
+def _at_joints(finger: Finger, q: SX, qd: SX) -> SX:
+    """Torques (n) [N m] in the joints themselves, of a motion without acceleration."""
+    return passive_torque(finger, q, qd) + armature_rate(finger, q, qd) * qd
 
 
 def _of_links(assembly: Assembly, qd: SX) -> tuple[SX, SX]:

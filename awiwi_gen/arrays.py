@@ -1,13 +1,18 @@
-"""The shortest way from Python to a kernel: one sample, in arrays that are as C has them."""
+"""Arrays on the way to C: what counts as numbers, and the shortest way of one sample to a kernel."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from decimal import Decimal
+from numbers import Real
 from typing import Any
 
 import numpy as np
 
+Array = np.ndarray[Any, Any]
 Shape = tuple[int, ...]
+
+KINDS = {"c": "complex numbers", "U": "text", "S": "bytes", "M": "dates", "m": "durations", "V": "records"}
 
 # Written out for each kernel, as `collections.namedtuple` does it: loops over ports would double what a call costs.
 SOURCE = """
@@ -19,6 +24,22 @@ def call({inputs}):
     return {result}
 """
 TEST = "type({0}) is ndarray and {0}.shape == {1} and {0}.dtype is dtype and {0}.flags.carray"
+
+
+def as_numbers(value: Any) -> Array:
+    """An array of real numbers. Raises TypeError or ValueError for all that NumPy would silently make numbers of."""
+    if isinstance(value, np.ma.MaskedArray):
+        raise TypeError("it is masked; fill it, or choose the samples that are not")
+    array = np.asarray(value)
+    kind = array.dtype.kind
+    if kind == "O":  # numbers of Python and SymPy, but neither None nor dates nor texts
+        for one in array.flat:
+            if not isinstance(one, (Real, Decimal)):
+                raise TypeError(f"it holds a {type(one).__name__}")
+        return array.astype(float)
+    if kind not in "fiub":
+        raise TypeError(f"it holds {KINDS.get(kind, array.dtype.name)}")
+    return array
 
 
 def direct_call(
