@@ -116,7 +116,7 @@ def test_a_solver_costs_every_kernel_as_often_as_it_calls_it(hand):
 
     assert function.cost == Cost(add=1 + 10 + 100 * kernel.solver.iterations)
     assert function.comment[-1] == (
-        "Cost: the solver's own work and calls, at most: 1 of coupling, 1 of coupling_derivative, 357 of tendon_stiffness."
+        "Cost: the solver's own work and calls, at most: 1 of coupling, 1 of coupling_derivative, 456 of tendon_stiffness."
     )
 
 
