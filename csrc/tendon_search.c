@@ -12,8 +12,8 @@ static const awiwi_real MARGIN = 4;                            /* over the great
 static const awiwi_real LITTLE = (awiwi_real)1 / 16;          /* gain by a step, relative to the cost */
 static const awiwi_real SAME = (awiwi_real)1 / 1048576;       /* costs of one minimum, found from two starts */
 enum { BENDS = 8 };                                           /* trials along a direction of negative curvature */
-/* Where a search starts: at the middle of the limits, at the answer that chords have, as low and as high as the torque
-   permits. The curve bends, so a search may end at a minimum that is not the least; the next start is for that. */
+/* Starts, as one may lead to a minimum that is not the least: the middle of the limits, the answer with chords for the
+   curve, forces as low and as high as the torque permits. */
 enum { FROM_MIDDLE, FROM_CHORDS, FROM_LOW, FROM_HIGH };
 
 /* Newton's step of the free tendons along the moves that are allowed; where the Hessian is not positive, a damped
@@ -191,27 +191,25 @@ static int descend(const task *s, const moves *all, int steps, vector f, model *
             return AWIWI_NOT_FINITE;
         const int rounding = gain <= here->blur && 2 * longest >= last; /* nothing to gain, and no nearer */
         const awiwi_real near = s->tolerance * s->t->high;
-        /* slopes that decide about a held tendon need the last step */
-        const int none_held = m->rank + m->count == s->count;
-        int cut;
-        const awiwi_real whole = reach(s, f, step, &cut);
+        const int none_held = m->rank + m->count == s->count; /* slopes that let one leave need the last step */
+        const awiwi_real whole = reach(s, f, step, &stopped);
         const int ended = longest <= near || rounding ||
-                          (none_held && cut < 0 && awiwi_ends_with(longest, last, near, s->t->high / 64));
+                          (none_held && stopped < 0 && awiwi_ends_with(longest, last, near, s->t->high / 64));
         const awiwi_real *way = step;
         last = longest;
         if ((ended || (!straight && gain <= LITTLE * here->cost)) && here->cost > here->blur && steps > BENDS
             && awiwi_largest(bend, s->count) > 0) { /* off a saddle, or from the way to one */
-            int trials = BENDS;
-            const awiwi_real share = reach(s, f, bend, &stopped);
-            const int status = take(s, bend, share, here->cost - here->blur, &trials, f, here, &stopped);
+            int trials = BENDS, blocked;
+            const awiwi_real share = reach(s, f, bend, &blocked);
+            const int status = take(s, bend, share, here->cost - here->blur, &trials, f, here, &blocked);
             if (status == AWIWI_OUT_OF_DOMAIN)
                 return status;
             steps -= BENDS - trials;
             straight = status != AWIWI_OK;
             way = straight ? step : bend;
+            stopped = straight ? stopped : blocked;
         }
         const awiwi_real share = way == step ? whole : 0;
-        stopped = way == step ? cut : stopped;
         if (way == step && ended) {
             for (int i = 0; i < s->count; i++)
                 f[i] = awiwi_clamp(f[i] + share * step[i], s->t->low, s->t->high);

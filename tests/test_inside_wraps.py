@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from exported_mjcf import read_mjcf
+from wrapped_hands import hand_with, place, text_of
 
 from awiwi_gen.build import load
 from awiwi_gen.errors import InputError
@@ -18,21 +17,7 @@ from awiwi_gen.interchange.draft import draft
 from awiwi_gen.interchange.toml import hand_text
 from awiwi_gen.pipeline import Job, cached_tree, verify
 
-FILE = Path(__file__).with_name("inside_finger.toml").read_text(encoding="utf-8")
-HEAD = FILE[: FILE.index("[[fingers.claw.tendons]]")]
-LINKS = FILE[FILE.index("[[fingers.claw.links]]") :]
-
-
-def hand_with(*paths: str) -> Hand:
-    """The finger with other tendons, by their paths."""
-    tendons = "".join(f'[[fingers.claw.tendons]]\nrest = "0 m"\npath = [{path}]\nsource = "x"\n\n' for path in paths)
-    return Hand.parse(HEAD + tendons + LINKS)
-
-
-def place(link: str, x: float, y: float, z: float, more: str = "") -> str:
-    return f'{{ link = "{link}", at = ["{x} mm", "{y} mm", "{z} mm"]{more} }},'
-
-
+FILE = text_of("inside_finger")
 RING = ', radius = "2 mm", inside = true'
 START, END = place("palm", -20, 9, 1), place("root", 20, 9, -2)
 
@@ -130,7 +115,7 @@ def test_a_string_whose_end_is_inside_the_body_is_straight():
         START + place("palm", -10, 5, 0, RING) + END,
         place("palm", -10, 5, 1) + place("palm", -10, 5, 0, RING) + END,
     ]
-    job = Job(hand_with(*paths, START + END), only="claw_tendon_lengths")
+    job = Job(hand_with(*paths, START + END, name="inside_finger"), only="claw_tendon_lengths")
     found = load(cached_tree(job), job.store).claw_tendon_lengths([0.1, 0.0])
 
     assert found.status == 0
@@ -142,7 +127,10 @@ def test_a_string_whose_end_is_inside_the_body_is_straight():
 def test_an_end_that_comes_too_near_to_the_surface_has_a_status_and_one_inside_has_none():
     reach, angle = np.hypot(20, 9), np.arctan2(9, 20) + 2.1
     ring = place("palm", round(reach * np.cos(angle), 6), round(reach * np.sin(angle), 6), 0, RING)
-    job = Job(hand_with(place("palm", -10, 25, 0) + ring + place("root", 20, 9, 0)), only="claw_tendon_lengths")
+    job = Job(
+        hand_with(place("palm", -10, 25, 0) + ring + place("root", 20, 9, 0), name="inside_finger"),
+        only="claw_tendon_lengths",
+    )
     lib = load(cached_tree(job), job.store)
     from_ring = [2 * np.arcsin(distance / (2 * reach)) for distance in (10, 2.01, 1.99)]
 
@@ -189,6 +177,6 @@ def test_a_path_through_rings_comes_back_from_an_export(hand):
 )
 def test_a_fault_of_a_ring_is_told_with_its_place(path, message):
     with pytest.raises(InputError) as caught:
-        hand_with(path)
+        hand_with(path, name="inside_finger")
 
     assert f"fingers.claw.tendons[0].{message}" in str(caught.value)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from test_wraps import CYLINDER, END, START, hand_with, place
+from test_wraps import CYLINDER, END, START
+from wrapped_hands import hand_with, place
 
 from awiwi_gen.build import load
 from awiwi_gen.errors import InputError

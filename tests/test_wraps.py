@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
+from wrapped_hands import hand_with, place, text_of
 
 from awiwi_gen.build import load
 from awiwi_gen.emit.options import Options
@@ -16,21 +16,7 @@ from awiwi_gen.hand.capability import left_out
 from awiwi_gen.hand.pose import Chain
 from awiwi_gen.pipeline import Job, cached_tree, verify
 
-FILE = Path(__file__).with_name("wrapped_finger.toml").read_text(encoding="utf-8")
-HEAD = FILE[: FILE.index("[[fingers.claw.tendons]]")]
-LINKS = FILE[FILE.index("[[fingers.claw.links]]") :]
-
-
-def hand_with(*paths: str) -> Hand:
-    """The finger with other tendons, by their paths."""
-    tendons = "".join(f'[[fingers.claw.tendons]]\nrest = "0 m"\npath = [{path}]\nsource = "x"\n\n' for path in paths)
-    return Hand.parse(HEAD + tendons + LINKS)
-
-
-def place(link: str, x: float, y: float, z: float, more: str = "") -> str:
-    return f'{{ link = "{link}", at = ["{x} mm", "{y} mm", "{z} mm"]{more} }},'
-
-
+FILE = text_of("wrapped_finger")
 SPHERE = ', radius = "6 mm"'
 CYLINDER = SPHERE + ', axis = ["0", "0", "1"]'
 ABOVE = ', side = ["0 mm", "8 mm", "0 mm"]'
