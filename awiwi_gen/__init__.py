@@ -63,7 +63,7 @@ def build(
     """The hand as compiled NumPy functions.
 
     Generated and compiled at the first call for these numbers, which can take minutes, and loaded from the cache
-    afterwards. ``only`` chooses kernels by a pattern such as ``"index_*"``, together with those they call.
+    afterwards. ``only`` chooses kernels by patterns such as ``"index_*,spring_*"``, together with those they call.
     ``progress(stage, done, total)`` is called as the work proceeds; without it, progress is shown on standard error
     if that is a terminal.
 

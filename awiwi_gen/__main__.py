@@ -5,7 +5,6 @@ Exit codes: 0 done, 1 verification failed or out of date, 2 bad input.
 
 from __future__ import annotations
 
-import fnmatch
 import json
 import sys
 from collections.abc import Callable
@@ -17,6 +16,7 @@ from typing import Annotated, Any
 from awiwi_gen import exits, extras
 from awiwi_gen.errors import AwiwiError, InputError, printable
 from awiwi_gen.extras import GENERATE, HAND
+from awiwi_gen.patterns import matches
 from awiwi_gen.terminal import (
     find_kernel,
     fix,
@@ -104,7 +104,7 @@ def make_job(
     from awiwi_gen.report import Progress
 
     job = Job(read or Hand.load(hand), Options(scalar.value, params.value, math.value), only, progress=Progress())
-    if only != "*" and not fnmatch.filter([kernel.name for kernel in job.catalog], only):
+    if not any(matches(kernel.name, only) for kernel in job.catalog):
         raise InputError(
             f"--only {only}: {why_absent(job.hand, only) or f'no kernel has such a name; see {listing(hand)}'}"
         )

@@ -9,7 +9,6 @@ stage does what is missing. `parallel` spreads the work over all cores.
 
 from __future__ import annotations
 
-import fnmatch
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
@@ -37,6 +36,7 @@ from awiwi_gen.emit.tree import (
 from awiwi_gen.errors import Fault, InputError, OutputError
 from awiwi_gen.hand import Hand
 from awiwi_gen.parallel import Progress, silent
+from awiwi_gen.patterns import ALL, matches
 
 if TYPE_CHECKING:
     from awiwi_gen.library import Library
@@ -52,7 +52,6 @@ GENERATOR = (
     *(f"awiwi_gen/{file}.py" for file in ("parameters", "pipeline")),
     "templates",
 )
-ALL = "*"
 
 
 @dataclass(frozen=True)
@@ -84,7 +83,7 @@ class Job:
     def kernels(self) -> list[Any]:
         """The kernels asked for and those they call. Raises InputError if the pattern matches none."""
         known = self.catalog
-        wanted = {kernel.name for kernel in known if fnmatch.fnmatch(kernel.name, self.only)}
+        wanted = {kernel.name for kernel in known if matches(kernel.name, self.only)}
         if not wanted:
             raise InputError(f"--only {self.only}: no kernel has such a name; awiwi-gen list shows them")
         wanted |= {name for kernel in known if kernel.name in wanted for name in kernel.needs.values()}

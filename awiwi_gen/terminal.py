@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fnmatch
 import json
 import shlex
 import sys
@@ -11,6 +10,7 @@ from typing import Any
 
 from awiwi_gen import extras
 from awiwi_gen.errors import InputError, unknown
+from awiwi_gen.patterns import matches
 
 
 def fix(job: Any, hand: Path | None, output: Path) -> str:
@@ -42,7 +42,7 @@ def why_absent(hand: Any, pattern: str) -> str:
     from awiwi_gen.hand.capability import left_out_names
 
     return next(
-        (f"{name} is left out: {why}" for name, why in left_out_names(hand).items() if fnmatch.fnmatch(name, pattern)),
+        (f"{name} is left out: {why}" for name, why in left_out_names(hand).items() if matches(name, pattern)),
         "",
     )
 

@@ -63,11 +63,13 @@ static int fits(const awiwi_problem *p)
     return p->unknowns <= AWIWI_MOST_UNKNOWNS && p->equations <= AWIWI_MOST_EQUATIONS;
 }
 
-/* Solve (A + damping diag A) x = -b for the unknowns not held, by Cholesky without roots; A's lower half is read. */
-static void damped_step(int n, matrix A, const vector b, const int *held, awiwi_real damping, vector x)
+/* Solve (A + damping diag A) x = -b for the unknowns not held, by Cholesky without roots; A's lower half is read.
+   Returns whether the matrix is positive definite. */
+static int damped_step(int n, matrix A, const vector b, const int *held, awiwi_real damping, vector x)
 {
     matrix L;
     vector d;
+    int definite = 1;
     for (int j = 0; j < n; j++) {
         d[j] = held[j] ? 1 : A[j][j] + damping * A[j][j];
         x[j] = held[j] ? 0 : -b[j];
@@ -79,12 +81,65 @@ static void damped_step(int n, matrix A, const vector b, const int *held, awiwi_
             d[j] -= L[j][k] * L[j][k] * d[k];
             x[j] -= L[j][k] * x[k];
         }
+        definite = definite && d[j] > 0;
     }
     for (int j = n - 1; j >= 0; j--) {
         x[j] = d[j] > 0 ? x[j] / d[j] : 0;
         for (int k = j + 1; k < n; k++)
             x[j] -= L[k][j] * x[k];
     }
+    return definite;
+}
+
+/* What the curvature of the equations adds to J'J, per root of the cost: learnt from steps, and gone with the residuals. */
+typedef struct bending {
+    int known;
+    matrix added;
+} bending;
+
+/* The step from a point: with the curvature, if it is known and leaves a minimum, else that of Gauss and Newton. */
+static void step_from(int n, sums *s, const bending *c, const int *held, awiwi_real damping, vector step)
+{
+    if (c->known) {
+        const awiwi_real size = awiwi_sqrt(s->cost);
+        matrix A;
+        for (int j = 0; j < n; j++)
+            for (int k = 0; k <= j; k++)
+                A[j][k] = s->normal[j][k] + size * c->added[j][k];
+        if (damped_step(n, A, s->gradient, held, damping, step))
+            return;
+    }
+    (void)damped_step(n, s->normal, s->gradient, held, damping, step);
+}
+
+/* Correct the curvature after a step: the least change that explains the new gradient (Powell's symmetric form of
+   Broyden's update). */
+static void learn(int n, const sums *from, const sums *to, const vector step, bending *c)
+{
+    const awiwi_real size = awiwi_sqrt(to->cost);
+    vector missing;
+    awiwi_real square = 0, along = 0;
+    if (!(size > 0))
+        return;
+    if (!c->known)
+        for (int j = 0; j < n; j++)
+            for (int k = 0; k <= j; k++)
+                c->added[j][k] = 0;
+    c->known = 1;
+    for (int j = 0; j < n; j++) {
+        missing[j] = to->gradient[j] - from->gradient[j];
+        for (int k = 0; k < n; k++) {
+            const int row = k < j ? j : k, column = k < j ? k : j;
+            const awiwi_real mean = (from->normal[row][column] + to->normal[row][column]) / 2;
+            missing[j] -= (mean + size * c->added[row][column]) * step[k];
+        }
+        missing[j] /= size;
+        square += step[j] * step[j];
+        along += missing[j] * step[j];
+    }
+    for (int j = 0; j < n; j++)
+        for (int k = 0; k <= j; k++)
+            c->added[j][k] += (missing[j] * step[k] + step[j] * missing[k] - along / square * step[j] * step[k]) / square;
 }
 
 /* Clamp the start into the box; a start that is not a number becomes the middle of the box. */
@@ -114,7 +169,9 @@ static int descend(const awiwi_problem *p, const awiwi_part *b, const awiwi_real
     int now = 0; /* which of the two belongs to q; the other is that of the trial */
     values last = *begun, there;
     vector step, trial;
+    bending learnt;
     awiwi_real damping = 0, last_length = AWIWI_REAL_MAX, previous = tolerance;
+    learnt.known = 0;
     add_up(p, b, measured, &last, &two[now]);
     if (!(two[now].cost <= AWIWI_REAL_MAX))
         return AWIWI_NOT_FINITE;
@@ -128,7 +185,7 @@ static int descend(const awiwi_problem *p, const awiwi_part *b, const awiwi_real
             held[j] = (q[u] <= p->low[u] && here->gradient[j] >= 0) || (q[u] >= p->high[u] && here->gradient[j] <= 0);
             free = free && !held[j];
         }
-        damped_step(b->unknowns, here->normal, here->gradient, held, damping, step);
+        step_from(b->unknowns, here, &learnt, held, damping, step);
         for (int j = 0; j < p->unknowns; j++)
             trial[j] = q[j];
         for (int j = 0; j < b->unknowns; j++) {
@@ -171,6 +228,9 @@ static int descend(const awiwi_problem *p, const awiwi_part *b, const awiwi_real
             return AWIWI_OK;
         if (b->linear)
             last = there;
+        else if (two[!now].cost > here->cost / 16 && longest * longest > tolerance)
+            /* else steps are Newton's, or so short that they tell rounding */
+            learn(b->unknowns, here, &two[!now], step, &learnt);
         damping = damping / 10;
         now = !now;
     }

@@ -225,7 +225,8 @@ def the_derivatives_are_the_rates_of_the_inverse_dynamics(
 ) -> Residual:
     d, qd, qdd = inverse_dynamics_derivatives, x.inputs["qd"], x.inputs["qdd"]
     rate = x.rate("inverse_dynamics", "tau", q=qd, qd=qdd)
-    return rate - _times(d["dtau_dq"], qd) - _times(d["dtau_dqd"], qdd), rate
+    change = rate - _times(d["dtau_dq"], qd) - _times(d["dtau_dqd"], qdd)
+    return change, _terms(rate, x.per_radian(inverse_dynamics["tau"]))
 
 
 def the_coupling_is_the_derivative_of_the_tendon_lengths(x: Motion, coupling: Any, tendon_lengths: Any) -> Residual:
