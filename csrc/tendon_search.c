@@ -180,6 +180,7 @@ static int descend(const task *s, const moves *all, int steps, vector f, model *
         return AWIWI_OUT_OF_DOMAIN;
     while (steps-- > 0 && (s->keep_torque || here->cost > here->blur)) {
         vector step = {0}, bend = {0};
+        stopped = -1;
         if (changed) {
             split(s, s->keep_torque, held, &own);
             m = &own;
@@ -189,10 +190,10 @@ static int descend(const task *s, const moves *all, int steps, vector f, model *
         const awiwi_real gain = newton(s, here, m, d, step, bend), longest = awiwi_largest(step, s->count);
         if (!(longest <= AWIWI_REAL_MAX))
             return AWIWI_NOT_FINITE;
-        const int rounding = gain <= here->blur && 2 * longest >= last; /* nothing to gain, and no nearer */
         const awiwi_real near = s->tolerance * s->t->high;
         const int none_held = m->rank + m->count == s->count; /* slopes that let one leave need the last step */
-        const awiwi_real whole = reach(s, f, step, &stopped);
+        const int rounding = gain <= here->blur && 2 * longest >= last; /* nothing to gain, and no nearer */
+        const awiwi_real whole = rounding && longest > last ? 0 : reach(s, f, step, &stopped);
         const int ended = longest <= near || rounding ||
                           (none_held && stopped < 0 && awiwi_ends_with(longest, last, near, s->t->high / 64));
         const awiwi_real *way = step;

@@ -20,13 +20,14 @@ from awiwi_gen.verify.problems import Descent
 LOW, HIGH = 5.0, 100.0
 
 
-def pair(f: float, wanted: float) -> Found:
+def pair(f: float, wanted: float, missing: float = 0.0) -> Found:
     """Equal forces of two antagonists with arms of 1 m, whose springs have the stiffness 10 f + f^2 / 10."""
     forces, ones = np.full(2, f), np.ones(2)
     k, slope, curvature = 10 * forces + forces**2 / 10, 10 + forces / 5, 0.2 * ones
     return Found(
-        forces, np.array([[1.0], [-1.0]]), np.zeros((2, 1, 1)), k, slope, curvature, np.array([[wanted]]), LOW, HIGH
-    )
+        forces, np.array([[1.0], [-1.0]]), np.zeros((2, 1, 1)), k, slope, curvature, np.array([[wanted]]), LOW, HIGH,
+        np.array([missing]),
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -42,6 +43,11 @@ def pair(f: float, wanted: float) -> Found:
 )
 def test_a_minimum_is_told_from_forces_that_want_to_leave_and_from_a_maximum(force, wanted, is_minimum):
     assert pair(force, wanted).is_minimum() is is_minimum
+
+
+def test_a_torque_out_of_reach_holds_its_tendons_whatever_their_stiffness():
+    assert not pair(HIGH, 0.0).is_minimum()
+    assert pair(HIGH, 0.0, missing=1.0).is_minimum()
 
 
 def test_distances_of_stiffness_are_those_of_all_entries():

@@ -16,7 +16,8 @@ UPHILL = 1e-6  # slopes and curvatures down by this share of the largest count a
 @dataclass(frozen=True)
 class Found:
     """Forces f (m,) [N] of one sample, the coupling P (m, n) there and its `derivative` (m, n, n), the stiffness of the
-    tendons k, its slope and curvature (m,), the symmetric demand K (n, n), and the limits of all forces."""
+    tendons k, its slope and curvature (m,), the symmetric demand K (n, n), the limits of all forces, and the torque
+    missing (n,) [N m] where the demanded one is out of reach: tendons that it pulls against a limit stay there."""
 
     f: Array
     P: Array
@@ -27,6 +28,7 @@ class Found:
     K: Array
     low: float
     high: float
+    missing: Array
 
     @property
     def held(self) -> Array:
@@ -56,7 +58,8 @@ class Found:
         growth, free = self.slope[:, None, None] * self.pairs + self.derivative, self.held == 0
         slopes = np.einsum("iab,ab->i", growth, self.excess)
         prices = np.linalg.lstsq(self.P[free], -slopes[free], rcond=None)[0]
-        leaving = self.held * (slopes + self.P @ prices)
+        pinned = np.abs(self.P @ self.missing) > UPHILL * np.abs(self.P).max() * np.abs(self.missing).max(initial=0)
+        leaving = np.where(pinned, 0, self.held * (slopes + self.P @ prices))
         hessian = np.einsum("iab,lab->il", growth, growth)
         hessian += np.diag(self.curvature * np.einsum("iab,ab->i", self.pairs, self.excess))
         u, sizes, _ = np.linalg.svd(self.P[free])

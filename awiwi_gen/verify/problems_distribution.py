@@ -220,14 +220,16 @@ class Distribution(Problem):
         as found if it is a minimum; too many that are farther than the nearest known are a fault.
         """
         answers = self.answers(inputs["q"], inputs["f_min"], inputs["f_max"])
-        limits = (inputs[end].astype(np.float64) for end in ("f_min", "f_max"))
+        limits = [inputs[end].astype(np.float64) for end in ("f_min", "f_max")]
         (P, dP), curves = self.tendons(inputs["q"]), ("k", "slope", "curvature")
         f, symmetric = found.f.astype(np.float64), (inputs["K"] + np.swapaxes(inputs["K"], 1, 2)).astype(np.float64) / 2
         known = np.array([answer.f for answer in answers])
+        reached = np.array([answer.feasible for answer in answers])[:, None]
         ends, nearest = (
-            [Found(*each) for each in zip(forces, P, dP, *(c.T for c in self.curve(forces.T, *curves)), symmetric, *both,
+            [Found(*each) for each in zip(forces, P, dP, *(c.T for c in self.curve(forces.T, *curves)), symmetric, *limits,
+                                          np.where(reached, 0, inputs["tau"] + np.einsum("sia,si->sa", P, forces)),
                                           strict=True)]
-            for forces, both in zip((f, known), [[*limits]] * 2, strict=True)
+            for forces in (f, known)
         )  # fmt: skip
         farther = 0
         for s, (end, best) in enumerate(zip(ends, nearest, strict=True)):
