@@ -37,7 +37,10 @@ class Math(StrEnum):
 HandFile = Annotated[Path | None, typer.Option("--hand", help="Hand file; the Awiwi hand if left out.")]
 Output = Annotated[Path, typer.Option("--output", "-o", help="Directory of the generated C.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for programs.")]
-Only = Annotated[str, typer.Option("--only", metavar="GLOB", help="Only kernels whose name matches; commas separate several patterns.")]
+Only = Annotated[
+    str,
+    typer.Option("--only", metavar="GLOB", help="Only kernels whose name matches; commas separate several patterns."),
+]
 ScalarOption = Annotated[Scalar, typer.Option("--scalar", help="Scalar type of the C.")]
 MathOption = Annotated[Math, typer.Option("--math", help="Own sine, arcus tangent, ..., or the C library's.")]
 ParamsOption = Annotated[Params, typer.Option("--params", help="Numbers as constants or in a struct.")]

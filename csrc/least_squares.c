@@ -112,15 +112,13 @@ static void step_from(int n, sums *s, const bending *c, const int *held, awiwi_r
     (void)damped_step(n, s->normal, s->gradient, held, damping, step);
 }
 
-/* Correct the curvature after a step: the least change that explains the new gradient (Powell's symmetric form of
-   Broyden's update). */
+/* Correct the curvature after a step to where the cost is not zero: the least change that explains the new gradient
+   (Powell's symmetric form of Broyden's update). */
 static void learn(int n, const sums *from, const sums *to, const vector step, bending *c)
 {
     const awiwi_real size = awiwi_sqrt(to->cost);
     vector missing;
     awiwi_real square = 0, along = 0;
-    if (!(size > 0))
-        return;
     if (!c->known)
         for (int j = 0; j < n; j++)
             for (int k = 0; k <= j; k++)

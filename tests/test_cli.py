@@ -96,6 +96,12 @@ def test_a_kernel_that_iterates_brings_the_kernels_it_calls(tmp_path):
     }  # fmt: skip
 
 
+def test_commas_separate_patterns(tmp_path):
+    told("generate", "--hand", ONE_FINGER, "-o", tmp_path / "out", "--only", "jaw_tendon_l*, jaw_gravity")
+
+    assert {path.stem for path in (tmp_path / "out").glob("jaw*.c")} == {"jaw_tendon_lengths", "jaw_gravity"}
+
+
 def test_a_fresh_directory_is_called_fresh(small):
     assert told("check", *SMALL, "-o", small) == f"{ONE_FINGER}: 1 finger, no faults\n{small}: fresh\n"
     assert answer("check", *SMALL, "-o", small) == {

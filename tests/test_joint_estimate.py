@@ -68,10 +68,10 @@ def readings():
 @pytest.mark.parametrize(
     ("reading", "reach", "noise", "steps"),
     [("literal", 0.4, 0.0, 5), ("literal", 0.8, 0.0, 7), ("tenth", 0.4, 0.0, 5), ("tenth", 0.8, 0.0, 6),
-     ("literal", 0.4, 1e-3, 9), ("literal", 0.8, 1e-3, 14)],
+     ("literal", 0.4, 1e-3, 7), ("literal", 0.8, 1e-3, 9)],
 )  # fmt: skip
 def test_few_steps_find_the_base_joints(readings, reading, reach, noise, steps):
-    """From (0, 0) on a grid of 81 poses; undamped Gauss-Newton takes as many to 1e-12."""
+    """From (0, 0) on a grid of 81 poses; undamped Gauss-Newton takes as many to 1e-12, with noise up to 14."""
     hand, lib = readings[reading]
     search, axis = BaseSearch(lib, hand, "thumb"), np.linspace(-reach, reach, 9)
     q = np.stack(np.meshgrid(axis, axis), axis=-1)

@@ -32,7 +32,7 @@ COMPILER = [
 ]
 ROOMS = ("reproduce", "compare", "tune")
 TOP = [
-    ["derive", "records", "budget", "parameters"],
+    ["patterns", "derive", "records", "budget", "parameters"],
     ["judge", "golden"],
     ["parallel", "tasks"],
     ["pipeline"],

@@ -23,6 +23,9 @@ SEEDS = {  # of hands on which a kernel or its proof once failed
     "many tendons over few joints": (12, "two_tendon_distribution"),
     "a step of Gauss and Newton goes too far": (31, "two_joint_estimate"),
     "angles of the base and of a link add up to a right one": (93, "one_jacobian"),
+    "no torque at any pose": (108, "one_inverse_dynamics*"),
+    "inconsistent lengths shorten the steps of Gauss and Newton by half only": (124, "one_joint_estimate"),
+    "exchanges between tendons are level within rounding": (145, "one_tendon_distribution"),
 }
 WHOLE = {"wrist", "motor", "spring", "fibre"}  # of the hand: with these all of its kernels are proved
 
