@@ -50,6 +50,7 @@ from awiwi_gen.arguments import (
     Version,
 )
 from awiwi_gen.interchange.command import export, import_
+from awiwi_gen.starter import init
 
 app = typer.Typer(
     help="From the CAD numbers of a tendon-driven hand to verified real-time C.",
@@ -359,6 +360,7 @@ def simulate(
     return 0
 
 
+command()(init)
 command(*HAND)(import_)
 command(*HAND)(export)
 

@@ -15,4 +15,5 @@ def _find(name: str) -> Path:
 TEMPLATES = _find("templates")
 CSRC = _find("csrc")
 DEFAULT_HAND = PACKAGE / "hand.toml"
+STARTER_HAND = PACKAGE / "starter.toml"
 SOURCES = (PACKAGE, TEMPLATES, CSRC)

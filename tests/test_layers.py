@@ -36,7 +36,7 @@ TOP = [
     ["judge", "golden"],
     ["parallel", "tasks"],
     ["pipeline"],
-    ["report", "explain", "terminal", "simulate", "results", "amalgamate", "interchange", "arguments"],
+    ["report", "explain", "terminal", "simulate", "results", "amalgamate", "interchange", "arguments", "starter"],
     ["loops", "identify"],
     [*ROOMS],
     ["__init__"],
