@@ -49,8 +49,8 @@ from awiwi_gen.arguments import (
     ScalarOption,
     Version,
 )
+from awiwi_gen.editing import init, set_
 from awiwi_gen.interchange.command import export, import_
-from awiwi_gen.starter import init
 
 app = typer.Typer(
     help="From the CAD numbers of a tendon-driven hand to verified real-time C.",
@@ -66,8 +66,11 @@ def options(version: Version = False) -> None:
     """What holds for all commands."""
 
 
-def command(*needs: str) -> Callable[[Callable[..., int | None]], Callable[..., None]]:
-    """Register a command that needs some modules: an error becomes one message and an exit code, in JSON with --json."""
+def command(*needs: str, **settings: Any) -> Callable[[Callable[..., int | None]], Callable[..., None]]:
+    """Register a command that needs some modules, with settings of its parser.
+
+    An error becomes one message and an exit code, in JSON with --json.
+    """
 
     def register(function: Callable[..., int | None]) -> Callable[..., None]:
         name = function.__name__.removesuffix("_")
@@ -88,7 +91,7 @@ def command(*needs: str) -> Callable[[Callable[..., int | None]], Callable[..., 
                 code = known.exit_code
             raise typer.Exit(code or 0)
 
-        app.command(name)(run)
+        app.command(name, context_settings=settings)(run)
         return run
 
     return register
@@ -361,6 +364,7 @@ def simulate(
 
 
 command()(init)
+command(*HAND, ignore_unknown_options=True)(set_)  # "-5 deg" is a value
 command(*HAND)(import_)
 command(*HAND)(export)
 

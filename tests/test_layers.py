@@ -36,7 +36,7 @@ TOP = [
     ["judge", "golden"],
     ["parallel", "tasks"],
     ["pipeline"],
-    ["report", "explain", "terminal", "simulate", "results", "amalgamate", "interchange", "arguments", "starter"],
+    ["report", "explain", "terminal", "simulate", "results", "amalgamate", "interchange", "arguments", "editing"],
     ["loops", "identify"],
     [*ROOMS],
     ["__init__"],

@@ -1,4 +1,4 @@
-"""The line of every key of a TOML text, from a second parser that is imported for messages only."""
+"""Where the keys of a TOML text are, from a second parser that is imported for messages and edits only."""
 
 from __future__ import annotations
 
@@ -12,17 +12,27 @@ from awiwi_gen.hand.parts import Keys
 if TYPE_CHECKING:
     from tree_sitter import Node
 
-__all__ = ["lines_of_keys"]
+__all__ = ["lines_of_keys", "values_of_keys"]
 
 _DEEPEST = 12  # keys of a path that get a line of their own; the schema is 8 deep
 
 
 def lines_of_keys(text: str) -> dict[Keys, int]:
     """The line, from 1, of each key, table and array element of a valid TOML text."""
+    return _places(text)[0]
+
+
+def values_of_keys(text: str) -> dict[Keys, slice]:
+    """The bytes of the value of each key and array element of a valid TOML text in UTF-8; tables with a header have none."""
+    return _places(text)[1]
+
+
+def _places(text: str) -> tuple[dict[Keys, int], dict[Keys, slice]]:
     import tree_sitter_toml
     from tree_sitter import Language, Parser
 
     lines: dict[Keys, int] = {}
+    values: dict[Keys, slice] = {}
     elements: dict[Keys, int] = {}  # number of [[tables]] of each name so far
 
     def mark(keys: Keys, node: Node) -> None:
@@ -30,6 +40,7 @@ def lines_of_keys(text: str) -> dict[Keys, int]:
             lines.setdefault(keys[:end], node.start_point.row + 1)
 
     def value(keys: Keys, node: Node) -> None:
+        values[keys] = slice(node.start_byte, node.end_byte)
         inside = [child for child in node.named_children if child.type != "comment"]
         if node.type == "array":
             for index, child in enumerate(inside):
@@ -63,7 +74,7 @@ def lines_of_keys(text: str) -> dict[Keys, int]:
             keys = (*keys, elements[keys] - 1)
         mark(keys, node)
         pairs(keys, body)
-    return lines
+    return lines, values
 
 
 def _parts(key: Node) -> list[str]:
