@@ -39,6 +39,7 @@ from awiwi_gen.arguments import (
     PAGE,
     HandFile,
     Json,
+    KernelName,
     Math,
     MathOption,
     Only,
@@ -55,7 +56,6 @@ from awiwi_gen.interchange.command import export, import_
 app = typer.Typer(
     help="From the CAD numbers of a tendon-driven hand to verified real-time C.",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
@@ -238,7 +238,7 @@ def list_(
 
 @command()
 def call(
-    kernel: Annotated[str, typer.Argument(help="Name of a kernel, see list.")],
+    kernel: KernelName,
     inputs: Annotated[list[str] | None, typer.Argument(help="Inputs such as q=0.1,0.2,0.3,0.4")] = None,
     hand: HandFile = None, as_json: Json = False,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Call what was generated there.")] = None,
@@ -265,7 +265,7 @@ def call(
 
 @command(*GENERATE)
 def explain(
-    kernel: Annotated[str, typer.Argument(help="Name of a kernel, see list.")],
+    kernel: KernelName,
     hand: HandFile = None, as_json: Json = False,
 ) -> int:  # fmt: skip
     """Show a kernel's mathematics, source, units and cost."""

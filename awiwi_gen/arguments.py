@@ -10,6 +10,7 @@ from typing import Annotated
 
 import typer
 
+from awiwi_gen.errors import AwiwiError
 from awiwi_gen.resources import CSRC
 
 
@@ -46,6 +47,20 @@ MathOption = Annotated[Math, typer.Option("--math", help="Own sine, arcus tangen
 ParamsOption = Annotated[Params, typer.Option("--params", help="Numbers as constants or in a struct.")]
 GENERATED = Path("generated")
 PAGE = Path("build/report/index.html")
+
+
+def kernel_names(incomplete: str) -> list[str]:
+    """What a shell offers for a kernel's name: those of `generated/`; nothing where there is no such directory."""
+    from awiwi_gen.emit.tree import read_manifest
+
+    try:
+        manifest = read_manifest(GENERATED) or {"kernels": []}
+    except AwiwiError:
+        return []
+    return [kernel["name"] for kernel in manifest["kernels"] if kernel["name"].startswith(incomplete)]
+
+
+KernelName = Annotated[str, typer.Argument(help="Name of a kernel, see list.", autocompletion=kernel_names)]
 
 
 def show_version(wanted: bool) -> None:

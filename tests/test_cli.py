@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import shlex
+import subprocess
+import sys
 from importlib import metadata
 from pathlib import Path
 
@@ -333,3 +336,20 @@ def test_the_versions_of_generator_and_c_interface_are_told():
     result = run("--version")
     assert result.exit_code == 0
     assert result.output == f"awiwi-gen {metadata.version('awiwi_gen')}, C interface {c}\n"
+
+
+@pytest.mark.parametrize(
+    ("words", "offered"),
+    [
+        ("awiwi-gen se", {"set"}),
+        ("awiwi-gen explain index_mass", {"index_mass_matrix"}),
+        ("awiwi-gen generate --sc", {"--scalar"}),
+    ],
+)
+def test_a_shell_completes_commands_options_and_kernels(words, offered):
+    root = Path(__file__).resolve().parent.parent
+    asked = {"_AWIWI_GEN_COMPLETE": "complete_bash", "COMP_WORDS": words, "COMP_CWORD": str(words.count(" "))}
+    command = Path(sys.executable).with_name("awiwi-gen")
+    done = subprocess.run([command], cwd=root, env=os.environ | asked, capture_output=True, text=True, check=False)
+
+    assert set(done.stdout.split()) == offered
