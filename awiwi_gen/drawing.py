@@ -1,0 +1,191 @@
+"""`awiwi-gen show`: a drawing of the hand as SVG, true to scale, each finger seen along and across its last joint's axis."""
+
+from __future__ import annotations
+
+import json
+import webbrowser
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+from xml.etree import ElementTree
+
+import numpy as np
+import typer
+
+from awiwi_gen.arguments import HandFile, Json
+from awiwi_gen.errors import printable
+
+if TYPE_CHECKING:
+    from awiwi_gen.hand import Finger, Hand
+    from awiwi_gen.hand.pose import Chain
+
+Array = np.ndarray[Any, Any]
+
+WIDTH, MARGIN, GAP, LINE = 1000.0, 24.0, 36.0, 16.0  # px
+VIEW = 330.0  # px, of the longest finger
+ROUTES = 740.0  # px, where the list of tendons begins
+CORNERS = 32  # of a pulley's rim
+SMALL = 0.002  # m, the radius of a joint's mark without a pulley
+STYLE = """
+svg { font: 12px sans-serif; background: #ffffff; color: #1a1a1a }
+text { fill: currentColor } .title { font-weight: bold; font-size: 14px } .small { font-size: 11px }
+polyline, path { fill: none; stroke: currentColor; stroke-linejoin: round; stroke-linecap: round }
+.link { stroke-width: 5; stroke: #7a7a7a } .end { stroke-width: 1.2; stroke: #a8a8a8; stroke-dasharray: 4 3 }
+.rim { stroke-width: 1.5 } .tendon { stroke-width: 1.5; stroke: #b3261e } .return { stroke-width: 1.5; stroke: #1f5fbf }
+@media (prefers-color-scheme: dark) { svg { background: #16181c; color: #e8e8e8 } .tendon { stroke: #ff8a80 }
+.return { stroke: #82b1ff } .link { stroke: #8f8f8f } .end { stroke: #666666 } }
+"""
+
+
+def show(
+    hand: HandFile = None,
+    output: Annotated[Path, typer.Option("--output", "-o", help="SVG file to write.")] = Path("hand.svg"),
+    open_: Annotated[bool, typer.Option("--open", help="Open the drawing in a browser.")] = False,
+    as_json: Json = False,
+) -> int:
+    """Draw the hand: links in the middle of their ranges and at both ends, joints, pulleys and tendons."""
+    from awiwi_gen.hand import Hand
+    from awiwi_gen.interchange.loss import write_whole
+    from awiwi_gen.report import counted
+
+    drawn = Hand.load(hand)
+    write_whole(output, drawing(drawn))
+    joints = sum(len(finger.links) for finger in drawn.fingers.values())
+    tendons = sum(len(finger.tendons) for finger in drawn.fingers.values())
+    if as_json:
+        print(json.dumps({"file": str(output), "fingers": list(drawn.fingers), "joints": joints, "tendons": tendons}))
+    else:
+        counts = [counted(len(drawn.fingers), "finger"), counted(joints, "joint"), counted(tendons, "tendon")]
+        print(printable(f"{output}: {', '.join(counts)}"))
+    if open_:
+        webbrowser.open(output.resolve().as_uri())
+    return 0
+
+
+def drawing(hand: Hand) -> str:
+    """The hand as SVG text: one row for each finger, all at one scale."""
+    from awiwi_gen.hand.pose import Chain
+
+    chains = {name: Chain(finger) for name, finger in hand.fingers.items()}
+    scale = VIEW / max(_reach(chain) for chain in chains.values())
+    root = ElementTree.Element("svg", xmlns="http://www.w3.org/2000/svg", role="img")
+    ElementTree.SubElement(root, "title").text = f"{hand.name}: fingers with their tendons"
+    ElementTree.SubElement(root, "style").text = STYLE
+    top = MARGIN + LINE
+    _text(root, MARGIN, top, f"{hand.name}: links in the middle of their ranges, dashed at the ends", "title")
+    _text(root, WIDTH - MARGIN, top, f"{_bar(root, scale, top)} mm", "small", "end")
+    for name, chain in chains.items():
+        top = _finger(root, name, hand.fingers[name], chain, scale, top + GAP)
+    root.set("viewBox", f"0 0 {WIDTH:g} {top + MARGIN:.0f}")
+    ElementTree.indent(root)
+    return ElementTree.tostring(root, encoding="unicode") + "\n"
+
+
+def skeleton(chain: Chain, q: Sequence[float]) -> Array:
+    """Origins of a finger's links and its tip (links + 1, 3) [m], in its base frame, at joint angles q [rad]."""
+    from awiwi_gen.hand.pose import point
+
+    frames = [own for _, own in chain.frames(q)]
+    tip = tuple(float(x) for x in chain.finger.links[-1].offset)
+    return np.array([*(origin for _, origin in frames), point(*frames[-1], (tip[0], tip[1], tip[2]))])
+
+
+def _reach(chain: Chain) -> float:
+    """The largest distance [m] between points of a finger, at the poses that are drawn."""
+    points = np.concatenate([skeleton(chain, q) for q in _poses(chain)])
+    return float(np.linalg.norm(points[:, None] - points[None], axis=2).max()) or 1.0
+
+
+def _poses(chain: Chain) -> list[list[float]]:
+    return chain.poses()[:3]  # the middle, and both ends
+
+
+def _views(chain: Chain) -> tuple[Array, Array]:
+    """Directions (2, 3) of a paper's right and up: along the last joint's axis, and across it, from base to tip."""
+    middle = _poses(chain)[0]
+    *_, (axes, _) = (own for _, own in chain.frames(middle))
+    points, axis = skeleton(chain, middle), np.array(axes[2])
+    right = points[-1] - points[0]
+    right = right - right @ axis * axis
+    if np.linalg.norm(right) < 1e-9:
+        right = np.array(axes[0])
+    right = right / np.linalg.norm(right)
+    return np.array([right, np.cross(axis, right)]), np.array([right, axis])
+
+
+def _finger(root: ElementTree.Element, name: str, finger: Finger, chain: Chain, scale: float, top: float) -> float:
+    """Draw one finger below `top`; returns where it ends."""
+    _text(root, MARGIN, top, name, "title")
+    shapes = [_shapes(chain, view) for view in _views(chain)]
+    left, lowest = 2 * MARGIN, top
+    for view, drawn in enumerate(shapes):
+        points = np.concatenate([points for _, points in drawn]) * scale
+        low, high = points.min(axis=0), points.max(axis=0)
+        corner = np.array([left - low[0], top + LINE + high[1]])
+        for kind, line in drawn:
+            place = corner + line * scale * [1, -1]
+            ElementTree.SubElement(
+                root, "polyline", {"class": kind, "points": " ".join(f"{x:.1f},{y:.1f}" for x, y in place)}
+            )
+        if view == 0:
+            _name_joints(
+                root, chain, corner + skeleton(chain, _poses(chain)[0]) @ _views(chain)[0].T * scale * [1, -1], scale
+            )
+        left, lowest = left + high[0] - low[0] + GAP, max(lowest, top + LINE + high[1] - low[1])
+    for index, route in enumerate(_routes(finger)):
+        _text(root, ROUTES, top + LINE * (index + 1), route, "small")
+    return max(lowest, top + LINE * len(finger.tendons))
+
+
+def _name_joints(root: ElementTree.Element, chain: Chain, places: Array, scale: float) -> None:
+    """Write the names of joints above their pulleys, joints at one place side by side."""
+    at: dict[tuple[int, ...], list[str]] = {}
+    for link, place in zip(chain.finger.links, places, strict=False):
+        at.setdefault(tuple(np.round(place / LINE).astype(int)), []).append(link.joint)
+    for cell, names in at.items():
+        radius = max(float(chain.finger.radii.get(name, SMALL)) for name in names) * scale
+        _text(root, cell[0] * LINE, cell[1] * LINE - radius - 4, ", ".join(names), "small", "middle")
+
+
+def _shapes(chain: Chain, view: Array) -> list[tuple[str, Array]]:
+    """Kinds and points (n, 2) [m] of the lines of a view."""
+    middle, *ends = _poses(chain)
+    shapes = [("end", skeleton(chain, q) @ view.T) for q in ends]
+    shapes.append(("link", skeleton(chain, middle) @ view.T))
+    turns = np.linspace(0, 2 * np.pi, CORNERS + 1)[:, None]
+    for link, (_, (axes, origin)) in zip(chain.finger.links, chain.frames(middle), strict=True):
+        radius = float(chain.finger.radii.get(link.joint, SMALL))
+        rim = np.array(origin) + radius * (np.cos(turns) * np.array(axes[0]) + np.sin(turns) * np.array(axes[1]))
+        shapes.append(("rim", rim @ view.T))
+    for tendon, lines in zip(chain.finger.tendons, chain.lines, strict=True):
+        for line in lines:
+            both = np.array([chain.place(middle, line.start), chain.place(middle, line.end)])
+            shapes.append(("return" if tendon.spring else "tendon", both @ view.T))
+    return shapes
+
+
+def _routes(finger: Finger) -> list[str]:
+    """How each tendon runs, in words."""
+    rows = []
+    for index, tendon in enumerate(finger.tendons):
+        parts = [*tendon.over]
+        parts += [f"arm at {joint}" for joint in tendon.arms]
+        parts += [f"span to {tendon.span.joint}"] if tendon.span else []
+        parts += [f"path through {len(tendon.path)} places"] if tendon.path else []
+        kind = "return string" if tendon.spring else "tendon"
+        rows.append(f"{kind} {index}: {', '.join(parts) or 'pulls at nothing'}")
+    return rows
+
+
+def _bar(root: ElementTree.Element, scale: float, top: float) -> str:
+    """Draw a bar of a round length [mm] near the right edge; returns the length."""
+    length = next(mm for mm in (100, 50, 20, 10, 5, 2, 1) if mm * 1e-3 * scale < 120 or mm == 1)
+    right = WIDTH - MARGIN - 60
+    points = f"{right - length * 1e-3 * scale:.1f},{top - 4} {right},{top - 4}"
+    ElementTree.SubElement(root, "polyline", {"class": "rim", "points": points})
+    return str(length)
+
+
+def _text(root: ElementTree.Element, x: float, y: float, text: str, kind: str, anchor: str = "start") -> None:
+    given = {"x": f"{x:.1f}", "y": f"{y:.1f}", "class": kind, "text-anchor": anchor}
+    ElementTree.SubElement(root, "text", given).text = text
