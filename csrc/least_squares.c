@@ -3,6 +3,8 @@
 #include "awiwi_solvers.h"
 #include "dense.h"
 
+static const awiwi_real NEARBY = (awiwi_real)0.25; /* steps that tell of the curvature: longer ones cross valleys */
+
 typedef awiwi_real vector[AWIWI_MOST_UNKNOWNS];
 typedef awiwi_real matrix[AWIWI_MOST_UNKNOWNS][AWIWI_MOST_UNKNOWNS];
 
@@ -218,6 +220,7 @@ static int descend(const awiwi_problem *p, const awiwi_part *b, const awiwi_real
         /* near the bottom rounding decides which cost is lower, and the step is still right */
         if (!ended && !(two[!now].cost <= here->cost + two[!now].blur)) {
             damping = damping > 0 ? damping * 10 : (awiwi_real)0.001;
+            learnt.known = 0;
             continue;
         }
         for (int j = 0; j < b->unknowns; j++)
@@ -226,7 +229,7 @@ static int descend(const awiwi_problem *p, const awiwi_part *b, const awiwi_real
             return AWIWI_OK;
         if (b->linear)
             last = there;
-        else if (two[!now].cost > here->cost / 16 && longest * longest > tolerance)
+        else if (two[!now].cost > here->cost / 16 && longest < NEARBY && longest * longest > tolerance)
             /* else steps are Newton's, or so short that they tell rounding */
             learn(b->unknowns, here, &two[!now], step, &learnt);
         damping = damping / 10;
