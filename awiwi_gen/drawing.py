@@ -128,9 +128,8 @@ def _finger(root: ElementTree.Element, name: str, finger: Finger, chain: Chain, 
                 root, "polyline", {"class": kind, "points": " ".join(f"{x:.1f},{y:.1f}" for x, y in place)}
             )
         if view == 0:
-            _name_joints(
-                root, chain, corner + skeleton(chain, _poses(chain)[0]) @ _views(chain)[0].T * scale * [1, -1], scale
-            )
+            joints = skeleton(chain, _poses(chain)[0]) @ _views(chain)[0].T
+            _name_joints(root, chain, corner + joints * scale * [1, -1], scale)
         left, lowest = left + high[0] - low[0] + GAP, max(lowest, top + LINE + high[1] - low[1])
     for index, route in enumerate(_routes(finger)):
         _text(root, ROUTES, top + LINE * (index + 1), route, "small")

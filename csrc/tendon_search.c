@@ -12,8 +12,7 @@ static const awiwi_real MARGIN = 4;                            /* over the great
 static const awiwi_real LITTLE = (awiwi_real)1 / 16;          /* gain by a step, relative to the cost */
 static const awiwi_real SAME = (awiwi_real)1 / 1048576;       /* costs of one minimum, found from two starts */
 enum { BENDS = 8 };                                           /* trials along a direction of negative curvature */
-/* Starts, as one may lead to a minimum that is not the least: the middle of the limits, the answer with chords for the
-   curve, forces as low and as high as the torque permits. */
+/* Starts, as a minimum need not be the least: middle of the limits, answer with chords, lowest and highest forces. */
 enum { FROM_MIDDLE, FROM_CHORDS, FROM_LOW, FROM_HIGH };
 
 /* Newton's step of the free tendons along the moves that are allowed; where the Hessian is not positive, a damped
