@@ -271,6 +271,45 @@ static void combine(const task *s, const moves *m, const vector x, awiwi_real si
         sum[i] *= scale;
 }
 
+/* Give back by the basic tendons what rounding has taken from a torque within reach. One that is at a limit, but for
+   rounding, is held there, and others are the basic ones. */
+static void settle(const task *s, const moves *m, int *held, vector f)
+{
+    moves own;
+    for (int again = s->within_reach && !s->by_chords; again;) {
+        awiwi_real A[AWIWI_MOST_JOINTS * AWIWI_MOST_JOINTS], missing[AWIWI_MOST_JOINTS];
+        again = 0;
+        for (int r = 0; r < m->rank; r++) { /* by the couplings: shares have rounding of their own */
+            const int a = m->joint[r];
+            awiwi_real sizes = awiwi_size(s->torque[a]);
+            missing[r] = s->torque[a];
+            for (int i = 0; i < s->count; i++) {
+                missing[r] -= s->p[i][a] * f[i];
+                sizes += awiwi_size(s->p[i][a]) * s->t->high;
+            }
+            for (int l = 0; l < m->rank; l++)
+                A[r * m->rank + l] = s->p[m->basic[l]][a];
+            again = again || awiwi_size(missing[r]) > 2 * AWIWI_REAL_EPSILON * sizes;
+        }
+        if (!again || !awiwi_solve(m->rank, 1, A, missing))
+            return;
+        again = 0;
+        for (int r = 0; r < m->rank; r++) {
+            const int i = m->basic[r];
+            const awiwi_real aim = f[i] + missing[r];
+            f[i] = awiwi_clamp(aim, s->t->low, s->t->high);
+            if (awiwi_size(aim - f[i]) > 0) {
+                held[i] = aim < f[i] ? AT_LOW : AT_HIGH;
+                again = 1;
+            }
+        }
+        if (again) {
+            split(s, 1, held, &own);
+            m = &own;
+        }
+    }
+}
+
 /* -- derivatives --------------------------------------------------------------------------------------------------- */
 
 /* Slopes of the cost by each force, with all others at rest. */

@@ -103,69 +103,68 @@ static void keep(const task *s, const model *from, model *to)
     }
 }
 
-/* Take a share of a step, or as much of that as the cost permits: at most `most` afterwards. Each trial is one of the
-   steps left. */
-static int take(const task *s, const vector step, awiwi_real share, awiwi_real most, int *steps, vector f, model *here,
-                int *stopped)
+/* Geodesic acceleration of a step: the second order of what the entries change by along it, undone by the moves of Gauss
+   and Newton. So a path bends as the valley of the cost does. Zero where no moves undo it. */
+static void accelerate(const task *s, const model *c, const moves *m, rates *d, const vector step, vector bend)
 {
+    const vector none = {0};
+    model second;
+    vector gradient, x;
+    awiwi_real trace = 0;
+    keep(s, c, &second);
+    for (int i = 0; i < s->count; i++)
+        bend[i] = 0;
+    for (int e = 0; e < s->entries; e++) {
+        second.excess[e] = 0;
+        for (int i = 0; i < s->count; i++)
+            second.excess[e] -= c->curvature[i] * step[i] * step[i] / 2 * s->p[i][s->at[e].a] * s->p[i][s->at[e].b];
+    }
+    slopes(s, &second, gradient);
+    for (int j = 0; j < m->count; j++) {
+        d->downhill[j] = along(m, m->loose[j], gradient);
+        trace += d->hessian[j][j];
+    }
+    add_diagonal(m, d, none, awiwi_sqrt(AWIWI_REAL_EPSILON) * trace);
+    if (awiwi_solve_positive(m->count, AWIWI_MOST_TENDONS, d->work[0], 0, d->downhill, x) > 0)
+        combine(s, m, x, 0, bend);
+}
+
+/* Take a share of a step, or as much of that as the cost permits: at most `most` afterwards. With the moves that the step
+   is made of, trials bend from the second on. Each trial is one of the steps left. */
+static int take(const task *s, const vector step, awiwi_real share, awiwi_real most, const moves *m, rates *d, int *steps,
+                vector f, model *here, int *stopped)
+{
+    vector bend;
+    int bent = 0;
     while (share > 0) {
         vector trial;
         model there;
+        int inside = 1;
         for (int i = 0; i < s->count; i++)
             trial[i] = awiwi_clamp(f[i] + share * step[i], s->t->low, s->t->high);
-        if (cost(s, trial, &there))
+        for (int i = 0; i < s->count && bent; i++) {
+            trial[i] = f[i] + share * (step[i] + share * bend[i]);
+            inside = inside && trial[i] >= s->t->low && trial[i] <= s->t->high;
+        }
+        if (inside && cost(s, trial, &there))
             return AWIWI_OUT_OF_DOMAIN;
-        if (there.cost <= most) {
+        if (inside && there.cost <= most) {
             for (int i = 0; i < s->count; i++)
                 f[i] = trial[i];
             keep(s, &there, here);
             return AWIWI_OK;
         }
-        if (--*steps <= 0)
+        if (inside && --*steps <= 0)
             break;
-        share /= 2;
+        if (m && !bent) {
+            accelerate(s, here, m, d, step, bend);
+            bent = 1;
+        } else {
+            share /= 2;
+        }
         *stopped = -1;
     }
     return AWIWI_NOT_CONVERGED;
-}
-
-/* Give back by the basic tendons what rounding has taken from a torque within reach. One that is at a limit, but for
-   rounding, is held there, and others are the basic ones. */
-static void settle(const task *s, const moves *m, int *held, vector f)
-{
-    moves own;
-    for (int again = s->within_reach && !s->by_chords; again;) {
-        awiwi_real A[AWIWI_MOST_JOINTS * AWIWI_MOST_JOINTS], missing[AWIWI_MOST_JOINTS];
-        again = 0;
-        for (int r = 0; r < m->rank; r++) { /* by the couplings: shares have rounding of their own */
-            const int a = m->joint[r];
-            awiwi_real sizes = awiwi_size(s->torque[a]);
-            missing[r] = s->torque[a];
-            for (int i = 0; i < s->count; i++) {
-                missing[r] -= s->p[i][a] * f[i];
-                sizes += awiwi_size(s->p[i][a]) * s->t->high;
-            }
-            for (int l = 0; l < m->rank; l++)
-                A[r * m->rank + l] = s->p[m->basic[l]][a];
-            again = again || awiwi_size(missing[r]) > 2 * AWIWI_REAL_EPSILON * sizes;
-        }
-        if (!again || !awiwi_solve(m->rank, 1, A, missing))
-            return;
-        again = 0;
-        for (int r = 0; r < m->rank; r++) {
-            const int i = m->basic[r];
-            const awiwi_real aim = f[i] + missing[r];
-            f[i] = awiwi_clamp(aim, s->t->low, s->t->high);
-            if (awiwi_size(aim - f[i]) > 0) {
-                held[i] = aim < f[i] ? AT_LOW : AT_HIGH;
-                again = 1;
-            }
-        }
-        if (again) {
-            split(s, 1, held, &own);
-            m = &own;
-        }
-    }
 }
 
 /* From f down to where no free move and no leaving tendon lowers the cost. `all` are the moves while none is held. */
@@ -201,7 +200,8 @@ static int descend(const task *s, const moves *all, int steps, vector f, model *
             && awiwi_largest(bend, s->count) > 0) { /* off a saddle, or from the way to one */
             int trials = BENDS, blocked;
             const awiwi_real share = reach(s, f, bend, &blocked);
-            const int status = take(s, bend, share, here->cost - here->blur, &trials, f, here, &blocked);
+            const int status = share > 0 ? take(s, bend, share, here->cost - here->blur, 0, d, &trials, f, here, &blocked)
+                                         : AWIWI_OK; /* hold what blocks it */
             if (status == AWIWI_OUT_OF_DOMAIN)
                 return status;
             steps -= BENDS - trials;
@@ -224,7 +224,7 @@ static int descend(const task *s, const moves *all, int steps, vector f, model *
             continue;
         }
         if (share > 0) {
-            const int status = take(s, step, share, here->cost + here->blur, &steps, f, here, &stopped);
+            const int status = take(s, step, share, here->cost + here->blur, s->keep_torque ? m : 0, d, &steps, f, here, &stopped);
             if (status != AWIWI_OK)
                 return status;
         } else if (way == step && stopped == left) {

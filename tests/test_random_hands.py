@@ -26,6 +26,7 @@ SEEDS = {  # of hands on which a kernel or its proof once failed
     "no torque at any pose": (108, "one_inverse_dynamics*"),
     "inconsistent lengths shorten the steps of Gauss and Newton by half only": (124, "one_joint_estimate"),
     "exchanges between tendons are level within rounding": (145, "one_tendon_distribution"),
+    "the search follows a curved valley": (175, "two_tendon_distribution"),
 }
 WHOLE = {"wrist", "motor", "spring", "fibre"}  # of the hand: with these all of its kernels are proved
 
