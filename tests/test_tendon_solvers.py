@@ -157,6 +157,26 @@ def test_alike_tendons_share_a_force_unequally_where_only_that_is_stiff_enough(l
     assert np.abs(np.sort(f) - np.sort(wanted)).max() < 1e-7
 
 
+def test_alike_tendons_at_one_limit_do_not_slow_the_search(library):
+    random = np.random.default_rng(19)
+    directions = random.normal(size=(9, 4)) * 0.01
+    directions[random.uniform(size=directions.shape) < 0.3] = 0
+    P = np.concatenate([directions[:3], directions])
+    P[-1] -= P.sum(axis=0)
+    finger = solvers.Finger(library, P, quadratic)
+    calls = []
+
+    for _ in range(11):
+        kind, forces = random.uniform(size=12), random.uniform(finger.low, finger.high, 12)
+        forces = np.where(kind < 0.3, finger.low, np.where(kind < 0.5, finger.high, forces))
+        off = random.normal(size=(4, 4)) * random.choice([0.1, 1.0])
+        wanted = finger.stiffness(forces) * random.uniform(0.3, 3) + off + off.T
+        assert finger.distribute(-P.T @ forces, wanted)[0] == OK
+        calls.append(finger.calls)
+
+    assert calls[-1] <= 40  # 143 where a tendon that blocks a way off a saddle is not held
+
+
 def test_tendons_that_pull_at_nothing_give_no_torque_and_forces_within_limits(library):
     for finger in fingers(library, np.random.default_rng(20)):
         finger.P *= 0
