@@ -55,6 +55,7 @@ def cases(lib: Any) -> Iterator[Case]:
     for finger in ("index", "middle", "ring", "fifth"):
         yield from list(distributions(lib, finger))[1:]
     yield from estimates(lib)
+    yield from dynamics(lib)
     yield from laws(lib)
 
 
@@ -104,6 +105,16 @@ def estimates(lib: Any) -> Iterator[Case]:
         ("inconsistent", h + random.normal(size=h.shape) * 3e-3, middle),
     ):
         yield Case(f"{kernel}, {name}", kernel, {"h": lengths, "start": start})
+
+
+def dynamics(lib: Any) -> Iterator[Case]:
+    """All dynamics of a finger in one call; before, that was four calls, for M, C, gravity and the inverse dynamics."""
+    random = np.random.default_rng(3)
+    for finger in ("thumb", "index", "middle", "ring", "fifth"):
+        kernel = f"{finger}_dynamics_and_torque"
+        ports = lib[kernel].inputs
+        inputs = {p["name"]: random.uniform(p["low"], p["high"], (TICKS, *p["shape"])) for p in ports}
+        yield Case(kernel, kernel, inputs)
 
 
 def laws(lib: Any) -> Iterator[Case]:

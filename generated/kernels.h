@@ -23,6 +23,7 @@
 #define awiwi_index_joint_torque_and_stiffness awiwi_index_joint_torq_beede771
 #define awiwi_index_joint_estimate_error awiwi_index_joint_esti_88f81b41
 #define awiwi_middle_inverse_dynamics_derivatives awiwi_middle_inverse_d_3adeb0a5
+#define awiwi_middle_dynamics_and_torque awiwi_middle_dynamics__f52ea577
 #define awiwi_middle_coupling_derivative awiwi_middle_coupling__daa40f96
 #define awiwi_middle_joint_torque_and_stiffness awiwi_middle_joint_tor_eb229b87
 #define awiwi_middle_joint_estimate_error awiwi_middle_joint_est_541f7671
@@ -198,6 +199,21 @@ void awiwi_thumb_forward_dynamics(const double q_in[4], const double qd_in[4], c
  * Cost: 152 add, 161 mul, 1 neg, 4 sincos.
  */
 void awiwi_thumb_dynamics(const double q_in[4], const double qd_in[4], const double g_in[3], double M_out[16], double C_out[16], double gravity_out[4]);
+
+/*
+ * All of `dynamics`, and the torques of `inverse_dynamics`, in one call with fewer operations.
+ * Source: eq. 2.4 to 2.15, 2.17.
+ *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
+ *   in   qd[4] in rad/s, -20 to 20
+ *   in   qdd[4] in rad/s^2, -2000 to 2000
+ *   in   g[3] in m/s^2, -9.81 to 9.81
+ *   out  M[4][4] in kg m^2
+ *   out  C[4][4] in N m s/rad
+ *   out  gravity[4] in N m
+ *   out  tau[4] in N m
+ * Cost: 183 add, 192 mul, 2 neg, 4 sincos.
+ */
+void awiwi_thumb_dynamics_and_torque(const double q_in[4], const double qd_in[4], const double qdd_in[4], const double g_in[3], double M_out[16], double C_out[16], double gravity_out[4], double tau_out[4]);
 
 /*
  * Kinetic energy and potential energy in the gravity field g (zero at the base frame's origin).
@@ -469,6 +485,21 @@ void awiwi_index_forward_dynamics(const double q_in[4], const double qd_in[4], c
 void awiwi_index_dynamics(const double q_in[4], const double qd_in[4], const double g_in[3], double M_out[16], double C_out[16], double gravity_out[4]);
 
 /*
+ * All of `dynamics`, and the torques of `inverse_dynamics`, in one call with fewer operations.
+ * Source: eq. 2.4 to 2.15, 2.17.
+ *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
+ *   in   qd[4] in rad/s, -20 to 20
+ *   in   qdd[4] in rad/s^2, -2000 to 2000
+ *   in   g[3] in m/s^2, -9.81 to 9.81
+ *   out  M[4][4] in kg m^2
+ *   out  C[4][4] in N m s/rad
+ *   out  gravity[4] in N m
+ *   out  tau[4] in N m
+ * Cost: 108 add, 115 mul, 4 neg, 4 sincos.
+ */
+void awiwi_index_dynamics_and_torque(const double q_in[4], const double qd_in[4], const double qdd_in[4], const double g_in[3], double M_out[16], double C_out[16], double gravity_out[4], double tau_out[4]);
+
+/*
  * Kinetic energy and potential energy in the gravity field g (zero at the base frame's origin).
  * Source: eq. 2.16, 5.4.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
@@ -724,6 +755,21 @@ void awiwi_middle_forward_dynamics(const double q_in[4], const double qd_in[4], 
 void awiwi_middle_dynamics(const double q_in[4], const double qd_in[4], const double g_in[3], double M_out[16], double C_out[16], double gravity_out[4]);
 
 /*
+ * All of `dynamics`, and the torques of `inverse_dynamics`, in one call with fewer operations.
+ * Source: eq. 2.4 to 2.15, 2.17.
+ *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
+ *   in   qd[4] in rad/s, -20 to 20
+ *   in   qdd[4] in rad/s^2, -2000 to 2000
+ *   in   g[3] in m/s^2, -9.81 to 9.81
+ *   out  M[4][4] in kg m^2
+ *   out  C[4][4] in N m s/rad
+ *   out  gravity[4] in N m
+ *   out  tau[4] in N m
+ * Cost: 108 add, 115 mul, 4 neg, 4 sincos.
+ */
+void awiwi_middle_dynamics_and_torque(const double q_in[4], const double qd_in[4], const double qdd_in[4], const double g_in[3], double M_out[16], double C_out[16], double gravity_out[4], double tau_out[4]);
+
+/*
  * Kinetic energy and potential energy in the gravity field g (zero at the base frame's origin).
  * Source: eq. 2.16, 5.4.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
@@ -977,6 +1023,21 @@ void awiwi_ring_forward_dynamics(const double q_in[3], const double qd_in[3], co
  * Cost: 87 add, 96 mul, 4 sincos.
  */
 void awiwi_ring_dynamics(const double q_in[3], const double qd_in[3], const double g_in[3], double M_out[9], double C_out[9], double gravity_out[3]);
+
+/*
+ * All of `dynamics`, and the torques of `inverse_dynamics`, in one call with fewer operations.
+ * Source: eq. 2.4 to 2.15, 2.17.
+ *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
+ *   in   qd[3] in rad/s, -20 to 20
+ *   in   qdd[3] in rad/s^2, -2000 to 2000
+ *   in   g[3] in m/s^2, -9.81 to 9.81
+ *   out  M[3][3] in kg m^2
+ *   out  C[3][3] in N m s/rad
+ *   out  gravity[3] in N m
+ *   out  tau[3] in N m
+ * Cost: 105 add, 115 mul, 1 neg, 4 sincos.
+ */
+void awiwi_ring_dynamics_and_torque(const double q_in[3], const double qd_in[3], const double qdd_in[3], const double g_in[3], double M_out[9], double C_out[9], double gravity_out[3], double tau_out[3]);
 
 /*
  * Kinetic energy and potential energy in the gravity field g (zero at the base frame's origin).
@@ -1256,6 +1317,23 @@ AWIWI_MUST_CHECK int awiwi_fifth_forward_dynamics(const double q_in[4], const do
  * Cost: 342 add, 406 mul, 2 div, 2 neg, 1 sqrt, 5 sincos.
  */
 AWIWI_MUST_CHECK int awiwi_fifth_dynamics(const double q_in[4], const double qd_in[4], const double g_in[3], double M_out[16], double C_out[16], double gravity_out[4]);
+
+/*
+ * All of `dynamics`, and the torques of `inverse_dynamics`, in one call with fewer operations.
+ * Source: eq. 2.4 to 2.15, 2.17.
+ *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
+ *   in   qd[4] in rad/s, -20 to 20
+ *   in   qdd[4] in rad/s^2, -2000 to 2000
+ *   in   g[3] in m/s^2, -9.81 to 9.81
+ *   out  M[4][4] in kg m^2
+ *   out  C[4][4] in N m s/rad
+ *   out  gravity[4] in N m
+ *   out  tau[4] in N m
+ * Returns 0 where all inputs and outputs are finite and the four-bar of hmc closes; else 1, and
+ * outputs without a value are NaN.
+ * Cost: 374 add, 438 mul, 2 div, 5 neg, 1 sqrt, 5 sincos.
+ */
+AWIWI_MUST_CHECK int awiwi_fifth_dynamics_and_torque(const double q_in[4], const double qd_in[4], const double qdd_in[4], const double g_in[3], double M_out[16], double C_out[16], double gravity_out[4], double tau_out[4]);
 
 /*
  * Kinetic energy and potential energy in the gravity field g (zero at the base frame's origin).

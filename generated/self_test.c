@@ -200,6 +200,25 @@ static int run_thumb_dynamics(const parameters *params, const awiwi_real *in, aw
     (void)params; awiwi_thumb_dynamics(in, in + 4, in + 8, out, out + 16, out + 32); return 0;
 }
 
+static const awiwi_real in_thumb_dynamics_and_torque[] = {
+    0.01640592391961415, -0.4761514895380321, 0.45137979559520214, 0.5205986692143287,
+    -6.393455271007152, 12.404002912271075, -6.360394527552593, -2.988906184350686,
+    1795.3601943870271, -1445.6908546198347, 1316.3495695597521, 643.1231997515147,
+    -6.501653446270417, 5.4243222431657845, -4.93099972890993, 0.27323064623751714,
+    0.37282876116494423, 0.04002607877475621, 0.5228275744461657, -3.377765183946746,
+    1.6373207286177731, 15.2318671305515, 1.344564484549462, 1858.7744704485367,
+    -1330.5368671436045, 286.71070182639505, 1146.2881390245684, -6.937771197121451,
+    6.572506584085287, -6.748049352072612, 0.4322356690487945, 0.18834519970972963,
+    1.1708812606090686, 1.362683401605597, 18.388177219070265, -18.905026560706304,
+    -1.1805876337846009, 7.99523344685192, -226.49135754513281, 300.7714109981939,
+    586.0385683805112, 1984.961723050431, -8.49206296116479, 2.2259914318238696,
+    -7.56347199739135,
+};
+static int run_thumb_dynamics_and_torque(const parameters *params, const awiwi_real *in, awiwi_real *out)
+{
+    (void)params; awiwi_thumb_dynamics_and_torque(in, in + 4, in + 8, in + 12, out, out + 16, out + 32, out + 36); return 0;
+}
+
 static const awiwi_real in_thumb_energy[] = {
     0.01640592391961415, -0.4761514895380321, 0.45137979559520214, 0.5205986692143287,
     -6.393455271007152, 12.404002912271075, -6.360394527552593, -2.988906184350686,
@@ -577,6 +596,25 @@ static int run_index_dynamics(const parameters *params, const awiwi_real *in, aw
     (void)params; awiwi_index_dynamics(in, in + 4, in + 8, out, out + 16, out + 32); return 0;
 }
 
+static const awiwi_real in_index_dynamics_and_torque[] = {
+    0.21997841379423616, 0.002379939078116039, 0.5170198393353279, 1.1470208329825249,
+    14.613098871683839, 13.769140136715222, -16.737063382596507, -10.84838110016458,
+    -897.3739427909693, 842.3419354227049, -1486.908256228131, 1784.3855278593164,
+    -4.510763781993576, -0.7033996488429217, -1.863023901356546, -0.33484986530820493,
+    0.4161926590107382, 0.9808110843015744, -0.04026511699593795, 9.495195568608935,
+    -17.545415192933753, -5.7548560563208895, 3.7308863089677686, -1939.798114407567,
+    -1279.7384454797675, 1453.5658853318064, 467.46320195916815, -4.626288006912114,
+    -9.243441313891232, 3.565676603616586, -0.21605754027343063, 0.16540541730262917,
+    1.262718514507528, 0.46670425593284726, 13.041292058644572, 1.679088096599198,
+    -12.059918880752889, 18.722982983037845, 810.7103915299281, 218.42283211127233,
+    755.0624435969562, -1374.3780653809981, 3.0034001779888957, -1.3853044029156223,
+    3.853622599245197,
+};
+static int run_index_dynamics_and_torque(const parameters *params, const awiwi_real *in, awiwi_real *out)
+{
+    (void)params; awiwi_index_dynamics_and_torque(in, in + 4, in + 8, in + 12, out, out + 16, out + 32, out + 36); return 0;
+}
+
 static const awiwi_real in_index_energy[] = {
     0.21997841379423616, 0.002379939078116039, 0.5170198393353279, 1.1470208329825249,
     14.613098871683839, 13.769140136715222, -16.737063382596507, -10.84838110016458,
@@ -929,6 +967,25 @@ static int run_middle_dynamics(const parameters *params, const awiwi_real *in, a
     (void)params; awiwi_middle_dynamics(in, in + 4, in + 8, out, out + 16, out + 32); return 0;
 }
 
+static const awiwi_real in_middle_dynamics_and_torque[] = {
+    -0.012966620478382984, 1.2001190365403418, 0.39942317688004664, 1.2070861716948595,
+    2.1498492607529407, -3.6447188134513873, 13.072330626864456, -19.215968019880066,
+    -380.37141628094855, -673.1191075106847, 1554.0119445605687, 421.09295242136795,
+    7.93707724126943, -9.781990191959965, 1.0552350766724032, 0.17331425714848775,
+    0.5861167534009643, 0.09287236274810283, 0.5936815582722194, 17.04770091989223,
+    -7.0084088976884615, 18.732413595072572, -10.756828416813873, 506.4932119699488,
+    947.4011856931206, -476.94324049013517, 478.39594226174904, -5.154638661672186,
+    6.376266492700628, 7.259080675011193, -0.1953160626470344, 0.1745377329361589,
+    1.3113739329976553, 1.3456525378876223, 0.7339069860515295, 16.58582444861584,
+    -19.073310273934748, 13.36704335977737, 326.20550421699545, -870.2726259874498,
+    336.2798215206831, -1817.1581230001043, -3.77372589833149, -8.182672253306206,
+    -2.6856615715049657,
+};
+static int run_middle_dynamics_and_torque(const parameters *params, const awiwi_real *in, awiwi_real *out)
+{
+    (void)params; awiwi_middle_dynamics_and_torque(in, in + 4, in + 8, in + 12, out, out + 16, out + 32, out + 36); return 0;
+}
+
 static const awiwi_real in_middle_energy[] = {
     -0.012966620478382984, 1.2001190365403418, 0.39942317688004664, 1.2070861716948595,
     2.1498492607529407, -3.6447188134513873, 13.072330626864456, -19.215968019880066,
@@ -1265,6 +1322,22 @@ static int run_ring_dynamics(const parameters *params, const awiwi_real *in, awi
     (void)params; awiwi_ring_dynamics(in, in + 3, in + 6, out, out + 9, out + 18); return 0;
 }
 
+static const awiwi_real in_ring_dynamics_and_torque[] = {
+    0.08637561606957722, 0.5333486805385775, 0.2866229584572712, 13.817166671624356,
+    10.489190335902798, -13.649021498458067, 1861.4921622136267, 1821.8077285726413,
+    958.8973667748046, 3.0215209098814597, 1.9129000026323286, -7.500979799240675,
+    -0.011828368740752992, 0.39435124565433655, 0.22802382031066948, 19.498260210825798,
+    19.46844936942219, -13.986589325811707, 896.1182754953138, -1239.3824766993407,
+    870.4441173172254, 9.012881654717441, 7.763357662011623, 4.869496944771857,
+    -0.11585062776417909, 1.286424388526707, 0.6420349333726393, 10.306069753992915,
+    -4.228439010428806, 13.216065161707945, -1557.0006109708038, -1906.64865252509,
+    1085.8368876808258, -9.073194285121422, -8.544126095876138, 4.443971719363052,
+};
+static int run_ring_dynamics_and_torque(const parameters *params, const awiwi_real *in, awiwi_real *out)
+{
+    (void)params; awiwi_ring_dynamics_and_torque(in, in + 3, in + 6, in + 9, out, out + 9, out + 18, out + 21); return 0;
+}
+
 static const awiwi_real in_ring_energy[] = {
     0.08637561606957722, 0.5333486805385775, 0.2866229584572712, 13.817166671624356,
     10.489190335902798, -13.649021498458067, 3.0215209098814597, 1.9129000026323286,
@@ -1592,6 +1665,25 @@ static const awiwi_real in_fifth_dynamics[] = {
 static int run_fifth_dynamics(const parameters *params, const awiwi_real *in, awiwi_real *out)
 {
     (void)params; return awiwi_fifth_dynamics(in, in + 4, in + 8, out, out + 16, out + 32);
+}
+
+static const awiwi_real in_fifth_dynamics_and_torque[] = {
+    0.5882227810920022, 0.3065003075816462, 0.8708110004636971, 0.7393819196907919,
+    -8.932094402452924, 19.53899280122083, 9.135162429324325, 1.320652909234589,
+    -1442.9304142007045, -1099.145686060947, -566.7274528157448, 1867.7188630608061,
+    -0.3855466673238084, -6.783328037303548, 4.809085825469904, -0.4274479503500054,
+    -0.021384623523499013, 1.4683445682055438, 0.9333126637089456, 8.430608295298075,
+    19.634789097884514, -1.8042458464242657, -5.1566990683646985, 770.3327517109669,
+    1557.002947331769, -268.27302291254045, 490.21108766714724, 0.8020480922044513,
+    7.790407636568423, -5.544962329751782, -0.13512432123571277, -0.18570630572156266,
+    0.05473972859774412, 0.3479398018591778, -0.9972700426945806, -12.692685497728586,
+    6.8028559234511405, 10.979922777313117, -649.5537663608952, -1687.7051818835862,
+    -1587.7105860189702, -317.8977898341868, 9.561938122856143, -2.450033958856265,
+    -4.347748831937215,
+};
+static int run_fifth_dynamics_and_torque(const parameters *params, const awiwi_real *in, awiwi_real *out)
+{
+    (void)params; return awiwi_fifth_dynamics_and_torque(in, in + 4, in + 8, in + 12, out, out + 16, out + 32, out + 36);
 }
 
 static const awiwi_real in_fifth_energy[] = {
@@ -3121,6 +3213,7 @@ static const golden tests[] = {
     {"thumb_inverse_dynamics_derivatives", run_thumb_inverse_dynamics_derivatives, in_thumb_inverse_dynamics_derivatives, 0, 0x64747a0du, 3, 15, 32},
     {"thumb_forward_dynamics", run_thumb_forward_dynamics, in_thumb_forward_dynamics, 0, 0x3daa833du, 3, 15, 4},
     {"thumb_dynamics", run_thumb_dynamics, in_thumb_dynamics, 0, 0x303870b0u, 3, 11, 36},
+    {"thumb_dynamics_and_torque", run_thumb_dynamics_and_torque, in_thumb_dynamics_and_torque, 0, 0x13625586u, 3, 15, 40},
     {"thumb_energy", run_thumb_energy, in_thumb_energy, 0, 0xc98afbefu, 3, 11, 2},
     {"thumb_tendon_lengths", run_thumb_tendon_lengths, in_thumb_tendon_lengths, 0, 0xffacfd80u, 3, 4, 8},
     {"thumb_coupling", run_thumb_coupling, in_thumb_coupling, 0, 0x9e61cbb6u, 3, 4, 32},
@@ -3145,6 +3238,7 @@ static const golden tests[] = {
     {"index_inverse_dynamics_derivatives", run_index_inverse_dynamics_derivatives, in_index_inverse_dynamics_derivatives, 0, 0xd9f54e64u, 3, 15, 32},
     {"index_forward_dynamics", run_index_forward_dynamics, in_index_forward_dynamics, 0, 0x5008d584u, 3, 15, 4},
     {"index_dynamics", run_index_dynamics, in_index_dynamics, 0, 0xef691fbau, 3, 11, 36},
+    {"index_dynamics_and_torque", run_index_dynamics_and_torque, in_index_dynamics_and_torque, 0, 0x72205ecbu, 3, 15, 40},
     {"index_energy", run_index_energy, in_index_energy, 0, 0xf96ef1d6u, 3, 11, 2},
     {"index_tendon_lengths", run_index_tendon_lengths, in_index_tendon_lengths, 0, 0xa2c5b9b1u, 3, 4, 8},
     {"index_coupling", run_index_coupling, in_index_coupling, 0, 0x601b025du, 3, 4, 32},
@@ -3168,6 +3262,7 @@ static const golden tests[] = {
     {"middle_inverse_dynamics_derivatives", run_middle_inverse_dynamics_derivatives, in_middle_inverse_dynamics_derivatives, 0, 0xebe2fbc9u, 3, 15, 32},
     {"middle_forward_dynamics", run_middle_forward_dynamics, in_middle_forward_dynamics, 0, 0xdd69fe6du, 3, 15, 4},
     {"middle_dynamics", run_middle_dynamics, in_middle_dynamics, 0, 0x47f55d53u, 3, 11, 36},
+    {"middle_dynamics_and_torque", run_middle_dynamics_and_torque, in_middle_dynamics_and_torque, 0, 0xa3cd38f9u, 3, 15, 40},
     {"middle_energy", run_middle_energy, in_middle_energy, 0, 0xc861aaeeu, 3, 11, 2},
     {"middle_tendon_lengths", run_middle_tendon_lengths, in_middle_tendon_lengths, 0, 0xb16f46d1u, 3, 4, 8},
     {"middle_coupling", run_middle_coupling, in_middle_coupling, 0, 0x601b025du, 3, 4, 32},
@@ -3191,6 +3286,7 @@ static const golden tests[] = {
     {"ring_inverse_dynamics_derivatives", run_ring_inverse_dynamics_derivatives, in_ring_inverse_dynamics_derivatives, 0, 0xafba8c8fu, 3, 12, 18},
     {"ring_forward_dynamics", run_ring_forward_dynamics, in_ring_forward_dynamics, 0, 0x21c2696cu, 3, 12, 3},
     {"ring_dynamics", run_ring_dynamics, in_ring_dynamics, 0, 0x4d60461du, 3, 9, 21},
+    {"ring_dynamics_and_torque", run_ring_dynamics_and_torque, in_ring_dynamics_and_torque, 0, 0x2ccba0cbu, 3, 12, 24},
     {"ring_energy", run_ring_energy, in_ring_energy, 0, 0x121c898eu, 3, 9, 2},
     {"ring_tendon_lengths", run_ring_tendon_lengths, in_ring_tendon_lengths, 0, 0x6e5b12f1u, 3, 3, 6},
     {"ring_coupling", run_ring_coupling, in_ring_coupling, 0, 0xb14ceed9u, 3, 3, 18},
@@ -3214,6 +3310,7 @@ static const golden tests[] = {
     {"fifth_inverse_dynamics_derivatives", run_fifth_inverse_dynamics_derivatives, in_fifth_inverse_dynamics_derivatives, 0, 0xaa3f346eu, 3, 15, 32},
     {"fifth_forward_dynamics", run_fifth_forward_dynamics, in_fifth_forward_dynamics, 0, 0x2b8e6d71u, 3, 15, 4},
     {"fifth_dynamics", run_fifth_dynamics, in_fifth_dynamics, 0, 0xe6c85283u, 3, 11, 36},
+    {"fifth_dynamics_and_torque", run_fifth_dynamics_and_torque, in_fifth_dynamics_and_torque, 0, 0x3faf93bcu, 3, 15, 40},
     {"fifth_energy", run_fifth_energy, in_fifth_energy, 0, 0x31dc2ed1u, 3, 11, 2},
     {"fifth_tendon_lengths", run_fifth_tendon_lengths, in_fifth_tendon_lengths, 0, 0xdf4cb2ddu, 3, 4, 8},
     {"fifth_coupling", run_fifth_coupling, in_fifth_coupling, 0, 0x0064537du, 3, 4, 32},

@@ -190,11 +190,7 @@ def link_poses(finger: Any, q: Any) -> Any:
     """Pose of every link frame (origin at its joint, fixed to the link) in the finger's base frame."""
 
 
-@per_finger(
-    lambda z: {"J": jacobian_port(z)},
-    "eq. 5.3, differentiated",
-    subject="kinematics",
-)
+@per_finger(lambda z: {"J": jacobian_port(z)}, "eq. 5.3, differentiated", subject="kinematics")
 def jacobian(finger: Any, q: Any) -> Any:
     """Fingertip Jacobian in base axes: velocity of the tip (rows 0-2) and angular velocity (rows 3-5)."""
 
@@ -251,6 +247,15 @@ def forward_dynamics(finger: Any, q: Any, qd: Any, tau: Any, g: Any) -> Any:
 @per_finger(lambda z: {"M": inertia(z), "C": coriolis(z), "gravity": torque(z)}, "eq. 2.17", subject="dynamics")
 def dynamics(finger: Any, q: Any, qd: Any, g: Any) -> Any:
     """Mass matrix, Coriolis matrix and gravity torques in one call with fewer operations."""
+
+
+@per_finger(
+    lambda z: {"M": inertia(z), "C": coriolis(z), "gravity": torque(z), "tau": torque(z)},
+    "eq. 2.4 to 2.15, 2.17",
+    subject="dynamics",
+)
+def dynamics_and_torque(finger: Any, q: Any, qd: Any, qdd: Any, g: Any) -> Any:
+    """All of `dynamics`, and the torques of `inverse_dynamics`, in one call with fewer operations."""
 
 
 @per_finger(lambda z: {"kinetic": Port((), J), "potential": Port((), J)}, "eq. 2.16, 5.4", subject="dynamics")

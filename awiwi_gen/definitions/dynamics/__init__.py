@@ -4,6 +4,7 @@ from awiwi_gen.definitions.dynamics.lagrange import (  # noqa: F401 the kernels 
     bias,
     coriolis_matrix,
     dynamics,
+    dynamics_and_torque,
     energy,
     forward_dynamics,
     gravity,

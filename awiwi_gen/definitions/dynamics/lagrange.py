@@ -53,6 +53,13 @@ def dynamics(finger: Finger, q: Matrix, qd: Matrix, g: Matrix) -> tuple[Matrix, 
     return mass, Matrix(n, n, christoffel), lagrangian.gravity()
 
 
+def dynamics_and_torque(
+    finger: Finger, q: Matrix, qd: Matrix, qdd: Matrix, g: Matrix
+) -> tuple[Matrix, Matrix, Matrix, Matrix]:
+    """M, C and the gravity torques, and the torques of the inverse dynamics by Lagrange's equation."""
+    return *dynamics(finger, q, qd, g), inverse_dynamics(finger, q, qd, qdd, g)
+
+
 def inverse_dynamics(finger: Finger, q: Matrix, qd: Matrix, qdd: Matrix, g: Matrix) -> Matrix:
     """Joint torques (n) [N m] of a motion: d/dt (dL/dqd) - dL/dq + dD/dqd with L = T - V (eq. 2.16)."""
     return _lagrangian(finger, q, qd, g).torques(qdd)

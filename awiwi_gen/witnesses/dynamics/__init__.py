@@ -4,6 +4,7 @@ from awiwi_gen.witnesses.dynamics.recursion import (  # noqa: F401 the kernels f
     bias,
     coriolis_matrix,
     dynamics,
+    dynamics_and_torque,
     energy,
     forward_dynamics,
     gravity,

@@ -70,6 +70,12 @@ def dynamics(finger: Finger, q: SX, qd: SX, g: SX) -> tuple[SX, SX, SX]:
     return *_mass_and_coriolis(finger, assembly, q, qd), _weight(assembly, g, q.numel())
 
 
+def dynamics_and_torque(finger: Finger, q: SX, qd: SX, qdd: SX, g: SX) -> tuple[SX, SX, SX, SX]:
+    """M, C and the gravity torques, and from these the joint torques (n) [N m] of a motion."""
+    mass, coriolis, weight = dynamics(finger, q, qd, g)
+    return mass, coriolis, weight, mass @ qdd + coriolis @ qd + weight + passive_torque(finger, q, qd)
+
+
 def energy(finger: Finger, q: SX, qd: SX, g: SX) -> tuple[SX, SX]:
     """Kinetic and potential energy [J] (eq. 5.4); the potential of a mass at the base frame's origin is zero."""
     assembly = assemble(finger, q)
