@@ -209,8 +209,9 @@ def _precision_restored() -> Iterator[None]:
 def emit(job: Job, records: Mapping[str, Record], directory: Path) -> dict[str, str]:
     """All files of the generated directory, by name. Raises BudgetError against the budget that is there."""
     from awiwi_gen.budget import BUDGET, budget_text, require_budget
-    from awiwi_gen.emit.batch import batch_files
+    from awiwi_gen.emit.batch import BATCHES, batch_files
     from awiwi_gen.emit.files import room_of, shared_files
+    from awiwi_gen.emit.lanes import shared_programs
     from awiwi_gen.emit.params import params_files, struct_fields
     from awiwi_gen.golden import self_test_files
     from awiwi_gen.parameters import numbers_of
@@ -228,7 +229,10 @@ def emit(job: Job, records: Mapping[str, Record], directory: Path) -> dict[str, 
     if numbers:
         files |= params_files(job.hand.prefix, numbers, job.options)
     entries = [manifest_entry(kernel, records[kernel.name]) for kernel in job.kernels]
-    files |= batch_files(entries, job.hand.prefix, job.options)
+    shared = list(shared_programs(entries, {name: record.function for name, record in records.items()}))
+    naming = (job.hand.prefix, job.options.c_type)
+    files |= batch_files(entries, job.hand.prefix, job.options, [program.prototype(*naming) for program in shared])
+    files |= {f"{BATCHES}/{program.name}.c": program.file(*naming) for program in shared}
     manifest = {
         "hand": job.hand.name,
         "prefix": job.hand.prefix,

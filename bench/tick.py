@@ -20,8 +20,10 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from awiwi_gen.build import FLAGS, compile_objects, compiler, load
+from awiwi_gen.build import FLAGS, GCC_FLAGS, VECTOR_FLAGS, compile_objects, compiler, load
 from awiwi_gen.cache import Cache
+from awiwi_gen.emit.batch import BATCHES
+from awiwi_gen.resources import CSRC
 from awiwi_gen.verify.problems_riccati import joint
 from bench.measure import called_costs
 
@@ -35,15 +37,20 @@ Array = np.ndarray[Any, Any]
 
 @dataclass(frozen=True)
 class Case:
-    """Inputs (samples, ...) of one kernel by port, under a name that says what they are."""
+    """Inputs (samples, ...) of one kernel by port, under a name that says what they are.
+
+    With ``lanes`` it is the function of that name that computes the kernel of several fingers, all with these inputs.
+    """
 
     name: str
     kernel: str
     inputs: dict[str, Array]
+    lanes: tuple[str, int] = ("", 1)
 
     def records(self, ports: list[dict[str, Any]]) -> Array:
         """The inputs of a call side by side, one call in a row."""
-        return np.hstack([self.inputs[p["name"]].reshape(-1, int(np.prod(p["shape"]))) for p in ports])
+        arrays = [self.inputs[p["name"]].reshape(-1, int(np.prod(p["shape"]))) for p in ports]
+        return np.hstack([np.repeat(array, self.lanes[1], axis=1) for array in arrays])
 
 
 # -- cases ---------------------------------------------------------------------------------------------------
@@ -115,6 +122,9 @@ def dynamics(lib: Any) -> Iterator[Case]:
         ports = lib[kernel].inputs
         inputs = {p["name"]: random.uniform(p["low"], p["high"], (TICKS, *p["shape"])) for p in ports}
         yield Case(kernel, kernel, inputs)
+        if finger == "middle":  # it is the index finger with other numbers
+            function = f"index_{kernel}_lanes"
+            yield Case(f"index and {kernel}, AVX2 lanes", kernel, inputs, (function, 2))
 
 
 def laws(lib: Any) -> Iterator[Case]:
@@ -150,7 +160,12 @@ def count(lib: Any, chosen: list[Case], directory: Path) -> dict[str, float]:
         objects = compile_objects(directory, Cache(), scratch)
         source, program, profile = scratch / "driver.c", scratch / "driver", scratch / "profile"
         source.write_text(_driver(lib, chosen), encoding="utf-8")
-        includes = (f"-I{directory}",)
+        includes, vectors = (f"-I{directory}", f"-I{CSRC}"), ("-mavx2", "-mno-fma", *VECTOR_FLAGS, *GCC_FLAGS)
+        for function in {case.lanes[0] for case in chosen} - {""}:
+            objects.append(scratch / f"{function}.o")
+            compiler().run(
+                *vectors, *includes, "-c", str(directory / BATCHES / f"{function}.c"), "-o", str(objects[-1])
+            )
         compiler().run(*FLAGS, "-w", *includes, str(source), *map(str, objects), "-lm", "-o", str(program))
         data = np.concatenate([case.records(lib[case.kernel].inputs).ravel() for case in chosen])
         (scratch / "inputs").write_bytes(np.ascontiguousarray(data, float).tobytes())
@@ -164,14 +179,16 @@ def _driver(lib: Any, chosen: list[Case]) -> str:
     """A C program with one function for each case, which calls the kernel with every record of a file."""
     functions, calls = [], []
     for i, case in enumerate(chosen):
-        sizes = [int(np.prod(port["shape"])) for port in lib[case.kernel].inputs]
+        function, lanes = case.lanes
+        sizes = [lanes * int(np.prod(port["shape"])) for port in lib[case.kernel].inputs]
         places = [f"x + {sum(sizes[:j])}" for j in range(len(sizes))]
         outputs = [f"y + {32 * j}" for j in range(len(lib[case.kernel].outputs))]
-        call = f"{lib.manifest['prefix']}_{case.kernel}({', '.join([*places, *outputs])})"
+        call = f"{lib.manifest['prefix']}_{function or case.kernel}({', '.join([*places, *outputs])})"
         loop = f"for (int s = 0; s < {TICKS}; s++, x += {sum(sizes)}) {call}; return x;"
         functions.append(f"__attribute__((noinline)) const double *case_{i}(const double *x) {{ {loop} }}")
         calls.append(f"x = case_{i}(x);")
-    opening = '#include <stdio.h>\n#include <stdlib.h>\n#include "kernels.h"\nstatic double y[128];\n'
+    headers = ("<stdio.h>", "<stdlib.h>", '"kernels.h"', '"batches/batches.h"')
+    opening = "".join(f"#include {header}\n" for header in headers) + "static double y[128];\n"
     reading = (
         'double *data = malloc(1 << 24); FILE *file = fopen(words[1], "rb");\n'
         "if (!data || !file || !fread(data, 1, 1 << 24, file)) return 1;\n"

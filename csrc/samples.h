@@ -63,14 +63,17 @@ INLINED awiwi_sincos4_result awiwi_sincos4_apart(awiwi_real x0, awiwi_real x1, a
 
 #if defined(__clang__)
 #define SAMPLES_ARE_INDEPENDENT _Pragma("clang loop vectorize(assume_safety)")
+#define LANES_ARE_INDEPENDENT /* it warns of loops that it unrolls instead */
 #define UNROLLED _Pragma("clang loop unroll(full)")
 #define SHUFFLE(a, b, ...) __builtin_shufflevector(a, b, __VA_ARGS__)
 #elif defined(__GNUC__)
 #define SAMPLES_ARE_INDEPENDENT _Pragma("GCC ivdep")
+#define LANES_ARE_INDEPENDENT SAMPLES_ARE_INDEPENDENT
 #define UNROLLED _Pragma("GCC unroll 65534")
 #define SHUFFLE(a, b, ...) __builtin_shuffle(a, b, (lanes){__VA_ARGS__})
 #else
 #define SAMPLES_ARE_INDEPENDENT
+#define LANES_ARE_INDEPENDENT
 #define UNROLLED
 #endif
 
@@ -113,7 +116,7 @@ static inline void transpose_four(const awiwi_real *from, ptrdiff_t from_step, a
 #endif
 
 /* Copies samples into rows of BLOCK, one row per element; the last of `count` samples fills up the rows. */
-static void gather(const awiwi_real *x, ptrdiff_t sample, ptrdiff_t element, int size, int count, awiwi_real *rows)
+static inline void gather(const awiwi_real *x, ptrdiff_t sample, ptrdiff_t element, int size, int count, awiwi_real *rows)
 {
     int e = 0;
     if (count == BLOCK && element == 1)
@@ -126,7 +129,7 @@ static void gather(const awiwi_real *x, ptrdiff_t sample, ptrdiff_t element, int
 }
 
 /* Copies rows of BLOCK into samples. */
-static void scatter(const awiwi_real *rows, int size, int count, awiwi_real *x, ptrdiff_t sample, ptrdiff_t element)
+static inline void scatter(const awiwi_real *rows, int size, int count, awiwi_real *x, ptrdiff_t sample, ptrdiff_t element)
 {
     int e = 0;
     if (count == BLOCK && element == 1)
@@ -164,5 +167,10 @@ static inline void prefetch(awiwi_real *x, ptrdiff_t sample, int size)
 #define SCATTER(x, size) \
     if (!PLACED(x)) \
         scatter(x##_rows, size, COUNT, x + first_*x##_sample, x##_sample, x##_element);
+
+/* Likewise where each lane is a finger: element e of lane i of an array lies at e*LANES + i. */
+#define EACH_LANE LANES_ARE_INDEPENDENT for (int i_ = 0; i_ < LANES; i_++)
+#define TAKE_LANE(x, size) UNROLLED for (int e_ = 0; e_ < size; e_++) x##_one[e_] = x[e_*LANES + i_];
+#define GIVE_LANE(x, size) UNROLLED for (int e_ = 0; e_ < size; e_++) x[e_*LANES + i_] = x##_one[e_];
 
 #endif

@@ -26,13 +26,19 @@ USAGE = (
     "Element e of sample i of an array x is at x[i*x_sample + e*x_element]. Steps of 1 and n are a structure of arrays,",
     "which is fastest; steps of x's size and 1 are samples one after another; a step of 0 repeats one sample.",
     "Outputs overlap no other array. Every result has the bits that the kernel alone computes.",
+    "",
+    "NAMES_KERNEL_lanes compute a kernel of several fingers at once, of which the C differs in its numbers only: element e",
+    "of the i-th of n fingers is at x[e*n + i].",
 )
 LIBRARY_CALL = re.compile(r"\b(sin|cos|tan|asin|acos|atan|atan2|exp|log|pow)f?\(")
 Entry = Mapping[str, Any]  # a kernel in the manifest
 
 
-def batch_files(entries: Iterable[Entry], prefix: str, options: Options) -> dict[str, str]:
-    """C files with kernels over many samples, by their paths in the generated directory."""
+def batch_files(entries: Iterable[Entry], prefix: str, options: Options, others: Iterable[str] = ()) -> dict[str, str]:
+    """C files with kernels over many samples, by their paths in the generated directory.
+
+    ``others`` are prototypes of more functions for the header.
+    """
     from awiwi_gen.emit.files import banner, render  # here, because a library is loaded without Jinja
 
     chosen = [entry for entry in entries if has_batch(entry)]
@@ -40,7 +46,7 @@ def batch_files(entries: Iterable[Entry], prefix: str, options: Options) -> dict
     files["batches.h"] = render(
         "batches.h.j2",
         banner=banner(*USAGE),
-        prototypes=[prototype(entry, prefix, options.c_type) for entry in chosen],
+        prototypes=[*(prototype(entry, prefix, options.c_type) for entry in chosen), *others],
         prefix=prefix,
     )
     return {f"{BATCHES}/{name}": text for name, text in files.items()} if chosen else {}

@@ -8,6 +8,9 @@
  * Element e of sample i of an array x is at x[i*x_sample + e*x_element]. Steps of 1 and n are a structure of arrays,
  * which is fastest; steps of x's size and 1 are samples one after another; a step of 0 repeats one sample.
  * Outputs overlap no other array. Every result has the bits that the kernel alone computes.
+ *
+ * NAMES_KERNEL_lanes compute a kernel of several fingers at once, of which the C differs in its numbers only: element e
+ * of the i-th of n fingers is at x[e*n + i].
  */
 #ifndef AWIWI_BATCHES_H
 #define AWIWI_BATCHES_H
@@ -206,6 +209,20 @@ void awiwi_plant_antagonistic_batch(ptrdiff_t samples, const double *x_in, ptrdi
 void awiwi_antagonistic_springs_batch(ptrdiff_t samples, const double *stretches_in, ptrdiff_t stretches_in_sample, ptrdiff_t stretches_in_element, const double *speeds_in, ptrdiff_t speeds_in_sample, ptrdiff_t speeds_in_element, const double *tendons_in, ptrdiff_t tendons_in_sample, ptrdiff_t tendons_in_element, double *torques_out, ptrdiff_t torques_out_sample, ptrdiff_t torques_out_element, double *springs_out, ptrdiff_t springs_out_sample, ptrdiff_t springs_out_element);
 void awiwi_plant_finger_forces_batch(ptrdiff_t samples, const double *thetas_in, ptrdiff_t thetas_in_sample, ptrdiff_t thetas_in_element, const double *path_in, ptrdiff_t path_in_sample, ptrdiff_t path_in_element, const double *slack_in, ptrdiff_t slack_in_sample, ptrdiff_t slack_in_element, const double *motor_in, ptrdiff_t motor_in_sample, ptrdiff_t motor_in_element, const double *line_in, ptrdiff_t line_in_sample, ptrdiff_t line_in_element, double *f_out, ptrdiff_t f_out_sample, ptrdiff_t f_out_element);
 void awiwi_plant_finger_batch(ptrdiff_t samples, const double *qd_in, ptrdiff_t qd_in_sample, ptrdiff_t qd_in_element, const double *qdd_in, ptrdiff_t qdd_in_sample, ptrdiff_t qdd_in_element, const double *thds_in, ptrdiff_t thds_in_sample, ptrdiff_t thds_in_element, const double *f_in, ptrdiff_t f_in_sample, ptrdiff_t f_in_element, const double *u_in, ptrdiff_t u_in_sample, ptrdiff_t u_in_element, const double *motor_in, ptrdiff_t motor_in_sample, ptrdiff_t motor_in_element, const double *friction_in, ptrdiff_t friction_in_sample, ptrdiff_t friction_in_element, double *xd_out, ptrdiff_t xd_out_sample, ptrdiff_t xd_out_element);
+void awiwi_index_middle_fingertip_pose_lanes(const double q_in[8], double T_out[32]);
+void awiwi_index_middle_link_poses_lanes(const double q_in[8], double T_out[128]);
+void awiwi_index_middle_jacobian_lanes(const double q_in[8], double J_out[48]);
+void awiwi_index_middle_pose_and_jacobian_lanes(const double q_in[8], double T_out[32], double J_out[48]);
+void awiwi_index_middle_mass_matrix_lanes(const double q_in[8], double M_out[32]);
+void awiwi_index_middle_coriolis_matrix_lanes(const double q_in[8], const double qd_in[8], double C_out[32]);
+void awiwi_index_middle_gravity_lanes(const double q_in[8], const double g_in[6], double gravity_out[8]);
+void awiwi_index_middle_bias_lanes(const double q_in[8], const double qd_in[8], const double g_in[6], double bias_out[8]);
+void awiwi_index_middle_inverse_dynamics_lanes(const double q_in[8], const double qd_in[8], const double qdd_in[8], const double g_in[6], double tau_out[8]);
+void awiwi_index_middle_inverse_dynamics_derivatives_lanes(const double q_in[8], const double qd_in[8], const double qdd_in[8], const double g_in[6], double dtau_dq_out[32], double dtau_dqd_out[32]);
+void awiwi_index_middle_forward_dynamics_lanes(const double q_in[8], const double qd_in[8], const double tau_in[8], const double g_in[6], double qdd_out[8]);
+void awiwi_index_middle_dynamics_lanes(const double q_in[8], const double qd_in[8], const double g_in[6], double M_out[32], double C_out[32], double gravity_out[8]);
+void awiwi_index_middle_dynamics_and_torque_lanes(const double q_in[8], const double qd_in[8], const double qdd_in[8], const double g_in[6], double M_out[32], double C_out[32], double gravity_out[8], double tau_out[8]);
+void awiwi_index_middle_energy_lanes(const double q_in[8], const double qd_in[8], const double g_in[6], double kinetic_out[2], double potential_out[2]);
 
 #ifdef __cplusplus
 }
