@@ -104,7 +104,7 @@ static void keep(const task *s, const model *from, model *to)
 }
 
 /* Geodesic acceleration of a step: the second order of what the entries change by along it, undone by the moves of Gauss
-   and Newton. So a path bends as the valley of the cost does. Zero where no moves undo it. */
+   and Newton, a little damped. So a path bends as the valley of the cost does. */
 static void accelerate(const task *s, const model *c, const moves *m, rates *d, const vector step, vector bend)
 {
     const vector none = {0};
@@ -112,8 +112,6 @@ static void accelerate(const task *s, const model *c, const moves *m, rates *d, 
     vector gradient, x;
     awiwi_real trace = 0;
     keep(s, c, &second);
-    for (int i = 0; i < s->count; i++)
-        bend[i] = 0;
     for (int e = 0; e < s->entries; e++) {
         second.excess[e] = 0;
         for (int i = 0; i < s->count; i++)
@@ -125,8 +123,8 @@ static void accelerate(const task *s, const model *c, const moves *m, rates *d, 
         trace += d->hessian[j][j];
     }
     add_diagonal(m, d, none, awiwi_sqrt(AWIWI_REAL_EPSILON) * trace);
-    if (awiwi_solve_positive(m->count, AWIWI_MOST_TENDONS, d->work[0], 0, d->downhill, x) > 0)
-        combine(s, m, x, 0, bend);
+    (void)awiwi_solve_positive(m->count, AWIWI_MOST_TENDONS, d->work[0], 0, d->downhill, x);
+    combine(s, m, x, 0, bend);
 }
 
 /* Take a share of a step, or as much of that as the cost permits: at most `most` afterwards. With the moves that the step
@@ -156,7 +154,7 @@ static int take(const task *s, const vector step, awiwi_real share, awiwi_real m
         }
         if (inside && --*steps <= 0)
             break;
-        if (m && !bent) {
+        if (m && !bent) { /* rather than to halve the step at once */
             accelerate(s, here, m, d, step, bend);
             bent = 1;
         } else {
