@@ -24,6 +24,7 @@ from typing import Any
 
 Finger = Any
 Palm = Any
+Wrist = Any
 
 
 def leaders(finger: Finger) -> dict[str, str]:
@@ -113,3 +114,8 @@ def fixed_turns(part: Any) -> list[tuple[int, int | None, Any]]:
 def sense(over: str) -> tuple[int, str]:
     """A pulley that a tendon runs over, "-pip", as (sign, joint): (-1, "pip")."""
     return (1 if over[0] == "+" else -1), over[1:]
+
+
+def is_symmetric(wrist: Wrist) -> bool:
+    """Whether the side bars of a wrist are a crossed parallelogram, with A straight across from the middle of BC."""
+    return wrist.width is None and wrist.c is None

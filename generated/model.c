@@ -4,5 +4,5 @@
 #include "awiwi_version.h"
 #include "kernels.h"
 
-const char awiwi_model_digest[65] = "cf12d1c70fa564324ae0bb9593c1bfff3327ccef3897f22847f4926cea706439";
+const char awiwi_model_digest[65] = "a1c1ad135b2366351070ce79b921dfff6580ceb7c7ae40b2139031ebd7616d20";
 const int awiwi_api_version = AWIWI_API_VERSION;

@@ -41,9 +41,28 @@ def wrist_library(hand: Hand):
     return load(cached_tree(job), job.store)
 
 
+def unequal(sense: int = 1, **others: str) -> str:
+    """A wrist whose bars differ in length, drawn upside down if the sense is -1."""
+    points = {
+        "a0": (0, 21, 36 * sense),
+        "a": (52, 18, 2 * sense),
+        "b": (50, 42, 36 * sense),
+        "palm": (50, 21, 18 * sense),
+    }
+    keys = {"width": "40 mm", "c": ("52.5", 2, 37.8 * sense)} | others
+    lines = [f'{key} = "{v}"' if isinstance(v, str) else written(key, v) for key, v in keys.items() if v]
+    return redrawn(**points).replace("[wrist]", "\n".join(["[wrist]", *lines]))
+
+
 @pytest.mark.parametrize(
     ("text", "fault"),
     [
+        (unequal(c=("52.5", 2, 30)), "wrist.c has z = 30 mm; expected 37.8 mm, in the plane through B0C0 and B"),
+        (unequal(c=("52.5", 90, 37.8)), "wrist.c is where the bars BB0 and CC0 do not cross"),
+        (unequal(c="", width="-1 mm"), "wrist.width"),
+        (unequal().replace('a = ["52 mm", "18 mm", "2 mm"]', 'a = ["52 mm", "18 mm", "40 mm"]'),
+         "wrist.a lies on the same side of the side bars as A0"),
+        (unequal().replace('q73 = { low = "-20 deg"', 'q73 = { low = "-50 deg"'), "wrist does not close at q71"),
         (replaced('q71 = { low = "-30 deg"', 'q71 = { low = "-120 deg"'),
          "wrist does not close at q71 = -84.25 deg, q73 = 35.72 deg (-120 and -20 deg from the neutral pose): "),
         (replaced('q71 = { low = "-30 deg", high = "30 deg"', 'q71 = { low = "-30 deg", high = "60 deg"'),
@@ -113,3 +132,34 @@ def test_other_readings_of_the_drawing_are_other_numbers_of_the_same_file(text, 
     flexed = internal_angles(lib, other.wrist, 0, np.radians([30.0]))
     moved = tendon_displacements(lib, other.wrist, *flexed) * 1e3
     assert [moved.min(), moved.max()] == pytest.approx([lowest, highest], abs=1e-3)
+
+
+@pytest.mark.parametrize("sense", [1, -1])
+def test_bars_of_any_length_keep_it_and_give_the_drawn_palm_in_the_neutral_pose(sense):
+    hand = Hand.parse(unequal(sense))
+    lib = wrist_library(hand)
+    grid = np.meshgrid(*(np.linspace(low, high, 21) for low, high in zip(*hand.wrist.range, strict=True)))
+
+    assert bar_errors(lib, hand.wrist, *grid).max() < 1e-16
+    neutral = lib.wrist_palm_pose(*hand.wrist.neutral)
+    assert neutral.status == 0
+    np.testing.assert_allclose(
+        neutral.T, [[1, 0, 0, 0.05], [0, 1, 0, 0.021], [0, 0, 1, 0.018 * sense], [0, 0, 0, 1]], atol=2e-15
+    )
+
+
+def test_equal_bars_written_as_any_bars_move_as_before(lib, hand):
+    written_out = Hand.parse(PACKAGED.replace("[wrist]", '[wrist]\nwidth = "42 mm"\nc = ["50 mm", "0 mm", "36 mm"]'))
+    grid = np.meshgrid(*(np.linspace(low, high, 9) for low, high in zip(*hand.wrist.range, strict=True)))
+
+    other = wrist_library(written_out)
+    np.testing.assert_allclose(other.wrist_palm_pose(*grid).T, lib.wrist_palm_pose(*grid).T, atol=1e-15)
+
+
+def test_side_bars_that_reach_their_end_are_a_status():
+    hand = Hand.parse(unequal(c=("52.5", 12, 37.8)).replace('q73 = { low = "-20 deg"', 'q73 = { low = "-10 deg"'))
+    lib, (q71, q73) = wrist_library(hand), hand.wrist.neutral
+
+    statuses = lib.wrist_points(q71, np.linspace(q73, 0.1, 200)).status
+    assert statuses[0] == 0
+    assert {*statuses.tolist()} > {0}

@@ -28,16 +28,15 @@ def wrist_of_bars(forearm: Element, wrist: Wrist, sections: Sections, lost: Lost
     least_inertia(palm, lost)
     (q71, q73), (low, high) = wrist.neutral, wrist.range
     normal = np.array([-np.sin(q71), 0.0, np.cos(q71)])
-    across, b0 = np.array([0.0, 1.0, 0.0]), np.zeros(3)
+    across, b0, (c0, c) = np.array([0.0, 1.0, 0.0]), np.zeros(3), map(np.array, wrist.far_bar)
     hinges = [("q71", -across, b0, q71, (low[0], high[0])), ("q73", -normal, b0, q73, (low[1], high[1])),
-              ("b.normal", normal, b, 0.0, None), ("b.side", across, b, 0.0, None)]  # fmt: skip
+              ("b.normal", normal, b, 0.0, None), ("b.side", (b - c) / np.linalg.norm(b - c), b, 0.0, None)]  # fmt: skip
     for name, axis, anchor, angle, ends in hinges:
         joint = SubElement(palm, "joint", name=f"wrist_{name}", axis=text(axis), pos=text(anchor - origin))
         if angle:
             joint.set("ref", text(angle))
         if ends is not None:
             joint.set("range", text(ends))
-    c0, c = np.array([0.0, b[1], 0.0]), np.array([b[0], 0.0, b[2]])
     for name, start, end in (("cc0", c0, c), ("aa0", vector(wrist.a0), vector(wrist.a))):
         SubElement(forearm, "site", name=f"wrist.{name}.forearm", pos=text(start))
         SubElement(palm, "site", name=f"wrist.{name}.palm", pos=text(end - origin))

@@ -15,7 +15,7 @@ from awiwi_gen.kernel import Kernel, Port
 from awiwi_gen.kernels.declare import Family
 from awiwi_gen.kernels.fingers import Size, input_ports
 from awiwi_gen.kernels.routing import wraps_hold
-from awiwi_gen.kernels.wrist import BARS_CLOSE, wrist_ports
+from awiwi_gen.kernels.wrist import bars_close, wrist_ports
 from awiwi_gen.units import N, m, rad
 
 of_hand: Family[Size] = Family("hand_tendons")
@@ -31,7 +31,10 @@ def hand_kernels(hand: Hand) -> list[Kernel]:
     whole = Size(ports["q"].size, ports["f"].size, sum(size.links for size in sizes.values()))
     kernels = of_hand.kernels("hand", hand, "", hand.structure(), ports, whole)
     wraps = tuple(each for name, finger in hand.fingers.items() for each in wraps_hold(finger, f"{name}."))
-    return [replace(kernel, guards=(kernel.guards if hand.wrist else ()) + wraps) for kernel in kernels]
+    return [
+        replace(kernel, guards=(bars_close(hand.wrist) if hand.wrist and "wrist" in kernel.inputs else ()) + wraps)
+        for kernel in kernels
+    ]
 
 
 def joined(ports: list[Port]) -> Port:
@@ -44,7 +47,6 @@ def joined(ports: list[Port]) -> Port:
 @of_hand(
     lambda z: {"h": Port((z.tendons,), m)},
     "eq. 5.1, 5.5, 6.9",
-    guards=BARS_CLOSE,
 )
 def tendon_lengths(hand: Any, q: Any, wrist: Any = None) -> Any:
     """Path length of every tendon in its finger and in the wrist, at its internal angles wrist = (q71, q73)."""

@@ -10,16 +10,19 @@ from typing import Any
 import casadi as ca
 from casadi import SX
 
+from awiwi_gen.structure import is_symmetric
+
 Wrist = Any
 
 
 @dataclass(frozen=True)
 class Palm:
-    """The palm in the rotating axes: points b, c, m and unit vectors x, y, z of the palm frame (3 each).
+    """The palm in the rotating axes: points a, b, c, m and unit vectors x, y, z of the palm frame (3 each).
 
     `axes` takes the rotating axes to those of {0}. The `guards` must be positive for the palm to exist.
     """
 
+    a: SX
     b: SX
     c: SX
     x: SX
@@ -37,8 +40,7 @@ class Palm:
 def points(wrist: Wrist, q71: SX, q73: SX) -> tuple[Any, ...]:
     """A, B, C (3 each) [m] in {0}, and the guards."""
     palm = _palm(wrist, q71, q73)
-    a = palm.m - (wrist.b[2] - wrist.a[2]) * palm.z
-    return palm.axes @ a, palm.axes @ palm.b, palm.axes @ palm.c, palm.guards
+    return palm.axes @ palm.a, palm.axes @ palm.b, palm.axes @ palm.c, palm.guards
 
 
 def palm_pose(wrist: Wrist, q71: SX, q73: SX) -> tuple[Any, ...]:
@@ -60,23 +62,35 @@ def coupling(wrist: Wrist, q71: SX, q73: SX) -> tuple[Any, ...]:
 
 
 def _palm(wrist: Wrist, q71: SX, q73: SX) -> Palm:
-    width, height = wrist.b[1], wrist.b[2] - wrist.a[2]
+    drawn = _Drawing(wrist)
+    width, height = drawn.width, drawn.height
     side_squared = wrist.b[0] ** 2 + wrist.b[1] ** 2 + wrist.b[2] ** 2
     side = ca.sqrt(side_squared)
     c71, s71 = ca.cos(q71), ca.sin(q71)
     axes = ca.vertcat(ca.horzcat(c71, 0, -s71), ca.horzcat(0, 1, 0), ca.horzcat(s71, 0, c71))
 
-    # In a crossed parallelogram the diagonals B0C and C0B are parallel, and their product is R^2 - D^2 (eq. 6.4).
     b = (side * ca.sin(q73), side * ca.cos(q73))
-    product = side_squared - width**2
-    stretch = 1 / ((side_squared + width**2) / product - 2 * width * side / product * ca.cos(q73))
-    c = (stretch * b[0], stretch * (b[1] - width))
-    y = ((b[0] - c[0]) / width, (b[1] - c[1]) / width)
+    if is_symmetric(wrist):
+        # In a crossed parallelogram the diagonals B0C and C0B are parallel, and their product is R^2 - D^2 (eq. 6.4).
+        product = side_squared - width**2
+        stretch = 1 / ((side_squared + width**2) / product - 2 * width * side / product * ca.cos(q73))
+        c, closes = (stretch * b[0], stretch * (b[1] - width)), []
+        foot = (b[0] + c[0], b[1] + c[1])  # twice, as all that follows
+    else:
+        # C is on circles about C0 and B: `share` of the way from C0 to B, and sideways from there, where the bars cross.
+        x, y = b[0], b[1] - width
+        square, other = x**2 + y**2, drawn.c[0] ** 2 + (drawn.c[1] - width) ** 2 + drawn.c[2] ** 2
+        twice = other + square - drawn.palm_width**2
+        closes = [4 * other * square - twice**2]
+        share, sideways = twice / (2 * square), ca.sqrt(closes[0]) / (2 * square)
+        c = (share * x + sideways * y, width + share * y - sideways * x)
+        foot = tuple((1 - 2 * drawn.share) * p + (1 + 2 * drawn.share) * q for p, q in zip(b, c, strict=True))
+    y = ((b[0] - c[0]) / drawn.palm_width, (b[1] - c[1]) / drawn.palm_width)
 
     # Eq. 6.7, doubled as 2 M is B + C. From M, the foot of A0 in the plane that bisects BC lies at `off` along
     # (y[1], -y[0], 0) and at `away` along e3. A lies at `reach` towards the foot and at `across` normal to that.
     away = c71 * (2 * wrist.a0[2]) - s71 * (2 * wrist.a0[0])
-    run = (c71 * (2 * wrist.a0[0]) + s71 * (2 * wrist.a0[2]) - (b[0] + c[0]), 2 * wrist.a0[1] - (b[1] + c[1]))
+    run = (c71 * (2 * wrist.a0[0]) + s71 * (2 * wrist.a0[2]) - foot[0], 2 * wrist.a0[1] - foot[1])
     off = run[0] * y[1] - run[1] * y[0]
     middle = sum((p - q) ** 2 for p, q in zip(wrist.a, wrist.a0, strict=True))
     reach = (run[0] ** 2 + run[1] ** 2 + away**2 + 4 * (height**2 - middle)) / (4 * height)
@@ -86,20 +100,55 @@ def _palm(wrist: Wrist, q71: SX, q73: SX) -> Palm:
     # z, from A to M, makes the same angle with the line from the foot to M.
     tilt = (across * away - reach * off) / distance_squared
     rise = -(across * off + reach * away) / distance_squared
+    own = (
+        ca.vertcat(rise * y[1], -rise * y[0], -tilt),
+        ca.vertcat(*y, 0),
+        ca.vertcat(tilt * y[1], -tilt * y[0], rise),
+    )
+    z = own[2]
+    if not is_symmetric(wrist):
+        own = tuple(ca.horzcat(*own) @ row.T for row in ca.vertsplit(drawn.triad))
     return Palm(
+        a=ca.vertcat(*foot, 0) / 2 - height * z,
         b=ca.vertcat(*b, 0),
         c=ca.vertcat(*c, 0),
-        x=ca.vertcat(rise * y[1], -rise * y[0], -tilt),
-        y=ca.vertcat(*y, 0),
-        z=ca.vertcat(tilt * y[1], -tilt * y[0], rise),
+        x=own[0],
+        y=own[1],
+        z=own[2],
         axes=axes,
-        guards=[ca.sin(q73), height * away, across_squared],
+        guards=[ca.sin(q73), height * away, across_squared, *closes],
     )
+
+
+class _Drawing:
+    """The neutral pose: C, |B0C0| and |BC|; the foot of A on BC, by its `share` of BC from the middle, and A's distance.
+
+    The columns of ``triad`` are what the axes of a palm drawn along its bars would be.
+    """
+
+    def __init__(self, wrist: Wrist) -> None:
+        self.width = self.palm_width = wrist.b[1] if wrist.width is None else wrist.width
+        self.c = (wrist.b[0], SX(0), wrist.b[2]) if wrist.c is None else wrist.c
+        self.height = wrist.b[2] - wrist.a[2]
+        self.share, self.triad = SX(0), SX.eye(3)
+        self.middle = (ca.vertcat(*wrist.b) + ca.vertcat(*self.c)) / 2
+        if is_symmetric(wrist):
+            return
+        a, b, c = ca.vertcat(*wrist.a), ca.vertcat(*wrist.b), ca.vertcat(*self.c)
+        self.palm_width = ca.sqrt(ca.dot(c - b, c - b))
+        self.share = ca.dot(a - self.middle, c - b) / ca.dot(c - b, c - b)
+        up = self.middle + self.share * (c - b) - a
+        side = wrist.a0[2] * wrist.b[0] - wrist.a0[0] * wrist.b[2]
+        self.height = ca.sqrt(ca.dot(up, up)) * side / ca.sqrt(side**2)  # which side A0 is on
+        y, z = (b - c) / self.palm_width, up / self.height
+        self.triad = ca.horzcat(ca.cross(y, z), y, z)
 
 
 def _origin(wrist: Wrist, palm: Palm) -> SX:
     """The palm frame's origin in the rotating axes; the palm frame is parallel to {0} in the neutral pose."""
-    drawn = (wrist.palm[0] - wrist.b[0], wrist.palm[1] - wrist.b[1] / 2, wrist.palm[2] - wrist.b[2])
+    drawn = [wrist.palm[0] - wrist.b[0], wrist.palm[1] - wrist.b[1] / 2, wrist.palm[2] - wrist.b[2]]
+    if not is_symmetric(wrist):
+        drawn = ca.vertsplit(ca.vertcat(*wrist.palm) - _Drawing(wrist).middle)
     origin: SX = palm.m + drawn[0] * palm.x + drawn[1] * palm.y + drawn[2] * palm.z
     return origin
 

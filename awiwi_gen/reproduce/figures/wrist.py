@@ -93,9 +93,10 @@ def internal_angles(library: Any, wrist: Wrist, axis: int, turned: Array) -> tup
 def bar_errors(library: Any, wrist: Wrist, q71: Array, q73: Array) -> Array:
     """Deviations (..., 6) [m] of the lengths AA0, BB0, CC0, AB, AC, BC from those of the drawing."""
     a0, a, b = (np.array([float(x) for x in point]) for point in (wrist.a0, wrist.a, wrist.b))
-    forearm = [a0, np.zeros(3), b * [0, 1, 0]]
+    c0, c = (np.array(point) for point in wrist.far_bar)
+    forearm = [a0, np.zeros(3), c0]
     palm = library.wrist_points(q71, q73)[:3]
-    drawn = [a, b, b * [1, 0, 1]]
+    drawn = [a, b, c]
 
     def lengths(points: Any) -> Array:
         triangle = [points[i] - points[k] for i, k in ((0, 1), (0, 2), (1, 2))]
