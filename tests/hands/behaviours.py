@@ -130,8 +130,8 @@ def a_side_site_near_the_axis_and_far_along_it_is_outside() -> bool:
 
 def a_bend_inside_a_geom_is_not_quite_where_the_string_is_shortest() -> bool:
     off = []
-    for x in np.linspace(1.5, 4, 40):
-        a, b = np.array([-x, -1.7]), np.array([2.5, -1.4])
+    for x in np.linspace(0.4, 3, 80):
+        a, b = np.array([-x, -1.7]), np.array([0.9, -1.2])
         ends = "".join(f'<site name="{name}" pos="{p[0]} {p[1]} 0"/>' for name, p in (("a", a), ("b", b)))
         model, data = _compiled(
             f'<geom name="g" type="cylinder" size="1 1"/><site name="s" pos="0 0 0"/>{ends}',
@@ -141,7 +141,7 @@ def a_bend_inside_a_geom_is_not_quite_where_the_string_is_shortest() -> bool:
         bend = np.asarray(data.wrap_xpos).reshape(-1, 3)[1, :2]
         pull = sum((end - bend) / np.linalg.norm(end - bend) for end in (a, b))
         off.append(abs(pull[0] * bend[1] - pull[1] * bend[0]))  # along the surface; zero where the string is shortest
-    return 1e-9 < max(off) < 1e-5
+    return 1e-8 < max(off) < 1e-5
 
 
 def a_link_of_a_urdf_without_inertial_weighs_what_its_geometry_does() -> bool:
