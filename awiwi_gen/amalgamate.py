@@ -21,7 +21,7 @@ BANNER = "/* All kernels in one file, made by awiwi-gen amalgamate; do not edit.
 # clang reports inline functions that are not used only outside of headers, where they stood.
 QUIET = '#ifdef __clang__\n#pragma clang diagnostic ignored "-Wunused-function"\n#endif\n'
 HEADER, SOURCE = "awiwi.h", "awiwi.c"
-PUBLIC = (HEADER, "params.h", "self_test.h")  # what the one header holds
+PUBLIC = (HEADER, "hand.h", "params.h", "self_test.h")  # what the one header holds
 INCLUDE = re.compile(r'^#include "([^"]+)"\n', re.M)
 SKIPPED = r'/\*.*?\*/|//[^\n]*|"(?:\\.|[^"\\\n])*"'
 TOKEN = re.compile(rf"{SKIPPED}|(?P<access>\.|->)?\b(?P<name>[A-Za-z_]\w*)", re.S)

@@ -49,7 +49,7 @@ if TYPE_CHECKING:
 GENERATOR = (
     *(f"awiwi_gen/{room}" for room in ("definitions", "witnesses", "kernels", "ir", "emit", "verify")),
     *(f"awiwi_gen/{file}.py" for file in ("structure", "kernel", "units", "derive", "records", "golden", "budget")),
-    *(f"awiwi_gen/{file}.py" for file in ("parameters", "pipeline")),
+    *(f"awiwi_gen/{file}.py" for file in ("hand_header", "parameters", "pipeline")),
     "templates",
 )
 
@@ -214,6 +214,7 @@ def emit(job: Job, records: Mapping[str, Record], directory: Path) -> dict[str, 
     from awiwi_gen.emit.lanes import shared_programs
     from awiwi_gen.emit.params import params_files, struct_fields
     from awiwi_gen.golden import self_test_files
+    from awiwi_gen.hand_header import header_files
     from awiwi_gen.parameters import numbers_of
     from awiwi_gen.records import manifest_entry
 
@@ -228,6 +229,9 @@ def emit(job: Job, records: Mapping[str, Record], directory: Path) -> dict[str, 
     files |= self_test_files(job.hand, job.kernels, records, job.options)
     if numbers:
         files |= params_files(job.hand.prefix, numbers, job.options)
+    files |= header_files(
+        job.hand, job.options, {n: sha256(text) for n, text in sorted(files.items()) if n.endswith((".c", ".h"))}
+    )
     entries = [manifest_entry(kernel, records[kernel.name]) for kernel in job.kernels]
     shared = list(shared_programs(entries, {name: record.function for name, record in records.items()}))
     naming = (job.hand.prefix, job.options.c_type)

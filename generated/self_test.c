@@ -3435,11 +3435,12 @@ static int is_ieee(void)
     return !(below > one) && above >= one + part && !(minus < -one) && half > 0;
 }
 
-int awiwi_self_test(const char **failed)
+int awiwi_self_test_of(unsigned long build_id, const char **failed)
 {
     const parameters *params = 0;
-    const char *name = is_ieee() ? 0 : "arithmetic";
-    int found = name ? -1 : 0;
+    const int belongs = build_id == awiwi_build_id && build_id == AWIWI_BUILD_ID;
+    const char *name = !belongs ? "headers" : is_ieee() ? 0 : "arithmetic";
+    int found = !belongs ? -2 : name ? -1 : 0;
     for (int k = 0; k < (int)(sizeof tests / sizeof tests[0]) && !found; k++) {
         if (!passes(&tests[k], params)) {
             found = k + 1;

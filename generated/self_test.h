@@ -3,6 +3,7 @@
 #ifndef AWIWI_SELF_TEST_H
 #define AWIWI_SELF_TEST_H
 
+#include "hand.h"
 #include "kernels.h"
 
 #ifdef __cplusplus
@@ -10,14 +11,19 @@ extern "C" {
 #endif
 
 /* Runs every kernel on golden inputs. Returns 0 if all results are right; else which kernel is the first that failed,
- * counted from 1, or -1 if arithmetic does not round to the nearest or drops subnormal numbers. *failed (failed may be
- * null) becomes its name, or null. Kernels without iterations must give the same bits as the interpreter, others the
+ * counted from 1; -1 if arithmetic does not round to the nearest or drops subnormal numbers, -2 if the headers of the
+ * caller are not those of the library. *failed (failed may be null) becomes its name, "arithmetic", "headers", or null. Kernels without iterations must give the same bits as the interpreter, others the
  * exact solution within the error that they are verified for.
  *
  * Call it once, before the first control cycle: it finds compilers, flags, libraries and modes of the floating-point unit
  * that compute something else. It needs no heap, and 722 numbers (double) of stack beside the kernels' own.
  * It is in a file of its own, self_test.c, which may be left out. */
-int awiwi_self_test(const char **failed);
+int awiwi_self_test_of(unsigned long build_id, const char **failed);
+
+static inline int awiwi_self_test(const char **failed)
+{
+    return awiwi_self_test_of(AWIWI_BUILD_ID, failed);
+}
 
 #ifdef __cplusplus
 }

@@ -33,7 +33,7 @@ COMPILER = [
 ROOMS = ("reproduce", "compare", "tune")
 TOP = [
     ["patterns", "derive", "records", "budget", "parameters"],
-    ["judge", "golden"],
+    ["judge", "golden", "hand_header"],
     ["parallel", "tasks"],
     ["pipeline"],
     [

@@ -20,7 +20,11 @@ from awiwi_gen.resources import CSRC
 SIGNIFICANT = 63  # characters of an external name that today's toolchains use
 C99_SIGNIFICANT = 31  # and those that C99 guarantees
 # External names that are not those of kernels; the prefix stands before them.
-OWN_NAMES = ("model_digest", "api_version", "default_numbers", "params_derive", "params_load", "self_test")
+OWN_NAMES = (
+    "model_digest", "api_version", "default_numbers", "params_derive", "params_load", "self_test", "self_test_of",
+    "build_id", "build_digest", "joint_low", "joint_high", "pulley_radius", "finger_base", "tendon_low", "tendon_high",
+    "sensor_slack", "sensor_taut", "finger", "joint", "tendon",
+)  # fmt: skip
 LONGEST_PORT = 48  # leaves room for the suffixes of batch loops within 63 characters
 PORT = re.compile(r"[A-Za-z](_?[A-Za-z0-9])*")
 KERNEL = PORT
@@ -82,14 +86,16 @@ def csrc_names() -> dict[str, str]:
 
 def taken_names(prefix: str) -> dict[str, str]:
     """The table: every external name that a kernel may not have, and who has it."""
-    own = {f"{prefix}_{name}": "kernels.h, params.h or self_test.h" for name in ("params", "numbers", *OWN_NAMES)}
+    own = {
+        f"{prefix}_{name}": "kernels.h, hand.h, params.h or self_test.h" for name in ("params", "numbers", *OWN_NAMES)
+    }
     return dict.fromkeys(STANDARD, "the C or C++ standard") | csrc_names() | own
 
 
 def taken_files() -> dict[str, str]:
     """File names (without suffix) that a kernel may not have: their files or objects would overwrite each other."""
     return {path.stem: f"csrc/{path.name}" for path in sorted(CSRC.glob("*.c"))} | {
-        name: f"{name}.c" for name in ("model", "params", "self_test")
+        name: f"{name}.c" for name in ("hand", "model", "params", "self_test")
     }
 
 

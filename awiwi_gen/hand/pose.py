@@ -9,13 +9,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from awiwi_gen.hand.parts import MOST, PALM, Finger, FourBar, Link, Tendon
 from awiwi_gen.hand.wraps import Body, Vector
 
 __all__ = ["Chain", "Line", "Spot", "point", "polynomial"]
 
+_ROUNDING = 1e-15  # of the sine of a quarter turn
 Axes = tuple[Vector, Vector, Vector]  # unit vectors of a frame, in base axes
 Frame = tuple[Axes, Vector]  # with its origin
 
@@ -215,6 +216,15 @@ def _elementary(link: Link) -> list[tuple[int, float]]:
     turn = [] if link.turn == "none" else [("xyz".index(link.turn[0]), math.radians(float(link.turn[1:])))]
     roll, pitch, yaw = link.rpy or (0, 0, 0)
     return [*turn, *((axis, float(angle)) for axis, angle in ((2, yaw), (1, pitch), (0, roll)) if angle)]
+
+
+def fixed_rotation(part: Any) -> Axes:
+    """The axes that `turn` and `rpy` of a part make of those before them; quarter turns are exact."""
+    axes: Axes = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    for axis, angle in _elementary(part):
+        axes = _rotated(axes, angle, axis)
+    a, b, c = (tuple(round(x) if abs(x - round(x)) < _ROUNDING else x for x in axis) for axis in axes)
+    return (a[0], a[1], a[2]), (b[0], b[1], b[2]), (c[0], c[1], c[2])
 
 
 def polynomial(coefficients: Sequence[float], x: float) -> float:

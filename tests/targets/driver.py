@@ -64,7 +64,10 @@ def write_driver(directory: Path, manifest: Mapping[str, Any], inputs: Mapping[s
     text = "\n\n".join(['#include "run.h"', *parts, f"const struct kernel kernels[] = {{\n{table},\n}};"])
     most_in = max(array.shape[1] for array in inputs.values())
     most_out = max(_size(entry["outputs"]) for entry in manifest["kernels"])
-    header = HEADER.format(word=word, rows=len(first), inputs=most_in, outputs=most_out, prefix=manifest["prefix"])
+    guard = f"{manifest['prefix'].upper()}_SELF_TEST_H"
+    header = HEADER.format(
+        word=word, rows=len(first), inputs=most_in, outputs=most_out, prefix=manifest["prefix"], guard=guard
+    )
     directory.mkdir(parents=True, exist_ok=True)
     (directory / "run.h").write_text(header)
     path = directory / "table.c"
@@ -93,7 +96,9 @@ struct kernel {{
 extern const struct kernel kernels[];
 extern const int kernel_count;
 
-int {prefix}_self_test(const char **failed);
+#ifndef {guard} /* one header may have it already */
+#include "self_test.h"
+#endif
 #define SELF_TEST {prefix}_self_test
 
 #endif
