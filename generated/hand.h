@@ -41,7 +41,7 @@
 #define AWIWI_FIRST_TENDON_OF_FIFTH 30
 #define AWIWI_TENDONS_OF_FIFTH 8
 
-enum awiwi_finger {
+enum {
     AWIWI_FINGER_THUMB,
     AWIWI_FINGER_INDEX,
     AWIWI_FINGER_MIDDLE,
@@ -49,7 +49,7 @@ enum awiwi_finger {
     AWIWI_FINGER_FIFTH
 };
 
-enum awiwi_joint {
+enum {
     AWIWI_JOINT_THUMB_FLEXION,
     AWIWI_JOINT_THUMB_ABDUCTION,
     AWIWI_JOINT_THUMB_PIP,
@@ -71,7 +71,7 @@ enum awiwi_joint {
     AWIWI_JOINT_FIFTH_PIP
 };
 
-enum awiwi_tendon {
+enum {
     AWIWI_TENDON_THUMB_0,
     AWIWI_TENDON_THUMB_1,
     AWIWI_TENDON_THUMB_2,

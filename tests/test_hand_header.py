@@ -11,6 +11,7 @@ from samples import ONE_FINGER
 
 import awiwi_gen
 from awiwi_gen.build import WARNINGS, compiler
+from awiwi_gen.emit.names import csrc_names
 from awiwi_gen.emit.options import Options
 from awiwi_gen.hand_header import base_pose, enumerators
 from awiwi_gen.pipeline import Job, cached_tree
@@ -33,7 +34,9 @@ def tree(text: str | None = None, options: Options | None = None, only: str = FE
 def run(directory, body: str, scratch, *files: str, language: str = "-std=c99", include=None):
     """What a program prints that has hand.h and is linked with the files."""
     main, program = scratch / "main.c", scratch / "program"
-    main.write_text(f'#include <stdio.h>\n#include "hand.h"\n#include "self_test.h"\nint main(void)\n{{\n{body}\n}}\n')
+    main.write_text(
+        f'#include <stdio.h>\n#include "awiwi.h"\n#include "hand.h"\n#include "self_test.h"\nint main(void)\n{{\n{body}\n}}\n'
+    )
     flags = (language, *WARNINGS, f"-I{include or directory}", f"-I{directory}", f"-I{CSRC}", "-c")
     compiler().run(*flags, str(main), "-o", str(scratch / "main.o"))
     sources = [str(directory / name) for name in files]
@@ -78,7 +81,7 @@ def test_names_lead_to_the_places_of_whole_hand_arrays(tmp_path):
 
 def test_the_header_is_cpp(tmp_path):
     (tmp_path / "main.cpp").write_text(
-        '#include "hand.h"\n#include "self_test.h"\nint main() { return awiwi_self_test(0); }\n'
+        '#include "awiwi.h"\n#include "hand.h"\n#include "self_test.h"\nint main() { return awiwi_self_test(0); }\n'
     )
     flags = ("-x", "c++", "-std=c++98", "-Wall", "-Wextra", "-Werror", f"-I{tree()}", f"-I{CSRC}", "-c")
     compiler().run(*flags, str(tmp_path / "main.cpp"), "-o", str(tmp_path / "main.o"))
@@ -126,4 +129,13 @@ def test_a_hand_without_motors_and_tendons_has_no_such_numbers(tmp_path):
     ).read_text()
 
     assert "CLAW_TENDONS 0" in header
-    assert not {"tendon_low", "MOTOR", "enum claw_tendon"} & {*re.findall(r"tendon_low|MOTOR|enum claw_tendon", header)}
+    assert not re.findall(r"tendon_low|MOTOR|TENDON_JAW", header)
+
+
+def test_its_names_are_none_of_the_solvers():
+    header = (tree() / "hand.h").read_text()
+    names = {*re.findall(r"\bawiwi_\w+|\bAWIWI_\w+", re.sub(r"/\*.*?\*/", "", header, flags=re.DOTALL))}
+
+    assert len(names) > 100
+    assert not names & {*csrc_names()}
+    assert not [name for name in csrc_names() if re.match(r"AWIWI_(FINGER|JOINT|TENDON|FIRST|MOTOR|BUILD)", name)]
