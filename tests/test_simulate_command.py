@@ -12,6 +12,7 @@ pytest.importorskip("scipy")
 
 from awiwi_gen.compare.laws import LAWS
 from awiwi_gen.hand import Hand
+from awiwi_gen.tune import hand_gains
 from awiwi_gen.tune.hand_gains import failing
 from awiwi_gen.tune.tendons import GAINS, plants, tune_tendon
 
@@ -104,6 +105,13 @@ def test_gains_that_no_clock_of_3_khz_can_have_are_refused_with_the_nearest_that
     mended = fault.message.split("that run are ")[1].replace(", ", "\n")
     text = f'{AWIWI}\n[[gains]]\ntendon = {TENDON}\n{mended}\nsource = "test"\n'
     assert failing(lib, Hand.parse(text)) == []
+
+
+def test_gains_that_give_no_feedback_are_said_to(lib, tuned, monkeypatch):
+    monkeypatch.setattr(hand_gains, "radius", lambda *_: float("inf"))
+    (fault,) = failing(lib, Hand.parse(AWIWI + tables(tuned)))
+
+    assert "(the law has no finite feedback with them); no other bandwidth" in fault.message
 
 
 def test_a_hand_with_such_gains_is_not_generated(tmp_path):

@@ -50,9 +50,10 @@ def failing(library: Any, hand: Hand) -> list[Fault]:
         wanted = {name: float(getattr(gains, name)) for name in GAINS}
         worst = max(radius(library, plant, wanted) for plant in both)
         if not worst < 1:
+            why = f"spectral radius {worst:.3g}" if np.isfinite(worst) else "the law has no finite feedback with them"
             message = (
                 f"= {gains.tendon} ({joint}): these gains are unstable at {1 / PERIOD:.0f} Hz and a delay of one sample "
-                f"(spectral radius {worst:.3g}); {way_out(library, both, wanted)}"
+                f"({why}); {way_out(library, both, wanted)}"
             )
             faults.append(Fault(key=f"gains[{index}].tendon", message=message))
     return faults
