@@ -106,7 +106,7 @@ def _outputs(found: Difference, everything: bool) -> Section:
     same = "other code, same outputs"
     notes += _by_reason({each.name: each.note or same for each in found.kernels if not each.outputs})
     title = f"kernels: {len(found.kernels)} of {found.kernel_count} change"
-    title += "; the worst of each output, in percent of its largest value" if rows else ""
+    title += "; worst of each output, in % of its largest value" if rows else ""
     return Section(title, ("kernel", "output", *CHANGE), rows, notes)
 
 
