@@ -20,7 +20,7 @@ from awiwi_gen.diff import hands
 from awiwi_gen.diff.difference import Difference, difference
 from awiwi_gen.diff.figures import figures
 from awiwi_gen.diff.kernels import operations
-from awiwi_gen.diff.slopes import _DERIVATIVES, Sloped, outputs
+from awiwi_gen.diff.slopes import DERIVATIVES, Sloped, outputs
 from awiwi_gen.diff.text import sections
 from awiwi_gen.editing import changed
 from awiwi_gen.hand import Hand
@@ -181,7 +181,7 @@ def test_derivatives_of_spans_and_followers_are_those_of_edited_files(hand, fing
         assert found[name] != 0
 
 
-@pytest.mark.parametrize("operation", [*_DERIVATIVES, "atan2", "inv"])
+@pytest.mark.parametrize("operation", [*DERIVATIVES, "atan2", "inv"])
 def test_every_function_of_a_graph_has_its_derivative(operation):
     builder = Builder()
     x = builder.input("x", 0)
@@ -283,6 +283,15 @@ def test_other_limits_change_figures_and_ranges():
 
     assert {each.name for each in found.figures if not each.same} >= {"torque +root", "torque -mid"}
     assert {each.note for each in found.kernels if "torque" in each.name} == {"the inputs have other ranges"}
+
+
+def test_samples_that_leave_the_domain_are_counted():
+    """At a crank angle of 120 deg the four-bar is open; it closes up to 114 deg."""
+    turned = TEXT.replace('reference = "60 deg"', 'reference = "80 deg"').replace('high = "40 deg"', 'high = "30 deg"')
+    notes = {each.name: each.note for each in compared(TEXT, turned).kernels}
+
+    assert re.fullmatch(r"\d+ of 320 samples are no longer in its domain", notes["jaw_fingertip_pose"])
+    assert notes["jaw_tendon_lengths"] == "the inputs have other ranges"
 
 
 def test_fingers_of_one_hand_only_are_named():

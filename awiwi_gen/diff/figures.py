@@ -6,15 +6,16 @@ derivatives do too: of a largest value, that of the pose where it is largest.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, reduce
 from math import degrees, isfinite, pi
+from operator import add
 from typing import Any
 
 import numpy as np
 
-from awiwi_gen.diff.slopes import Sloped, outputs
+from awiwi_gen.diff.slopes import Sloped, function, outputs
 from awiwi_gen.kernel import Kernel, Port
 from awiwi_gen.kernels.fingers import joint_limits, limit_paths
 from awiwi_gen.pipeline import Job
@@ -26,7 +27,7 @@ Array = np.ndarray[Any, Any]
 Pick = Callable[[Array], Any]  # the index of one of some values
 
 POSES = 512  # of a finger; the first is the middle of the joints' ranges
-MM, DEG_PER_TURN, GRAM = 1e3, degrees(2 * pi), 1e3  # what a metre, a radian per radian, a kilogram is in those units
+MM, GRAM = 1e3, 1e3  # what a metre and a kilogram are in those units
 FORCE, SOFT, STIFF = (f"limits.tendon_{name}" for name in ("force", "stiffness_low", "stiffness_high"))
 GRAVITY, SPOOL = "limits.gravity", "motor.pulley"
 SHARED = (FORCE, SOFT, STIFF, GRAVITY, SPOOL)  # numbers of the hand that figures of all fingers depend on
@@ -71,7 +72,7 @@ class FingerAtPoses:
 
     @cached_property
     def poses(self) -> Sloped:
-        """Joint angles (poses, joints) [rad]; by their limits they have derivatives, since each is a share of its range."""
+        """Joint angles (poses, joints) [rad]; they have derivatives by their limits, since each is a share of its range."""
         low, high = map(np.array, joint_limits(self.finger))
         joints = len(low)
         share = draw({"q": Port((joints,), rad, 0.0, 1.0)}, f"fingers.{self.name}", samples=POSES)["q"]
@@ -80,21 +81,19 @@ class FingerAtPoses:
         for end, each in (("low", 1 - share), ("high", share)):
             for joint, path in enumerate(limit_paths(self.finger)[end]):
                 if path:
-                    slope[self._row(f"fingers.{self.name}.{path}"), :, joint] = each[:, joint]
+                    slope[self.rows[f"fingers.{self.name}.{path}"], :, joint] = each[:, joint]
         return Sloped(low + share * (high - low), slope)
 
     def number(self, path: str) -> Sloped:
-        """A number of the hand as a scalar; its derivative by itself is one."""
-        return Sloped(self.numbers[path], self.unit(path)[:, None])
+        """A number of the hand; its derivative by itself is one."""
+        slope = np.zeros((len(self.numbers), 1))
+        slope[self.rows[path]] = 1.0
+        return Sloped(self.numbers[path], slope)
 
-    def unit(self, path: str) -> Array:
-        """Derivatives of a number by all numbers: one in its own row."""
-        found = np.zeros(len(self.numbers))
-        found[self._row(path)] = 1.0
-        return found
-
-    def _row(self, path: str) -> int:
-        return list(self.numbers).index(path)
+    @cached_property
+    def rows(self) -> dict[str, int]:
+        """Where the numbers are in arrays of derivatives."""
+        return {path: row for row, path in enumerate(self.numbers)}
 
     def outputs(self, family: str, **inputs: Sloped) -> dict[str, Sloped]:
         """The outputs of a kernel (poses, *shape), and derivatives (numbers, poses, *shape)."""
@@ -108,15 +107,18 @@ class FingerAtPoses:
         """P = dh/dq (poses, tendons, joints) [m/rad]."""
         return self.outputs("coupling")["P"]
 
-    def figure(self, name: str, unit: str, value: float, slope: Array) -> Figure:
-        """A figure from its value and its derivatives by all numbers."""
-        slopes = {path: float(each) for path, each in zip(self.numbers, slope, strict=True) if each and isfinite(each)}
-        return Figure(name, unit, float(value), slopes)
+    def unit(self, family: str, output: str, *index: int) -> tuple[str, float]:
+        """The unit of an element of an output, with mm in place of m, and its number of those."""
+        port = self.kernels[family].outputs[output]
+        unit = str(port.units[int(np.ravel_multi_index(index, port.shape))])
+        return (f"m{unit}", MM) if unit.partition("/")[0] == "m" else (unit, 1.0)
 
-    def most(self, name: str, unit: str, values: Array, slopes: Array, pick: Pick = np.nanargmax) -> Figure:
-        """The largest of values (poses), or the one that another function picks, with derivatives (numbers, poses)."""
-        where = int(pick(values))
-        return self.figure(name, unit, values[where], slopes[:, where])
+    def figure(self, name: str, unit: str, values: Sloped, scale: float = 1.0, pick: Pick = np.nanargmax) -> Figure:
+        """The largest of the values (poses), or the one that another function picks, times a scale."""
+        pose = int(pick(values.value))
+        slope = np.broadcast_to(values.slope, (len(self.numbers), POSES))[:, pose] * scale
+        slopes = {path: float(each) for path, each in zip(self.numbers, slope, strict=True) if each and isfinite(each)}
+        return Figure(name, unit, float(values.value[pose] * scale), slopes)
 
 
 def smallest(kernel: Kernel, job: Job) -> Any:
@@ -139,88 +141,91 @@ def figures(job: Job, name: str) -> list[Figure]:
 def _coupling(finger: FingerAtPoses) -> Iterator[Figure]:
     """The entries of P = dh/dq in the middle pose, but for zeros."""
     P = finger.coupling
-    for tendon, joint in np.argwhere(P.value[0]):
+    for tendon, joint in np.argwhere(np.nan_to_num(P.value[0])):
         name = f"P[{tendon}, {finger.finger.joints[joint]}]"
-        yield finger.figure(name, "mm/rad", MM * P.value[0, tendon, joint], MM * P.slope[:, 0, tendon, joint])
+        unit, scale = finger.unit("coupling", "P", tendon, joint)
+        yield finger.figure(name, unit, P.at(tendon, joint), scale, _middle)
 
 
 def _torque(finger: FingerAtPoses) -> Iterator[Figure]:
     """The largest torque -P' f of each joint to either side, with forces up to the limit, whatever other joints feel."""
-    P = finger.coupling
-    force = finger.numbers[FORCE]
+    force = finger.number(FORCE)
     for joint, name in enumerate(finger.finger.joints):
+        unit, _ = finger.unit("joint_torque", "tau", joint)
         for sign, side in ((1, "+"), (-1, "-")):
-            arms = -sign * P.value[:, :, joint]
-            pulls = arms > 0
-            arm = np.where(pulls, arms, 0.0).sum(axis=1)
-            slope = np.where(pulls, -sign * P.slope[:, :, :, joint], 0.0).sum(axis=2)
-            total = force * slope + finger.unit(FORCE)[:, None] * arm
-            yield finger.most(f"torque {side}{name}", "N m", sign * force * arm, sign * total, _farthest)
-
-
-def _farthest(values: Array) -> Any:
-    return np.nanargmax(np.abs(values))
+            pulls = [_above_zero(-sign * arm) for arm in _arms(finger, joint)]
+            yield finger.figure(f"torque {side}{name}", unit, force * _total(pulls), sign)
 
 
 def _stiffness(finger: FingerAtPoses) -> Iterator[Figure]:
     """The least and the largest diagonal entries of P' diag(k) P + sum f d2h/dq2, over poses, stiffnesses and forces."""
-    P, dP = finger.coupling, finger.outputs("coupling_derivative")["dP"]
-    force = finger.numbers[FORCE]
+    dP, force = finger.outputs("coupling_derivative")["dP"], finger.number(FORCE)
     for joint, name in enumerate(finger.finger.joints):
-        arm, arm_slope = P.value[:, :, joint], P.slope[:, :, :, joint]
-        squares, bends = (arm**2).sum(axis=1), dP.value[:, :, joint, joint]
-        squares_slope = 2 * (arm * arm_slope).sum(axis=2)
-        for side, path, counts, pick in (
-            ("least", SOFT, bends < 0, np.nanargmin),
-            ("most", STIFF, bends > 0, np.nanargmax),
-        ):
-            bend = np.where(counts, bends, 0.0).sum(axis=1)
-            bend_slope = np.where(counts, dP.slope[:, :, :, joint, joint], 0.0).sum(axis=2)
-            k = finger.numbers[path]
-            slope = k * squares_slope + force * bend_slope
-            slope = slope + finger.unit(path)[:, None] * squares + finger.unit(FORCE)[:, None] * bend
-            yield finger.most(f"stiffness {name}, {side}", "N m/rad", k * squares + force * bend, slope, pick)
+        arms, (unit, _) = _arms(finger, joint), finger.unit("joint_stiffness", "K", joint, joint)
+        squares = _total([arm * arm for arm in arms])
+        bends = [dP.at(tendon, joint, joint) for tendon in range(len(arms))]
+        for side, sign, path, pick in (("least", -1, SOFT, np.nanargmin), ("most", 1, STIFF, np.nanargmax)):
+            bend = sign * _total([_above_zero(sign * each) for each in bends])
+            stiffness = finger.number(path) * squares + force * bend
+            yield finger.figure(f"stiffness {name}, {side}", unit, stiffness, 1.0, pick)
 
 
 def _travel(finger: FingerAtPoses) -> Iterator[Figure]:
     """How far a turn of a motor's pulley moves each joint in the middle pose, by the tendon with the longest arm there."""
-    P, spool = finger.coupling, finger.numbers[SPOOL]
+    units = finger.kernels["coupling"].inputs["q"].units
     for joint, name in enumerate(finger.finger.joints):
-        tendon = int(np.abs(P.value[0, :, joint]).argmax())
-        arm = P.value[0, tendon, joint]
-        if arm:
-            travel = DEG_PER_TURN * spool / abs(arm)
-            slope = travel * (finger.unit(SPOOL) / spool - P.slope[:, 0, tendon, joint] / arm)
-            yield finger.figure(f"travel {name}", "deg/turn", travel, slope)
+        unit, scale = ("deg", degrees(1)) if units[joint].radians else ("mm", MM)
+        longest = max(_arms(finger, joint), key=lambda arm: float(abs(arm.value[0])))
+        if abs(longest.value[0]) > 0:
+            travel = finger.number(SPOOL) / function("fabs", longest)
+            yield finger.figure(f"travel {name}", f"{unit}/turn", travel, 2 * pi * scale, _middle)
 
 
 def _workspace(finger: FingerAtPoses) -> Iterator[Figure]:
     """How far the fingertip's places are apart along the axes of the base frame, and the farthest from its origin."""
     T = finger.outputs("fingertip_pose")["T"]
-    tip, slope = MM * T.value[:, :3, 3], MM * T.slope[:, :, :3, 3]
-    for axis, name in enumerate("xyz"):
-        along, there = tip[:, axis], slope[:, :, axis]
-        high, low = np.nanargmax(along), np.nanargmin(along)
-        yield finger.figure(f"workspace {name}", "mm", along[high] - along[low], there[:, high] - there[:, low])
-    reach = np.linalg.norm(tip, axis=1)
-    yield finger.most("reach", "mm", reach, (tip * slope).sum(axis=2) / reach)
+    tip = [T.at(axis, 3) for axis in range(3)]
+    for name, along in zip("xyz", tip, strict=True):
+        low = int(np.nanargmin(along.value))
+        width = along - Sloped(along.value[low], along.slope[:, low, None])
+        yield finger.figure(f"workspace {name}", "mm", width, MM)
+    yield finger.figure("reach", "mm", _length(tip), MM)
 
 
 def _mass(finger: FingerAtPoses) -> Iterator[Figure]:
     """The mass of all links."""
-    paths = [path for path in finger.numbers if path.endswith("].mass")]
-    total = sum(finger.numbers[path] for path in paths)
-    slope = np.sum([finger.unit(path) for path in paths], axis=0) if paths else np.zeros(len(finger.numbers))
-    yield finger.figure("mass", "g", GRAM * total, GRAM * slope)
+    masses = [finger.number(path) for path in finger.numbers if path.endswith("].mass")]
+    none = Sloped(np.zeros(POSES), np.zeros((len(finger.numbers), 1)))
+    yield finger.figure("mass", "g", sum(masses, start=none), GRAM)
 
 
 def _gravity(finger: FingerAtPoses) -> Iterator[Figure]:
     """The largest torque of each joint that holds the finger at rest, gravity having any direction."""
-    g = finger.numbers[GRAVITY]
-    loads = [finger.outputs("gravity", g=Sloped(np.broadcast_to(axis, (POSES, 3))))["gravity"] for axis in np.eye(3)]
+    axes = [Sloped(np.broadcast_to(axis, (POSES, 3))) for axis in np.eye(3)]
+    loads = [finger.outputs("gravity", g=axis)["gravity"] for axis in axes]
     for joint, name in enumerate(finger.finger.joints):
-        along = np.array([load.value[:, joint] for load in loads])
-        size = np.sqrt((along**2).sum(axis=0))
-        slope = sum(load.value[:, joint] * load.slope[:, :, joint] for load in loads) / np.where(size > 0, size, 1.0)
-        total = g * slope + finger.unit(GRAVITY)[:, None] * size
-        yield finger.most(f"gravity {name}", "N m", g * size, total)
+        load = _length([each.at(joint) for each in loads])
+        yield finger.figure(
+            f"gravity {name}", finger.unit("gravity", "gravity", joint)[0], finger.number(GRAVITY) * load
+        )
+
+
+def _arms(finger: FingerAtPoses, joint: int) -> list[Sloped]:
+    """The arms of all tendons at a joint (poses) [m/rad]."""
+    return [finger.coupling.at(tendon, joint) for tendon in range(finger.coupling.value.shape[1])]
+
+
+def _total(terms: Sequence[Sloped]) -> Sloped:
+    return reduce(add, terms)
+
+
+def _above_zero(values: Sloped) -> Sloped:
+    return values * (values.value > 0)
+
+
+def _length(components: Sequence[Sloped]) -> Sloped:
+    return function("sqrt", _total([each * each for each in components]))
+
+
+def _middle(_: Array) -> int:
+    return 0

@@ -84,11 +84,14 @@ def _compared(was: Kernel, now: Kernel, old: Job, new: Job) -> KernelChange:
     if shapes[0] != shapes[1]:
         return KernelChange(now.name, spent, (), "its inputs or outputs have other shapes")
     inputs = draw(was.inputs, was.path)
-    values = [_values(kernel, job, inputs) for kernel, job in ((was, old), (now, new))]
-    if not all(np.isfinite(each).any() for found in values for each in found.values()):
-        return KernelChange(now.name, spent, (), "no sample is in its domain")
-    changes = (_worst(now, name, values[0][name], values[1][name], inputs) for name in now.outputs)
-    return KernelChange(now.name, spent, tuple(each for each in changes if each is not None))
+    before, after = (_values(kernel, job, inputs) for kernel, job in ((was, old), (now, new)))
+    inside = np.array([np.isfinite(next(iter(found.values()))).all(axis=1) for found in (before, after)])
+    left = int((inside[0] & ~inside[1]).sum())
+    note = f"{left} of {inside.shape[1]} samples are no longer in its domain" if left else ""
+    if not inside.all(axis=0).any():
+        return KernelChange(now.name, spent, (), note or "no sample is in its domain")
+    changes = (_worst(now, name, before[name], after[name], inputs) for name in now.outputs)
+    return KernelChange(now.name, spent, tuple(each for each in changes if each is not None), note)
 
 
 def _values(kernel: Kernel, job: Job, inputs: dict[str, Array]) -> dict[str, Array]:

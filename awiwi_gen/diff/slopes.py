@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
@@ -19,56 +20,56 @@ Array = np.ndarray[Any, Any]
 
 @dataclass(frozen=True)
 class Sloped:
-    """A value of any shape, and its derivatives (numbers, *shape), or None where it depends on none of the numbers.
+    """A value (samples, ...), or a number, and its derivatives (numbers, samples, ...); None where there are none.
 
-    The derivatives may have ones in place of the shape; they broadcast.
+    Derivatives may have ones in place of the samples. Sums, products and quotients are those of values without further
+    dimensions.
     """
 
     value: Any
     slope: Any = None
+    __array_ufunc__ = None  # NumPy's numbers leave the operators to this class
+
+    def at(self, *index: int) -> Sloped:
+        """One element, at all samples."""
+        place = (slice(None), *index)
+        return Sloped(self.value[place], None if self.slope is None else self.slope[(slice(None), *place)])
+
+    def __neg__(self) -> Sloped:
+        return Sloped(-self.value, _times(self.slope, -1))
+
+    def __add__(self, other: Any) -> Sloped:
+        b = _sloped(other)
+        return Sloped(self.value + b.value, _sum(self.slope, b.slope))
+
+    def __sub__(self, other: Any) -> Sloped:
+        return self + -_sloped(other)
+
+    def __mul__(self, other: Any) -> Sloped:
+        b = _sloped(other)
+        return Sloped(self.value * b.value, _sum(_times(self.slope, b.value), _times(b.slope, self.value)))
+
+    def __truediv__(self, other: Any) -> Sloped:
+        b = _sloped(other)
+        quotient = self.value / b.value
+        return Sloped(quotient, _sum(_times(self.slope, 1 / b.value), _times(b.slope, -quotient / b.value)))
+
+    __radd__, __rmul__ = __add__, __mul__
 
 
-class Slopes:
-    """The algebra of `Sloped` values over the samples (forward differentiation)."""
-
-    def const(self, value: Fraction) -> Sloped:
-        """A number without derivatives."""
-        return Sloped(np.float64(value.numerator / value.denominator))
-
-    def neg(self, a: Sloped) -> Sloped:
-        """Minus a."""
-        return Sloped(-a.value, None if a.slope is None else -a.slope)
-
-    def add(self, a: Sloped, b: Sloped) -> Sloped:
-        """a + b."""
-        return Sloped(a.value + b.value, _sum(a.slope, b.slope))
-
-    def sub(self, a: Sloped, b: Sloped) -> Sloped:
-        """a - b."""
-        return self.add(a, self.neg(b))
-
-    def mul(self, a: Sloped, b: Sloped) -> Sloped:
-        """A product."""
-        return Sloped(a.value * b.value, _sum(_times(a.slope, b.value), _times(b.slope, a.value)))
-
-    def div(self, a: Sloped, b: Sloped) -> Sloped:
-        """A quotient."""
-        quotient = a.value / b.value
-        return Sloped(quotient, _sum(_times(a.slope, 1 / b.value), _times(b.slope, -quotient / b.value)))
-
-    def call(self, operation: str, *args: Sloped) -> Sloped:
-        """A function of the graph."""
-        values = [each.value for each in args]
-        found = getattr(np, NUMPY_NAMES.get(operation, operation))(*values)
-        if all(each.slope is None for each in args):
-            return Sloped(found)
-        if operation == "atan2":
-            (y, x), square = values, values[0] ** 2 + values[1] ** 2
-            return Sloped(found, _sum(_times(args[0].slope, x / square), _times(args[1].slope, -y / square)))
-        return Sloped(found, _times(args[0].slope, _DERIVATIVES[operation](values[0], found)))
+def function(operation: str, *args: Sloped) -> Sloped:
+    """A function of a graph."""
+    values = [each.value for each in args]
+    found = getattr(np, NUMPY_NAMES.get(operation, operation))(*values)
+    if all(each.slope is None for each in args):
+        return Sloped(found)
+    if operation == "atan2":
+        (y, x), square = values, values[0] ** 2 + values[1] ** 2
+        return Sloped(found, _sum(_times(args[0].slope, x / square), _times(args[1].slope, -y / square)))
+    return Sloped(found, _times(args[0].slope, DERIVATIVES[operation](values[0], found)))
 
 
-_DERIVATIVES: dict[str, Callable[[Any, Any], Any]] = {  # of the argument and the value
+DERIVATIVES: dict[str, Callable[[Any, Any], Any]] = {  # of the argument and the value
     "sin": lambda x, _: np.cos(x),
     "cos": lambda x, _: -np.sin(x),
     "tan": lambda _, t: 1 + t**2,
@@ -80,6 +81,21 @@ _DERIVATIVES: dict[str, Callable[[Any, Any], Any]] = {  # of the argument and th
     "sqrt": lambda _, r: 0.5 / r,
     "fabs": lambda x, _: np.sign(x),
 }
+
+
+class Slopes:
+    """The algebra of `Sloped` values over the samples: forward differentiation."""
+
+    neg, add, sub = staticmethod(operator.neg), staticmethod(operator.add), staticmethod(operator.sub)
+    mul, div, call = staticmethod(operator.mul), staticmethod(operator.truediv), staticmethod(function)
+
+    def const(self, value: Fraction) -> Sloped:
+        """A number without derivatives."""
+        return Sloped(np.float64(value.numerator / value.denominator))
+
+
+def _sloped(value: Any) -> Sloped:
+    return value if isinstance(value, Sloped) else Sloped(value)
 
 
 def _sum(a: Any, b: Any) -> Any:

@@ -104,7 +104,7 @@ def _outputs(found: Difference, everything: bool) -> Section:
         shown = [max(shown, key=lambda output: output.relative)]
     notes = [f"at {_inputs(each)}" for each in shown]
     same = "other code, same outputs"
-    notes += _by_reason({each.name: each.note or same for each in found.kernels if not each.outputs})
+    notes += _by_reason({each.name: each.note or same for each in found.kernels if each.note or not each.outputs})
     title = f"kernels: {len(found.kernels)} of {found.kernel_count} change"
     title += "; worst of each output, in % of its largest value" if rows else ""
     return Section(title, ("kernel", "output", *CHANGE), rows, notes)
