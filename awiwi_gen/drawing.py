@@ -64,17 +64,19 @@ def show(
 
 
 def drawing(hand: Hand, before: Hand | None = None) -> str:
-    """The hand as SVG text: one row for each finger, all at one scale; below it the fingers of a hand ``before``."""
+    """The hand as SVG text: one row for each finger, all at one scale, over those of a hand ``before`` that differ."""
     from awiwi_gen.hand.pose import Chain
 
     chains = {name: Chain(finger) for name, finger in hand.fingers.items()}
-    olds = {name: Chain(finger) for name, finger in before.fingers.items() if name in chains} if before else {}
+    others = before.fingers.items() if before else ()
+    olds = {name: Chain(old) for name, old in others if name in chains and old != hand.fingers[name]}
     scale = VIEW / max(_reach(chain) for chain in (*chains.values(), *olds.values()))
     root = ElementTree.Element("svg", xmlns="http://www.w3.org/2000/svg", role="img")
     ElementTree.SubElement(root, "title").text = f"{hand.name}: fingers with their tendons"
     ElementTree.SubElement(root, "style").text = STYLE
     top = MARGIN + LINE
-    _text(root, MARGIN, top, f"{hand.name}: links in the middle of their ranges, dashed at the ends", "title")
+    told = ", old ones in orange" if before else ""
+    _text(root, MARGIN, top, f"{hand.name}: links in the middle of their ranges, dashed at the ends{told}", "title")
     _text(root, WIDTH - MARGIN, top, f"{_bar(root, scale, top)} mm", "small", "end")
     for name, chain in chains.items():
         top = _finger(root, name, chain, olds.get(name), scale, top + GAP)

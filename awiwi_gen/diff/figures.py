@@ -216,11 +216,13 @@ def _arms(finger: FingerAtPoses, joint: int) -> list[Sloped]:
 
 
 def _total(terms: Sequence[Sloped]) -> Sloped:
-    return reduce(add, terms)
+    total: Sloped = reduce(add, terms)
+    return total
 
 
 def _above_zero(values: Sloped) -> Sloped:
-    return values * (values.value > 0)
+    kept: Sloped = values * (values.value > 0)
+    return kept
 
 
 def _length(components: Sequence[Sloped]) -> Sloped:

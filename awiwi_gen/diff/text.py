@@ -18,12 +18,16 @@ GAP = 2  # columns between two cells
 
 @dataclass(frozen=True)
 class Section:
-    """A table with a title above and notes below; without rows, title and notes only."""
+    """A table with a title above and notes below; without rows, title and notes only.
+
+    A line that is too long loses letters in other columns than ``whole``.
+    """
 
     title: str
     columns: Sequence[str] = ()
     rows: Sequence[Sequence[str]] = ()
     notes: Sequence[str] = ()
+    whole: int | None = None
 
 
 def print_terminal(found: Difference, everything: bool) -> None:
@@ -145,7 +149,7 @@ def _tornado(found: Difference, finger: str, names: Sequence[str]) -> Section:
             step = "" if each.step is None else f"{each.step:+.2g} {each.unit}"
             rows.append(("" if rank else name, number, _percent(each.part or 0.0), step, _guess(each)))
     columns = ("figure", "number", "per 1 %", "per 10 um", "")
-    return Section(f"finger {finger}: the numbers that matter most for each figure", columns, rows)
+    return Section(f"finger {finger}: the numbers that matter most for each figure", columns, rows, whole=0)
 
 
 def _tightest(found: Difference) -> Section:
@@ -187,10 +191,10 @@ def _fitted(section: Section) -> list[list[str]]:
     """The rows, their widest columns shortened until a line has at most 80 characters."""
     rows = [[*row] for row in section.rows]
     widths = [max(map(len, column)) for column in zip(section.columns, *rows, strict=True)]
+    others = [index for index in range(len(widths)) if index != section.whole]
     while (excess := sum(widths) + GAP * (len(widths) - 1) - WIDTH) > 0:
-        widest = widths.index(max(widths))
-        second = max(width for index, width in enumerate(widths) if index != widest)
-        widths[widest] = max(widths[widest] - excess, min(second, widths[widest] - 1))
+        second, widest = sorted(others, key=widths.__getitem__)[-2:]
+        widths[widest] = max(widths[widest] - excess, min(widths[second], widths[widest] - 1))
     return [[_short(cell, width) for cell, width in zip(row, widths, strict=True)] for row in rows]
 
 
