@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -14,11 +14,15 @@ from awiwi_gen.hand import Hand
 from awiwi_gen.hand.capability import left_out_names
 from awiwi_gen.ir.cost import cost
 from awiwi_gen.kernel import Kernel
+from awiwi_gen.parallel import run, silent
 from awiwi_gen.pipeline import Job
 from awiwi_gen.records import fingerprints, load_graphs, prepare, record_key, values_of
 from awiwi_gen.verify.samples import draw
 
 Array = np.ndarray[Any, Any]
+
+ROUNDING = 1e-11  # of the largest value: what two orders of the same operations differ by
+RANGES = "the inputs have other ranges"
 
 
 @dataclass(frozen=True)
@@ -51,22 +55,42 @@ def changed(old: Job, new: Job) -> Iterator[KernelChange]:
     """The kernels whose code depends on what the hands do not have in common, in the order of the new hand."""
     before = {kernel.name: kernel for kernel in old.catalog}
     pairs = [(before[kernel.name], kernel) for kernel in new.catalog if kernel.name in before]
-    seen: set[str] = set()
+    formulas = [pair for pair in pairs if pair[0].solver is None and pair[1].solver is None]
+    others = [pair for pair in formulas if _depends(pair[0], old) != _depends(pair[1], new)]
+    _count(old, [was for was, _ in others])
+    _count(new, [now for _, now in others])
     found: dict[str, KernelChange] = {}
-    # A kernel that iterates comes after those that it calls.
-    for count, (was, now) in enumerate(sorted(pairs, key=lambda pair: pair[1].solver is not None)):
-        if now.solver is not None or was.solver is not None:
-            calls = [name for name in now.needs.values() if name in seen]
-            if was.solver != now.solver or calls:
-                note = f"iterates, calls {', '.join(calls)}" if calls else "iterates, with other numbers"
-                found[now.name] = KernelChange(now.name, (None, None), (), note)
-        elif _depends(was, old) != _depends(now, new):
-            found[now.name] = _compared(was, now, old, new)
-            seen.add(now.name)
-        elif was.inputs != now.inputs:
-            found[now.name] = KernelChange(now.name, (None, None), (), "the inputs have other ranges")
-        new.progress("compare", count + 1, len(pairs))
+    for done, (was, now) in enumerate(others, start=1):
+        found[now.name] = _compared(was, now, old, new)
+        new.progress("compare", done, len(others))
+    for was, now in pairs:
+        calls = [name for name in now.needs.values() if name in found and found[name].note != RANGES]
+        if (was.solver is not None or now.solver is not None) and (was.solver != now.solver or calls):
+            note = f"iterates, calls {', '.join(calls)}" if calls else "iterates, with other numbers"
+            found[now.name] = KernelChange(now.name, (None, None), (), note)
+        elif now.name not in found and was.inputs != now.inputs:
+            found[now.name] = KernelChange(now.name, (None, None), (), RANGES)
     yield from (found[kernel.name] for kernel in new.catalog if kernel.name in found)
+
+
+def _count(job: Job, kernels: Sequence[Kernel]) -> None:
+    """Count the operations of kernels that were not counted before, on all cores; the largest first."""
+    sizes = {kernel.name: sum(each.size for each in fingerprints(kernel, job.store).values()) for kernel in kernels}
+    quiet = replace(job, progress=silent)
+    absent = [
+        (kernel, quiet)
+        for kernel in sorted(kernels, key=lambda kernel: -sizes[kernel.name])
+        if all(job.store.missing(kind, [_key(kernel, job)]) for kind in ("records", "operations"))
+    ]
+    run("count", _operations, absent, job.progress)
+
+
+def _operations(piece: tuple[Kernel, Job]) -> int:
+    return operations(*piece)
+
+
+def _key(kernel: Kernel, job: Job) -> str:
+    return record_key(kernel, fingerprints(kernel, job.store), job.hand.prefix, job.options)
 
 
 def _depends(kernel: Kernel, job: Job) -> tuple[Any, ...]:
@@ -122,12 +146,9 @@ def _worst(kernel: Kernel, name: str, old: Array, new: Array, inputs: dict[str, 
     )  # fmt: skip
 
 
-ROUNDING = 1e-11  # of the largest value: what two orders of the same operations differ by
-
-
 def operations(kernel: Kernel, job: Job) -> int:
     """Operations of a kernel's code: of its record, if it was made, else of its optimised graph."""
-    digest = record_key(kernel, fingerprints(kernel, job.store), job.hand.prefix, job.options)
+    digest = _key(kernel, job)
     record: Any = job.store.get("records", digest)
     if record is not None:
         return int(record.function.cost.operations)
