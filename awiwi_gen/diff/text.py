@@ -8,12 +8,14 @@ from textwrap import wrap
 
 from awiwi_gen.diff.difference import Difference, Effect
 from awiwi_gen.diff.kernels import OutputChange
+from awiwi_gen.errors import printable
 from awiwi_gen.report import counted, print_table
 
 WIDTH = 80
 STRONGEST = 3  # numbers of each figure in the tornado
 TIGHTEST = 10  # lengths in the list for the workshop
 GAP = 2  # columns between two cells
+ABSENT = "-"
 
 
 @dataclass(frozen=True)
@@ -38,20 +40,21 @@ def print_terminal(found: Difference, everything: bool) -> None:
         if section.rows:
             print_table(section.columns, _fitted(section), section.title)
         else:
-            print(section.title)
+            print(printable(section.title))
         for note in section.notes:
-            print("\n".join(wrap(note, WIDTH, subsequent_indent="  ", break_on_hyphens=False)))
+            print("\n".join(wrap(printable(note), WIDTH, subsequent_indent="  ", break_on_hyphens=False)))
 
 
 def print_markdown(found: Difference, everything: bool) -> None:
     """Print the tables as Markdown."""
     for section in sections(found, everything):
-        print(f"### {section.title}\n")
+        print(printable(f"### {section.title}\n"))
         if section.rows:
             table = [section.columns, ["---"] * len(section.columns), *section.rows]
-            print("\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |" for row in table) + "\n")
+            lines = ["| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |" for row in table]
+            print(printable("\n".join(lines) + "\n"))
         for note in section.notes:
-            print(f"{note}\n")
+            print(printable(f"{note}\n"))
 
 
 def sections(found: Difference, everything: bool) -> Iterator[Section]:
@@ -71,8 +74,8 @@ def sections(found: Difference, everything: bool) -> Iterator[Section]:
     yield from _present(found)
     for finger in found.fingers:
         names = [each.name for each in found.figures if each.finger == finger and (everything or not each.same)]
-        if names := [name for name in names if not _is_entry(name)]:
-            yield _tornado(found, finger, names)
+        if (section := _tornado(found, finger, [name for name in names if not _is_entry(name)])).rows:
+            yield section
     if found.effects:
         yield _tightest(found)
 
@@ -88,8 +91,8 @@ def _values(found: Difference) -> Section:
     rows = [
         (
             each.key,
-            each.old or "none",
-            each.new or "none",
+            each.old or ABSENT,
+            each.new or ABSENT,
             "" if each.relative is None else _percent(100 * each.relative),
             "guess" if each.assumed else "",
         )
@@ -100,13 +103,11 @@ def _values(found: Difference) -> Section:
 
 
 def _outputs(found: Difference, everything: bool) -> Section:
-    """The worst change of each output; below, inputs at which it is so large, as `awiwi-gen call` takes them."""
-    changes = [(each, output) for each in found.kernels for output in each.outputs]
-    rows = [_output_row(output) for _, output in changes]
-    shown = [output for _, output in changes]
-    if shown and not everything:
-        shown = [max(shown, key=lambda output: output.relative)]
-    notes = [f"at {_inputs(each)}" for each in shown]
+    """The worst change of each output; below, the inputs of the worst of all, or of each, as `awiwi-gen call` takes them."""
+    changes = [output for each in found.kernels for output in each.outputs]
+    rows = [_output_row(each) for each in changes]
+    worst = sorted(changes, key=lambda each: -each.relative)[:1]
+    notes = [f"at {_inputs(each)}" for each in (changes if everything else worst)]
     same = "other code, same outputs"
     notes += _by_reason({each.name: each.note or same for each in found.kernels if each.note or not each.outputs})
     title = f"kernels: {len(found.kernels)} of {found.kernel_count} change"
@@ -180,7 +181,7 @@ def _change(old: float | None, new: float | None) -> tuple[str, str, str]:
 
 
 def _number(value: float | None) -> str:
-    return "none" if value is None else f"{value:.6g}"
+    return ABSENT if value is None else f"{value:.6g}"
 
 
 def _percent(value: float) -> str:
