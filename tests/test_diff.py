@@ -83,7 +83,13 @@ def test_numbers_and_other_values_that_change_are_told_with_key_and_guess():
 
 
 def test_guesses_are_those_of_the_new_file(wider):
-    assert list(Hand.parse(TEXT).assumed()) == wider.assumed
+    measured = TEXT.replace('source = "assumed"', 'source = "measured"', 1)  # the seven limits
+    found = compared(TEXT, measured)
+
+    assert list(Hand.parse(TEXT).assumed()) == wider.assumed == found.assumed_before
+    assert len(found.assumed) == len(wider.assumed) - 7
+    assert found.values == []
+    assert "48 of 61 numbers of new are guesses, 55 of old were" in next(sections(found, everything=False)).notes
 
 
 # -- figures -----------------------------------------------------------------------------------------------
@@ -371,6 +377,7 @@ def test_bad_input_is_one_sentence(repository, tmp_path, monkeypatch):
     assert (
         complaint("diff", "v9", "--hand", repository) == f"v9: the git repository of {repository} has no such revision"
     )
+    assert complaint("diff", outside, "--hand", repository).endswith("; to compare two files, leave out --hand")
     assert complaint("diff", "HEAD", "--hand", outside) == f"HEAD: {outside} is in no git repository"
     missing = repository.with_name("other.toml")
     assert complaint("diff", "HEAD", "--hand", missing) == f"HEAD has no file {missing}"

@@ -14,6 +14,7 @@ from awiwi_gen.units import Quantity, m
 
 PART = 0.01  # the share of a number, and
 STEP = 1e-5  # the length [m], whose effects are told
+ROUNDING = 1e-12  # of a figure, in its unit or of its value
 
 
 @dataclass(frozen=True)
@@ -42,7 +43,7 @@ class FigureChange:
         """Whether nothing changes, but for rounding."""
         if self.old is None or self.new is None:
             return False
-        return abs(self.new - self.old) <= 1e-12 * max(abs(self.old), abs(self.new))
+        return abs(self.new - self.old) <= ROUNDING * max(abs(self.old), abs(self.new), 1.0)
 
 
 @dataclass(frozen=True)
@@ -65,11 +66,16 @@ class Effect:
 
 @dataclass(frozen=True)
 class Difference:
-    """What differs between two hands. ``fingers`` are those whose figures were computed, ``only`` those of one hand."""
+    """What differs between two hands.
+
+    ``assumed`` are the keys of guesses, ``fingers`` those whose figures were computed, ``only`` those of one hand, with its
+    name. ``appear`` and ``vanish`` have kernels with the reason why the other hand has none.
+    """
 
     old: str
     new: str
     values: Sequence[ValueChange]
+    assumed_before: Sequence[str]
     assumed: Sequence[str]
     numbers: int
     fingers: Sequence[str]
@@ -107,6 +113,7 @@ def difference(old: Job, new: Job, names: tuple[str, str], wanted: Sequence[str]
     return Difference(
         *names,
         values=values,
+        assumed_before=list(old.hand.assumed()),
         assumed=list(assumed),
         numbers=len(new.hand.quantities()),
         fingers=list(wanted),
@@ -174,7 +181,7 @@ def _paired(finger: str, before: Mapping[str, Figure], after: Mapping[str, Figur
 
 def _effects(finger: str, figure: Figure, hand: Hand, assumed: Mapping[str, Any]) -> Iterator[Effect]:
     """The effects of all numbers on a figure, but for a figure that is zero; the strongest for one percent first."""
-    if not figure.value:
+    if abs(figure.value) <= ROUNDING:
         return
     quantities = hand.quantities()
     found = []

@@ -43,7 +43,8 @@ def _at_revision(revision: str, file: Path) -> tuple[str, Hand]:
     if commit is None:
         inside = _git(folder, "rev-parse", "--git-dir") is not None
         where = f"the git repository of {file} has no such revision" if inside else f"{file} is in no git repository"
-        raise InputError(f"{revision}: {where}")
+        files = "; to compare two files, leave out --hand" if Path(revision).is_file() else ""
+        raise InputError(f"{revision}: {where}{files}")
     text = _git(folder, "show", f"{commit.decode().strip()}:./{file.name}")
     if text is None:
         raise InputError(f"{revision} has no file {file}")

@@ -86,6 +86,8 @@ CHANGE = ("old", "new", "change")
 def _values(found: Difference) -> Section:
     names = f"{found.old} -> {found.new}"
     guesses = f"{len(found.assumed)} of {found.numbers} numbers of {found.new} are guesses"
+    if len(found.assumed) != len(found.assumed_before):
+        guesses += f", {len(found.assumed_before)} of {found.old} were"
     if not found.values:
         return Section(f"{names}: nothing changes", notes=[guesses])
     rows = [
