@@ -50,6 +50,7 @@ from awiwi_gen.arguments import (
     ScalarOption,
     Version,
 )
+from awiwi_gen.diff.command import diff
 from awiwi_gen.drawing import show
 from awiwi_gen.editing import init, set_
 from awiwi_gen.interchange.command import export, import_
@@ -365,6 +366,7 @@ def simulate(
 
 
 command(*HAND)(show)
+command(*GENERATE)(diff)
 command()(init)
 command(*HAND, ignore_unknown_options=True)(set_)  # "-5 deg" is a value
 command(*HAND)(import_)

@@ -31,6 +31,7 @@ svg { font: 12px sans-serif; background: #ffffff; color: #1a1a1a }
 text { fill: currentColor } .title { font-weight: bold; font-size: 14px } .small { font-size: 11px }
 polyline, path { fill: none; stroke: currentColor; stroke-linejoin: round; stroke-linecap: round }
 .link { stroke-width: 5; stroke: #7a7a7a } .end { stroke-width: 1.2; stroke: #a8a8a8; stroke-dasharray: 4 3 }
+.before { stroke-width: 1; stroke: #c77700 }
 .rim { stroke-width: 1.5 } .tendon { stroke-width: 1.5; stroke: #b3261e } .return { stroke-width: 1.5; stroke: #1f5fbf }
 @media (prefers-color-scheme: dark) { svg { background: #16181c; color: #e8e8e8 } .tendon { stroke: #ff8a80 }
 .return { stroke: #82b1ff } .link { stroke: #8f8f8f } .end { stroke: #666666 } }
@@ -62,20 +63,23 @@ def show(
     return 0
 
 
-def drawing(hand: Hand) -> str:
-    """The hand as SVG text: one row for each finger, all at one scale."""
+def drawing(hand: Hand, before: Hand | None = None) -> str:
+    """The hand as SVG text: one row for each finger, all at one scale, over those of a hand ``before`` that differ."""
     from awiwi_gen.hand.pose import Chain
 
     chains = {name: Chain(finger) for name, finger in hand.fingers.items()}
-    scale = VIEW / max(_reach(chain) for chain in chains.values())
+    others = before.fingers.items() if before else ()
+    olds = {name: Chain(old) for name, old in others if name in chains and old != hand.fingers[name]}
+    scale = VIEW / max(_reach(chain) for chain in (*chains.values(), *olds.values()))
     root = ElementTree.Element("svg", xmlns="http://www.w3.org/2000/svg", role="img")
     ElementTree.SubElement(root, "title").text = f"{hand.name}: fingers with their tendons"
     ElementTree.SubElement(root, "style").text = STYLE
     top = MARGIN + LINE
-    _text(root, MARGIN, top, f"{hand.name}: links in the middle of their ranges, dashed at the ends", "title")
+    told = ", old ones in orange" if before else ""
+    _text(root, MARGIN, top, f"{hand.name}: links in the middle of their ranges, dashed at the ends{told}", "title")
     _text(root, WIDTH - MARGIN, top, f"{_bar(root, scale, top)} mm", "small", "end")
     for name, chain in chains.items():
-        top = _finger(root, name, hand.fingers[name], chain, scale, top + GAP)
+        top = _finger(root, name, chain, olds.get(name), scale, top + GAP)
     root.set("viewBox", f"0 0 {WIDTH:g} {top + MARGIN:.0f}")
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode") + "\n"
@@ -113,10 +117,13 @@ def _views(chain: Chain) -> tuple[Array, Array]:
     return np.array([right, np.cross(axis, right)]), np.array([right, axis])
 
 
-def _finger(root: ElementTree.Element, name: str, finger: Finger, chain: Chain, scale: float, top: float) -> float:
-    """Draw one finger below `top`; returns where it ends."""
+def _finger(root: ElementTree.Element, name: str, chain: Chain, old: Chain | None, scale: float, top: float) -> float:
+    """Draw one finger below `top`, over an old one if there is one; returns where it ends."""
     _text(root, MARGIN, top, name, "title")
-    shapes = [_shapes(chain, view) for view in _views(chain)]
+    shapes = [
+        [*[("before", line) for _, line in (_shapes(old, view) if old else ())], *_shapes(chain, view)]
+        for view in _views(chain)
+    ]
     left, lowest = 2 * MARGIN, top
     for view, drawn in enumerate(shapes):
         points = np.concatenate([points for _, points in drawn]) * scale
@@ -131,9 +138,9 @@ def _finger(root: ElementTree.Element, name: str, finger: Finger, chain: Chain, 
             joints = skeleton(chain, _poses(chain)[0]) @ _views(chain)[0].T
             _name_joints(root, chain, corner + joints * scale * [1, -1], scale)
         left, lowest = left + high[0] - low[0] + GAP, max(lowest, top + LINE + high[1] - low[1])
-    for index, route in enumerate(_routes(finger)):
+    for index, route in enumerate(_routes(chain.finger)):
         _text(root, ROUTES, top + LINE * (index + 1), route, "small")
-    return max(lowest, top + LINE * len(finger.tendons))
+    return max(lowest, top + LINE * len(chain.finger.tendons))
 
 
 def _name_joints(root: ElementTree.Element, chain: Chain, places: Array, scale: float) -> None:

@@ -14,6 +14,7 @@ from awiwi_gen.__main__ import app
 from awiwi_gen.errors import InputError
 from awiwi_gen.hand import Hand
 from awiwi_gen.ir import passes
+from awiwi_gen.resources import DEFAULT_HAND
 from awiwi_gen.verify import physics
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -119,6 +120,18 @@ def test_the_messages_of_the_hand_file_are_printed_like_this(old, new):
         Hand.parse(spoilt)
 
     assert str(caught.value) in text("docs/hand_file.md")
+
+
+def test_the_tables_of_diff_are_printed_like_this(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name in ("hand.toml", "wider.toml"):
+        (tmp_path / name).write_bytes(DEFAULT_HAND.read_bytes())
+    edit, compare = re.findall(r"^\$ awiwi-gen ((?:set|diff) .*wider.toml)$", text("docs/diff.md"), re.MULTILINE)
+    assert CliRunner().invoke(app, shlex.split(edit)).exit_code == 0
+    said = CliRunner().invoke(app, shlex.split(compare)).stdout.splitlines()
+    (block,) = re.findall(r"```\n(hand.toml -> .*?)```", text("docs/diff.md"), re.DOTALL)
+
+    assert [line for line in block.splitlines() if line not in (*said, "...")] == []
 
 
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)

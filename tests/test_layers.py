@@ -47,6 +47,7 @@ TOP = [
         "arguments",
         "editing",
         "drawing",
+        "diff",
     ],
     ["loops", "identify"],
     [*ROOMS],
