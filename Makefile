@@ -1,7 +1,7 @@
 # make        set up .venv, then derive, emit, compile and verify the default hand
 # make test   all tests              make lint   ruff, mypy, layers
 # make check  is generated/ fresh?   make bench  us and the peers, side by side
-# make report the figures of the source, computed again, with all proofs: build/report/index.html
+# make report the hand in figures, those of the source computed again, all proofs: build/report/index.html
 # make torture  hours: 10 000 mutated hand files, 200 random hands, 10 000 damaged caches, 200 kills
 # make firmware  every kernel on every target: equal bits, committed figures (ACCEPT=1 writes them, ALL=1: more, QUICK=1: what CI runs)
 # make analysis  gcc -fanalyzer, clang-tidy and cppcheck: no finding without a reason

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from base64 import b64decode
 from dataclasses import replace
 from html import escape
 from html.parser import HTMLParser
@@ -21,6 +22,7 @@ from awiwi_gen.reproduce import page
 from awiwi_gen.reproduce.figures import all_figures
 from awiwi_gen.reproduce.figures import fingers as figures_fingers
 from awiwi_gen.reproduce.figures.fingers import coriolis, released
+from awiwi_gen.reproduce.this_hand import this_hand
 from awiwi_gen.results import Table, compared
 
 
@@ -30,8 +32,8 @@ def figures(lib, hand):
 
 
 @pytest.fixture(scope="module")
-def results(figures, some_proof):
-    return page.Results(figures, NUMBERS, some_proof[0], COMPARED)
+def results(figures, some_proof, hand, lib):
+    return page.Results(figures, NUMBERS, some_proof[0], COMPARED, this_hand(Job(hand)))
 
 
 @pytest.fixture(scope="module")
@@ -67,8 +69,9 @@ class Tags(HTMLParser):
         given = dict(attributes)
         self.images += tag == "svg"
         self.ids += [given["id"]] if "id" in given else []
-        self.loaded += [given[k] for k in ("src", "href", "xlink:href") if k in given and not given[k].startswith("#")]
-        if tag != "meta":
+        addresses = [given[k] for k in ("src", "href", "xlink:href") if k in given]
+        self.loaded += [each for each in addresses if not each.startswith(("#", "data:"))]
+        if tag not in ("meta", "img"):
             self.open.append(tag)
 
     def handle_endtag(self, tag):
@@ -102,6 +105,26 @@ def test_the_page_is_whole_and_needs_no_other_file(text, figures):
     assert tags.loaded == []
     assert tags.images == len(figures)
     assert len([name for name in tags.ids if name.startswith("figure-")]) == len(figures)
+
+
+def test_the_page_shows_the_hand_first(text, results, hand):
+    before = text[: text.index("<article>")]
+    image = re.search(r'<img class="hand" src="data:image/svg\+xml;base64,([^"]+)"', before)
+
+    assert f"<title>{hand.name}: fingers with their tendons</title>" in b64decode(image[1]).decode()
+    for name in hand.fingers:
+        assert f"<h4>{name}</h4>" in before
+    assert "<tr><td>torque +pip</td><td>1.2</td><td>N m</td></tr>" in before
+    assert f"{results.hand.guesses} of {len(hand.quantities())} numbers are guesses" in before
+    assert '<td>fingers.index.pulleys[2].radius</td><td>6 mm</td><td class="guess">guess</td>' in before
+    assert results.hand.guesses == len(hand.assumed())
+
+
+def test_the_figures_of_the_hand_are_data_too(results):
+    found = results.as_dict()["hand"]
+
+    assert {"figure": "mass", "value": "21.5", "unit": "g"} in found["fingers"]["index"]
+    assert found["guesses"] == results.hand.guesses
 
 
 def test_the_page_shows_every_printed_number_beside_ours(text):

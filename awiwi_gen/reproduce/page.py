@@ -6,17 +6,20 @@ import io
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from awiwi_gen.diff.figures import POSES
 from awiwi_gen.emit.files import render
 from awiwi_gen.hand import Hand
 from awiwi_gen.report import COLUMNS, proof_rows
 from awiwi_gen.reproduce.figures import all_figures, in_order
 from awiwi_gen.reproduce.figures.absent import ABSENT
 from awiwi_gen.reproduce.printed import all_numbers
+from awiwi_gen.reproduce.this_hand import COLUMNS as FIGURE_COLUMNS
+from awiwi_gen.reproduce.this_hand import ThisHand, this_hand
 from awiwi_gen.results import Figure, Printed, Table, Verdict
 
 if TYPE_CHECKING:
@@ -44,6 +47,7 @@ class Results:
     numbers: Sequence[Printed]
     proof: Proof
     compared: Sequence[Table] = ()
+    hand: ThisHand = field(default_factory=ThisHand)
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
@@ -52,6 +56,7 @@ class Results:
             for f in self.figures
         ]
         return {
+            "hand": self.hand.as_dict(),
             "figures": shown,
             "numbers": [vars(number) for number in self.numbers],
             "compared": [vars(table) for table in self.compared],
@@ -73,7 +78,7 @@ def publish(job: Job, path: Path, comparison: Comparison) -> Results:
     library = load(directory, job.store)
     compared_figures, tables = comparison(library, job.hand)
     figures = in_order([*all_figures(library, job.hand), *compared_figures])
-    results = Results(figures, all_numbers(library, job.hand), verify(job, directory), tables)
+    results = Results(figures, all_numbers(library, job.hand), verify(job, directory), tables, this_hand(job))
     write_page(path, job.hand, results, library.manifest)
     return results
 
@@ -96,6 +101,12 @@ def write_page(path: Path, hand: Hand, results: Results, manifest: Mapping[str, 
         hand=escape(hand.name),
         digest=hand.digest(),
         summary=escape(summary(results)),
+        image=results.hand.image,
+        fingers=[(escape(name), _escaped(rows)) for name, rows in results.hand.fingers.items()],
+        figure_columns=FIGURE_COLUMNS,
+        poses=POSES,
+        own_numbers=_escaped(results.hand.numbers),
+        guesses=results.hand.guesses,
         parts=parts,
         absent=_escaped(ABSENT.items()),
         columns=COLUMNS,
