@@ -130,7 +130,7 @@ def _joint(root: Element, hand: Hand, name: str, finger: Finger, part: Part, par
     link, full = part.link, f"{name}_{part.link.joint}"
     joint = _hinge(root, hand, full, part, (parent, full), _range(finger, link.joint))
     if link.damping is not None or link.friction is not None:
-        friction = value(link.friction.torque) if link.friction else 0.0
+        friction = value(link.friction.level) if link.friction else 0.0
         SubElement(joint, "dynamics", damping=text(value(link.damping)), friction=text(friction))
     if link.joint in finger.leaders:
         leader = f"{name}_{finger.leaders[link.joint]}"

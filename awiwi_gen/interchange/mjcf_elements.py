@@ -27,7 +27,7 @@ def hinge(body: Element, name: str, part: Part, axis: Array, anchor: Array) -> N
         if getattr(link, key) is not None:
             joint.set(key, text(value(getattr(link, key))))
     if link.friction is not None:
-        joint.set("frictionloss", text(float(link.friction.torque)))
+        joint.set("frictionloss", text(float(link.friction.level)))
     if link.spring is not None:
         joint.set("stiffness", text(float(link.spring.stiffness)))
         joint.set("springref", text(float(link.spring.reference)))

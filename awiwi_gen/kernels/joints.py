@@ -9,7 +9,8 @@ from awiwi_gen.hand import Hand
 from awiwi_gen.hand.parts import Finger
 from awiwi_gen.kernel import Kernel, Port
 from awiwi_gen.kernels.declare import Family
-from awiwi_gen.kernels.fingers import POSE, Size, guarded, input_ports, torque
+from awiwi_gen.kernels.fingers import guarded, input_ports
+from awiwi_gen.kernels.sizes import POSE, Size, torque
 from awiwi_gen.units import m, s
 
 per_passive: Family[Size] = Family("joints")
@@ -43,7 +44,7 @@ def documented(finger: Finger, kernels: list[Kernel]) -> list[Kernel]:
 
 def optional_kernels(hand: Hand, name: str, finger: Finger) -> list[Kernel]:
     """The kernels of a finger with passive torques in its joints, and those of a finger with a base in the palm."""
-    size = Size(len(finger.joints), len(finger.tendons), len(finger.links))
+    size = Size.of(finger)
     ports = input_ports(hand, finger, size)
     ports["g_palm"] = ports["g"]
     families = [family for family, has in ((per_passive, finger.passive), (per_placed, finger.base)) if has]
