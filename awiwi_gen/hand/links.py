@@ -115,7 +115,6 @@ class Link(Rotated):
     """
 
     joint: JointName
-    kind: Annotated[Literal["hinge", "slide"], Field(examples=['"hinge"', '"slide"'])] = "hinge"
     turn: Turn = "none"
     low: JointPosition | None = None
     high: JointPosition | None = None
@@ -124,6 +123,7 @@ class Link(Rotated):
     com: Point | None = None
     inertia: Annotated[Inertia | None, Field(examples=['{ xx = "35 g mm^2", ... }'])] = None
     four_bar: FourBar | None = None
+    kind: Annotated[Literal["hinge", "slide"], Field(examples=['"hinge"', '"slide"'])] = "hinge"
     rpy: Rpy | None = None
     reference: JointPosition | None = None
     armature: Annotated[

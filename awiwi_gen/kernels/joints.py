@@ -35,11 +35,21 @@ PASSIVE = {
 
 
 def documented(finger: Finger, kernels: list[Kernel]) -> list[Kernel]:
-    """The kernels of a finger; what their joints add is told in their documentation."""
+    """The kernels of a finger; what their joints add is told in their documentation, and which of them slide."""
     for notes, has in ((ARMATURE, finger.has_armature), (PASSIVE, finger.passive)):
         if has:
             kernels = [replace(k, doc=f"{k.doc}\n{notes[k.family]}") if k.family in notes else k for k in kernels]
-    return kernels
+    slides = [f"{index} ({joint})" for index, joint in enumerate(finger.joints) if joint in finger.sliding]
+    return with_slides(kernels, slides)
+
+
+def with_slides(kernels: list[Kernel], slides: list[str]) -> list[Kernel]:
+    """Kernels whose documentation says which elements of arrays over the joints belong to slides, if any do."""
+    if not slides:
+        return kernels
+    note = f"Of arrays over the joints, {' and '.join(slides)} slides: in m for rad, and N for N m."
+    over_joints = [{"q", "start"} & k.inputs.keys() for k in kernels]
+    return [replace(k, doc=f"{k.doc}\n{note}") if has else k for k, has in zip(kernels, over_joints, strict=True)]
 
 
 def optional_kernels(hand: Hand, name: str, finger: Finger) -> list[Kernel]:

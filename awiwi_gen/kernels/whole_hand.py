@@ -14,6 +14,7 @@ from awiwi_gen.hand import Hand
 from awiwi_gen.kernel import Kernel, Port
 from awiwi_gen.kernels.declare import Family
 from awiwi_gen.kernels.fingers import input_ports
+from awiwi_gen.kernels.joints import with_slides
 from awiwi_gen.kernels.routing import wraps_hold
 from awiwi_gen.kernels.sizes import Size, arms, stiffness, torque
 from awiwi_gen.kernels.wrist import BARS_CLOSE, wrist_ports
@@ -31,7 +32,9 @@ def hand_kernels(hand: Hand) -> list[Kernel]:
         ports["wrist"] = joined([*wrist_ports(hand.wrist).values()])
     sliding = tuple(slides for size in sizes.values() for slides in size.sliding)
     whole = Size(sliding, ports["f"].size, sum(size.links for size in sizes.values()))
-    kernels = of_hand.kernels("hand", hand, "", hand.structure(), ports, whole)
+    joints = [(joint, finger) for finger in hand.fingers.values() for joint in finger.joints]
+    slides = [f"{index} ({joint})" for index, (joint, finger) in enumerate(joints) if joint in finger.sliding]
+    kernels = with_slides(of_hand.kernels("hand", hand, "", hand.structure(), ports, whole), slides)
     wraps = tuple(each for name, finger in hand.fingers.items() for each in wraps_hold(finger, f"{name}."))
     return [replace(kernel, guards=(kernel.guards if hand.wrist else ()) + wraps) for kernel in kernels]
 
