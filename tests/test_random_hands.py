@@ -84,7 +84,7 @@ def test_equal_seeds_give_equal_hands_and_others_differ():
 def test_random_hands_are_of_all_kinds():
     kinds = set().union(*(random_hands.kinds(random_hands.hand(seed)) for seed in range(40)))
 
-    assert kinds == set(random_hands.FEATURES)
+    assert kinds == {*random_hands.FEATURES, random_hands.SLIDES}
 
 
 @pytest.mark.parametrize("turn", ["none", "z+90", "x+90"])

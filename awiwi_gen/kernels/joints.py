@@ -47,7 +47,8 @@ def with_slides(kernels: list[Kernel], slides: list[str]) -> list[Kernel]:
     """Kernels whose documentation says which elements of arrays over the joints belong to slides, if any do."""
     if not slides:
         return kernels
-    note = f"Of arrays over the joints, {' and '.join(slides)} slides: in m for rad, and N for N m."
+    which = f"elements {', '.join(slides)} are of slides" if len(slides) > 1 else f"element {slides[0]} is of a slide"
+    note = f"In arrays over the joints, {which}: in m for rad, and N for N m."
     over_joints = [{"q", "start"} & k.inputs.keys() for k in kernels]
     return [replace(k, doc=f"{k.doc}\n{note}") if has else k for k, has in zip(kernels, over_joints, strict=True)]
 
