@@ -8,6 +8,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+import random_hands
 from hand_numbers import fingers_of, gravity_torque, link_angles, mass_matrix, poses, tendon_lengths
 
 import awiwi_gen
@@ -147,6 +148,16 @@ def test_forces_for_a_stiffness_are_left_out_with_the_slide_that_prevents_them(s
     assert left_out_names(sliding) == {
         "claw_tendon_distribution": "the joint rail slides: its stiffness has another unit than that of a hinge"
     }
+
+
+def test_estimates_of_a_slide_beside_a_hinge_converge_where_lengths_contradict_each_other():
+    text = random_hands.hand(
+        3, 2, {"slides", "passive joints", "rotors", "skew axes", "references", "few tendons", "paths"}
+    )
+    job = Job(Hand.parse(text), only="one_joint_estimate")
+
+    assert "slides" in random_hands.kinds(text)
+    assert verify(job, cached_tree(job)).passed
 
 
 def test_a_search_for_the_base_over_a_slide_is_left_out():

@@ -74,10 +74,10 @@ def _reasons(finger: Finger, couplings: Sequence[Any]) -> tuple[tuple[str, str],
     found: list[tuple[str, str]] = []
     lengths = _indistinct(couplings, finger.joints)
     one_sided = _one_sided(couplings, finger.joints)
-    torques = _mixed(finger) or "; ".join(filter(None, (lengths, one_sided)))
-    torques = torques or _beyond_pull(couplings, finger.joints)
-    if torques and finger.strings and not finger.sliding:
+    torques = "; ".join(filter(None, (lengths, one_sided))) or _beyond_pull(couplings, finger.joints)
+    if torques and finger.strings:
         torques += "; return strings do not count, for no motor pulls them"
+    torques = _mixed(finger) or torques
     found += [
         (family, f"{lengths}: tendon lengths do not determine the joint angles") for family in _NEED_LENGTHS if lengths
     ]

@@ -323,12 +323,17 @@ def estimated_parts(finger: Finger) -> list[tuple[list[int], list[int], bool]]:
 ROUND_BODIES = {"f64": "1e-13", "f32": "5e-6"}
 
 
+SLIDE_UNIT = "(awiwi_real)0.0078125"  # m, a power of two near the arms that tendons have at hinges
+NEAR = {"hinge": 0.2, "slide": 0.005}  # rad and m: how far an estimate may be away from the next one
+
+
 def nonlinear_estimate(finger: Finger, iterations: int = 24) -> Solver | None:
     """The solver of fingers whose coupling depends on the pose; None for other fingers."""
     if not is_curved(finger):
         return None
     low, high = joint_limits(finger)
     parts = estimated_parts(finger)
+    scales = [SLIDE_UNIT if joint in finger.sliding else "1" for joint in finger.joints]
     curved = sum(not linear for _, _, linear in parts)
     return Solver(
         template="joint_estimate.c.j2",
@@ -349,11 +354,13 @@ def nonlinear_estimate(finger: Finger, iterations: int = 24) -> Solver | None:
             ),
             "part_count": str(len(parts)),
             "iterations": str(iterations),
+            "scale": ", ".join(scales) if SLIDE_UNIT in scales else "",
         },
         iterations=1 + curved * (iterations - 1),
         tolerance={"f64": 1e-12, "f32": 1e-5},
         limits=limit_paths(finger),
         stop=ROUND_BODIES if wraps(finger) else STOP,
+        near=tuple(NEAR["slide" if joint in finger.sliding else "hinge"] for joint in finger.joints),
     )
 
 

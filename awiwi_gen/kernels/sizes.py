@@ -91,7 +91,8 @@ def arms_derivative(size: Size) -> Port:
 
 def covariance(size: Size) -> Port:
     """Covariances of joint angles."""
-    return of_units((size.joints, size.joints), (a * b for a in size.motions for b in size.motions))
+    pairs = (sorted((a, b), key=lambda unit: unit.label) for a in size.motions for b in size.motions)  # "m rad"
+    return of_units((size.joints, size.joints), (a * b for a, b in pairs))
 
 
 def jacobian_port(size: Size) -> Port:
