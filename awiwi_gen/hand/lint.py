@@ -105,9 +105,9 @@ def _finger(finger: Finger) -> Iterator[Complaint]:
         yield from below(("base",), sources(finger.base))
     misnamed = [*_names(finger), *misfits(finger)]
     yield from misnamed
-    unfit = any(True for link in finger.links for _ in link_complaints(link))
+    unfit = [complaint for link in finger.links for complaint in link_complaints(link)]
     limited = all(link.low and link.high for link in finger.links if link.joint in finger.joints)
-    if not misnamed and limited and not unfit:
+    if limited and not (misnamed or unfit):
         yield from _tendons(finger)
         yield from _singular(finger)
 

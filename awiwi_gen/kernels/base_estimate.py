@@ -13,7 +13,7 @@ from typing import Any
 from awiwi_gen.hand import Finger, Hand
 from awiwi_gen.kernel import Kernel, Port, Solver
 from awiwi_gen.kernels.declare import Family
-from awiwi_gen.kernels.fingers import input_ports, joint_limits, limit_paths
+from awiwi_gen.kernels.fingers import NEAR, input_ports, joint_limits, limit_paths
 from awiwi_gen.kernels.routing import moved
 from awiwi_gen.kernels.sizes import Size
 from awiwi_gen.units import rad
@@ -79,6 +79,7 @@ def gradient_search(finger: Finger) -> Solver:
         },
         iterations=TRIALS + 1,
         tolerance={"f64": 1e-6, "f32": 1e-4},
+        near=(NEAR["hinge"],) * len(base.joints),
         limits={end: tuple(paths[j] for j in base.joints) for end, paths in limit_paths(finger).items()},
     )
 
