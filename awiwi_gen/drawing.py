@@ -160,6 +160,10 @@ def _shapes(chain: Chain, view: Array) -> list[tuple[str, Array]]:
     shapes.append(("link", skeleton(chain, middle) @ view.T))
     turns = np.linspace(0, 2 * np.pi, CORNERS + 1)[:, None]
     for link, (_, (axes, origin)) in zip(chain.finger.links, chain.frames(middle), strict=True):
+        if link.slides:  # a piece of its axis
+            piece = np.array(origin) + np.outer([-2 * SMALL, 2 * SMALL], axes[2])
+            shapes.append(("rim", piece @ view.T))
+            continue
         radius = float(chain.finger.radii.get(link.joint, SMALL))
         rim = np.array(origin) + radius * (np.cos(turns) * np.array(axes[0]) + np.sin(turns) * np.array(axes[1]))
         shapes.append(("rim", rim @ view.T))

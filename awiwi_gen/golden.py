@@ -20,7 +20,7 @@ from awiwi_gen.kernel import Kernel
 from awiwi_gen.parameters import derivations, of_part
 from awiwi_gen.records import Record, solver_of
 from awiwi_gen.verify.samples import draw
-from awiwi_gen.verify.verdict import STATUS, float_values, stack
+from awiwi_gen.verify.verdict import STATUS, float_values, scales, stack
 
 ROOM = 800  # bytes of golden inputs, or of outputs with their limits, that a kernel may have beyond its first sample
 SAMPLES = 3
@@ -127,8 +127,8 @@ def _near(
         else:
             value = known[name][rows]
             if record.graph is None:
-                largest = float(np.max(np.abs(known[name])))
-                limit = np.full_like(value, solver_of(kernel).tolerance[options.scalar] * largest)
+                tolerance = solver_of(kernel).tolerance[options.scalar]
+                limit = np.broadcast_to(tolerance * scales(known[name], port.units), value.shape)
             else:
                 limit = stack([bound[1] for bound in bounds[name]], len(rows)) + np.spacing(np.abs(value))
         columns.append(np.stack([value, limit], axis=2))

@@ -62,8 +62,9 @@ def judge_record(
         mirror = as_computed.mirror(record.inputs, own)
         observed = partial(problem.observed, record.inputs)
         other = partial(problem.other_reference, record.inputs)
+        units = {name: port.units for name, port in kernel.outputs.items()}
         return judge_solver(
-            kernel.name, record.reference, mirror, observed, other, record.inputs, function, tolerance, SEED
+            kernel.name, record.reference, mirror, observed, other, record.inputs, function, tolerance, SEED, units
         )
     inputs = draw(kernel.inputs, kernel.path, options.dtype)
     examine = partial(

@@ -89,7 +89,8 @@ class Solver:
     solutions; a compiled result may differ from these by ``tolerance`` of the largest element, per scalar type.
     ``iterations`` is the number of calls of the used kernels in the worst case; those in ``once`` are called once.
     A last step shorter than ``stop``, per scalar type, ends an iteration.
-    ``limits`` are the paths of the numbers in ``arrays`` that are read at run time where others are.
+    ``limits`` are the paths of the numbers in ``arrays`` that are read at run time where others are. The solver is
+    expected to converge from starts up to ``near`` away in each unknown.
     """
 
     template: str
@@ -104,6 +105,7 @@ class Solver:
     once: tuple[str, ...] = ()
     limits: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     stop: Mapping[str, str] = field(default_factory=lambda: STOP)
+    near: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 A finger is anything with these attributes (the hand file's `Finger` and its symbolic copies are):
 
-    links[i]      joint, turn, offset[3], mass, com[3], inertia.{xx,yy,zz,xy,xz,yz} (or None of the three), start;
+    links[i]      joint, slides, turn, offset[3], mass, com[3], inertia.{xx,yy,zz,xy,xz,yz} (or None of the three), start;
                   quarters[3], and None or rpy[3], reference, four_bar, armature, damping, friction, spring
     pulleys[i]    joint, radius
     tendons[i]    rest, over (senses and joints: "+flexion", "-pip"), arms (joint -> arm), span (None or from_[3], to[3],
@@ -14,8 +14,10 @@ A finger is anything with these attributes (the hand file's `Finger` and its sym
                   to the fourth)
     base          None or position[3], turn, quarters[3], rpy[3]
 
-A palm on joints in series has `joints` (also called `links`) with joint, turn, quarters[3], rpy[3], reference and
-offset[3]; `base`; and `turn`, `quarters[3]` and `rpy[3]` of its own.
+A palm on joints in series has `joints` (also called `links`) with joint, slides (False), turn, quarters[3], rpy[3],
+reference and offset[3]; `base`; and `turn`, `quarters[3]` and `rpy[3]` of its own.
+
+An angle of a joint that slides is its position [m], along z.
 
 The numbers may be symbols of either library. Independent joints are counted along the chain, base to tip.
 """

@@ -138,6 +138,7 @@ _NAMES: dict[tuple[Dimension, Fraction], str] = {
         (m / s, "a velocity"),
         (m / s**2, "an acceleration"),
         (m / rad, "a length per angle"),
+        (rad / m, "an angle per length"),
         (N, "a force"),
         (N * m, "a torque"),
         (N * s, "a momentum"),

@@ -56,7 +56,7 @@ def read_mjcf(text: str) -> Model:
             low, high = numbers(each.get("range")) if each.get("range") else (None, None)
             own = {key: float(each.get(name, 0)) for key, name in ATTRIBUTES.items()}
             axis, anchor = numbers(each.get("axis")), numbers(each.get("pos"))
-            joints.append(Joint(each.get("name"), index, "hinge", axis, anchor, low, high, **own))
+            joints.append(Joint(each.get("name"), index, each.get("type", "hinge"), axis, anchor, low, high, **own))
         sites.extend(Site(each.get("name"), index, numbers(each.get("pos"))) for each in element.findall("site"))
         for each in element.findall("geom"):
             axis = None if each.get("zaxis") is None else numbers(each.get("zaxis"))

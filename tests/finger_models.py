@@ -96,6 +96,7 @@ def make(kind: str, leaf: Leaf, **special: float) -> Tree:
             com=point(f"{joint}_com", -0.01, 0.03),
             inertia=Tree(**moments, **products),
             start=0,
+            slides=False,
             four_bar=Tree(**loop, branch=1) if joint == structure.get("four_bar") else None,
             **NOTHING_ELSE,
         )

@@ -15,7 +15,7 @@ from awiwi_gen.units import parse_quantity
 def numbers(node: Any) -> Any:
     """A hand file's tables with SI numbers in place of quantities; names and sources stay."""
     if isinstance(node, dict):
-        kept = ("source", "joint", "turn", "link", "over", "follower", "leader", "prefix", "name")
+        kept = ("source", "joint", "kind", "turn", "link", "over", "follower", "leader", "prefix", "name")
         return {key: value if key in kept else numbers(value) for key, value in node.items()}
     if isinstance(node, list):
         return [numbers(value) for value in node]
@@ -64,12 +64,21 @@ def link_angles(finger: dict[str, Any], q: np.ndarray) -> np.ndarray:
     return coordinates(finger)[1] @ q + np.array([offsets.get(link["joint"], 0.0) for link in finger["links"]])
 
 
+def slides(link: dict[str, Any]) -> bool:
+    return link.get("kind") == "slide"
+
+
 def poses(finger: dict[str, Any], angles: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
     """Axes and origin of every link, and of the tip, in the base frame."""
     found, axes, origin = [], np.eye(3), np.zeros(3)
     for link, angle in zip(finger["links"], angles, strict=True):
         fixed = turn_matrix(link.get("turn", "none")) @ rpy_matrix(link.get("rpy", [0.0, 0.0, 0.0]))
-        axes = axes @ fixed @ about("z", angle - link.get("reference", 0.0))
+        moved = angle - link.get("reference", 0.0)
+        if slides(link):
+            axes = axes @ fixed
+            origin = origin + axes[:, 2] * moved
+        else:
+            axes = axes @ fixed @ about("z", moved)
         found.append((axes, origin))
         origin = origin + axes @ np.array(link["offset"])
     return [*found, (axes, origin)]
@@ -89,7 +98,8 @@ def mass_matrix(finger: dict[str, Any], q: np.ndarray) -> np.ndarray:
         J = np.zeros((6, len(finger["links"])))
         for k in range(i + 1):
             axis = frames[k][0][:, 2]
-            J[:, k] = [*np.cross(axis, centre - frames[k][1]), *axis]
+            lever = np.cross(axis, centre - frames[k][1])
+            J[:, k] = [*axis, 0, 0, 0] if slides(finger["links"][k]) else [*lever, *axis]
         t = link["inertia"]
         tensor = np.array([[t["xx"], t["xy"], t["xz"]], [t["xy"], t["yy"], t["yz"]], [t["xz"], t["yz"], t["zz"]]])
         total += (
@@ -109,7 +119,9 @@ def gravity_torque(finger: dict[str, Any], q: np.ndarray, g: np.ndarray) -> np.n
         if "mass" in link:
             centre = frames[i][1] + frames[i][0] @ np.array(link["com"])
             for k in range(i + 1):
-                torque[k] -= link["mass"] * g @ np.cross(frames[k][0][:, 2], centre - frames[k][1])
+                axis = frames[k][0][:, 2]
+                moves = axis if slides(finger["links"][k]) else np.cross(axis, centre - frames[k][1])
+                torque[k] -= link["mass"] * g @ moves
     return matrix.T @ torque
 
 

@@ -8,6 +8,8 @@ A seed chooses the features; `kinds` names those that a file has. What hand file
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 
 from awiwi_gen.errors import InputError
@@ -19,6 +21,7 @@ FEATURES = (
     "narrow range", "range without zero", "axial mass", "second finger", "skew axes", "references", "massless links",
     "rotors", "passive joints", "arms", "paths", "return strings", "ratios", "few tendons", "base", "palm",
 )  # fmt: skip
+SLIDES = "slides"  # drawn apart from the other features, so that hands without are what they were before there were any
 TURNS = ("none", "none", "x+90", "x-90", "y+90", "y-90", "z+90", "z-90")
 LINKS = (1, 2, 1, 3, 2, 4, 3, 5, 2, 4, 6, 8)  # most hands are small: eight links take a minute to derive
 QUARTER = np.pi / 2
@@ -29,6 +32,8 @@ def hand(seed: int, links: int | None = None, features: set[str] | None = None) 
     for attempt in range(200):
         random = np.random.default_rng([seed, attempt])
         chosen = {f for f in FEATURES if random.random() < 0.35} if features is None else features
+        if features is None and np.random.default_rng([seed, attempt, 1]).random() < 0.2:
+            chosen.add(SLIDES)
         text = _Writer(random, chosen).hand(LINKS[seed % len(LINKS)] if links is None else links)
         try:
             Hand.parse(text)
@@ -50,6 +55,7 @@ class _Writer:
     def __init__(self, random: np.random.Generator, features: set[str]) -> None:
         self.random, self.features = random, features
         self.used: set[str] = set()
+        self.sliding: set[str] = set()  # joints of the finger that is written
         self.scale = random.uniform(0.4, 2.5)  # of all lengths: a child's hand to a giant's
 
     def wants(self, feature: str) -> bool:
@@ -86,6 +92,9 @@ tendon_stiffness_high = "{low * b(3, 60):.4g} N/m"
 gravity = "{self.random.choice([9.81, 1.62])} m/s^2"
 source = "assumed"
 """
+        if SLIDES in self.used:
+            most = f'slide_velocity = "{b(0.1, 1):.3g} m/s"\nslide_acceleration = "{b(5, 80):.3g} m/s^2"\n'
+            limits = limits.replace("tendon_force", f'{most}slide_force = "{b(10, 200):.4g} N"\ntendon_force', 1)
         parts = "".join(text for text, _ in fingers) + (self.wrist(tendons) or self.palm()) + self.actuators(tendons)
         head = 'prefix = "claw"\nname = "Random hand"\n'
         return f"# {', '.join(sorted(self.used))}\n{head}{limits}{parts}"
@@ -187,7 +196,7 @@ guiding = "{b(0.02, 0.2):.2g}"
 bend = "{b(1, 7):.2g} rad"
 source = "assumed"
 """
-        gains = motor and spring and self.wants("gains")
+        gains = motor and spring and SLIDES not in self.used and self.wants("gains")
         for tendon in sorted(self.random.choice(tendons, min(2, tendons), False)) if gains else ():
             text += f"""
 [[gains]]
@@ -212,6 +221,10 @@ source = "assumed"
         free = [joint for joint in joints if joint not in leaders]
         bar = self.random.choice(free[2:] if tensegrity else free) if len(free) > 2 * tensegrity else None
         turns = [str(self.random.choice(TURNS)) for _ in joints]
+        alone = [joint for joint in free[2 * tensegrity :] if joint != bar and joint not in leaders.values()]
+        self.sliding = set()
+        if alone and self.wants(SLIDES):
+            self.sliding = set(self.random.choice(alone, int(self.random.integers(1, len(alone) + 1)), False))
         if tensegrity:
             turns[:2] = ["none", "x+90"]
         rows = self.tendons(free[2:] if tensegrity else free, leaders)
@@ -226,18 +239,21 @@ source = "assumed"
             for _ in range(int(self.random.integers(1, 3))):
                 joint = self.random.choice(joints[1:])
                 start, end = self.point((-60, -40), (-8, 8), (-8, 8)), self.point((-4, 4), (-6, 6), (-6, 6))
-                over = f', over = ["+{self.random.choice(free)}"]' if self.random.random() < 0.3 else ""
+                over = f", {self.routed([f'+{self.random.choice(free)}'], {})}" if self.random.random() < 0.3 else ""
                 spans.append(
                     f'{{ rest = "0 mm"{over}, span = {{ from = {start}, to = {end}, joint = "{joint}" }}, '
                     'source = "assumed" }'
                 )
         spans += self.paths(joints)
-        pulleys = [f'{{ joint = "{joint}", radius = {self.mm(4, 10)}, source = "drawing" }}' for joint in joints]
+        pulleys = [
+            f'{{ joint = "{joint}", radius = {self.mm(4, 10)}, source = "drawing" }}'
+            for joint in joints
+            if joint not in self.sliding
+        ]
         if self.wants("few tendons"):
             rows = rows[: int(self.random.integers(1, len(rows) + 1))]
         tendons = spans + [
-            f'{{ rest = {self.mm(0, 50)}, over = [{", ".join(row)}]{self.arms(free)}, source = "assumed" }}'
-            for row in rows
+            f'{{ rest = {self.mm(0, 50)}, {self.routed(row, self.arms(free))}, source = "assumed" }}' for row in rows
         ]
         strings = self.strings(joints)
         couplings = [f'{{ follower = "{one}", leader = "{other}"{self.ratio()} }}' for one, other in leaders.items()]
@@ -257,10 +273,18 @@ source = "assumed"
                   for _ in range(3)]  # fmt: skip
         return "[" + ", ".join(f'"{angle:.6g} deg"' for angle in angles) + "]"
 
-    def arms(self, joints: list[str]) -> str:
+    def routed(self, row: list[str], arms: dict[str, str]) -> str:
+        """What a tendon runs over, and its arms: slides have no pulleys."""
+        over = [each for each in row if each[1:] not in self.sliding]
+        arms = {each[1:]: f'"{each[0]}1"' for each in row if each[1:] in self.sliding} | arms
+        text = f"over = [{', '.join(json.dumps(each) for each in over)}]"
+        return f"{text}, arms = {{ {', '.join(f'{joint} = {arm}' for joint, arm in arms.items())} }}" if arms else text
+
+    def arms(self, joints: list[str]) -> dict[str, str]:
         if not self.wants("arms"):
-            return ""
-        return f", arms = {{ {self.random.choice(joints)} = {self.mm(-6, 6)} }}"
+            return {}
+        joint, arm = str(self.random.choice(joints)), self.mm(-6, 6)
+        return {joint: f'"{self.between(-1, 1):.3g}"' if joint in self.sliding else arm}
 
     def ratio(self) -> str:
         if not self.wants("ratios"):
@@ -302,7 +326,7 @@ source = "assumed"
 
         def name(joint: str, sense: int) -> str:
             pulley = followers.get(joint, joint) if self.random.random() < 0.3 else joint
-            return f'"{"+" if sense > 0 else "-"}{pulley}"'
+            return f"{'+' if sense > 0 else '-'}{pulley}"
 
         if len(joints) > 1 and self.wants("fewest"):  # one tendon more than joints
             senses = np.tril(np.where(self.random.random((len(joints),) * 2) < 0.5, -1, 1))
@@ -329,6 +353,8 @@ source = "assumed"
         elif self.random.random() < 0.5 and self.wants("range without zero"):
             low, high = sorted(self.random.choice([-1, 1]) * x for x in (self.between(5, 20), self.between(40, 80)))
         limits = "" if follows else f'low = "{low:.4f} deg"\nhigh = "{high:.4f} deg"\n'
+        if slides := joint in self.sliding:
+            limits = f'kind = "slide"\nlow = {self.mm(-8, -1)}\nhigh = {self.mm(1, 20)}\n'
         axial = self.random.random() < 0.5 and self.wants("axial mass")
         com = '["0 mm", "0 mm", "0 mm"]' if axial else self.point((5, 20), (-2, 2), (-2, 2))
         offset = self.point((15, 40), (-4, 4), (-4, 4))
@@ -344,13 +370,15 @@ inertia = {self.inertia()}
 joint = "{joint}"
 turn = "{turn}"
 {limits}offset = {offset}
-{body}{self.joint(bool(four_bar) or base)}source = "assumed"
+{body}{self.joint(bool(four_bar) or base, slides)}source = "assumed"
 """
         return text + (f"\n[fingers.{finger}.links.four_bar]\n{four_bar}" if four_bar else "")
 
-    def joint(self, planar: bool) -> str:
+    def joint(self, planar: bool, slides: bool) -> str:
         """The optional keys of a joint; without rotations for a `planar` one."""
         b, text = self.between, ""
+        if slides:
+            return self.slide()
         if not planar and self.wants("skew axes"):
             text += f"rpy = {self.turned()}\n"
         if not planar and self.wants("references"):
@@ -363,6 +391,21 @@ turn = "{turn}"
                 f'friction = {{ torque = "{b(1e-3, 0.05):.3g} N m", velocity = "{b(0.02, 1):.3g} rad/s" }}\n',
                 f'spring = {{ stiffness = "{b(0.01, 0.5):.3g} N m/rad", reference = "{b(-40, 40):.4g} deg" }}\n',
             )[key]
+        return text
+
+    def slide(self) -> str:
+        """The optional keys of a slide."""
+        b, text = self.between, ""
+        if self.wants("skew axes"):
+            text += f"rpy = {self.turned()}\n"
+        if self.wants("references"):
+            text += f"reference = {self.mm(-9, 9)}\n"
+        if self.wants("rotors"):
+            text += f'armature = "{b(0.5, 50):.3g} g"\n'
+        if self.wants("passive joints"):
+            text += f'damping = "{b(0.05, 2):.3g} N s/m"\n'
+            text += f'friction = {{ force = "{b(0.05, 2):.3g} N", velocity = "{b(1, 20):.3g} mm/s" }}\n'
+            text += f'spring = {{ stiffness = "{b(10, 500):.3g} N/m", reference = {self.mm(-9, 9)} }}\n'
         return text
 
     def inertia(self) -> str:

@@ -21,7 +21,7 @@ from awiwi_gen.interchange.toml import hand_text
 from awiwi_gen.kernels.fingers_control import distribution
 
 HERE = Path(__file__).parent
-HANDS = ["exported_finger.toml", "../examples/claw.toml", "../awiwi_gen/hand.toml"]
+HANDS = ["exported_finger.toml", "sliding_finger.toml", "../examples/claw.toml", "../awiwi_gen/hand.toml"]
 
 
 @pytest.mark.parametrize("name", HANDS)
@@ -50,8 +50,9 @@ def base_of(finger) -> tuple[np.ndarray, np.ndarray]:
     return rpy_matrix(base["rpy"]), np.array(base["position"])
 
 
-def test_the_import_of_an_export_is_the_same_hand_again():
-    first = hand_text(draft(read_mjcf(export_mjcf.text_and_losses(Hand.load(HERE / "exported_finger.toml"))[0])))
+@pytest.mark.parametrize("name", ["exported_finger.toml", "sliding_finger.toml"])
+def test_the_import_of_an_export_is_the_same_hand_again(name):
+    first = hand_text(draft(read_mjcf(export_mjcf.text_and_losses(Hand.load(HERE / name))[0])))
     once = Hand.parse(first)
     twice = Hand.parse(hand_text(draft(read_mjcf(export_mjcf.text_and_losses(once)[0]))))
 

@@ -47,8 +47,8 @@ def passive_torque(finger: Finger, q: Matrix, qd: Matrix) -> Matrix:
 
 
 def _dry(friction: Any, rate: Expr) -> Expr:
-    """Integral of the friction torque over the velocity."""
+    """Integral of the friction torque, or of a slide's force, over the velocity."""
     share = rate / friction.velocity
     half_pi = sympy.atan2(friction.velocity, 0, evaluate=False)  # exact in every arithmetic
     area = rate * sympy.atan(share) - friction.velocity * sympy.log(1 + share**2) / 2
-    return friction.torque * area / half_pi
+    return friction.level * area / half_pi

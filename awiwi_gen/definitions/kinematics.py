@@ -5,7 +5,7 @@ last. R_i is the fixed rotation: the link's turn, then its roll, pitch and yaw a
 of the n independent joint angles q: a joint rotates by its angle less its reference, a coupled joint's angle is in
 proportion to its leader's (eq. 5.16), and a four-bar counts twice, as its massless crank (angle q + reference, offset
 along the crank) and as its coupler, which is parallel to the turned frame at q = 0, or at the end of the joint's range
-that is nearest to it.
+that is nearest to it. A slide does not rotate: Trans(0, 0, c) stands for its Rz(c), by its position less its reference.
 
 All velocities are derivatives of positions. Entries of results may be `Named` symbols.
 """
@@ -38,7 +38,7 @@ class Frame:
 
 
 def joint_angles(finger: Finger, q: Matrix) -> dict[str, Expr]:
-    """Angle [rad] of every joint by name, coupled ones included; for a four-bar, the rotation of its crank."""
+    """Angle [rad], or position of a slide [m], of every joint by name, coupled ones included; the crank's of a four-bar."""
     position = coordinates(finger)
     angles = {link.joint: q[position[link.joint]] for link in finger.links}
     for follower, leader in leaders(finger).items():
@@ -64,7 +64,7 @@ def fingertip_pose(finger: Finger, q: Matrix) -> Matrix:
 
 
 def jacobian(finger: Finger, q: Matrix) -> Matrix:
-    """J (6 x n), in base axes: velocity [m/rad], then angular velocity [rad/rad] of the tip per unit joint velocity."""
+    """J (6 x n), in base axes: velocity, then angular velocity of the tip per unit velocity of each joint."""
     derivation = Derivation()
     tip = frames(finger, q, derivation)[-1]
     columns = []
@@ -95,7 +95,11 @@ def frames(finger: Finger, q: Matrix, derivation: Derivation) -> list[Frame]:
         turned = fixed_rotation(link)
         if turned != sympy.eye(3):
             fixed, angle = chain[-1].axes * turned, sympy.S.Zero
-        angle += next(angles)
+        moved = next(angles)
+        if link.slides:
+            origin += fixed.col(2) * moved
+        else:
+            angle += moved
         if link.four_bar is not None:
             origin += fixed * rotation(angle) * Matrix([link.four_bar.crank, 0, 0])
             angle += next(angles)
@@ -105,7 +109,7 @@ def frames(finger: Finger, q: Matrix, derivation: Derivation) -> list[Frame]:
 
 
 def joint_frames(finger: Finger, q: Matrix, derivation: Derivation) -> dict[str, Frame]:
-    """Joint -> the frame in which it rotates: at the joint, after its fixed rotation and before its own."""
+    """Joint -> the frame in which it rotates or slides: at the joint, after its fixed rotation and before its own motion."""
     found, offset = {}, sympy.zeros(3, 1)
     for link, before in zip(finger.links, frames(finger, q, derivation)[:-2], strict=True):
         found[link.joint] = Frame(before.axes * fixed_rotation(link), before.point(offset))

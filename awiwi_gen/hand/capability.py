@@ -77,12 +77,19 @@ def _reasons(finger: Finger, couplings: Sequence[Any]) -> tuple[tuple[str, str],
     torques = "; ".join(filter(None, (lengths, one_sided))) or _beyond_pull(couplings, finger.joints)
     if torques and finger.strings:
         torques += "; return strings do not count, for no motor pulls them"
+    torques = _mixed(finger) or torques
     found += [
         (family, f"{lengths}: tendon lengths do not determine the joint angles") for family in _NEED_LENGTHS if lengths
     ]
     found += [(family, torques) for family in _NEED_TORQUES if torques]
     found += [(family, reason) for family in _NEED_SPANS for reason in _indistinct_base(finger, couplings)]
     return tuple(found)
+
+
+def _mixed(finger: Finger) -> str:
+    """That the stiffnesses of a finger's joints have no common measure, because some slide; empty if none does."""
+    slide = next((joint for joint in finger.joints if joint in finger.sliding), "")
+    return f"the joint {slide} slides: its stiffness has another unit than that of a hinge" if slide else ""
 
 
 def _none(finger: Finger) -> str:
@@ -98,7 +105,11 @@ def _indistinct_base(finger: Finger, couplings: Sequence[Any]) -> list[str]:
     base = {finger.leaders.get(joint, joint) for joint in order[: max(ends, default=0)]}
     columns = [column for column, joint in enumerate(finger.joints) if joint in base]
     spans = [[[coupling[row][column] for column in columns] for row in rows] for coupling in couplings]
-    reason = _indistinct(spans, [finger.joints[column] for column in columns]) if len(rows) >= len(columns) > 0 else ""
+    if not len(rows) >= len(columns) > 0:
+        return []
+    if slide := next((finger.joints[column] for column in columns if finger.joints[column] in finger.sliding), ""):
+        return [f"the joint {slide} slides: a gradient search has no step for lengths beside angles"]
+    reason = _indistinct(spans, [finger.joints[column] for column in columns])
     return [f"of the spans alone, {reason}"] if reason else []
 
 

@@ -14,6 +14,7 @@ from awiwi_gen.units import Quantity, parse_quantity
 Turn = Annotated[Literal["none", "x+90", "x-90", "y+90", "y-90", "z+90", "z-90"], Field(examples=['"none"', '"x+90"'])]
 # Joints with a spool turn several times.
 JointAngle = Annotated[Quantity, Measure("20 deg", "-1440 deg", "1440 deg")]
+JointPosition = Annotated[Quantity, Measure("20 deg", "-1440 deg", "1440 deg", (Measure("12 mm", "-1 m", "1 m"),))]
 Rpy = Annotated[tuple[Angle, Angle, Angle], Field(strict=False, examples=['["0 deg", "12.5 deg", "0 deg"]'])]
 Quarters = tuple[int | None, int | None, int | None]
 """Of each angle of an `Rpy`: its number of quarter turns, 0 to 3, or None for an angle between these."""
@@ -57,17 +58,32 @@ class FourBar(Part):
 
 
 class Friction(Part):
-    """Dry friction of a joint: torque * 2/pi * atan(joint velocity / velocity), which is smooth at rest."""
+    """Dry friction of a joint: torque * 2/pi * atan(joint velocity / velocity), which is smooth at rest.
 
-    torque: Annotated[Quantity, Measure("0.02 N m", "0 N m", "1000 N m")]
-    velocity: Annotated[Quantity, Measure("0.05 rad/s", "1e-6 rad/s", "1000 rad/s")]
+    A slide has a force instead of the torque.
+    """
+
+    torque: Annotated[Quantity | None, Measure("0.02 N m", "0 N m", "1000 N m")] = None
+    force: Annotated[Quantity | None, Measure("0.5 N", "0 N", "10000 N")] = None
+    velocity: Annotated[
+        Quantity,
+        Measure("0.05 rad/s", "1e-6 rad/s", "1000 rad/s", (Measure("2 mm/s", "1e-9 m/s", "100 m/s"),)),
+    ]
+
+    @property
+    def level(self) -> Any:
+        """The torque, or the force of a slide."""
+        return self.torque if self.force is None else self.force
 
 
 class JointSpring(Part):
-    """A linear spring in a joint, without torque at the joint angle `reference`."""
+    """A linear spring in a joint, without torque at the joint angle `reference`, or without force at a slide's position."""
 
-    stiffness: Annotated[Quantity, Measure("0.5 N m/rad", "0 N m/rad", "10000 N m/rad")]
-    reference: JointAngle
+    stiffness: Annotated[
+        Quantity,
+        Measure("0.5 N m/rad", "0 N m/rad", "10000 N m/rad", (Measure("200 N/m", "0 N/m", "1000000000 N/m"),)),
+    ]
+    reference: JointPosition
 
 
 class Rotated(Part):
@@ -93,21 +109,30 @@ class Link(Rotated):
     The rotation is by the joint angle less `reference`. `offset` leads from this joint to the next one (or to the
     fingertip), `com` to the centre of mass, in link axes. A link without `mass` is a joint only. `armature` is the
     inertia of a rotor as the joint sees it, `damping` a torque per velocity.
+
+    A joint of the `kind` "slide" moves along z instead, by its position less `reference`: lengths stand for angles, forces
+    for torques and masses for moments of inertia.
     """
 
     joint: JointName
     turn: Turn = "none"
-    low: JointAngle | None = None
-    high: JointAngle | None = None
+    low: JointPosition | None = None
+    high: JointPosition | None = None
     offset: Point
     mass: Mass | None = None
     com: Point | None = None
     inertia: Annotated[Inertia | None, Field(examples=['{ xx = "35 g mm^2", ... }'])] = None
     four_bar: FourBar | None = None
+    kind: Annotated[Literal["hinge", "slide"], Field(examples=['"hinge"', '"slide"'])] = "hinge"
     rpy: Rpy | None = None
-    reference: JointAngle | None = None
-    armature: Annotated[Quantity | None, Measure("1e-6 kg m^2", "0 kg m^2", "10 kg m^2")] = None
-    damping: Annotated[Quantity | None, Measure("0.01 N m s/rad", "0 N m s/rad", "1000 N m s/rad")] = None
+    reference: JointPosition | None = None
+    armature: Annotated[
+        Quantity | None, Measure("1e-6 kg m^2", "0 kg m^2", "10 kg m^2", (Measure("20 g", "0 g", "1000 kg"),))
+    ] = None
+    damping: Annotated[
+        Quantity | None,
+        Measure("0.01 N m s/rad", "0 N m s/rad", "1000 N m s/rad", (Measure("0.5 N s/m", "0 N s/m", "100000 N s/m"),)),
+    ] = None
     friction: Friction | None = None
     spring: JointSpring | None = None
     source: Source
@@ -125,6 +150,11 @@ class Link(Rotated):
         return getattr(self, self._limit_next_to_zero) if self._limit_next_to_zero else 0
 
     @property
+    def slides(self) -> bool:
+        """Whether the joint moves along its z axis instead of turning about it."""
+        return self.kind == "slide"
+
+    @property
     def passive(self) -> bool:
         """Whether the joint has a torque of its own: damping, friction or a spring."""
         return any(part is not None for part in (self.damping, self.friction, self.spring))
@@ -139,6 +169,8 @@ class Link(Rotated):
         extras: dict[str, Any] = {key: True for key in _OPTIONAL if getattr(self, key) is not None}
         if self.mass is None:
             extras["massless"] = True
+        if self.slides:
+            extras["slide"] = True
         if self._quarters != (0, 0, 0):
             extras["quarters"] = self._quarters
         return [self.joint, self.turn, self.four_bar_structure(), *([extras] if extras else [])]

@@ -11,6 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Protocol
 
 from awiwi_gen.hand.lint_paths import misplaced, told, without_length
+from awiwi_gen.hand.lint_slides import limit_complaints, link_complaints, misfits
 from awiwi_gen.hand.massless import without_inertia
 from awiwi_gen.hand.parts import PALM, Finger, FourBar, Keys, Limits, Link, Part, covers
 from awiwi_gen.hand.pose import Chain
@@ -24,6 +25,7 @@ Complaint = tuple[Keys, str]
 
 _CLOSURE_STEPS = 1000
 _NARROWEST_RANGE = 0.01  # deg; less than the backlash of any joint
+_SHORTEST_TRAVEL = 1e-6  # m; the same of a slide
 _BODY = {
     "mass": 'a mass such as "1.5 g"',
     "com": 'a point such as ["6 mm", "0 mm", "0 mm"]',
@@ -35,6 +37,7 @@ _LEAST_ARM = 1e-7  # m; a tendon with less than this about every joint pulls not
 def complaints(limits: Limits, fingers: Mapping[str, Finger], wrist: Wrist | None = None) -> Iterator[Complaint]:
     """All faults of a hand whose single values are valid."""
     yield from below(("limits",), _limits(limits))
+    yield from below(("limits",), limit_complaints(limits, fingers))
     for name, finger in fingers.items():
         yield from below(("fingers", name), _finger(finger))
     yield from tensor_complaints(fingers)
@@ -69,14 +72,17 @@ def _upside_down(part: Part, low: str, high: str) -> Iterator[Complaint]:
         yield (low,), f'= "{bottom}" is not below {high} = "{top}"'
 
 
-def _range(part: Part) -> Iterator[Complaint]:
-    """The range of an angle from `low` to `high`."""
+def _range(part: Part, slides: bool = False) -> Iterator[Complaint]:
+    """The range of an angle, or of the position of a slide, from `low` to `high`."""
     yield from _upside_down(part, "low", "high")
     low, high = part.low, part.high  # type: ignore[attr-defined]
-    width = math.degrees(high.value - low.value)
-    if 0 < width < _NARROWEST_RANGE:
-        least = f"expected {_NARROWEST_RANGE} deg or more"
-        yield ("high",), f'= "{high}" leaves a range of {width:.2g} deg from low = "{low}"; {least}'
+    width = float(high.value - low.value)
+    shown, least, unit = (
+        (width * 1e3, _SHORTEST_TRAVEL * 1e3, "mm") if slides else (math.degrees(width), _NARROWEST_RANGE, "deg")
+    )
+    if 0 < shown < least:
+        found = f'= "{high}" leaves a range of {shown:.2g} {unit} from low = "{low}"'
+        yield ("high",), f"{found}; expected {least:g} {unit} or more"
 
 
 def _wrist(wrist: Wrist, tendons: int) -> Iterator[Complaint]:
@@ -97,9 +103,11 @@ def _finger(finger: Finger) -> Iterator[Complaint]:
         yield from below(("tendons", index), sources(tendon))
     if finger.base:
         yield from below(("base",), sources(finger.base))
-    misnamed = [*_names(finger)]
+    misnamed = [*_names(finger), *misfits(finger)]
     yield from misnamed
-    if not misnamed and all(link.low and link.high for link in finger.links if link.joint in finger.joints):
+    unfit = [complaint for link in finger.links for complaint in link_complaints(link)]
+    limited = all(link.low and link.high for link in finger.links if link.joint in finger.joints)
+    if limited and not (misnamed or unfit):
         yield from _tendons(finger)
         yield from _singular(finger)
 
@@ -125,7 +133,8 @@ def _names(finger: Finger) -> Iterator[Complaint]:
             keys = ("tendons", number, "over", index)
             if name[1:] in over[:index]:
                 yield keys, f'= "{name}" comes twice in one tendon'
-            yield from _known(keys, name, name[1:], pulleys, "pulley")
+            if name[1:] not in finger.sliding:
+                yield from _known(keys, name, name[1:], pulleys, "pulley")
         for name in tendon.arms:
             yield from _known(("tendons", number, "arms", name), name, name, joints, "joint")
         for index, point in enumerate(tendon.path):
@@ -153,7 +162,7 @@ def _couplings(finger: Finger, joints: list[str], pulleys: list[str]) -> Iterato
         for role, joint in (("follower", coupling.follower), ("leader", coupling.leader)):
             keys: Keys = ("couplings", index, role)
             yield from _known(keys, joint, joint, joints, "joint")
-            if joint in joints and coupling.ratio is None:
+            if joint in joints and joint not in finger.sliding and coupling.ratio is None:
                 yield from _known(keys, joint, joint, pulleys, "pulley")
         if coupling.powers and coupling.ratio is None:
             yield ("couplings", index), 'has powers without a ratio; expected one, such as "1", or "0"'
@@ -192,16 +201,19 @@ def sources(part: Sourced) -> Iterator[Complaint]:
 
 def _link(link: Link, follows: bool) -> Iterator[Complaint]:
     yield from sources(link)
+    wrong = [*link_complaints(link)]
+    yield from wrong
     for key in ("low", "high"):
         given = getattr(link, key)
         if given is None and not follows:
-            yield (key,), 'is missing; expected an angle such as "20 deg" (only a joint that follows another has none)'
+            expected = 'a length such as "12 mm"' if link.slides else 'an angle such as "20 deg"'
+            yield (key,), f"is missing; expected {expected} (only a joint that follows another has none)"
         if given is not None and follows:
             yield (key,), f'= "{given}" is one too many: this joint follows another, which has the range'
-    if link.low and link.high and not follows:
-        yield from _range(link)
+    if link.low and link.high and not follows and not wrong:
+        yield from _range(link, link.slides)
     yield from _body(link)
-    if link.four_bar:
+    if link.four_bar and not wrong:
         yield from below(("four_bar",), sources(link.four_bar))
         if link.reference is not None:
             yield ("reference",), f'= "{link.reference}" is at a four-bar, whose angles count from four_bar.reference'

@@ -133,4 +133,8 @@ def _distance(chain: Chain, body: Body, line: Line, end: int, q: Sequence[float]
 
 def told(finger: Finger, q: Sequence[float]) -> str:
     """A pose in words."""
-    return ", ".join(f"{joint} = {math.degrees(x):.4g} deg" for joint, x in zip(finger.joints, q, strict=True))
+    places = zip(finger.joints, q, strict=True)
+    return ", ".join(
+        f"{joint} = {x * 1e3:.4g} mm" if joint in finger.sliding else f"{joint} = {math.degrees(x):.4g} deg"
+        for joint, x in places
+    )

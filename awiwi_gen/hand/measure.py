@@ -21,6 +21,8 @@ _LEAST = Fraction(1, 10**40)  # in SI; far below the rounding errors in exported
 class Measure:
     """The dimension of a number (that of the example) and its plausible range, ends included.
 
+    A number whose dimension depends on others of its table has a measure for each in `others`, the first for a slide.
+
     The ranges cover every hand that people build, of a cat's or a crane's size; they catch "6.2 km" and "6.2 fm". A
     range that begins below zero includes zero, and rounding errors of other programs, but no "1e-30 nm^39/m^38".
     """
@@ -28,6 +30,7 @@ class Measure:
     example: str
     low: str
     high: str
+    others: tuple[Measure, ...] = ()
 
     @cached_property
     def unit(self) -> Unit:
@@ -44,6 +47,14 @@ class Measure:
         """For error messages: `a length such as "6.2 mm"`."""
         return f'{name_of(self.unit)} such as "{self.example}"'
 
+    def fits(self, unit: Unit) -> bool:
+        """Whether a unit has this dimension. Units compare without the radian, but here it counts."""
+        return (unit, unit.radians) == (self.unit, self.unit.radians)
+
+    def of(self, unit: Unit) -> Measure | None:
+        """This measure or the one of `others` that has the dimension of a unit; None if none has."""
+        return next((each for each in (self, *self.others) if each.fits(unit)), None)
+
     def read(self, value: object) -> Quantity:
         """Read one value of the file. Raises `ValueError` with a predicate: 'is a force; expected a length ...'."""
         match value:
@@ -57,9 +68,15 @@ class Measure:
             quantity = parse_quantity(value)
         except InputError as error:
             raise ValueError(error.faults[0].message) from None
-        # Units compare without the radian, but here it counts: an angle must say rad or deg.
-        if (quantity.unit, quantity.unit.radians) != (self.unit, self.unit.radians):
-            raise ValueError(f"is {name_of(quantity.unit)}; expected {self.expected}")
+        measure = self.of(quantity.unit)
+        if measure is None:
+            kinds = [self.expected, *(each.expected for each in self.others)]
+            raise ValueError(f"is {name_of(quantity.unit)}; expected {' or '.join(kinds)}")
+        measure.require(value, quantity)
+        return quantity
+
+    def require(self, value: str, quantity: Quantity) -> None:
+        """Raise `ValueError` where a quantity of this dimension, read from a text, is outside the range."""
         low, high = self.ends
         if low > 0 and quantity.value <= 0:
             raise ValueError(f"must be above zero; expected {self.expected}")
@@ -69,7 +86,6 @@ class Measure:
         if 0 < abs(quantity.value) < _LEAST:
             zero = f'"0 {self.example.partition(" ")[2]}"'
             raise ValueError(f"is not plausible; expected zero, written {zero}, or {self.expected}")
-        return quantity
 
     def _other_angle(self, text: str, quantity: Quantity) -> str:
         """A hint where degrees were written as radians: "80 rad" for an angle."""

@@ -38,6 +38,11 @@ class PalmJoint(Rotated):
         """None: such a joint rotates the palm itself."""
         return
 
+    @property
+    def slides(self) -> bool:
+        """Whether it slides: it turns."""
+        return False
+
     def structure(self) -> list[Any]:
         """Everything but the numbers."""
         return [self.joint, self.turn, self.quarters, self.reference is not None]

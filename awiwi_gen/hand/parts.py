@@ -6,7 +6,7 @@ branch of a four-bar) is structure, on which derivations depend, while they neve
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
 from pydantic import Field
@@ -15,7 +15,7 @@ from awiwi_gen.hand.links import Base, FourBar, Inertia, Link
 from awiwi_gen.hand.measure import Measure
 from awiwi_gen.hand.names import FingerName, JointName, Over, Prefix, Source, Title
 from awiwi_gen.hand.part import Angle, Direction, Keys, Length, Moment, Part, Point, Size, covers, join
-from awiwi_gen.units import Quantity
+from awiwi_gen.units import Quantity, parse_unit
 
 # fmt: off
 __all__ = [
@@ -27,6 +27,8 @@ __all__ = [
 
 MOST = 32  # fingers of a hand; links, pulleys, tendons and couplings of a finger
 _POWERS = ("square", "cube", "fourth")
+# Length of a tendon per angle, or per length of a slide.
+Arm = Annotated[Quantity, Measure("6.2 mm", "-1 m", "1 m", (Measure("1", "-100", "100"),))]
 PALM = "palm"  # in place of a joint: the finger's base frame
 
 
@@ -141,7 +143,7 @@ class Tendon(Part):
 
     rest: Length
     over: Annotated[tuple[Over, ...], Field(strict=False, max_length=MOST)] = ()
-    arms: Annotated[dict[JointName, Length], Field(max_length=MOST)] = {}  # noqa: RUF012
+    arms: Annotated[dict[JointName, Arm], Field(max_length=MOST)] = {}  # noqa: RUF012
     span: Span | None = None
     path: Annotated[tuple[PathPoint, ...], Field(strict=False, min_length=2, max_length=MOST)] = ()
     spring: ReturnSpring | None = None
@@ -174,6 +176,24 @@ class Tendon(Part):
         return [list(self.over), self.span and self.span.joint, *([found] if found else [])]
 
 
+def _coefficient(power: int) -> Measure:
+    """What multiplies a power of the leader's angle: first of two hinges, then of a slide and its leader of each kind."""
+    if power == 0:
+        return Measure("20 deg", "-360 deg", "360 deg", (Measure("12 mm", "-1 m", "1 m"),))
+
+    def measure(follower: str, leader: str, usual: float, most: float) -> Measure:
+        unit = f" {parse_unit(follower) / parse_unit(leader) ** power}".removesuffix(" 1")
+        return Measure(f"{usual:g}{unit}", f"-{most:g}{unit}", f"{most:g}{unit}")
+
+    usual = 0.8 if power == 1 else 0.1
+    slides = (
+        measure("m", "rad", usual / 100, 100.0),
+        measure("m", "m", usual, 100.0**power),
+        measure("rad", "m", usual * 100, 10000.0**power),
+    )
+    return replace(measure("rad", "rad", usual, 100.0), others=slides)
+
+
 class Coupling(Part):
     """A joint that follows another: q_follower = offset + ratio q + square q^2 + cube q^3 + fourth q^4, by its leader's q.
 
@@ -182,11 +202,11 @@ class Coupling(Part):
 
     follower: JointName
     leader: JointName
-    ratio: Annotated[Quantity, Measure("0.8", "-100", "100")] | None = None
-    offset: Angle | None = None
-    square: Annotated[Quantity, Measure("0.1 1/rad", "-100 1/rad", "100 1/rad")] | None = None
-    cube: Annotated[Quantity, Measure("0.1 1/rad^2", "-100 1/rad^2", "100 1/rad^2")] | None = None
-    fourth: Annotated[Quantity, Measure("0.1 1/rad^3", "-100 1/rad^3", "100 1/rad^3")] | None = None
+    ratio: Annotated[Quantity | None, _coefficient(1)] = None
+    offset: Annotated[Quantity | None, _coefficient(0)] = None
+    square: Annotated[Quantity | None, _coefficient(2)] = None
+    cube: Annotated[Quantity | None, _coefficient(3)] = None
+    fourth: Annotated[Quantity | None, _coefficient(4)] = None
 
     @property
     def powers(self) -> tuple[Any, ...]:
@@ -213,6 +233,11 @@ class Finger(Part):
     def leaders(self) -> dict[str, str]:
         """Follower -> leader, for each coupled joint."""
         return {coupling.follower: coupling.leader for coupling in self.couplings}
+
+    @property
+    def sliding(self) -> tuple[str, ...]:
+        """The joints that slide, base to tip."""
+        return tuple(link.joint for link in self.links if link.slides)
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -276,6 +301,9 @@ class Limits(Part):
     joint_velocity: Annotated[Quantity, Measure("20 rad/s", "0.001 rad/s", "10000 rad/s")]
     joint_acceleration: Annotated[Quantity, Measure("2000 rad/s^2", "0.001 rad/s^2", "10000000 rad/s^2")]
     joint_torque: Annotated[Quantity, Measure("1 N m", "1e-9 N m", "1000 N m")]
+    slide_velocity: Annotated[Quantity | None, Measure("0.5 m/s", "1e-6 m/s", "1000 m/s")] = None
+    slide_acceleration: Annotated[Quantity | None, Measure("50 m/s^2", "1e-6 m/s^2", "1000000 m/s^2")] = None
+    slide_force: Annotated[Quantity | None, Measure("50 N", "1e-6 N", "100000 N")] = None
     tendon_force: Annotated[Quantity, Measure("100 N", "1e-6 N", "100000 N")]
     tendon_stiffness_low: Annotated[Quantity, Measure("1000 N/m", "0.001 N/m", "1000000000 N/m")]
     tendon_stiffness_high: Annotated[Quantity, Measure("50000 N/m", "0.001 N/m", "1000000000 N/m")]

@@ -22,6 +22,7 @@ _DENSEST, _LIGHTEST = 12e3, 5.0  # [kg/m^3]: lead, and less than any foam
 _ALONG_JOINT, _ALONG_COM = 0.28, 0.2  # second moment along the bone, in squares of its length: rods have 1/3 and 1/12
 _LARGEST_PULLEY, _SMALLEST_PULLEY = 1.0, 0.02  # radius in lengths of the finger's longest bone
 _SMALLEST_RANGE, _LARGEST_RANGE = 5.0, 270.0  # of a joint [deg]
+_SHORTEST_TRAVEL, _LONGEST_TRAVEL = 0.02, 5.0  # of a slide in lengths of the finger's longest bone
 _HEAVIEST_ROTOR = 1000.0  # armature over the inertia of all links that the joint moves
 _SLIPS = [
     (key, factor) for key in ("offset", "com", "mass", "inertia") for factor in (0.001, 0.01, 0.1, 10.0, 100.0, 1000.0)
@@ -216,6 +217,14 @@ def _ranges(finger: Finger) -> Iterator[Remark]:
     for index, link in enumerate(finger.links):
         if link.low is None or link.high is None:
             continue
+        if link.slides:
+            travel, longest = float(link.high) - float(link.low), _longest(finger)
+            ratio = travel / longest if longest else 1.0
+            if not _SHORTEST_TRAVEL <= ratio <= _LONGEST_TRAVEL:
+                found = f'= "{link.low}" leaves a travel of {_mm(travel)} up to high = "{link.high}"'
+                bone = f"{ratio:.3g} times the finger's longest bone of {_mm(longest)}"
+                yield Remark(("links", index, "low"), f"{found}, {bone}", ratio)
+            continue
         width = math.degrees(float(link.high) - float(link.low))
         if width < _SMALLEST_RANGE:
             degrees = all(not quantity.value or "rad" not in quantity.text for quantity in (link.low, link.high))
@@ -231,7 +240,7 @@ def _ranges(finger: Finger) -> Iterator[Remark]:
 
 
 def _rotors(finger: Finger) -> Iterator[Remark]:
-    """Rotors that outweigh all that their joint moves, in the middle of the range."""
+    """Rotors, and masses behind slides, that outweigh all that their joint moves, in the middle of the range."""
     if not finger.has_armature:
         return
     chain = Chain(finger)
@@ -242,6 +251,9 @@ def _rotors(finger: Finger) -> Iterator[Remark]:
         for other, (_, (axes, origin)) in zip(finger.links[index:], frames[index:], strict=True):
             if other.mass is None or other.com is None or other.inertia is None:
                 continue
+            if link.slides:
+                moved += float(other.mass)
+                continue
             x, y, z = (float(value) for value in other.com)
             arm = [a - b for a, b in zip(point(axes, origin, (x, y, z)), joint, strict=True)]
             along = sum(a * b for a, b in zip(arm, axis, strict=True))
@@ -249,5 +261,6 @@ def _rotors(finger: Finger) -> Iterator[Remark]:
             moved += spread + float(other.mass) * (sum(a * a for a in arm) - along**2)
         ratio = float(link.armature or 0) / moved if moved else 0.0
         if ratio > _HEAVIEST_ROTOR:
-            found = f'= "{link.armature}" is {ratio:.3g} times the inertia of all links that this joint moves'
+            what = "mass" if link.slides else "inertia"
+            found = f'= "{link.armature}" is {ratio:.3g} times the {what} of all links that this joint moves'
             yield Remark(("links", index, "armature"), found, ratio)

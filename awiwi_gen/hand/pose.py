@@ -1,7 +1,8 @@
 """A finger's pose and tendons in plain floats: what the checks of a hand file need before anything is derived.
 
 Frames are those of the definition of the kinematics: offset, fixed rotation, rotation about z (eq. 5.2, 5.3); a four-bar
-is a crank of angle q + reference and a coupler. Everything is a function of the n independent joint angles q [rad].
+is a crank of angle q + reference and a coupler. Everything is a function of the n independent joint angles q [rad], which
+are positions [m] of joints that slide along z.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ Frame = tuple[Axes, Vector]  # with its origin
 _SAMPLES = 24
 # Square roots of primes spread samples evenly over up to 32 joints.
 _PRIMES = [p for p in range(2, 132) if all(p % d for d in range(2, p))][:MOST]
-_STEP = 1e-5  # rad, of central differences: errors of 1e-10 relative
+_STEP, _SLIDE_STEP = 1e-5, 1e-7  # rad and m, of central differences: errors of 1e-10 relative
 _SWEEPS, _SECTIONS = 3, 24  # of a search for the shortest length, joint by joint
 _SHORTENING = 0.5  # a length that falls below this share of its mean is searched for zero
 
@@ -61,7 +62,7 @@ class Chain:
             leader = finger.leaders.get(link.joint, link.joint)
             self._angles.append((self.joints.index(leader), finger.motion(link.joint)))
         self._links = [
-            (_elementary(link), _floats(link.offset), float(link.reference or 0), float(link.start), link.four_bar)
+            (_elementary(link), _floats(link.offset), float(link.reference or 0), float(link.start), link)
             for link in finger.links
         ]
         self._order = {link.joint: index for index, link in enumerate(finger.links)}
@@ -89,12 +90,12 @@ class Chain:
                 column, slope = self.slope(joint, q)
                 row[column] += arm * slope
             if lines:
-                for column in range(len(row)):
-                    ends = [list(q), list(q)]
-                    ends[0][column] -= _STEP
-                    ends[1][column] += _STEP
+                for column, joint in enumerate(self.joints):
+                    ends, step = [list(q), list(q)], _SLIDE_STEP if joint in self.finger.sliding else _STEP
+                    ends[0][column] -= step
+                    ends[1][column] += step
                     before, after = (sum(self.distance(end, line) / line.divisor for line in lines) for end in ends)
-                    row[column] += (after - before) / (2 * _STEP)
+                    row[column] += (after - before) / (2 * step)
             rows.append(row)
         return rows
 
@@ -198,12 +199,16 @@ class Chain:
         axes: Axes = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
         origin: Vector = (0.0, 0.0, 0.0)
         offset: Vector = (0.0, 0.0, 0.0)
-        for (turns, following, drawn, start, bar), (column, followed) in zip(self._links, self._angles, strict=True):
+        for (turns, following, drawn, start, link), (column, followed) in zip(self._links, self._angles, strict=True):
             origin = point(axes, origin, offset)
             for axis, angle in turns:
                 axes = _rotated(axes, angle, axis)
             seat, angle = (axes, origin), polynomial(followed, q[column])
-            if bar:
+            if link.slides:
+                origin, offset = point(axes, origin, (0.0, 0.0, angle - drawn)), following
+                yield seat, (axes, origin)
+                continue
+            if bar := link.four_bar:
                 reference = float(bar.reference)
                 origin = point(_rotated(axes, angle + reference), origin, (float(bar.crank), 0.0, 0.0))
                 angle = coupler_angle(bar, angle + reference) - coupler_angle(bar, start + reference)

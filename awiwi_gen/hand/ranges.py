@@ -1,4 +1,4 @@
-"""The ranges that the schema permits for the numbers of a hand."""
+"""What the schema permits for the numbers of a hand."""
 
 from __future__ import annotations
 
@@ -15,26 +15,32 @@ Range = tuple[Fraction, Fraction]
 
 def ranges(part: Part) -> dict[str, Range]:
     """Lower and upper end of the range of every number, by its path relative to the part."""
-    found: dict[str, Range] = {}
+    numbers = part.quantities()
+    return {path: (each.of(numbers[path].unit) or each).ends for path, each in measures(part).items()}
+
+
+def measures(part: Part) -> dict[str, Measure]:
+    """What every number must be, by its path relative to the part."""
+    found: dict[str, Measure] = {}
     for name, field in type(part).model_fields.items():
-        measures = list(_measures((field.annotation, *field.metadata)))
-        _collect(getattr(part, name), field.alias or name, measures, found)
+        of_field = list(_measures((field.annotation, *field.metadata)))
+        _collect(getattr(part, name), field.alias or name, of_field, found)
     return found
 
 
-def _collect(node: object, path: str, measures: list[Measure], found: dict[str, Range]) -> None:
-    """The ranges of all numbers below a value of a field; all numbers of one field have one range."""
+def _collect(node: object, path: str, of_field: list[Measure], found: dict[str, Measure]) -> None:
+    """The measures of all numbers below a value of a field; all numbers of one field have the same."""
     match node:
         case Quantity():
-            found[path] = measures[0].ends
+            found[path] = of_field[0]
         case tuple():
             for index, item in enumerate(node):
-                _collect(item, f"{path}[{index}]", measures, found)
+                _collect(item, f"{path}[{index}]", of_field, found)
         case dict():
             for key, item in node.items():
-                _collect(item, join(path, key), measures, found)
+                _collect(item, join(path, key), of_field, found)
         case Part():
-            found |= {join(path, below): ends for below, ends in ranges(node).items()}
+            found |= {join(path, below): measure for below, measure in measures(node).items()}
 
 
 def _measures(annotations: Iterable[Any]) -> Iterable[Measure]:

@@ -17,10 +17,15 @@ from awiwi_gen.interchange.names import check_finger, finger_names, joint_names,
 
 __all__ = ["DraftFinger", "DraftHand", "DraftLink", "DraftPalm", "DraftTendon", "draft"]
 
+_TRAVEL = 0.1  # m, to both sides, of slides without limits
+
 
 @dataclass(frozen=True, eq=False)
 class DraftLink:
-    """A link of the hand file: lengths in metres, angles in radians; `mass` is None for a link without a body."""
+    """A link of the hand file: lengths in metres, angles in radians; `mass` is None for a link without a body.
+
+    `reference`, `limits` and `spring_reference` of a slide are lengths.
+    """
 
     joint: str
     published: Joint
@@ -34,6 +39,11 @@ class DraftLink:
     com: Array
     inertia: Array
     assumed: tuple[str, ...] = ()
+
+    @property
+    def slides(self) -> bool:
+        """Whether its joint slides."""
+        return self.published.kind == "slide"
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +78,11 @@ class DraftFinger:
     pulleys: dict[str, float]
     tendons: tuple[DraftTendon, ...]
     followed: tuple[Followed, ...]
+
+    @property
+    def sliding(self) -> set[str]:
+        """The joints that slide."""
+        return {link.joint for link in self.links if link.slides}
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,7 +160,14 @@ def _approximated(chains: list[Chain], fingers: tuple[DraftFinger, ...]) -> list
             "dry friction of joints: a smooth curve over velocity, where the model has a constraint",
             tuple(joint.name for joint in joints if joint.friction),
         ),
-        Loss("joints without limits: -180 to 180 deg assumed", tuple(j.name for j in joints if j.low is None)),
+        Loss(
+            "joints without limits: -180 to 180 deg assumed",
+            tuple(j.name for j in joints if j.low is None and j.kind != "slide"),
+        ),
+        Loss(
+            f"slides without limits: -{_TRAVEL * 1e3:g} to {_TRAVEL * 1e3:g} mm assumed",
+            tuple(j.name for j in joints if j.low is None and j.kind == "slide"),
+        ),
         Loss(
             "fingertips that no site or body marks: twice the distance of the centre of mass assumed",
             tuple(finger.name for finger in fingers if "offset" in finger.links[-1].assumed),
@@ -175,7 +197,7 @@ def _finger(
     places = {body: links[_last(chain, segment)] for segment in chain.segments for body in segment.members}
     strings = [_tendon(model, tendon, names, mimics, places, (base, axes[0].anchor)) for tendon in tendons]
     followers = tuple(mimics[joint.name] for joint in chain.joints if joint.name in mimics)
-    pulleys = _pulleys(strings, {each.follower for each in followers})
+    pulleys = _pulleys(strings, {each.follower for each in followers} | {each.joint for each in links if each.slides})
     return DraftFinger(
         name=chain.name,
         position=pose_axes.T @ (axes[0].anchor - pose_origin),
@@ -220,7 +242,7 @@ def _last(chain: Chain, segment: Segment) -> int:
 
 def _axis(model: Model, joint: Joint) -> Axis:
     axes, position = model.poses[joint.body]
-    return Axis(axes @ joint.axis, position + axes @ joint.anchor)
+    return Axis(axes @ joint.axis, position + axes @ joint.anchor, joint.kind == "slide")
 
 
 def _link(
@@ -228,7 +250,8 @@ def _link(
     mimic: Followed | None, assumed: tuple[str, ...],
 ) -> DraftLink:  # fmt: skip
     mass, com, inertia = composite(model, segment) if holds else (0.0, np.zeros(3), np.zeros((3, 3)))
-    limits = (joint.low, joint.high) if joint.low is not None and joint.high is not None else (-np.pi, np.pi)
+    most = _TRAVEL if joint.kind == "slide" else np.pi
+    limits = (joint.low, joint.high) if joint.low is not None and joint.high is not None else (-most, most)
     return DraftLink(
         joint=name,
         published=joint,
@@ -319,10 +342,11 @@ def _tendon(
     return DraftTendon(tendon.name, rest, (), arms, tuple(path), tendon.stiffness, tendon.rest)
 
 
-def _pulleys(tendons: Iterable[DraftTendon], followers: set[str]) -> dict[str, float]:
+def _pulleys(tendons: Iterable[DraftTendon], without: set[str]) -> dict[str, float]:
     """Joint -> radius [m] where the arms of all tendons are equal and have both senses.
 
-    Of such tendons the structure says that they are antagonists, so that their forces have a closed form.
+    Of such tendons the structure says that they are antagonists, so that their forces have a closed form. The joints
+    `without` are those that follow others, and slides.
     """
     arms: dict[str, set[float]] = {}
     for tendon in tendons:
@@ -331,7 +355,7 @@ def _pulleys(tendons: Iterable[DraftTendon], followers: set[str]) -> dict[str, f
     return {
         joint: max(found)
         for joint, found in arms.items()
-        if joint not in followers and len(found) == 2 and sum(found) == 0
+        if joint not in without and len(found) == 2 and sum(found) == 0
     }
 
 

@@ -31,6 +31,13 @@ class Part:
     reference: float
 
     @property
+    def at_zero(self) -> tuple[Array, Array]:
+        """The axes (3 x 3) and the origin (3) of its frame in the one before, where its joint is at zero."""
+        if self.link.slides:
+            return self.axes, self.position - self.axes[:, 2] * self.reference
+        return self.axes @ about(2, -self.reference), self.position
+
+    @property
     def inertia(self) -> Array:
         """The tensor (3 x 3) about the centre of mass [kg m^2]."""
         tensor = self.link.inertia

@@ -31,7 +31,7 @@ from awiwi_gen.interchange.export_motors import FORCE, MOTORS, TIMESTEP, Drives,
 from awiwi_gen.interchange.export_wrist import wrist_of_bars
 from awiwi_gen.interchange.fits import coupler_fit
 from awiwi_gen.interchange.frames import turn_matrix
-from awiwi_gen.interchange.mjcf_elements import hinge, inertial, least_inertia, place
+from awiwi_gen.interchange.mjcf_elements import inertial, joint_of, least_inertia, place
 from awiwi_gen.interchange.model import Array, Loss
 
 __all__ = ["MOTORS", "text_and_losses"]
@@ -74,7 +74,7 @@ def _palm(world: Element, hand: Hand, sections: Sections, lost: Lost) -> Element
     place(body, drawn.position, drawn.axes)
     least_inertia(body, lost)
     for part, axis, anchor in drawn.seats:
-        hinge(body, part.link.joint, part, drawn.axes.T @ axis, drawn.axes.T @ (anchor - drawn.position))
+        joint_of(body, part.link.joint, part, drawn.axes.T @ axis, drawn.axes.T @ (anchor - drawn.position))
     return body
 
 
@@ -103,7 +103,7 @@ class _Writer:
             self._tendon(number, tendon)
         if not self.finger.tendons:
             for joint in self.finger.joints:
-                self.drives.turn(f"{self.name}_{joint}")
+                self.drives.move(f"{self.name}_{joint}", joint in self.finger.sliding)
 
     def _lose(self, what: str, place: str) -> None:
         self.lost.setdefault(what, []).append(place)
@@ -145,7 +145,7 @@ class _Writer:
             least_inertia(body, self.lost)
         for part, axis, anchor in drawn.seats:
             name = f"{self.name}_{part.link.joint}"
-            hinge(body, name, part, drawn.axes.T @ axis, drawn.axes.T @ (anchor - drawn.position))
+            joint_of(body, name, part, drawn.axes.T @ axis, drawn.axes.T @ (anchor - drawn.position))
         return body
 
     def _coupling(self, follower: str, leader: str) -> None:

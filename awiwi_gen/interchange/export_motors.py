@@ -30,6 +30,7 @@ Sections = dict[str, Element]
 _MOST = 10.0  # [m] below its rest length, a spring of MuJoCo would push
 _LEG = 1.0  # [m] of a tendon through points between its shaft and the world, longer than any travel
 _SHARE = 0.01  # of a motor's travel, or of 10 rad of a joint: the error at which a servo gives its full torque
+_TRAVEL = 0.1  # [m] of a slide instead of 10 rad
 
 
 def one_sided(rest: float) -> str:
@@ -73,12 +74,13 @@ class Drives:
 
     # -- joints ------------------------------------------------------------------------------------------------------
 
-    def turn(self, joint: str) -> None:
+    def move(self, joint: str, slides: bool) -> None:
         """A motor in a joint of a finger without tendons."""
-        torque = float(self.hand.limits.joint_torque)
+        limits = self.hand.limits
+        torque, range_ = (float(limits.slide_force or 0), _TRAVEL) if slides else (float(limits.joint_torque), 10.0)
         if self.motors == POSITION:
             SubElement(self.sections["actuator"], "position", name=f"{joint}.motor", joint=joint,
-                       kp=text(torque / (10 * _SHARE)), forcerange=text((-torque, torque)))  # fmt: skip
+                       kp=text(torque / (range_ * _SHARE)), forcerange=text((-torque, torque)))  # fmt: skip
             return
         SubElement(self.sections["actuator"], "motor", name=f"{joint}.motor", joint=joint,
                    ctrlrange=text((-torque, torque)))  # fmt: skip

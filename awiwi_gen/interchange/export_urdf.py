@@ -66,7 +66,7 @@ def _palm(root: Element, hand: Hand) -> None:
         child = f"wrist_{part.link.joint}"
         SubElement(root, "link", name=child)
         limits = value(part.link.low), value(part.link.high)
-        _hinge(root, hand, part.link.joint, part, (parent, child), limits)
+        _moving(root, hand, part.link.joint, part, (parent, child), limits)
         parent = child
     _fixed(root, parent, "palm", vector(hand.palm.joints[-1].offset), rpy_matrix(hand.palm.rpy))
 
@@ -108,29 +108,30 @@ def _link(root: Element, name: str, part: Part) -> None:
                ixy=text(t[0, 1]), ixz=text(t[0, 2]), iyz=text(t[1, 2]))  # fmt: skip
 
 
-def _hinge(
+def _moving(
     root: Element, hand: Hand, name: str, part: Part, ends: tuple[str, str], limits: tuple[float, float]
 ) -> Element:
     """A joint between two links, the parent and the child."""
-    joint = SubElement(root, "joint", name=name, type="revolute")
+    slides = part.link.slides
+    joint = SubElement(root, "joint", name=name, type="prismatic" if slides else "revolute")
     SubElement(joint, "parent", link=ends[0])
     SubElement(joint, "child", link=ends[1])
     # A joint of URDF stands at zero where it is drawn.
-    c, s = np.cos(part.reference), np.sin(part.reference)
-    drawn = part.axes @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
-    SubElement(joint, "origin", xyz=text(part.position), rpy=text(rpy_of(drawn)))
+    axes, origin = part.at_zero
+    SubElement(joint, "origin", xyz=text(origin), rpy=text(rpy_of(axes)))
     SubElement(joint, "axis", xyz="0 0 1")
     low, high = limits
-    SubElement(joint, "limit", lower=text(low), upper=text(high), effort=text(float(hand.limits.joint_torque)),
-               velocity=text(float(hand.limits.joint_velocity)))  # fmt: skip
+    most = ("slide_force", "slide_velocity") if slides else ("joint_torque", "joint_velocity")
+    effort, velocity = (text(value(getattr(hand.limits, key))) for key in most)
+    SubElement(joint, "limit", lower=text(low), upper=text(high), effort=effort, velocity=velocity)
     return joint
 
 
 def _joint(root: Element, hand: Hand, name: str, finger: Finger, part: Part, parent: str) -> None:
     link, full = part.link, f"{name}_{part.link.joint}"
-    joint = _hinge(root, hand, full, part, (parent, full), _range(finger, link.joint))
+    joint = _moving(root, hand, full, part, (parent, full), _range(finger, link.joint))
     if link.damping is not None or link.friction is not None:
-        friction = value(link.friction.torque) if link.friction else 0.0
+        friction = value(link.friction.level) if link.friction else 0.0
         SubElement(joint, "dynamics", damping=text(value(link.damping)), friction=text(friction))
     if link.joint in finger.leaders:
         leader = f"{name}_{finger.leaders[link.joint]}"
@@ -143,12 +144,12 @@ def _coupler(root: Element, hand: Hand, name: str, link: Link, part: Part, paren
     full, fit = f"{name}_{part.link.joint}", coupler_fit(link, 1)
     rest, slope = fit.coefficients[0] - fit.coefficients[1] * fit.origin, fit.coefficients[1]
     low, high = sorted(rest + slope * value(end) for end in (link.low, link.high))
-    joint = _hinge(root, hand, full, part, (parent, full), (low, high))
+    joint = _moving(root, hand, full, part, (parent, full), (low, high))
     SubElement(joint, "mimic", joint=f"{name}_{link.joint}", multiplier=text(slope), offset=text(rest))
 
 
 def _range(finger: Finger, joint: str) -> tuple[float, float]:
-    """Limits of a joint [rad]; those of a follower are where its leader's limits take it."""
+    """Limits of a joint [rad], or of a slide [m]; those of a follower are where its leader's limits take it."""
     offset, ratio, *_ = finger.motion(joint)
     leader = finger.leaders.get(joint, joint)
     link = next(link for link in finger.links if link.joint == leader)

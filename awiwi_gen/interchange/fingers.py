@@ -54,7 +54,7 @@ def palm_of(model: Model, name: str = "") -> int:
     counts = {child: _hinges(model, child) for child in model.children[0]}
     most = max(counts.values(), default=0)
     if not most:
-        raise _fault(model, "", "has no hinge joint; expected a hand")
+        raise _fault(model, "", "has no joint; expected a hand")
     hands = [child for child, count in counts.items() if count == most]
     if len(hands) > 1 and not model.joints_of[hands[0]]:
         names = " and ".join(model.bodies[hand].name for hand in hands)
@@ -79,8 +79,8 @@ def _hinges(model: Model, body: int) -> int:
 def find(model: Model, palm: int, named: Mapping[str, str]) -> tuple[list[Chain], list[Loss]]:
     """The fingers below the palm, or those that `named` gives by their first or last body, and what else moves.
 
-    Chains found in the tree have no names yet. Raises `InputError` for branches, joints that are no hinges, and unknown
-    bodies.
+    Chains found in the tree have no names yet. Raises `InputError` for branches, joints that are neither hinges nor
+    slides, and unknown bodies.
     """
     if named:
         chains = [_named(model, palm, name, body) for name, body in named.items()]
@@ -92,8 +92,8 @@ def find(model: Model, palm: int, named: Mapping[str, str]) -> tuple[list[Chain]
         )
     for chain in chains:
         for joint in chain.joints:
-            if joint.kind != "hinge":
-                message = f"is a {joint.kind} joint; a finger's joints are hinges"
+            if joint.kind not in ("hinge", "slide"):
+                message = f"is a {joint.kind} joint; a finger's joints are hinges and slides"
                 raise _fault(model, f"joint {joint.name}", f"{message}; leave the finger out by naming the others")
     held = {joint.name for chain in chains for joint in chain.joints}
     above = set(model.above(palm))

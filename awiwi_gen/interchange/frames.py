@@ -3,7 +3,7 @@
 The frame of a link is that of the link before, moved by `offset`, turned by a quarter turn or a roll about x, and then
 by its joint about z. Where the next axis is along a coordinate axis, a quarter turn leads there. Everywhere else the
 frame before is turned about its own z until the next axis is in its y-z plane: the joint's reference takes that angle,
-and a roll remains.
+and a roll remains. Behind a slide, whose reference is no angle, a yaw remains too.
 """
 
 from __future__ import annotations
@@ -24,10 +24,11 @@ _TURNS = ("none", "x+90", "x-90", "y+90", "y-90")  # one for each direction of t
 
 @dataclass(frozen=True, eq=False)
 class Axis:
-    """A joint's axis in the world, as drawn: a unit vector (3) through a point (3)."""
+    """A joint's axis in the world, as drawn: a unit vector (3) through a point (3); a slide moves along it."""
 
     direction: Array
     anchor: Array
+    slides: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +43,7 @@ class Frame:
     angle: float
     axes: Array
     origin: Array
+    yaw: float = 0.0
 
 
 def turn_matrix(turn: str) -> Array:
@@ -93,19 +95,20 @@ def _yaw_and_roll(local: Array) -> tuple[float, float]:
 def link_frames(base: Array, axes: list[Axis]) -> list[Frame]:
     """The frames of all links of a finger, from the base's axes (3 x 3) and the joints' axes."""
     found: list[Frame] = []
-    before = base
+    before, carried = base, False  # by a slide
     for axis, following in zip(axes, [*axes[1:], None], strict=True):
         local = before.T @ axis.direction
-        turn, roll = _aligned(local), 0.0
+        turn, yaw, roll = _aligned(local), 0.0, 0.0
         if turn is None:
-            roll = _yaw_and_roll(local)[1]  # no yaw: the frame before is turned accordingly
-        fixed = before @ turn_matrix(turn or "none") @ about(0, roll)
+            yaw, roll = _yaw_and_roll(local)
+            yaw = yaw if carried else 0.0  # else the frame before is turned accordingly
+        fixed = before @ turn_matrix(turn or "none") @ about(2, yaw) @ about(0, roll)
         angle = 0.0
-        if following is not None and _aligned(fixed.T @ following.direction) is None:
+        if following is not None and not axis.slides and _aligned(fixed.T @ following.direction) is None:
             angle = _yaw_and_roll(fixed.T @ following.direction)[0]
         turned = fixed @ about(2, angle) if angle else fixed
-        found.append(Frame(turn or "none", roll, angle, turned, axis.anchor))
-        before = turned
+        found.append(Frame(turn or "none", roll, angle, turned, axis.anchor, yaw))
+        before, carried = turned, axis.slides
     return found
 
 

@@ -24,7 +24,6 @@ from awiwi_gen.errors import Fault, InputError, unknown
 from awiwi_gen.hand import Hand
 from awiwi_gen.hand.file import HandFile
 from awiwi_gen.interchange.export import Part, parts, value, vector
-from awiwi_gen.interchange.frames import about
 from awiwi_gen.interchange.model import Array
 from awiwi_gen.interchange.toml import cite, mass_and_inertia
 from awiwi_gen.units import parse_quantity
@@ -155,8 +154,8 @@ def _properties(table: Path, row: Row, links: list[Part], index: int) -> dict[st
 def _pose_at_zero(links: list[Part], index: int) -> tuple[Array, Array]:
     axes, origin = np.eye(3), np.zeros(3)
     for part in links[: index + 1]:
-        origin = origin + axes @ part.position
-        axes = axes @ part.axes @ about(2, -part.reference)
+        own_axes, own_origin = part.at_zero
+        axes, origin = axes @ own_axes, origin + axes @ own_origin
     return axes, origin
 
 

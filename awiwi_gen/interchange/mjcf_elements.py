@@ -1,4 +1,4 @@
-"""Elements of MJCF that several parts of the export write: places, inertias, hinges and quaternions."""
+"""Elements of MJCF that several parts of the export write: places, inertias, joints and quaternions."""
 
 from __future__ import annotations
 
@@ -10,13 +10,15 @@ from awiwi_gen.hand import Link
 from awiwi_gen.interchange.export import Part, text, value
 from awiwi_gen.interchange.model import LEAST_MASS, Array
 
-__all__ = ["hinge", "inertial", "least_inertia", "place", "quaternion"]
+__all__ = ["inertial", "joint_of", "least_inertia", "place", "quaternion"]
 
 
-def hinge(body: Element, name: str, part: Part, axis: Array, anchor: Array) -> None:
+def joint_of(body: Element, name: str, part: Part, axis: Array, anchor: Array) -> None:
     """A joint of a finger or of the wrist, by its axis and a point of it in the body's frame."""
     link = part.link
     joint = SubElement(body, "joint", name=name, axis=text(axis), pos=text(anchor))
+    if link.slides:
+        joint.set("type", "slide")
     if part.reference:
         joint.set("ref", text(part.reference))
     if link.low is not None and link.high is not None:
@@ -27,7 +29,7 @@ def hinge(body: Element, name: str, part: Part, axis: Array, anchor: Array) -> N
         if getattr(link, key) is not None:
             joint.set(key, text(value(getattr(link, key))))
     if link.friction is not None:
-        joint.set("frictionloss", text(float(link.friction.torque)))
+        joint.set("frictionloss", text(float(link.friction.level)))
     if link.spring is not None:
         joint.set("stiffness", text(float(link.spring.stiffness)))
         joint.set("springref", text(float(link.spring.reference)))

@@ -1,6 +1,7 @@
 """What a file says of a hand, whatever its format: a tree of bodies, their joints, tendons, couplings and sites.
 
-Lengths are in metres, masses in kilograms, angles in radians. Bodies come parents first; the first one is the world.
+Lengths are in metres, masses in kilograms, angles in radians; the angle of a slide is a length. Bodies come parents
+first; the first one is the world.
 A body stands as drawn where every joint is at its reference.
 """
 

@@ -12,6 +12,7 @@ from awiwi_gen.interchange.frames import rpy_of
 from awiwi_gen.interchange.loss import loss_lines
 from awiwi_gen.interchange.mimics import Followed
 from awiwi_gen.interchange.model import Array, Place
+from awiwi_gen.units import m, rad
 
 NOISE = 2e-15
 """What rounding leaves of a number, relative to the largest in its vector."""
@@ -24,8 +25,9 @@ _LIMITS = {
     "tendon_stiffness_high": "50000 N/m",
     "gravity": "9.81 m/s^2",
 }
-_FRICTION_VELOCITY = "0.05 rad/s"
-_POWERS = {"square": "1/rad", "cube": "1/rad^2", "fourth": "1/rad^3"}
+_SLIDE_LIMITS = {"slide_velocity": "0.5 m/s", "slide_acceleration": "50 m/s^2", "slide_force": "50 N"}
+_FRICTION_VELOCITY, _SLIDE_FRICTION_VELOCITY = "0.05 rad/s", "2 mm/s"
+_POWERS = ("square", "cube", "fourth")
 _RULE = "# " + "-" * 100
 
 
@@ -37,7 +39,8 @@ def hand_text(hand: DraftHand, command: str = "") -> str:
     lines += [f"# taken: {note}" for note in hand.notes]
     lines += [f"# {line}" for line in loss_lines(hand.losses)]
     lines += ["", f"prefix = {_text(hand.prefix)}", f"name = {_text(cite(hand.name))}", "", "[limits]"]
-    lines += [f"{key} = {_text(value)}" for key, value in _LIMITS.items()]
+    limits = _LIMITS | (_SLIDE_LIMITS if any(finger.sliding for finger in hand.fingers) else {})
+    lines += [f"{key} = {_text(value)}" for key, value in limits.items()]
     lines += ['source = "assumed"']
     if hand.wrist is not None:
         lines += ["", _RULE, *_palm_lines(hand.wrist, hand)]
@@ -75,7 +78,7 @@ def _finger_lines(finger: DraftFinger, file: str) -> list[str]:
     head = f"fingers.{finger.name}"
     lines = [f"# {finger.name}: {len(finger.links)} links, {len(finger.tendons)} tendons", "", f"[{head}]"]
     if finger.followed:
-        lines += ["couplings = [", *(f"    {{ {_coupling(each)} }}," for each in finger.followed), "]"]
+        lines += ["couplings = [", *(f"    {{ {_coupling(each, finger.sliding)} }}," for each in finger.followed), "]"]
     if finger.pulleys:
         source = _text(cite(f"{file} arms of tendons"))
         rows = (f"joint = {_text(joint)}, radius = {_text(length(r))}" for joint, r in finger.pulleys.items())
@@ -86,30 +89,36 @@ def _finger_lines(finger: DraftFinger, file: str) -> list[str]:
     for link in finger.links:
         lines += ["", f"[[{head}.links]]", *_link_lines(link, file)]
     for tendon in finger.tendons:
-        lines += ["", f"[[{head}.tendons]]", *_tendon_lines(tendon, file)]
+        lines += ["", f"[[{head}.tendons]]", *_tendon_lines(tendon, file, finger.sliding)]
     return lines
 
 
-def _coupling(mimic: Followed) -> str:
-    ratio, offset = quantity(mimic.ratio, "").strip(), mimic.offset
-    more = f', offset = "{angle(offset)}"' if offset else ""
-    for (key, unit), power in zip(_POWERS.items(), mimic.powers, strict=False):
-        more += f', {key} = "{quantity(power, unit)}"' if power else ""
+def _coupling(mimic: Followed, sliding: set[str]) -> str:
+    follower, leader = (m if joint in sliding else rad for joint in (mimic.follower, mimic.leader))
+
+    def coefficient(value: float, power: int) -> str:
+        return quantity(value, (follower / leader**power).label).removesuffix(" 1")
+
+    ratio, offset = coefficient(mimic.ratio, 1), mimic.offset
+    more = f', offset = "{place(offset, mimic.follower in sliding)}"' if offset else ""
+    for power, (key, value) in enumerate(zip(_POWERS, mimic.powers, strict=False), start=2):
+        more += f', {key} = "{coefficient(value, power)}"' if value else ""
     return f'follower = "{mimic.follower}", leader = "{mimic.leader}", ratio = "{ratio}"{more}'
 
 
 def _place_lines(link: DraftLink) -> list[str]:
     """The joint of a link: its name, what leads to its frame, its limits, and its offset."""
-    lines = [f"joint = {_text(link.joint)}"]
+    lines = [f"joint = {_text(link.joint)}", *(['kind = "slide"'] if link.slides else [])]
     if link.frame.turn != "none" or not link.frame.roll:
         lines += [f"turn = {_text(link.frame.turn)}"]
-    roll = tidy([link.frame.roll], 1.0)[0]
-    if roll:
-        lines += [f"rpy = {_listed(map(angle, (roll, 0.0, 0.0)))}"]
+    roll, yaw = tidy([link.frame.roll, link.frame.yaw], 1.0)
+    if roll or yaw:
+        lines += [f"rpy = {_listed(map(angle, (roll, 0.0, yaw)))}"]
     if reference := tidy([link.reference], 1.0)[0]:
-        lines += [f"reference = {_text(angle(reference))}"]
+        lines += [f"reference = {_text(place(reference, link.slides))}"]
     if link.limits:
-        lines += [f"{key} = {_text(angle(x))}" for key, x in zip(("low", "high"), link.limits, strict=True)]
+        ends = zip(("low", "high"), link.limits, strict=True)
+        lines += [f"{key} = {_text(place(x, link.slides))}" for key, x in ends]
     return [*lines, f"offset = {_lengths(link.offset)}"]
 
 
@@ -120,27 +129,31 @@ def _link_lines(link: DraftLink, file: str) -> list[str]:
     if link.mass is not None:
         lines += [f"{key} = {each}" for key, each in mass_and_inertia(link.mass, link.com, link.inertia).items()]
         sources |= dict.fromkeys(("mass", "com", "inertia"), body)
+    inertia, torque, unit = ("kg", "N", "m") if link.slides else ("kg m^2", "N m", "rad")
     if joint.armature:
-        lines += [f"armature = {_text(quantity(joint.armature, 'kg m^2'))}"]
+        lines += [f"armature = {_text(quantity(joint.armature, inertia))}"]
     if joint.damping:
-        lines += [f"damping = {_text(quantity(joint.damping, 'N m s/rad'))}"]
+        lines += [f"damping = {_text(quantity(joint.damping, f'{torque} s/{unit}'))}"]
     if joint.friction:
-        torque = quantity(joint.friction, "N m")
-        lines += [f'friction = {{ torque = "{torque}", velocity = "{_FRICTION_VELOCITY}" }}']
+        key, velocity = ("force", _SLIDE_FRICTION_VELOCITY) if link.slides else ("torque", _FRICTION_VELOCITY)
+        lines += [f'friction = {{ {key} = "{quantity(joint.friction, torque)}", velocity = "{velocity}" }}']
         sources["friction.velocity"] = "assumed"
     if joint.stiffness:
-        reference_text = angle(tidy([link.spring_reference], 1.0)[0])
-        stiffness = quantity(joint.stiffness, "N m/rad")
+        reference_text = place(tidy([link.spring_reference], 1.0)[0], link.slides)
+        stiffness = quantity(joint.stiffness, f"{torque}/{unit}")
         lines += [f'spring = {{ stiffness = "{stiffness}", reference = "{reference_text}" }}']
     return [*lines, f"source = {_sources(sources, cite(f'{file} joint {joint.name}'))}"]
 
 
-def _tendon_lines(tendon: DraftTendon, file: str) -> list[str]:
+def _tendon_lines(tendon: DraftTendon, file: str, sliding: set[str]) -> list[str]:
     lines = [f"rest = {_text(length(tidy([tendon.rest], 0.1)[0]))}"]
     if tendon.over:
         lines += [f"over = {_listed(tendon.over)}"]
     if tendon.arms:
-        arms = ", ".join(f"{joint} = {_text(length(arm))}" for joint, arm in tendon.arms.items())
+        arms = ", ".join(
+            f"{joint} = {_text(quantity(arm, '').rstrip() if joint in sliding else length(arm))}"
+            for joint, arm in tendon.arms.items()
+        )
         lines += [f"arms = {{ {arms} }}"]
     if tendon.path:
         lines += ["path = ["]
@@ -210,6 +223,11 @@ def angle(radians: float, noise: float = 2e-16) -> str:
     if abs(math.radians(degrees) - radians) <= noise * max(1.0, abs(radians)):
         return quantity(degrees, "deg")
     return quantity(radians, "rad")
+
+
+def place(value: float, slides: bool) -> str:
+    """An angle [rad], or the position of a slide [m]."""
+    return length(value) if slides else angle(value)
 
 
 def mass_and_inertia(kilograms: float, com: Array, inertia: Array) -> dict[str, str]:

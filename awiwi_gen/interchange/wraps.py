@@ -75,15 +75,17 @@ def _inside(round_: Place, body: int, at: Array) -> bool:
 def fitted(compiled: Any, tendon: Tendon, mimics: tuple[Mimic, ...]) -> tuple[Tendon, float]:
     """The tendon with the arms and the constant length that fit best, and the largest error of its length [m].
 
-    Joints without limits count from -1 to 1 rad; followers move with their leaders.
+    Joints without limits count from -1 to 1 rad, slides from -10 to 10 mm; followers move with their leaders.
     """
     data = mujoco.MjData(compiled)
     index = compiled.tendon(tendon.name).id
-    hinges = [j for j in range(compiled.njnt) if compiled.jnt_type[j] == mujoco.mjtJoint.mjJNT_HINGE]
-    places = compiled.jnt_qposadr[hinges]
-    limited = compiled.jnt_limited[hinges].astype(bool)
-    ends = np.where(limited[:, None], compiled.jnt_range[hinges], np.array([-1.0, 1.0]))
-    order = {compiled.joint(j).name: k for k, j in enumerate(hinges)}
+    kinds = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
+    joints = [j for j in range(compiled.njnt) if compiled.jnt_type[j] in kinds]
+    places = compiled.jnt_qposadr[joints]
+    limited = compiled.jnt_limited[joints].astype(bool)
+    most = np.where(compiled.jnt_type[joints] == kinds[1], 0.01, 1.0)
+    ends = np.where(limited[:, None], compiled.jnt_range[joints], np.stack([-most, most], axis=1))
+    order = {compiled.joint(j).name: k for k, j in enumerate(joints)}
 
     def length(angles: Array) -> float:
         data.qpos[places] = angles
@@ -95,7 +97,7 @@ def fitted(compiled: Any, tendon: Tendon, mimics: tuple[Mimic, ...]) -> tuple[Te
         mujoco.mj_tendon(compiled, data)
         return float(data.ten_length[index])
 
-    crossed = [k for k in range(len(hinges)) if _moves(length, compiled.qpos0[places], ends, k)]
+    crossed = [k for k in range(len(joints)) if _moves(length, compiled.qpos0[places], ends, k)]
     random = np.random.default_rng(7)
     angles = np.tile(compiled.qpos0[places], (_STATES, 1))
     angles[:, crossed] = random.uniform(ends[crossed, 0], ends[crossed, 1], (_STATES, len(crossed)))
@@ -103,7 +105,7 @@ def fitted(compiled: Any, tendon: Tendon, mimics: tuple[Mimic, ...]) -> tuple[Te
     table = np.column_stack([np.ones(_STATES), angles[:, crossed]])
     best: Array = np.asarray(np.linalg.lstsq(table, lengths, rcond=None)[0]).round(6)  # the fit is good to millimetres
     error = float(np.abs(table @ best - lengths).max())
-    names = [compiled.joint(hinges[k]).name for k in crossed]
+    names = [compiled.joint(joints[k]).name for k in crossed]
     return replace(tendon, arms=dict(zip(names, map(float, best[1:]), strict=True)), constant=float(best[0])), error
 
 

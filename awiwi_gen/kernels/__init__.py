@@ -38,8 +38,7 @@ def declared(hand: Hand) -> list[Kernel]:
         for name, finger in hand.fingers.items()
         for kernel in [
             *elastic_kernels(hand, name, finger),
-            *documented(finger, finger_kernels(hand, name, finger)),
-            *optional_kernels(hand, name, finger),
+            *documented(finger, [*finger_kernels(hand, name, finger), *optional_kernels(hand, name, finger)]),
             *base_kernels(hand, name, finger),
             *four_bar_kernels(name, finger),
         ]

@@ -13,8 +13,9 @@ from typing import Any
 from awiwi_gen.hand import Finger, Hand
 from awiwi_gen.kernel import Kernel, Port, Solver
 from awiwi_gen.kernels.declare import Family
-from awiwi_gen.kernels.fingers import Size, input_ports, joint_limits, limit_paths
+from awiwi_gen.kernels.fingers import NEAR, input_ports, joint_limits, limit_paths
 from awiwi_gen.kernels.routing import moved
+from awiwi_gen.kernels.sizes import Size
 from awiwi_gen.units import rad
 
 TRIALS = 50  # as in algorithm 1; figure 5.17 shows that 15 are enough for noisy lengths
@@ -36,7 +37,7 @@ def base_kernels(hand: Hand, name: str, finger: Finger) -> list[Kernel]:
     base = base_of(finger)
     if not base.spans:
         return []
-    whole = input_ports(hand, finger, Size(len(finger.joints), len(finger.pulled), len(finger.links)))
+    whole = input_ports(hand, finger, Size.of(finger))
     ports = {"h": subset(whole["h"], base.spans), "start": subset(whole["start"], base.joints)}
     return of_base.kernels(name, finger, f"fingers.{name}", finger.structure(), ports, base)
 
@@ -78,6 +79,7 @@ def gradient_search(finger: Finger) -> Solver:
         },
         iterations=TRIALS + 1,
         tolerance={"f64": 1e-6, "f32": 1e-4},
+        near=(NEAR["hinge"],) * len(base.joints),
         limits={end: tuple(paths[j] for j in base.joints) for end, paths in limit_paths(finger).items()},
     )
 

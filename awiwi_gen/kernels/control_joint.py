@@ -46,6 +46,7 @@ def joint_stiffness(hand: Hand) -> tuple[float, float]:
         sum(float(tendon.arms[joint]) ** 2 for tendon in finger.pulled if joint in tendon.arms)
         for finger in hand.fingers.values()
         for joint in finger.joints
+        if joint not in finger.sliding
     ]
     found = [square for square in squares if square > 0] or [1.0]
     # Two digits; 5 % is the most that rounding can lose.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import Any
 
 from awiwi_gen.hand import Hand
@@ -13,18 +13,21 @@ from awiwi_gen.hand.pose import polynomial
 from awiwi_gen.kernel import STOP, Kernel, Port, Solver
 from awiwi_gen.kernels.declare import Family, within
 from awiwi_gen.kernels.routing import groups, moved, wraps_hold
+from awiwi_gen.kernels.sizes import (
+    POSE,
+    Size,
+    arms,
+    arms_derivative,
+    coriolis,
+    covariance,
+    inertia,
+    jacobian_port,
+    motion,
+    stiffness,
+    torque,
+)
 from awiwi_gen.structure import link_number, rolls, wraps
-from awiwi_gen.units import J, N, Unit, kg, m, one, rad, s
-
-
-@dataclass(frozen=True)
-class Size:
-    """Sizes of a finger's arrays: independent joints, tendons, links."""
-
-    joints: int
-    tendons: int
-    links: int
-
+from awiwi_gen.units import J, N, Unit, m, one, s
 
 per_finger: Family[Size] = Family()
 
@@ -33,7 +36,7 @@ STIFFEST = 50.0  # [N m/rad]; more than the tendons of a hand give a joint
 
 def finger_kernels(hand: Hand, name: str, finger: Finger) -> list[Kernel]:
     """All kernels of one finger."""
-    size = Size(len(finger.joints), len(finger.pulled), len(finger.links))
+    size = Size.of(finger)
     ports = input_ports(hand, finger, size)
     return guarded(finger, per_finger.kernels(name, finger, f"fingers.{name}", finger.structure(), ports, size))
 
@@ -61,7 +64,7 @@ def moves_the_chain(kernel: Kernel) -> bool:
 
 def input_ports(hand: Hand, finger: Finger, size: Size) -> dict[str, Port]:
     """The input ports by argument name, with the ranges of this hand."""
-    n, limits = (size.joints,), hand.limits
+    limits = hand.limits
     low, high = joint_limits(finger)
     slack, taut = force_range(hand)
     lengths = [length_range(finger, tendon) for tendon in finger.pulled]
@@ -69,18 +72,22 @@ def input_ports(hand: Hand, finger: Finger, size: Size) -> dict[str, Port]:
     def symmetric(shape: tuple[int, ...], unit: Unit, limit: Any) -> Port:
         return Port(shape, unit, -float(limit), float(limit))
 
+    def of_joints(port: Port, hinge: Any, slide: Any) -> Port:
+        most = size.choose(float(hinge), float(slide or 0))
+        return replace(port, low=tuple(-each for each in most) if isinstance(most, tuple) else -most, high=most)
+
     return {
-        "q": Port(n, rad, low, high),
-        "qd": symmetric(n, rad / s, limits.joint_velocity),
-        "qdd": symmetric(n, rad / s**2, limits.joint_acceleration),
-        "tau": symmetric(n, N * m, limits.joint_torque),
+        "q": replace(motion(size), low=low, high=high),
+        "qd": of_joints(motion(size, one / s), limits.joint_velocity, limits.slide_velocity),
+        "qdd": of_joints(motion(size, one / s**2), limits.joint_acceleration, limits.slide_acceleration),
+        "tau": of_joints(torque(size), limits.joint_torque, limits.slide_force),
         "f": Port((size.tendons,), N, 0.0, float(limits.tendon_force)),
         "k": Port((size.tendons,), N / m, float(limits.tendon_stiffness_low), float(limits.tendon_stiffness_high)),
         "h": Port((size.tendons,), m, tuple(low for low, _ in lengths), tuple(high for _, high in lengths)),
-        "start": Port(n, rad, low, high),
+        "start": replace(motion(size), low=low, high=high),
         "noise": Port((), m, 0.0, 1e-3),
         "g": symmetric((3,), m / s**2, limits.gravity),
-        "K": symmetric((size.joints, size.joints), N * m / rad, STIFFEST),
+        "K": replace(stiffness(size), low=-STIFFEST, high=STIFFEST),
         "f_min": Port((), N, slack, slack + (taut - slack) / 4),
         "f_max": Port((), N, taut - (taut - slack) / 4, taut),
     }
@@ -96,7 +103,7 @@ def force_range(hand: Hand) -> tuple[float, float]:
 
 
 def joint_limits(finger: Finger) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Lower and upper limits of the independent joints [rad]."""
+    """Lower and upper limits of the independent joints [rad], or [m] of slides."""
     free = [link for link in finger.links if link.joint in finger.joints]
     return tuple(float(k.low or 0) for k in free), tuple(float(k.high or 0) for k in free)
 
@@ -110,22 +117,15 @@ def limit_paths(finger: Finger) -> dict[str, tuple[str, ...]]:
 def length_range(finger: Finger, tendon: Tendon) -> tuple[float, float]:
     """Bounds of a tendon's length over all poses [m]: joints at their limits, lines from zero to their longest."""
     rest, reach = float(tendon.rest), 0.0
-    limits = dict(zip(finger.joints, zip(*joint_limits(finger), strict=True), strict=True))
-
-    def farthest(joint: str) -> float:
-        coefficients, ends = finger.motion(joint), limits[finger.leaders.get(joint, joint)]
-        if len(coefficients) > 2:  # the terms of a curve may cancel at both ends
-            return polynomial([abs(each) for each in coefficients], max(map(abs, ends)))
-        return max(abs(polynomial(coefficients, end)) for end in ends)
-
+    limits = limits_of(finger)
     for over in tendon.over:
         joint = over[1:]
         leader = finger.leaders.get(joint, joint)
         if rolls(finger, joint):  # the arcs on the pulleys of follower and leader are equal
             reach += float(finger.radii[leader]) * max(map(abs, limits[leader]))
         else:
-            reach += float(finger.radii[joint]) * farthest(joint)
-    reach += sum(abs(float(arm)) * farthest(joint) for joint, arm in tendon.arms.items())
+            reach += float(finger.radii[joint]) * farthest(finger, joint)
+    reach += sum(abs(float(arm)) * farthest(finger, joint) for joint, arm in tendon.arms.items())
     low, high = rest - reach, rest + reach
     for run in tendon.runs:
         if run.body is None:
@@ -137,7 +137,21 @@ def length_range(finger: Finger, tendon: Tendon) -> tuple[float, float]:
     if tendon.span is None:
         return low, high
     points = (tendon.span.from_, tendon.span.to, *(link.offset for link in finger.links))
+    high += sum(farthest(finger, link.joint) + abs(float(link.reference or 0)) for link in finger.links if link.slides)
     return low, high + sum(sum(float(x) ** 2 for x in point) ** 0.5 for point in points)
+
+
+def limits_of(finger: Finger) -> dict[str, tuple[float, float]]:
+    """Lower and upper limit of each independent joint [rad], or [m] of slides."""
+    return dict(zip(finger.joints, zip(*joint_limits(finger), strict=True), strict=True))
+
+
+def farthest(finger: Finger, joint: str) -> float:
+    """Bound of the size of a joint's angle [rad], or of a slide's position [m], over all poses."""
+    coefficients, ends = finger.motion(joint), limits_of(finger)[finger.leaders.get(joint, joint)]
+    if len(coefficients) > 2:  # the terms of a curve may cancel at both ends
+        return polynomial([abs(each) for each in coefficients], max(map(abs, ends)))
+    return max(abs(polynomial(coefficients, end)) for end in ends)
 
 
 def longest(finger: Finger, a: PathPoint, b: PathPoint) -> float:
@@ -145,36 +159,10 @@ def longest(finger: Finger, a: PathPoint, b: PathPoint) -> float:
     first, last = sorted(link_number(finger, point.link) for point in (a, b))
     between = finger.links[max(first, 0) : max(last, 0)]
     vectors = [a.at, b.at, *(link.offset for link in between)]
-    cranks = [float(link.four_bar.crank) for link in finger.links[first + 1 : last + 1] if link.four_bar]
-    return sum(math.hypot(*map(float, vector)) for vector in vectors) + sum(cranks)
-
-
-POSE = (one, one, one, m) * 3 + (one,) * 4
-
-
-def jacobian_port(size: Size) -> Port:
-    """Velocity and angular velocity of the fingertip per unit velocity of each joint."""
-    return Port((6, size.joints), (m / rad,) * (3 * size.joints) + (rad / rad,) * (3 * size.joints))
-
-
-def torque(size: Size) -> Port:
-    """One torque per joint."""
-    return Port((size.joints,), N * m)
-
-
-def inertia(size: Size) -> Port:
-    """A joint-space mass matrix."""
-    return Port((size.joints, size.joints), kg * m**2)
-
-
-def stiffness(size: Size) -> Port:
-    """Derivatives of joint torques by joint angles."""
-    return Port((size.joints, size.joints), N * m / rad)
-
-
-def coriolis(size: Size) -> Port:
-    """A joint-space Coriolis matrix."""
-    return Port((size.joints, size.joints), N * m * s / rad)
+    moved = finger.links[first + 1 : last + 1]
+    cranks = [float(link.four_bar.crank) for link in moved if link.four_bar]
+    travels = [farthest(finger, link.joint) + abs(float(link.reference or 0)) for link in moved if link.slides]
+    return sum(math.hypot(*map(float, vector)) for vector in vectors) + sum(cranks) + sum(travels)
 
 
 # -- kinematics -------------------------------------------------------------------------------------------
@@ -239,7 +227,7 @@ def inverse_dynamics_derivatives(finger: Any, q: Any, qd: Any, qdd: Any, g: Any)
     """Partial derivatives of the inverse dynamics with respect to the positions and the velocities."""
 
 
-@per_finger(lambda z: {"qdd": Port((z.joints,), rad / s**2)}, "eq. 2.1, solved for qdd", subject="dynamics")
+@per_finger(lambda z: {"qdd": motion(z, one / s**2)}, "eq. 2.1, solved for qdd", subject="dynamics")
 def forward_dynamics(finger: Any, q: Any, qd: Any, tau: Any, g: Any) -> Any:
     """Joint accelerations under the joint torques tau."""
 
@@ -271,13 +259,13 @@ def tendon_lengths(finger: Any, q: Any) -> Any:
     """Path length of every tendon in the finger, by its routing."""
 
 
-@per_finger(lambda z: {"P": Port((z.tendons, z.joints), m / rad)}, "eq. 5.6, 5.9, 5.21", subject="tendons")
+@per_finger(lambda z: {"P": arms(z)}, "eq. 5.6, 5.9, 5.21", subject="tendons")
 def coupling(finger: Any, q: Any) -> Any:
     """Coupling matrix P = dh/dq: tendon velocities are P qd."""
 
 
 @per_finger(
-    lambda z: {"dP": Port((z.tendons, z.joints, z.joints), m / rad**2)},
+    lambda z: {"dP": arms_derivative(z)},
     "eq. 5.11",
     subject="tendons",
 )
@@ -340,12 +328,17 @@ def estimated_parts(finger: Finger) -> list[tuple[list[int], list[int], bool]]:
 ROUND_BODIES = {"f64": "1e-13", "f32": "5e-6"}
 
 
+SLIDE_UNIT = "(awiwi_real)0.0078125"  # m, a power of two near the arms that tendons have at hinges
+NEAR = {"hinge": 0.2, "slide": 0.005}  # rad and m: how far an estimate may be away from the next one
+
+
 def nonlinear_estimate(finger: Finger, iterations: int = 24) -> Solver | None:
     """The solver of fingers whose coupling depends on the pose; None for other fingers."""
     if not is_curved(finger):
         return None
     low, high = joint_limits(finger)
     parts = estimated_parts(finger)
+    scales = [SLIDE_UNIT if joint in finger.sliding else "1" for joint in finger.joints]
     curved = sum(not linear for _, _, linear in parts)
     return Solver(
         template="joint_estimate.c.j2",
@@ -366,16 +359,18 @@ def nonlinear_estimate(finger: Finger, iterations: int = 24) -> Solver | None:
             ),
             "part_count": str(len(parts)),
             "iterations": str(iterations),
+            "scale": ", ".join(scales) if SLIDE_UNIT in scales else "",
         },
         iterations=1 + curved * (iterations - 1),
         tolerance={"f64": 1e-12, "f32": 1e-5},
         limits=limit_paths(finger),
         stop=ROUND_BODIES if wraps(finger) else STOP,
+        near=tuple(NEAR["slide" if joint in finger.sliding else "hinge"] for joint in finger.joints),
     )
 
 
 @per_finger(
-    lambda z: {"q": Port((z.joints,), rad)},
+    lambda z: {"q": motion(z)},
     "eq. 5.14, 5.15, 5.24",
     subject="joint_estimate",
     solver=nonlinear_estimate,
@@ -389,7 +384,7 @@ def joint_estimate(finger: Any, h: Any, start: Any) -> Any:
 
 
 @per_finger(
-    lambda z: {"covariance": Port((z.joints, z.joints), rad**2), "worst": Port((z.joints,), rad)},
+    lambda z: {"covariance": covariance(z), "worst": motion(z)},
     "eq. 5.14, linearised",
     subject="joint_estimate",
 )

@@ -9,7 +9,8 @@ from awiwi_gen.hand import Hand
 from awiwi_gen.hand.parts import Finger
 from awiwi_gen.kernel import Kernel, Port
 from awiwi_gen.kernels.declare import Family
-from awiwi_gen.kernels.fingers import POSE, Size, guarded, input_ports, torque
+from awiwi_gen.kernels.fingers import guarded, input_ports
+from awiwi_gen.kernels.sizes import POSE, Size, torque
 from awiwi_gen.units import m, s
 
 per_passive: Family[Size] = Family("joints")
@@ -34,16 +35,27 @@ PASSIVE = {
 
 
 def documented(finger: Finger, kernels: list[Kernel]) -> list[Kernel]:
-    """The kernels of a finger; what their joints add is told in their documentation."""
+    """The kernels of a finger; what their joints add is told in their documentation, and which of them slide."""
     for notes, has in ((ARMATURE, finger.has_armature), (PASSIVE, finger.passive)):
         if has:
             kernels = [replace(k, doc=f"{k.doc}\n{notes[k.family]}") if k.family in notes else k for k in kernels]
-    return kernels
+    slides = [f"{index} ({joint})" for index, joint in enumerate(finger.joints) if joint in finger.sliding]
+    return with_slides(kernels, slides)
+
+
+def with_slides(kernels: list[Kernel], slides: list[str]) -> list[Kernel]:
+    """Kernels whose documentation says which elements of arrays over the joints belong to slides, if any do."""
+    if not slides:
+        return kernels
+    which = f"elements {', '.join(slides)} are of slides" if len(slides) > 1 else f"element {slides[0]} is of a slide"
+    note = f"In arrays over the joints, {which}: in m for rad, and N for N m."
+    over_joints = [{"q", "start"} & k.inputs.keys() for k in kernels]
+    return [replace(k, doc=f"{k.doc}\n{note}") if has else k for k, has in zip(kernels, over_joints, strict=True)]
 
 
 def optional_kernels(hand: Hand, name: str, finger: Finger) -> list[Kernel]:
     """The kernels of a finger with passive torques in its joints, and those of a finger with a base in the palm."""
-    size = Size(len(finger.joints), len(finger.tendons), len(finger.links))
+    size = Size.of(finger)
     ports = input_ports(hand, finger, size)
     ports["g_palm"] = ports["g"]
     families = [family for family, has in ((per_passive, finger.passive), (per_placed, finger.base)) if has]

@@ -8,7 +8,7 @@ from awiwi_gen.hand import Hand
 from awiwi_gen.hand.palm import Palm
 from awiwi_gen.kernel import Kernel, Port
 from awiwi_gen.kernels.declare import Family
-from awiwi_gen.kernels.fingers import POSE
+from awiwi_gen.kernels.sizes import POSE
 from awiwi_gen.units import m, rad, s
 
 of_palm: Family[int] = Family("forearm")  # sized by the number of joints

@@ -13,23 +13,28 @@ from typing import Any
 from awiwi_gen.hand import Hand
 from awiwi_gen.kernel import Kernel, Port
 from awiwi_gen.kernels.declare import Family
-from awiwi_gen.kernels.fingers import Size, input_ports
+from awiwi_gen.kernels.fingers import input_ports
+from awiwi_gen.kernels.joints import with_slides
 from awiwi_gen.kernels.routing import wraps_hold
+from awiwi_gen.kernels.sizes import Size, arms, stiffness, torque
 from awiwi_gen.kernels.wrist import bars_close, wrist_ports
-from awiwi_gen.units import N, m, rad
+from awiwi_gen.units import m
 
 of_hand: Family[Size] = Family("hand_tendons")
 
 
 def hand_kernels(hand: Hand) -> list[Kernel]:
     """The kernels of all tendons together."""
-    sizes = {name: Size(len(f.joints), len(f.pulled), len(f.links)) for name, f in hand.fingers.items()}
+    sizes = {name: Size.of(finger) for name, finger in hand.fingers.items()}
     fingers = [input_ports(hand, finger, sizes[name]) for name, finger in hand.fingers.items()]
     ports = {name: joined([of_finger[name] for of_finger in fingers]) for name in ("q", "f", "k")}
     if hand.wrist:
         ports["wrist"] = joined([*wrist_ports(hand.wrist).values()])
-    whole = Size(ports["q"].size, ports["f"].size, sum(size.links for size in sizes.values()))
-    kernels = of_hand.kernels("hand", hand, "", hand.structure(), ports, whole)
+    sliding = tuple(slides for size in sizes.values() for slides in size.sliding)
+    whole = Size(sliding, ports["f"].size, sum(size.links for size in sizes.values()))
+    joints = [(joint, finger) for finger in hand.fingers.values() for joint in finger.joints]
+    slides = [f"{index} ({joint})" for index, (joint, finger) in enumerate(joints) if joint in finger.sliding]
+    kernels = with_slides(of_hand.kernels("hand", hand, "", hand.structure(), ports, whole), slides)
     wraps = tuple(each for name, finger in hand.fingers.items() for each in wraps_hold(finger, f"{name}."))
     return [
         replace(kernel, guards=(bars_close(hand.wrist) if hand.wrist and "wrist" in kernel.inputs else ()) + wraps)
@@ -52,18 +57,18 @@ def tendon_lengths(hand: Any, q: Any, wrist: Any = None) -> Any:
     """Path length of every tendon in its finger and in the wrist, at its internal angles wrist = (q71, q73)."""
 
 
-@of_hand(lambda z: {"P": Port((z.tendons, z.joints), m / rad)}, "eq. 5.6, 5.9, 5.21")
+@of_hand(lambda z: {"P": arms(z)}, "eq. 5.6, 5.9, 5.21")
 def coupling(hand: Any, q: Any) -> Any:
     """Coupling matrix P = dh/dq of all tendons and joints; zero outside the blocks of the fingers."""
 
 
-@of_hand(lambda z: {"tau": Port((z.joints,), N * m)}, "eq. 5.8")
+@of_hand(lambda z: {"tau": torque(z)}, "eq. 5.8")
 def joint_torque(hand: Any, q: Any, f: Any) -> Any:
     """Joint torques -P' f of the tendon forces f."""
 
 
 @of_hand(
-    lambda z: {"K": Port((z.joints, z.joints), N * m / rad)},
+    lambda z: {"K": stiffness(z)},
     "eq. 5.12, 5.23",
 )
 def joint_stiffness(hand: Any, q: Any, f: Any, k: Any) -> Any:

@@ -8,7 +8,7 @@ from typing import Any
 from awiwi_gen.hand import Wrist
 from awiwi_gen.kernel import Kernel, Port
 from awiwi_gen.kernels.declare import Family
-from awiwi_gen.kernels.fingers import POSE
+from awiwi_gen.kernels.sizes import POSE
 from awiwi_gen.structure import is_symmetric
 from awiwi_gen.units import m, rad
 

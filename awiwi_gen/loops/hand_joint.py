@@ -75,9 +75,11 @@ def joint_of(library: Any, hand: Hand, finger: str = FINGER, joint: str = JOINT)
     """A joint of a hand, with the finger straight and its other joints held. Raises InputError where there is none."""
     if hand.motor is None or hand.spring is None or hand.motor.friction is None:
         raise InputError("a joint between tendons needs a hand with the sections [motor], with friction, and [spring]")
-    pulled = [name for name, each in hand.fingers.items() if each.pulled]
+    pulled = [name for name, each in hand.fingers.items() if each.pulled and not each.sliding]
     if not pulled:
-        raise InputError("a joint between tendons needs a finger with tendons that motors pull")
+        raise InputError(
+            "a joint between tendons needs a finger with tendons that motors pull, none of whose joints slide"
+        )
     finger = finger if finger in pulled else pulled[0]
     names = hand.fingers[finger].joints
     index = names.index(joint) if joint in names else 0

@@ -169,6 +169,8 @@ def plants(library: Any, hand: Hand, name: str, finger: Finger, force: float) ->
     """
     if hand.motor is None or hand.spring is None:
         raise InputError("gains need a hand with the sections [motor] and [spring]")
+    if finger.sliding:
+        raise InputError(f"gains are of joints that turn, but {finger.sliding[0]} of fingers.{name} slides")
     elongation = library.spring_elongation(force)
     if elongation.status:
         raise InputError(f"pretension = {force:g} N is beyond what the hand's springs can hold")

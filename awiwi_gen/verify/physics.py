@@ -376,7 +376,10 @@ def obey(
         worst = _relative(residual, terms)
         laws.append(Law(part, law.__name__.replace("_", " "), worst, worst <= LIMIT))
     if "mass_matrix" in outputs:
-        eigenvalues = np.linalg.eigvalsh(np.vectorize(lambda x: float(x.mid()))(outputs["mass_matrix"]["M"]))
+        masses = np.vectorize(lambda x: float(x.mid()))(outputs["mass_matrix"]["M"])
+        # Scaled to diagonals of one, as joints that slide and joints that turn have other units.
+        sizes = np.sqrt(np.maximum(np.abs(np.diagonal(masses, axis1=1, axis2=2)), np.finfo(float).tiny))
+        eigenvalues = np.linalg.eigvalsh(masses / (sizes[:, :, None] * sizes[:, None, :]))
         ratio = float(np.min(eigenvalues[:, 0] / eigenvalues[:, -1]))
         laws.append(Law(part, "the mass matrix is positive definite", max(0.0, -ratio), ratio > POSITIVE))
     return laws

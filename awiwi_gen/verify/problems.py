@@ -81,15 +81,15 @@ class LeastSquares(Problem):
     """
 
     def sample(self, drawn: dict[str, Array]) -> dict[str, Array]:
-        """Measured lengths ``h`` of poses, and start angles up to 0.2 rad away from them."""
+        """Measured lengths ``h`` of poses, and starts near them."""
         start = drawn["start"]
         low, high = start.min(axis=0), start.max(axis=0)
         middle, noisy = (low + high) / 2, np.arange(len(start)) % 2 == 1
-        random = np.random.default_rng(len(start))
+        random, near = np.random.default_rng(len(start)), np.array(self.solver.near)
         pose = np.where(noisy[:, None], middle + 0.7 * (start - middle), start)
         lengths, _ = self.model(pose.astype(np.float64))
         lengths = lengths + np.where(noisy[:, None], random.uniform(-NOISE, NOISE, lengths.shape), 0)
-        nearby = np.clip(pose + random.uniform(-0.2, 0.2, pose.shape), low, high)
+        nearby = np.clip(pose + random.uniform(-near, near, pose.shape), low, high)
         return {"h": lengths.astype(start.dtype), "start": nearby.astype(start.dtype)}
 
     def model(self, q: Array, own: bool = False) -> tuple[Array, Array]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -12,12 +12,14 @@ from awiwi_gen.ir.algebras import UNIT_ROUNDOFF, Bounded, Floats
 from awiwi_gen.ir.graph import Graph, Node
 from awiwi_gen.ir.interpret import evaluate
 from awiwi_gen.kernel import GUARDS
+from awiwi_gen.units import Unit
 from awiwi_gen.verify.reference import Reference
 
 Array = np.ndarray[Any, Any]
 
 
 NEAR_ZERO = 1e-3
+REFERENCE = 2.0**-200  # relative error of a reference at 256 bits, after operations that may cancel 50 of them
 STATUS = "status"  # output of a reference: the status that the kernel must return, if not always 0
 
 
@@ -117,12 +119,14 @@ def judge_solver(
     call: Callable[..., Any],
     tolerance: float,
     seed: int,
+    units: Mapping[str, Sequence[Unit]] | None = None,
 ) -> Verdict:
     """Level 3 for a kernel that iterates: every sample converges to the exact solution within the tolerance.
 
     Level 1 for the outputs in ``mirror``, whose bits are known. ``observed`` computes from the result what the
     reference contains: outputs, or quantities that follow from them. ``other`` is asked after a miss: for the reference
-    of another right answer, and for what is wrong with it.
+    of another right answer, and for what is wrong with it. Elements of an output in ``units`` are compared with the
+    largest one of their own unit.
     """
     raw = call(**inputs)
     samples, reasons = len(raw.status), []
@@ -130,10 +134,10 @@ def judge_solver(
     if np.any(wrong):
         reasons.append(f"it returns a wrong status at {np.count_nonzero(wrong)} samples")
     found = observed(raw)
-    worst_ulp, worst_scaled = _misses(reference, found, samples)
+    worst_ulp, worst_scaled = _misses(reference, found, samples, units or {})
     if not worst_scaled <= tolerance:
         reference, faults = other(raw, reference)
-        worst_ulp, worst_scaled = _misses(reference, found, samples)
+        worst_ulp, worst_scaled = _misses(reference, found, samples, units or {})
         reasons += faults
     bits = bool(mirror) and all(same_bits(getattr(raw, port), known) for port, known in mirror.items())
     if mirror and not bits:
@@ -146,18 +150,29 @@ def judge_solver(
     )  # fmt: skip
 
 
-def _misses(reference: Reference, found: Mapping[str, Array], samples: int) -> tuple[float, float]:
-    """The worst error of all outputs in units in the last place, and relative to the largest value of its output."""
+def scales(exact: Array, units: Sequence[Unit] = ()) -> Array:
+    """For each element (size,) of exact values (samples, size), the largest magnitude of all in its unit."""
+    largest = np.max(np.abs(exact), axis=0)
+    alike = [[a.label == b.label for b in units] for a in units] or np.ones((len(largest), len(largest)), bool)
+    found: Array = np.array([np.max(largest, where=np.array(row), initial=0.0) for row in alike])
+    return found
+
+
+def _misses(
+    reference: Reference, found: Mapping[str, Array], samples: int, units: Mapping[str, Sequence[Unit]]
+) -> tuple[float, float]:
+    """The worst error of all outputs in units in the last place, and relative to the scale of its elements."""
     worst_ulp = worst_scaled = 0.0
     for port, exact in reference.high.items():
         if port == STATUS:
             continue
         values = found[port].reshape(samples, -1)
         error = reference.error(port, values)
-        scale = float(np.max(np.abs(exact))) or 1.0
+        scale = scales(exact, units.get(port, ()))
+        scale = np.where(scale > 0, scale, 1.0)
         spacing = np.spacing(np.maximum(np.abs(exact), NEAR_ZERO * scale).astype(values.dtype))
         worst_ulp = max(worst_ulp, float(np.max(error / spacing)))
-        worst_scaled = max(worst_scaled, float(np.max(error)) / scale)
+        worst_scaled = max(worst_scaled, float(np.max(error / scale)))
     return worst_ulp, worst_scaled
 
 
@@ -208,7 +223,8 @@ def judge(
         with np.errstate(over="ignore"):  # of errors near zero, which do not count
             worst_ulp = max(worst_ulp, float(np.max(error / spacing, initial=0.0, where=sizeable)))
         worst_scaled = max(worst_scaled, float(np.max(error, initial=0.0)) / scale)
-        share = np.divide(error, limit, out=np.where(error > 0, np.inf, 0.0), where=limit > 0)
+        wrong = error > REFERENCE * np.abs(reference.high[port])  # of what is exact in floats, as its bound is zero
+        share = np.divide(error, limit, out=np.where(wrong, np.inf, 0.0), where=limit > 0)
         bound_use = max(bound_use, float(np.max(share, initial=0.0)))
     if guarded and np.any(raw.status):
         reasons.append(f"it leaves its domain at {np.count_nonzero(raw.status)} samples of its documented range")

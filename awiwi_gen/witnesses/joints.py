@@ -50,7 +50,7 @@ def passive_torque(finger: Finger, q: SX, qd: SX) -> SX:
             torque += link.damping * velocity
         if link.friction is not None:
             half_pi = ca.atan2(link.friction.velocity, SX(0))  # CasADi's own pi is rounded
-            torque += link.friction.torque * (ca.atan(velocity / link.friction.velocity) / half_pi)
+            torque += link.friction.level * (ca.atan(velocity / link.friction.velocity) / half_pi)
         if link.spring is not None:
             torque += link.spring.stiffness * (angle - link.spring.reference)
         result[coordinate] += ratio * torque

@@ -1,4 +1,5 @@
-"""Kinematics of a finger by recursion along the chain: velocities are axis x lever, without derivatives."""
+"""Kinematics of a finger by recursion along the chain: velocities are axis x lever, or a slide's axis, without
+derivatives."""
 
 import casadi as ca
 from casadi import SX
@@ -14,7 +15,7 @@ def link_poses(finger: Finger, q: SX) -> list[SX]:
     assembly = assemble(finger, q)
     origin, poses = SX.zeros(3), {}
     for joint, axes in zip(assembly.joints, assembly.axes(), strict=True):
-        poses[joint.link] = _pose(axes @ joint.rotation, origin + axes @ (joint.axis * joint.shift))
+        poses[joint.link] = _pose(axes @ joint.rotation, origin + axes @ (joint.axis * (joint.shift + joint.travel)))
         origin = origin + axes @ joint.offset
     return list(poses.values())
 
@@ -27,12 +28,13 @@ def fingertip_pose(finger: Finger, q: SX) -> SX:
 
 
 def jacobian(finger: Finger, q: SX) -> SX:
-    """J (6 x n), in base axes: velocity [m/rad], then angular velocity [rad/rad] of the tip per unit joint velocity."""
+    """J (6 x n), in base axes: velocity, then angular velocity of the tip per unit velocity of each joint."""
     assembly = assemble(finger, q)
     lever, result = SX.zeros(3), SX.zeros(6, q.numel())
     for joint, axes in reversed(list(zip(assembly.joints, assembly.axes(), strict=True))):
         lever = joint.offset + lever
-        column = ca.vertcat(axes @ ca.cross(joint.axis, lever), axes @ joint.axis)
+        spin = SX.zeros(3) if joint.slides else axes @ joint.axis
+        column = ca.vertcat(axes @ joint.point_velocity(lever), spin)
         result[:, joint.coordinate] += joint.ratio * column
         lever = joint.inward(lever)
     return result
@@ -56,7 +58,7 @@ def point_before_joint(finger: Finger, q: SX, name: str, local: SX) -> SX:
 
 
 def point_of_link(finger: Finger, q: SX, link: int, local: SX) -> tuple[SX, SX]:
-    """Base coordinates (3) [m] of a point (3) [m] of a link's frame, and their rates (3 x n) [m/rad]: axis x lever.
+    """Base coordinates (3) [m] of a point (3) [m] of a link's frame, and their rates (3 x n) per unit joint velocity.
 
     Link -1 is the base frame.
     """
@@ -65,10 +67,10 @@ def point_of_link(finger: Finger, q: SX, link: int, local: SX) -> tuple[SX, SX]:
     if not moving:
         return local, rates
     last = moving[-1][0]
-    point = last.rotation @ (local + _Z * last.shift)
+    point = last.rotation @ (local + _Z * (last.shift + last.travel))
     for joint, axes in reversed(moving):
         lever = point if joint is last else joint.offset + point
-        rates[:, joint.coordinate] += joint.ratio * (axes @ ca.cross(joint.axis, lever))
+        rates[:, joint.coordinate] += joint.ratio * (axes @ joint.point_velocity(lever))
         point = joint.inward(lever)
     return assembly.base_rotation.T @ point, rates
 

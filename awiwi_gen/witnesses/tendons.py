@@ -114,7 +114,18 @@ def _column(elements: list[SX]) -> SX:
 
 def coupling_derivative(finger: Finger, q: SX) -> list[SX]:
     """d2h/dq2: one symmetric matrix (n x n) [m/rad^2] per tendon."""
-    return [ca.densify(ca.hessian(length, q)[0]) for length in ca.vertsplit(tendon_lengths(finger, q))]
+    return [ca.densify(_hessian(finger, length, q)) for length in ca.vertsplit(tendon_lengths(finger, q))]
+
+
+def _hessian(finger: Finger, scalar: SX, q: SX) -> SX:
+    """Second derivatives (n x n) by joint angles.
+
+    CasADi computes several columns as one sum where it can tell them apart afterwards: not where units differ.
+    """
+    if not any(link.slides for link in finger.links):
+        return ca.hessian(scalar, q)[0]
+    gradient = ca.gradient(scalar, q)
+    return ca.horzcat(*(ca.jacobian(gradient, q[i]) for i in range(q.numel())))
 
 
 def joint_torque(finger: Finger, q: SX, f: SX) -> SX:
@@ -128,7 +139,7 @@ def joint_stiffness(finger: Finger, q: SX, f: SX, k: SX) -> SX:
     fixed = SX.sym("fixed", h.numel())
     stretch = h - fixed
     energy = ca.dot(f, stretch) + ca.dot(k, stretch**2) / 2
-    stiffness = ca.substitute(ca.hessian(energy, q)[0], fixed, h)
+    stiffness = ca.substitute(_hessian(finger, energy, q), fixed, h)
     # The stretch is zero now; CasADi simplifies it only when the expression is evaluated again after cse.
     arguments = ca.symvar(stiffness)
     return ca.densify(ca.Function("stiffness", arguments, [ca.cse(stiffness)])(*arguments))

@@ -40,7 +40,8 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 DOCS, README = ROOT / "docs" / "interchange.md", ROOT / "README.md"
 BEGIN, END = "<!-- table of hands: make test-hands ACCEPT=1 -->\n", "<!-- end -->\n"
 _WORST = ("worst difference from MuJoCo", "from Pinocchio")
-OWN = ("wrapped_finger", "inside_finger", "curved_finger")  # our fingers with what no published hand has
+# Our fingers with what no published hand has.
+OWN = ("wrapped_finger", "inside_finger", "curved_finger", "sliding_finger", "telescope_finger")
 KERNELS = "{}_[bcgilmpt]*"  # all but solvers and what they need: seconds for a finger instead of minutes
 
 

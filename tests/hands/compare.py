@@ -129,7 +129,5 @@ def dry_friction(hand: Hand, finger: str, rates: np.ndarray) -> np.ndarray:
     for link, rate in zip(hand.fingers[finger].links, rates, strict=True):
         friction = link.friction
         known = friction is not None
-        torques.append(
-            float(friction.torque) * 2 / np.pi * np.arctan(rate / float(friction.velocity)) if known else 0.0
-        )
+        torques.append(float(friction.level) * 2 / np.pi * np.arctan(rate / float(friction.velocity)) if known else 0.0)
     return np.array(torques)

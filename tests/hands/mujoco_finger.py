@@ -131,6 +131,10 @@ class MujocoFinger:
             if not last:
                 frame[:3, :2] = np.nan
                 frame[:3, 2] = base_axes.T @ self.data.xaxis[joint.id]
-            frame[:3, 3] = base_axes.T @ (self.data.xanchor[joint.id] - base_origin)
+            anchor = self.data.xanchor[joint.id]  # of a slide, before it moves
+            if link.slides:
+                place = int(joint.qposadr[0])
+                anchor = anchor + self.data.xaxis[joint.id] * (self.data.qpos[place] - self.compiled.qpos0[place])
+            frame[:3, 3] = base_axes.T @ (anchor - base_origin)
             found.append(frame)
         return found

@@ -12,6 +12,9 @@ before has no component along the axis. So offsets between parallel joints becom
 *Mass moved towards the palm.* A rotation about an axis does not move the mass on that axis. So m, h_z and S_zz of a
 body are given to the body before it. The energies stay the same, hence the dynamics. Three of the ten inertial
 parameters of a link become zero, and so does the mass of every composite body.
+
+*Slides.* A slide turns nothing and carries its whole body along, so mass stays with it. Its body and its offset are those
+about the place where it has not moved yet, and so contain how far it has. What lies beyond is not shifted past it.
 """
 
 from collections.abc import Iterator, Sequence
@@ -157,16 +160,16 @@ def _product(turns: Sequence[Turn]) -> SX:
 class Joint:
     """One joint of the chain and the body it moves, in the body's working axes.
 
-    The joint's angle is a function of coordinate number `coordinate`, with the derivative `ratio` and the second
-    derivative `ratio_derivative`. If the next joint has another axis, the working axes rotate with this joint, by the
-    angle with cosine and sine `cos_sin`, and then by `next_rotation` (3 x 3), the fixed rotation of the next joint, which
-    is the product of `next_turns`. A first turn about z is part of `cos_sin` instead. Otherwise they are the axes before
-    the joint, and `next_rotation` is None.
+    The joint's angle, or the travel of one that `slides`, is a function of coordinate number `coordinate`, with the
+    derivative `ratio` and the second derivative `ratio_derivative`. If the next joint has another axis, the working axes
+    rotate with this joint, by the angle with cosine and sine `cos_sin`, and then by `next_rotation` (3 x 3), the fixed
+    rotation of the next joint, which is the product of `next_turns`. A first turn about z is part of `cos_sin` instead.
+    Otherwise they are the axes before the joint, and `next_rotation` is None.
 
     In working axes, `axis` (3) is the joint's axis, `offset` (3) [m] leads to the next joint, and `rotation` (3 x 3)
     takes the link's own axes to the working axes. `link_body` is the body in the link's own axes, and so is the offset,
     `link_offset`, if the next joint is parallel. The body is link number `link`, or its crank. The link's frame lies on
-    the axis, `shift` [m] beyond the joint.
+    the axis, `shift` [m] beyond the joint and by the `travel` [m] of a slide beyond that.
     """
 
     coordinate: int
@@ -181,8 +184,18 @@ class Joint:
     rotation: SX
     link: int
     shift: SX
+    slides: bool
+    travel: SX
     link_offset: SX
     link_body: Moments
+
+    def point_velocity(self, lever: SX) -> SX:
+        """Velocity (3) of a point at `lever` (3) [m] from the joint, per unit rate of the joint."""
+        return self.axis if self.slides else ca.cross(self.axis, lever)
+
+    def power(self, force: SX, moment: SX) -> SX:
+        """Power of a force (3) and of a moment (3) about the joint, per unit rate of the joint."""
+        return ca.dot(self.axis, force if self.slides else moment)
 
     def outward(self, vectors: SX) -> SX:
         """Vectors (columns) of the axes before the joint, in working axes."""
@@ -229,7 +242,7 @@ class Assembly:
 
 @dataclass(frozen=True)
 class _Part:
-    """A joint of the chain as the hand file gives it: its fixed rotations, then a rotation about z.
+    """A joint of the chain as the hand file gives it: its fixed rotations, then a rotation about z or a `travel` along it.
 
     The angle about z is `angle`, or for the coupler of a four-bar the angle with cosine and sine `cos_sin`. `offset` leads
     to the next joint, in the link's axes, or once joints are shifted in those in front of the next joint.
@@ -245,6 +258,8 @@ class _Part:
     body: Moments
     link: int
     shift: SX = _ZERO
+    slides: bool = False
+    travel: SX = _ZERO
 
     @property
     def fixed_rotation(self) -> SX | None:
@@ -253,7 +268,7 @@ class _Part:
 
 
 def assemble(finger: Finger, q: SX) -> Assembly:
-    """All that recursions need at joint angles q (n) [rad]."""
+    """All that recursions need at joint angles q (n) [rad], or [m] of slides."""
     parts = list(_shifted(list(_parts(finger, q))))
     bodies, palm_moment = _masses_moved_inward(parts)
     joints: list[Joint] = []
@@ -272,7 +287,7 @@ def assemble(finger: Finger, q: SX) -> Assembly:
         if len(next_turns) > 1 and next_turns[0].axis == 2 and next_turns[0].quarters is None:
             taken, next_turns = next_turns[0].angle, next_turns[1:]
         cos_sin = _sum_of_angles(start, (ca.cos(angle + taken), ca.sin(angle + taken)))
-        in_link = (part.link, part.shift, part.offset, body)
+        in_link = (part.link, part.shift, part.slides, part.travel, part.offset, body)
         if to_next is None:
             next_rotation, rotation, axis, body = None, about_z(cos_sin), _Z, body.rotated_about_z(*cos_sin)
         else:
@@ -283,21 +298,8 @@ def assemble(finger: Finger, q: SX) -> Assembly:
                 body.rotated(to_next.T),
             )
         offset = part.offset if to_next is not None else rotation @ part.offset
-        joints.append(
-            Joint(
-                part.coordinate,
-                part.ratio,
-                part.ratio_derivative,
-                cos_sin,
-                next_rotation,
-                next_turns,
-                axis,
-                offset,
-                body,
-                rotation,
-                *in_link,
-            )
-        )
+        how = (part.coordinate, part.ratio, part.ratio_derivative, cos_sin, next_rotation, next_turns)
+        joints.append(Joint(*how, axis, offset, body, rotation, *in_link))
     first = parts[0].fixed_rotation
     return Assembly(SX.eye(3) if first is None else first.T, joints, palm_moment)
 
@@ -310,8 +312,11 @@ def _parts(finger: Finger, q: SX) -> Iterator[_Part]:
         turns, yaw = turns_of(link)
         if link.four_bar is None:
             own, ratio, change = followed(finger, link.joint, angle)
-            angle = own + yaw - (0 if link.reference is None else link.reference)
-            yield _Part(coordinate, turns, angle, None, ratio, change, offset, body, index)
+            moved = own if link.reference is None else own - link.reference
+            angle, travel = (SX(yaw), moved) if link.slides else (moved + yaw, _ZERO)
+            yield _Part(
+                coordinate, turns, angle, None, ratio, change, offset, body, index, slides=link.slides, travel=travel
+            )
         else:
             crank = angle + link.four_bar.reference
             start = SX(link.start + link.four_bar.reference)
@@ -326,12 +331,14 @@ def _shifted(parts: Sequence[_Part]) -> Iterator[_Part]:
     """The parts, each joint shifted along its axis to where the offset before it has no component along that axis."""
     shift = SX(0)
     for part, following in zip(parts, [*parts[1:], None], strict=True):
-        offset, body = part.offset + _Z * shift, part.body.moved(_Z * shift)
-        before = shift
+        along = _Z * (shift + part.travel)
+        offset, body = part.offset + along, part.body.moved(along)
+        before, shift = shift, SX(0)
         if following is not None:
             if following.fixed_rotation is not None:
                 offset = following.fixed_rotation.T @ offset
-            shift, offset = offset[2], ca.vertcat(offset[:2], 0)
+            if not part.slides:
+                shift, offset = offset[2], ca.vertcat(offset[:2], 0)
         yield replace(part, offset=offset, body=body, shift=before)
 
 
@@ -339,7 +346,8 @@ def _masses_moved_inward(parts: Sequence[_Part]) -> tuple[list[Moments], SX]:
     """The parts' bodies, each with its mass moved to the body before, and the first moment moved into the palm."""
     bodies, moved = [], Moments.none()
     for part, before in zip(reversed(parts), [*reversed(parts[:-1]), None], strict=True):
-        moved, rest = (part.body + moved).split()
+        whole = part.body + moved
+        moved, rest = (Moments.none(), whole) if part.slides else whole.split()
         bodies.append(rest)
         if before is not None:
             moved = moved.moved(before.offset)

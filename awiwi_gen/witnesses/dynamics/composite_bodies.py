@@ -19,11 +19,13 @@ _Z = SX([0, 0, 1])
 @dataclass(frozen=True)
 class _Motion:
     """Motion of a body [rad/s]: `frame` (3) is the angular velocity of its working axes, `frame_rate` their rate about
-    the joint relative to the axes before it, and `body_rate` the body's rate relative to its working axes."""
+    the joint relative to the axes before it, `body_rate` the body's rate relative to its working axes, and `slip` (3)
+    [m/s] the velocity with which a slide moves it."""
 
     frame: SX
     frame_rate: SX
     body_rate: SX
+    slip: SX
 
 
 @dataclass(frozen=True)
@@ -37,11 +39,12 @@ class _Composite:
 
     def extended(self, joint: Joint, motion: _Motion) -> "_Composite":
         """With the joint's own body added, and about the joint."""
-        rate = motion.body_rate * ca.skew(joint.axis)
-        dyad = self.momentum @ joint.offset.T + rate @ (joint.offset @ self.body.first.T + joint.body.second)
-        return _Composite(
-            joint.body + self.body.moved(joint.offset), self.momentum + rate @ joint.body.first, self.dyad + dyad
-        )
+        rate, own = motion.body_rate * ca.skew(joint.axis), joint.body
+        next_momentum = self.body.mass * (rate @ joint.offset + motion.slip)
+        dyad = (self.momentum + next_momentum) @ joint.offset.T + motion.slip @ (self.body.first + own.first).T
+        dyad += rate @ (joint.offset @ self.body.first.T + own.second)
+        momentum = self.momentum + next_momentum + rate @ own.first + own.mass * motion.slip
+        return _Composite(own + self.body.moved(joint.offset), momentum, self.dyad + dyad)
 
     def inward(self, joint: Joint, motion: _Motion) -> "_Composite":
         """In the axes before the joint, which do not rotate with it."""
@@ -52,12 +55,18 @@ class _Composite:
     def column(self, joint: Joint, motion: _Motion, speed: SX) -> "_Column":
         """The part of the coordinate's field that this joint contributes."""
         axis, body, frame = joint.axis, self.body, motion.frame
-        force, moment = ca.cross(axis, body.first), body.inertia(axis)
-        # The field is axis x r. Its rate in space is that in the working axes plus that of the axes.
-        stretch = ca.trace(self.dyad) * axis
-        force_rate = ca.cross(axis, self.momentum) + ca.cross(frame, force)
-        moment_rate = stretch - self.dyad @ axis + ca.cross(body.second @ frame, axis)
-        velocity_moment = stretch - self.dyad.T @ axis + body.second @ ca.cross(frame, axis)
+        turned = ca.cross(frame, axis)
+        if joint.slides:  # the field is the axis, everywhere
+            force, moment = body.mass * axis, ca.cross(body.first, axis)
+            force_rate, moment_rate = body.mass * turned, ca.cross(body.first, turned)
+            velocity_moment = ca.cross(self.momentum + ca.cross(frame, body.first), axis)
+        else:
+            force, moment = ca.cross(axis, body.first), body.inertia(axis)
+            # The field is axis x r. Its rate in space is that in the working axes plus that of the axes.
+            stretch = ca.trace(self.dyad) * axis
+            force_rate = ca.cross(axis, self.momentum) + ca.cross(frame, force)
+            moment_rate = stretch - self.dyad @ axis + ca.cross(body.second @ frame, axis)
+            velocity_moment = stretch - self.dyad.T @ axis + body.second @ turned
         ratio, ratio_rate = joint.ratio, joint.ratio_derivative * speed
         return _Column(
             force=ratio * force,
@@ -75,8 +84,8 @@ class _Column:
 
     `force` and `moment` (3 each) are its momentum and angular momentum, `force_rate` and `moment_rate` those of its time
     derivative. `velocity_moment` (3) is the integral of v x field dm, with v the velocity relative to the joint. `row`
-    is the entry of this coordinate's row of C per unit rate of the joint; it is None once an axis was not parallel,
-    where the general formula is needed.
+    is the entry of this coordinate's row of C per unit rate of the joint; it is None once an axis was not parallel or
+    a joint slid, where the general formula is needed.
     """
 
     force: SX
@@ -96,17 +105,17 @@ class _Column:
             None if self.row is None or other.row is None else self.row + other.row,
         )
 
-    def moved(self, joint: Joint, spin: SX) -> "_Column":
-        """About this joint, whose body has the angular velocity `spin` (3), instead of about the next one."""
+    def moved(self, joint: Joint, spin: SX, slip: SX) -> "_Column":
+        """About this joint, whose body turns with `spin` (3) and slides with `slip` (3), instead of about the next one."""
         row = None
-        if self.row is not None and joint.next_rotation is None:
+        if self.row is not None and joint.next_rotation is None and not joint.slides:
             row = self.row - spin[2] * ca.dot(joint.offset, self.force)
         return _Column(
             self.force,
             self.moment + ca.cross(joint.offset, self.force),
             self.force_rate,
             self.moment_rate + ca.cross(joint.offset, self.force_rate),
-            self.velocity_moment + ca.cross(ca.cross(spin, joint.offset), self.force),
+            self.velocity_moment + ca.cross(ca.cross(spin, joint.offset) + slip, self.force),
             row,
         )
 
@@ -130,21 +139,23 @@ def mass_and_coriolis(assembly: Assembly, qd: SX) -> tuple[SX, SX]:
     beyond = _Composite(Moments.none(), SX.zeros(3), SX.zeros(3, 3))
     for joint, motion in reversed(list(zip(assembly.joints, _motions(assembly, qd), strict=True))):
         i, axis, spin = joint.coordinate, joint.axis, motion.frame + motion.body_rate * joint.axis
-        columns = {other: column.moved(joint, spin) for other, column in columns.items()}
+        columns = {other: column.moved(joint, spin, motion.slip) for other, column in columns.items()}
         for other, column in columns.items():
-            entry = ca.dot(axis, column.moment)
+            entry = joint.power(column.force, column.moment)
             row = column.row
-            if row is None:
+            if joint.slides:
+                row = ca.dot(ca.cross(spin, axis), column.force)
+            elif row is None:
                 row = ca.dot(axis, column.velocity_moment) + ca.dot(ca.cross(spin, axis), column.moment)
             mass[i, other] += joint.ratio * entry
             mass[other, i] += joint.ratio * entry
-            coriolis[i, other] += joint.ratio * ca.dot(axis, column.moment_rate)
+            coriolis[i, other] += joint.ratio * joint.power(column.force_rate, column.moment_rate)
             coriolis[other, i] += joint.ratio * row + joint.ratio_derivative * qd[i] * entry
 
         beyond = beyond.extended(joint, motion)
         column = beyond.column(joint, motion, qd[i])
-        mass[i, i] += joint.ratio * ca.dot(axis, column.moment)
-        coriolis[i, i] += joint.ratio * ca.dot(axis, column.moment_rate)
+        mass[i, i] += joint.ratio * joint.power(column.force, column.moment)
+        coriolis[i, i] += joint.ratio * joint.power(column.force_rate, column.moment_rate)
         columns[i] = columns[i] + column if i in columns else column
 
         columns = {other: column.inward(joint) for other, column in columns.items()}
@@ -155,11 +166,15 @@ def mass_and_coriolis(assembly: Assembly, qd: SX) -> tuple[SX, SX]:
 def _motions(assembly: Assembly, qd: SX) -> list[_Motion]:
     motions, frame, body_rate = [], SX.zeros(3), SX(0)
     for joint in assembly.joints:
-        body_rate = body_rate + joint.ratio * qd[joint.coordinate]
+        rate, slip = joint.ratio * qd[joint.coordinate], SX.zeros(3)
+        if joint.slides:
+            slip = rate * joint.axis
+        else:
+            body_rate = body_rate + rate
         if joint.next_rotation is None:
-            motions.append(_Motion(frame, SX(0), body_rate))
+            motions.append(_Motion(frame, SX(0), body_rate, slip))
         else:
             frame = joint.outward(frame + _Z * body_rate)
-            motions.append(_Motion(frame, body_rate, SX(0)))
+            motions.append(_Motion(frame, body_rate, SX(0), slip))
             body_rate = SX(0)
     return motions

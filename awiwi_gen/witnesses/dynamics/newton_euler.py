@@ -48,16 +48,21 @@ def torques(assembly: Assembly, qd: SX, qdd: SX, g: SX) -> SX:
     loads = []
     for joint in assembly.joints:
         velocity = qd[joint.coordinate]
-        body_rate += joint.ratio * velocity
-        body_acceleration += joint.ratio * qdd[joint.coordinate] + joint.ratio_derivative * velocity**2
+        rate = joint.ratio * velocity
+        change = joint.ratio * qdd[joint.coordinate] + joint.ratio_derivative * velocity**2
+        if not joint.slides:
+            body_rate, body_acceleration = body_rate + rate, body_acceleration + change
         acceleration = joint.outward(acceleration)
         if joint.next_rotation is None:
             spin, gradient = frame.spin + _Z * body_rate, frame.body_gradient(body_rate, body_acceleration)
         else:
             frame = frame.beyond(joint, body_rate, body_acceleration)
             spin, gradient, body_rate, body_acceleration = frame.spin, frame.gradient, SX(0), SX(0)
+        if joint.slides:
+            acceleration = acceleration + 2 * rate * ca.cross(spin, joint.axis) + change * joint.axis
         first = joint.body.first
-        loads.append((gradient @ first, _inertial_moment(joint.body, spin, gradient) + ca.cross(first, acceleration)))
+        force = gradient @ first + joint.body.mass * acceleration
+        loads.append((force, _inertial_moment(joint.body, spin, gradient) + ca.cross(first, acceleration)))
         acceleration = acceleration + gradient @ joint.offset
 
     result = SX.zeros(qd.numel())
@@ -65,21 +70,22 @@ def torques(assembly: Assembly, qd: SX, qdd: SX, g: SX) -> SX:
     for joint, (body_force, body_moment) in reversed(list(zip(assembly.joints, loads, strict=True))):
         moment = body_moment + moment + ca.cross(joint.offset, force)
         force = body_force + force
-        result[joint.coordinate] += joint.ratio * ca.dot(joint.axis, moment)
+        result[joint.coordinate] += joint.ratio * joint.power(force, moment)
         force, moment = joint.inward(force), joint.inward(moment)
     return result
 
 
 def weight(assembly: Assembly, g: SX, n: int) -> SX:
-    """Joint torques (n) [N m] against gravity, from first moments alone: the bodies have no mass (`assembly`)."""
+    """Joint torques (n) [N m] against gravity, from first moments; only bodies of slides have mass (`assembly`)."""
     down, downs = assembly.base_rotation @ g, []
     for joint in assembly.joints:
         down = joint.outward(down)
         downs.append(down)
-    result, first = SX.zeros(n), SX.zeros(3)
+    result, first, mass = SX.zeros(n), SX.zeros(3), SX(0)
     for joint, down in reversed(list(zip(assembly.joints, downs, strict=True))):
-        first = joint.body.first + first
-        result[joint.coordinate] -= joint.ratio * ca.dot(joint.axis, ca.cross(first, down))
+        first = joint.body.first + first + mass * joint.offset
+        mass = mass + joint.body.mass
+        result[joint.coordinate] -= joint.ratio * joint.power(mass * down, ca.cross(first, down))
         first = joint.inward(first)
     return result
 

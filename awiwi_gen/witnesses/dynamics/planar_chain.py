@@ -297,7 +297,7 @@ class RotatingPlane:
 def rotating_plane(assembly: Assembly) -> RotatingPlane | None:
     """The assembly as a chain in a rotating plane, or None if it is not such a chain."""
     first, *others = assembly.joints
-    if any(joint.next_rotation is not None for joint in others):
+    if any(joint.next_rotation is not None for joint in others) or any(joint.slides for joint in assembly.joints):
         return None
     if first.next_rotation is not None and not first.axis[2].is_zero():
         return None

@@ -80,9 +80,11 @@ def energy(finger: Finger, q: SX, qd: SX, g: SX) -> tuple[SX, SX]:
     """Kinetic and potential energy [J] (eq. 5.4); the potential of a mass at the base frame's origin is zero."""
     assembly = assemble(finger, q)
     potential, down = -ca.dot(g, assembly.palm_moment), assembly.base_rotation @ g
+    origin = SX.zeros(3)
     for joint in assembly.joints:
-        down = joint.outward(down)
-        potential -= ca.dot(down, joint.body.first)
+        down, origin = joint.outward(down), joint.outward(origin)
+        potential -= ca.dot(down, joint.body.first + joint.body.mass * origin)
+        origin += joint.offset
     kinetic = _kinetic_energy(assembly, qd) + ca.dot(armature(finger, q), qd**2) / 2
     return kinetic, potential + spring_energy(finger, q)
 
