@@ -10,8 +10,8 @@
 #define AWIWI_PARAMS "baked"
 
 /* SHA-256 of the hand's numbers, the options and the generated C; and its first digits as a number. */
-#define AWIWI_BUILD_DIGEST "a27a76b7a1f20acd3aa78843578f3cd6ed741d347f5c67ab18e736ffffe54d49"
-#define AWIWI_BUILD_ID 0xa27a76b7u
+#define AWIWI_BUILD_DIGEST "df4c88f322aa655abaf538a2dffcff68333eb839195b9a36d68b1869b4ca882b"
+#define AWIWI_BUILD_ID 0xdf4c88f3u
 
 /* -- counts and names ------------------------------------------------------------------------------------------------ */
 
@@ -129,9 +129,9 @@ extern "C" {
 extern const unsigned long awiwi_build_id;
 extern const char awiwi_build_digest[65];
 
-/* Lower limits of the joints in rad. */
+/* Lower limits of the joints in rad, of slides in m. */
 extern const double awiwi_joint_low[AWIWI_JOINTS];
-/* Upper limits of the joints in rad. */
+/* Upper limits of the joints in rad, of slides in m. */
 extern const double awiwi_joint_high[AWIWI_JOINTS];
 /* Pulleys of the joints in m; 0 where none is. */
 extern const double awiwi_pulley_radius[AWIWI_JOINTS];

@@ -4,5 +4,5 @@
 #include "awiwi_version.h"
 #include "kernels.h"
 
-const char awiwi_model_digest[65] = "a1c1ad135b2366351070ce79b921dfff6580ceb7c7ae40b2139031ebd7616d20";
+const char awiwi_model_digest[65] = "cab9e9ac18c100c4771232934208eee0be37958627967688a8b4f02e20c22d23";
 const int awiwi_api_version = AWIWI_API_VERSION;

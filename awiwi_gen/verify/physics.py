@@ -265,10 +265,8 @@ def the_power_of_return_strings_is_taken_from_their_energy(x: Motion, return_tor
 def the_bars_of_the_wrist_keep_their_lengths(x: Motion, wrist_points: Any) -> Residual:
     a0, a, b = (np.array([ball(x.values[f"{point}[{i}]"]) for i in range(3)]) for point in ("a0", "a", "b"))
     b0, c0, c = b - b, b * [0, 1, 0], b * [1, 0, 1]
-    if "width" in x.values:
-        c0[1] = ball(x.values["width"])
-    if "c[0]" in x.values:
-        c = np.array([ball(x.values[f"c[{i}]"]) for i in range(3)])
+    c0[1] = ball(x.values["width"]) if "width" in x.values else b[1]
+    c = np.array([ball(x.values[f"c[{i}]"]) for i in range(3)]) if "c[0]" in x.values else c
     moved = [wrist_points[point] for point in "ABC"]
     bars = [(a0, 0), (b0, 1), (c0, 2), (moved[0], 1), (moved[0], 2), (moved[1], 2)]
     drawn = [(a0, a), (b0, b), (c0, c), (a, b), (a, c), (b, c)]
