@@ -81,8 +81,9 @@ def constants(hand: Hand) -> Iterator[Constant]:
     """The arrays of a hand; those over tendons only where motors pull some."""
     ends = [joint_limits(finger) for finger in hand.fingers.values()]
     radii = [finger.radii.get(joint, 0) for finger in hand.fingers.values() for joint in finger.joints]
-    yield Constant("joint_low", "JOINTS", [x for low, _ in ends for x in low], "Lower limits of the joints in rad, of slides in m.")
-    yield Constant("joint_high", "JOINTS", [x for _, high in ends for x in high], "Upper limits of the joints in rad, of slides in m.")
+    for name, which in (("low", 0), ("high", 1)):
+        doc = f"The {name} limits of the joints in rad, of slides in m."
+        yield Constant(f"joint_{name}", "JOINTS", [x for pair in ends for x in pair[which]], doc)
     yield Constant("pulley_radius", "JOINTS", [float(r) for r in radii], "Pulleys of the joints in m; 0 where none is.")
     poses = [x for finger in hand.fingers.values() for x in base_pose(finger)]
     doc = "Poses (4 x 4, row by row) of the fingers' base frames in the palm's, in 1 and m."

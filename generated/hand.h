@@ -129,9 +129,9 @@ extern "C" {
 extern const unsigned long awiwi_build_id;
 extern const char awiwi_build_digest[65];
 
-/* Lower limits of the joints in rad, of slides in m. */
+/* The low limits of the joints in rad, of slides in m. */
 extern const double awiwi_joint_low[AWIWI_JOINTS];
-/* Upper limits of the joints in rad, of slides in m. */
+/* The high limits of the joints in rad, of slides in m. */
 extern const double awiwi_joint_high[AWIWI_JOINTS];
 /* Pulleys of the joints in m; 0 where none is. */
 extern const double awiwi_pulley_radius[AWIWI_JOINTS];
