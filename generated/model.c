@@ -4,5 +4,5 @@
 #include "awiwi_version.h"
 #include "kernels.h"
 
-const char awiwi_model_digest[65] = "cf12d1c70fa564324ae0bb9593c1bfff3327ccef3897f22847f4926cea706439";
+const char awiwi_model_digest[65] = "f421a4d41fb430ae278bc7803c312cce64bd6d36b9694e2178e731f09ade6c90";
 const int awiwi_api_version = AWIWI_API_VERSION;
