@@ -10,6 +10,8 @@ A finger is anything with these attributes (the hand file's `Finger` and its sym
                   carrier of the side (None or a link), inside, and kind), runs (path from point to point:
                   start, body or None, end, counted()), spring (None or stiffness, rest)
     pulled, strings   the tendons without a spring, and those with one
+    transmissions[i]  what each motor pulls: members (indices in pulled), and ratios of all of them, or none by which
+                      the motor's length is that of its only tendon
     couplings[i]  follower, leader, ratio (or None), offset (or None), powers (none, or the coefficients of the second
                   to the fourth)
     base          None or position[3], turn, quarters[3], rpy[3]

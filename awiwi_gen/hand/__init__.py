@@ -51,15 +51,15 @@ class Hand(Part):
 
     @property
     def tendons(self) -> int:
-        """Number of tendons of all fingers that motors pull."""
-        return sum(len(finger.pulled) for finger in self.fingers.values())
+        """Number of tendons of all fingers that motors pull; those of one motor count as one."""
+        return sum(len(finger.transmissions) for finger in self.fingers.values())
 
     @property
     def blocks(self) -> dict[str, tuple[slice, slice]]:
         """Finger -> slices of its tendons and its joints in arrays over all tendons and joints of the hand."""
         found, row, column = {}, 0, 0
         for name, finger in self.fingers.items():
-            tendons, joints = len(finger.pulled), len(finger.joints)
+            tendons, joints = len(finger.transmissions), len(finger.joints)
             found[name] = slice(row, row + tendons), slice(column, column + joints)
             row, column = row + tendons, column + joints
         return found

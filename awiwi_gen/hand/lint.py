@@ -10,6 +10,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Protocol
 
+from awiwi_gen.hand.lint_motors import motor_complaints, names_in_two_fingers
 from awiwi_gen.hand.lint_paths import misplaced, told, without_length
 from awiwi_gen.hand.massless import without_inertia
 from awiwi_gen.hand.parts import PALM, Finger, FourBar, Keys, Limits, Link, Part, covers
@@ -37,9 +38,10 @@ def complaints(limits: Limits, fingers: Mapping[str, Finger], wrist: Wrist | Non
     yield from below(("limits",), _limits(limits))
     for name, finger in fingers.items():
         yield from below(("fingers", name), _finger(finger))
+    yield from names_in_two_fingers(fingers)
     yield from tensor_complaints(fingers)
     if wrist:
-        yield from below(("wrist",), _wrist(wrist, sum(len(finger.pulled) for finger in fingers.values())))
+        yield from below(("wrist",), _wrist(wrist, sum(len(finger.transmissions) for finger in fingers.values())))
 
 
 class Sourced(Protocol):
@@ -262,3 +264,4 @@ def _tendons(finger: Finger) -> Iterator[Complaint]:
                 ("tendons", index, "spring", "rest"),
                 f"{slack}; expected less than its length, {longest * 1e3:.4g} mm",
             )
+    yield from motor_complaints(finger, arms)

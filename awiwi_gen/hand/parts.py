@@ -6,6 +6,7 @@ branch of a four-bar) is structure, on which derivations depend, while they neve
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any
 
@@ -14,14 +15,14 @@ from pydantic import Field
 from awiwi_gen.hand.links import Base, FourBar, Inertia, Link
 from awiwi_gen.hand.measure import Measure
 from awiwi_gen.hand.names import FingerName, JointName, Over, Prefix, Source, Title
-from awiwi_gen.hand.part import Angle, Direction, Keys, Length, Moment, Part, Point, Size, covers, join
+from awiwi_gen.hand.part import Angle, Direction, Keys, Length, Moment, Part, Point, Size, absent, covers, join
 from awiwi_gen.units import Quantity
 
 # fmt: off
 __all__ = [
     "MOST", "PALM", "Angle", "Base", "Coupling", "Finger", "FingerName", "FourBar", "Inertia", "Keys", "Length",
     "Limits", "Link", "Measure", "Moment", "Part", "PathPoint", "Point", "Prefix", "Pulley", "ReturnSpring", "Run", "Size",
-    "Source", "Span", "Tendon", "Title", "covers", "join",
+    "Source", "Span", "Tendon", "Title", "Transmission", "covers", "join",
 ]
 # fmt: on
 
@@ -131,12 +132,22 @@ class ReturnSpring(Part):
     rest: Length
 
 
+class MotorShare(Part):
+    """What a tendon has of a motor that pulls several: the motor's name, and length of the motor's per length of its own.
+
+    A force f of the motor is ratio * f in the tendon, for no work is lost between them.
+    """
+
+    name: Annotated[JointName, Field(examples=['"flexor"'])]
+    ratio: Annotated[Quantity, Measure("0.5", "-100", "100")]
+
+
 class Tendon(Part):
     """Path length in the finger: a sum of all that its keys describe.
 
     These are the rest, sense * radius * angle over the pulleys, arm * angle of joints with an arm of this tendon's own,
     the length of the span, and the lines from point to point of the path, straight or round bodies. A motor pulls it
-    unless it has a spring.
+    unless it has a spring: a motor of its own, or one that it shares.
     """
 
     rest: Length
@@ -145,6 +156,7 @@ class Tendon(Part):
     span: Span | None = None
     path: Annotated[tuple[PathPoint, ...], Field(strict=False, min_length=2, max_length=MOST)] = ()
     spring: ReturnSpring | None = None
+    motor: Annotated[MotorShare | None, Field(exclude_if=absent)] = None
     source: Source
 
     @property
@@ -169,9 +181,37 @@ class Tendon(Part):
             "arms": list(self.arms),
             "path": [point.structure() for point in self.path],
             "spring": self.spring is not None,
+            "motor": self.motor and self.motor.name,
         }
         found = {key: value for key, value in more.items() if value}
         return [list(self.over), self.span and self.span.joint, *([found] if found else [])]
+
+
+@dataclass(frozen=True)
+class Transmission:
+    """What one motor pulls: its tendons in the order of the file, and of each the index among all pulled tendons.
+
+    `ratios` has the length of the motor's per length of each tendon; it is empty for a tendon with a motor of its own.
+    """
+
+    tendons: tuple[Tendon, ...]
+    members: tuple[int, ...]
+    ratios: tuple[Quantity, ...] = ()
+
+    @property
+    def two_way(self) -> bool:
+        """Whether the motor winds some tendons up while it lets others go, so that its force has both signs."""
+        return any(ratio.value < 0 for ratio in self.ratios)
+
+    @property
+    def weights(self) -> list[float]:
+        """The ratios as numbers, one for each tendon."""
+        return [float(ratio) for ratio in self.ratios] or [1.0]
+
+    def arms(self, coupling: Sequence[Sequence[float]]) -> list[float]:
+        """The motor's arms at all joints [m/rad], from those of every pulled tendon."""
+        rows = [coupling[member] for member in self.members]
+        return [sum(w * arm for w, arm in zip(self.weights, arms, strict=True)) for arms in zip(*rows, strict=True)]
 
 
 class Coupling(Part):
@@ -246,8 +286,20 @@ class Finger(Part):
 
     @property
     def pulled(self) -> tuple[Tendon, ...]:
-        """The m tendons that motors pull, in the order of the arrays over tendons; the others are return strings."""
+        """The tendons that motors pull; the others are return strings."""
         return tuple(tendon for tendon in self.tendons if tendon.spring is None)
+
+    @property
+    def transmissions(self) -> tuple[Transmission, ...]:
+        """What each of the m motors pulls, in the order of the arrays over tendons: by its first tendon."""
+        shared: dict[int | str, list[int]] = {}
+        for index, tendon in enumerate(self.pulled):
+            shared.setdefault(tendon.motor.name if tendon.motor else index, []).append(index)
+        found = []
+        for members in shared.values():
+            tendons = tuple(self.pulled[index] for index in members)
+            found.append(Transmission(tendons, tuple(members), tuple(t.motor.ratio for t in tendons if t.motor)))
+        return tuple(found)
 
     @property
     def strings(self) -> tuple[Tendon, ...]:

@@ -36,19 +36,21 @@ def base_kernels(hand: Hand, name: str, finger: Finger) -> list[Kernel]:
     base = base_of(finger)
     if not base.spans:
         return []
-    whole = input_ports(hand, finger, Size(len(finger.joints), len(finger.pulled), len(finger.links)))
+    whole = input_ports(hand, finger, Size.of(finger))
     ports = {"h": subset(whole["h"], base.spans), "start": subset(whole["start"], base.joints)}
     return of_base.kernels(name, finger, f"fingers.{name}", finger.structure(), ports, base)
 
 
 def base_of(finger: Finger) -> Base:
     """The spans, and the joints between them and the palm; empty if the tendons of spans run over other joints too."""
+    if any(transmission.ratios for transmission in finger.transmissions):
+        return Base((), ())  # the lengths of spans are not measured one by one
     order = [link.joint for link in finger.links]
     spans = tuple(i for i, tendon in enumerate(finger.pulled) if tendon.span)
     ends = [order.index(tendon.span.joint) for tendon in finger.pulled if tendon.span]
     leaders = [finger.leaders.get(joint, joint) for joint in order[: max(ends, default=0)]]
     joints = tuple(i for i, joint in enumerate(finger.joints) if joint in leaders)
-    others = set().union(*(moved(finger, finger.pulled[i]) for i in spans)) - set(leaders)
+    others = set().union(*(moved(finger, finger.transmissions[i]) for i in spans)) - set(leaders)
     if any(run.body for tendon in finger.pulled for run in tendon.runs):
         return Base((), ())  # the slopes of wraps do not bound the gradient's steps
     return Base(spans, joints) if not others and len(joints) <= len(spans) else Base((), ())
@@ -73,7 +75,7 @@ def gradient_search(finger: Finger) -> Solver:
         arrays={"low": tuple(low[j] for j in base.joints), "high": tuple(high[j] for j in base.joints)},
         strings={
             "joints": str(len(finger.joints)),
-            "tendons": str(len(finger.pulled)),
+            "tendons": str(len(finger.transmissions)),
             "search": f"awiwi_gradient_search(&problem, h_in, start_in, {TRIALS}, 0, q_out)",
         },
         iterations=TRIALS + 1,

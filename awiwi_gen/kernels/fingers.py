@@ -8,22 +8,27 @@ from typing import Any
 
 from awiwi_gen.hand import Hand
 from awiwi_gen.hand.lever import Lever
-from awiwi_gen.hand.parts import Finger, PathPoint, Tendon
+from awiwi_gen.hand.parts import Finger, PathPoint, Tendon, Transmission
 from awiwi_gen.hand.pose import polynomial
 from awiwi_gen.kernel import STOP, Kernel, Port, Solver
 from awiwi_gen.kernels.declare import Family, within
-from awiwi_gen.kernels.routing import groups, moved, wraps_hold
+from awiwi_gen.kernels.routing import groups, is_bent, is_curved, least_forces, moved, wraps_hold
 from awiwi_gen.structure import link_number, rolls, wraps
 from awiwi_gen.units import J, N, Unit, kg, m, one, rad, s
 
 
 @dataclass(frozen=True)
 class Size:
-    """Sizes of a finger's arrays: independent joints, tendons, links."""
+    """Sizes of a finger's arrays: independent joints, tendons (those of one motor count as one), links."""
 
     joints: int
     tendons: int
     links: int
+
+    @classmethod
+    def of(cls, finger: Finger) -> Size:
+        """The sizes of a finger's arrays."""
+        return cls(len(finger.joints), len(finger.transmissions), len(finger.links))
 
 
 per_finger: Family[Size] = Family()
@@ -33,7 +38,7 @@ STIFFEST = 50.0  # [N m/rad]; more than the tendons of a hand give a joint
 
 def finger_kernels(hand: Hand, name: str, finger: Finger) -> list[Kernel]:
     """All kernels of one finger."""
-    size = Size(len(finger.joints), len(finger.pulled), len(finger.links))
+    size = Size.of(finger)
     ports = input_ports(hand, finger, size)
     return guarded(finger, per_finger.kernels(name, finger, f"fingers.{name}", finger.structure(), ports, size))
 
@@ -64,7 +69,8 @@ def input_ports(hand: Hand, finger: Finger, size: Size) -> dict[str, Port]:
     n, limits = (size.joints,), hand.limits
     low, high = joint_limits(finger)
     slack, taut = force_range(hand)
-    lengths = [length_range(finger, tendon) for tendon in finger.pulled]
+    least = least_forces(finger, limits)
+    lengths = [motor_range(finger, transmission) for transmission in finger.transmissions]
 
     def symmetric(shape: tuple[int, ...], unit: Unit, limit: Any) -> Port:
         return Port(shape, unit, -float(limit), float(limit))
@@ -74,7 +80,7 @@ def input_ports(hand: Hand, finger: Finger, size: Size) -> dict[str, Port]:
         "qd": symmetric(n, rad / s, limits.joint_velocity),
         "qdd": symmetric(n, rad / s**2, limits.joint_acceleration),
         "tau": symmetric(n, N * m, limits.joint_torque),
-        "f": Port((size.tendons,), N, 0.0, float(limits.tendon_force)),
+        "f": Port((size.tendons,), N, least if any(least) else 0.0, float(limits.tendon_force)),
         "k": Port((size.tendons,), N / m, float(limits.tendon_stiffness_low), float(limits.tendon_stiffness_high)),
         "h": Port((size.tendons,), m, tuple(low for low, _ in lengths), tuple(high for _, high in lengths)),
         "start": Port(n, rad, low, high),
@@ -105,6 +111,14 @@ def limit_paths(finger: Finger) -> dict[str, tuple[str, ...]]:
     """Paths of the lower and upper limits of the independent joints; empty where a joint has none."""
     free = [(i, link) for i, link in enumerate(finger.links) if link.joint in finger.joints]
     return {end: tuple(f"links[{i}].{end}" if getattr(k, end) else "" for i, k in free) for end in ("low", "high")}
+
+
+def motor_range(finger: Finger, transmission: Transmission) -> tuple[float, float]:
+    """Bounds of the length of what a motor pulls [m]."""
+    ranges = [length_range(finger, tendon) for tendon in transmission.tendons]
+    ends = [sorted((weight * low, weight * high))
+            for weight, (low, high) in zip(transmission.weights, ranges, strict=True)]  # fmt: skip
+    return sum(low for low, _ in ends), sum(high for _, high in ends)
 
 
 def length_range(finger: Finger, tendon: Tendon) -> tuple[float, float]:
@@ -310,24 +324,14 @@ def return_torque(finger: Any, q: Any) -> Any:
 # -- joint angles from tendon lengths ---------------------------------------------------------------------
 
 
-def is_curved(finger: Finger) -> bool:
-    """Whether the coupling depends on the pose, as that of lines from link to link does."""
-    return any(is_bent(finger, tendon) for tendon in finger.pulled)
-
-
-def is_bent(finger: Finger, tendon: Tendon) -> bool:
-    """Whether a tendon has lines from point to point, straight or round bodies, or joints that follow others by a curve."""
-    curves = {coupling.follower for coupling in finger.couplings if coupling.powers}
-    return bool(tendon.span or tendon.path or curves & {*tendon.arms, *(over[1:] for over in tendon.over)})
-
-
 def estimated_parts(finger: Finger) -> list[tuple[list[int], list[int], bool]]:
     """Joints and tendons, by index, that depend on no others, and whether their coupling is constant."""
     found = []
     for tendons in groups(finger):
-        pulled = set().union(*(moved(finger, finger.pulled[i]) for i in tendons))
+        members = [finger.transmissions[i] for i in tendons]
+        pulled = set().union(*(moved(finger, each) for each in members))
         joints = [i for i, joint in enumerate(finger.joints) if joint in pulled]
-        found.append((joints, tendons, not any(is_bent(finger, finger.pulled[i]) for i in tendons)))
+        found.append((joints, tendons, not any(is_bent(finger, each) for each in members)))
     return [part for part in found if part[0]]
 
 
@@ -346,7 +350,7 @@ def nonlinear_estimate(finger: Finger, iterations: int = 24) -> Solver | None:
         template="joint_estimate.c.j2",
         problem="least squares",
         uses=("tendon_lengths", "coupling"),
-        equations=tuple(range(len(finger.pulled))),
+        equations=tuple(range(len(finger.transmissions))),
         unknowns=tuple(range(len(low))),
         arrays={"low": low, "high": high},
         strings={

@@ -1,4 +1,5 @@
-"""What only some fingers have: armature, damping, friction and springs in their joints, and a place in the palm."""
+"""What only some fingers have: armature, damping, friction and springs in their joints, motors with several tendons, and
+a place in the palm."""
 
 from __future__ import annotations
 
@@ -32,10 +33,20 @@ PASSIVE = {
     "energy": "The potential energy has that of the joints' springs.",
 }
 
+SHARED = {
+    "tendon_lengths": "Tendons of one motor count as one, whose length is the sum of ratio times length.",
+    "coupling": "Tendons of one motor count as one, whose length is the sum of ratio times length.",
+    "joint_torque": "A motor of several tendons pulls each with ratio times its force.",
+    "joint_stiffness": "Those of a motor of several tendons are on the side of the motor.",
+    "joint_torque_and_stiffness": "Those of a motor of several tendons are on the side of the motor.",
+    "tendon_distribution": "A motor of several tendons has one force.",
+}
+
 
 def documented(finger: Finger, kernels: list[Kernel]) -> list[Kernel]:
-    """The kernels of a finger; what their joints add is told in their documentation."""
-    for notes, has in ((ARMATURE, finger.has_armature), (PASSIVE, finger.passive)):
+    """The kernels of a finger; what their joints and motors add is told in their documentation."""
+    shared = any(transmission.ratios for transmission in finger.transmissions)
+    for notes, has in ((ARMATURE, finger.has_armature), (PASSIVE, finger.passive), (SHARED, shared)):
         if has:
             kernels = [replace(k, doc=f"{k.doc}\n{notes[k.family]}") if k.family in notes else k for k in kernels]
     return kernels
@@ -43,7 +54,7 @@ def documented(finger: Finger, kernels: list[Kernel]) -> list[Kernel]:
 
 def optional_kernels(hand: Hand, name: str, finger: Finger) -> list[Kernel]:
     """The kernels of a finger with passive torques in its joints, and those of a finger with a base in the palm."""
-    size = Size(len(finger.joints), len(finger.tendons), len(finger.links))
+    size = Size.of(finger)
     ports = input_ports(hand, finger, size)
     ports["g_palm"] = ports["g"]
     families = [family for family, has in ((per_passive, finger.passive), (per_placed, finger.base)) if has]

@@ -23,7 +23,7 @@ of_hand: Family[Size] = Family("hand_tendons")
 
 def hand_kernels(hand: Hand) -> list[Kernel]:
     """The kernels of all tendons together."""
-    sizes = {name: Size(len(f.joints), len(f.pulled), len(f.links)) for name, f in hand.fingers.items()}
+    sizes = {name: Size.of(finger) for name, finger in hand.fingers.items()}
     fingers = [input_ports(hand, finger, sizes[name]) for name, finger in hand.fingers.items()]
     ports = {name: joined([of_finger[name] for of_finger in fingers]) for name in ("q", "f", "k")}
     if hand.wrist:
