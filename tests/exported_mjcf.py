@@ -69,6 +69,7 @@ def read_mjcf(text: str) -> Model:
     places = {site.name: Place(site.body, site.position) for site in sites}
     references = {joint.name: joint.reference for joint in joints}
     tendons, mimics = [], []
+    both = {a.get("tendon") for a in root.findall("actuator/*") if numbers(a.get("ctrlrange"), "0 0")[0] < 0}
     for each in root.findall("tendon/*"):
         _, slack = numbers(each.get("springlength"), "0 0")
         spring = {"stiffness": float(each.get("stiffness", 0)), "rest": slack}
@@ -82,7 +83,8 @@ def read_mjcf(text: str) -> Model:
                 path.append(beside(round_[step.get("geom")], places.get(step.get("sidesite"))))
             elif step.tag == "pulley":
                 divisor = float(step.get("divisor"))
-        tendons.append(Tendon(each.get("name"), arms, tuple(path), **spring))
+        two_way = bool(arms) and each.get("name") in both
+        tendons.append(Tendon(each.get("name"), arms, tuple(path), two_way=two_way, **spring))
     for each in root.findall("equality/joint"):
         follower, leader = each.get("joint1"), each.get("joint2")
         curve = Polynomial(numbers(each.get("polycoef")))(Polynomial([-references[leader], 1.0]))

@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from exported_mjcf import read_mjcf
 
 from awiwi_gen.build import load
 from awiwi_gen.emit.options import Options
 from awiwi_gen.errors import InputError
 from awiwi_gen.hand import Hand
-from awiwi_gen.hand.capability import left_out_names
+from awiwi_gen.hand.capability import left_out_names, of_motors
+from awiwi_gen.hand.pose import Chain
+from awiwi_gen.interchange import export_mjcf
+from awiwi_gen.interchange.draft import draft
+from awiwi_gen.interchange.toml import hand_text
 from awiwi_gen.kernels import catalog
 from awiwi_gen.pipeline import Job, cached_tree, verify
 
@@ -138,6 +144,39 @@ def test_one_motor_for_two_joints_leaves_out_what_needs_more():
     assert "none pulls towards" in reason["index_tendon_distribution"]
     least = less.replace('    { rest = "40 mm", over = ["+mcp"], source = "assumed" },\n', "")
     assert "move only 1 of the 2 joints" in left_out_names(Hand.parse(least))["index_joint_estimate"]
+
+
+def test_an_exported_motor_is_one_tendon_and_comes_back_with_its_arms(hand):
+    text, losses = export_mjcf.text_and_losses(hand)
+    again = Hand.parse(hand_text(draft(read_mjcf(text))))
+    root = ElementTree.fromstring(text)  # noqa: S314 our own
+    ranges = {each.get("tendon"): each.get("ctrlrange") for each in root.findall("actuator/*")}
+
+    assert ranges["index.flexor"] == "0 100"
+    assert ranges["thumb.turner"] == "-100 100"
+    assert [each.get("divisor") for each in root.iter("pulley")] == ["2.5"]
+    assert [loss.places for loss in losses if "arcs and lines" in loss.what] == [("thumb.grip",)]
+    for finger, rows in (("index", [0, 1, 2]), ("thumb", [0])):  # arcs and lines of a motor are two tendons there
+        ours, theirs = (next(of_motors(each.fingers[finger], [coupling(each, finger)])) for each in (hand, again))
+        assert np.array(theirs)[rows] == pytest.approx(np.array(ours)[rows], abs=1e-15)
+    assert [each.two_way for each in again.fingers["thumb"].transmissions] == [True, False, False]
+    twice = Hand.parse(hand_text(draft(read_mjcf(export_mjcf.text_and_losses(again)[0]))))
+    assert [t.motor.name for t in twice.fingers["thumb"].pulled if t.motor] == ["thumb_turner"] * 2
+    assert twice.fingers["thumb"].structure() == again.fingers["thumb"].structure()
+
+
+def coupling(hand: Hand, finger: str) -> list[list[float]]:
+    return Chain(hand.fingers[finger]).coupling([0.2, 0.3])
+
+
+@pytest.mark.parametrize("motors", export_mjcf.MOTORS)
+def test_forces_of_motors_that_pull_both_ways_have_both_signs_in_every_export(hand, motors):
+    root = ElementTree.fromstring(export_mjcf.text_and_losses(hand, motors)[0])  # noqa: S314 our own
+    actuators = {each.get("name"): each.get("ctrlrange") or each.get("forcerange") for each in root.find("actuator")}
+    low, high = map(float, actuators["thumb.turner.motor"].split())
+
+    assert low == -high < 0
+    assert "0" in actuators["index.flexor.motor"].split()
 
 
 @pytest.mark.parametrize("options", [Options(params="runtime"), Options(scalar="f32")], ids=["runtime", "f32"])

@@ -74,9 +74,8 @@ def _of_finger(finger: Finger) -> tuple[tuple[str, str], ...]:
 
 def of_motors(finger: Finger, couplings: Iterable[list[list[float]]]) -> Iterator[list[list[float]]]:
     """The coupling of the motors [m/rad], a row for each, from that of all tendons of the file, in some poses."""
-    rows = [row for row, tendon in enumerate(finger.tendons) if tendon.spring is None]
     for coupling in couplings:
-        pulled = [coupling[row] for row in rows]
+        pulled = [coupling[number] for number in finger.pulled_numbers]
         yield [transmission.arms(pulled) for transmission in finger.transmissions]
 
 

@@ -33,7 +33,7 @@ def motor_complaints(finger: Finger, couplings: Sequence[Sequence[Sequence[float
             yield keys, "is at an elastic return string, which no motor pulls; expected motor or spring, not both"
         elif tendon.motor and not tendon.motor.ratio.value:
             yield (*keys, "ratio"), f'= "{tendon.motor.ratio}" moves nothing; expected another number, such as "0.5"'
-    numbers = [number for number, tendon in enumerate(finger.tendons) if tendon.spring is None]
+    numbers = finger.pulled_numbers
     pulled = [[coupling[number] for number in numbers] for coupling in couplings]
     for transmission in finger.transmissions:
         if transmission.ratios:

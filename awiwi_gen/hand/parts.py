@@ -181,7 +181,6 @@ class Tendon(Part):
             "arms": list(self.arms),
             "path": [point.structure() for point in self.path],
             "spring": self.spring is not None,
-            "motor": self.motor and self.motor.name,
         }
         found = {key: value for key, value in more.items() if value}
         return [list(self.over), self.span and self.span.joint, *([found] if found else [])]
@@ -290,6 +289,11 @@ class Finger(Part):
         return tuple(tendon for tendon in self.tendons if tendon.spring is None)
 
     @property
+    def pulled_numbers(self) -> list[int]:
+        """Of every tendon that motors pull, its number in the file."""
+        return [number for number, tendon in enumerate(self.tendons) if tendon.spring is None]
+
+    @property
     def transmissions(self) -> tuple[Transmission, ...]:
         """What each of the m motors pulls, in the order of the arrays over tendons: by its first tendon."""
         shared: dict[int | str, list[int]] = {}
@@ -313,11 +317,13 @@ class Finger(Part):
 
     def structure(self) -> dict[str, Any]:
         """Everything but the numbers, ready for JSON: fingers with equal structures share their derivations."""
+        shared = [transmission.members for transmission in self.transmissions if transmission.ratios]
         return {
             "links": [link.structure() for link in self.links],
             "pulleys": [pulley.joint for pulley in self.pulleys],
             "tendons": [tendon.structure() for tendon in self.tendons],
             "couplings": [coupling.structure() for coupling in self.couplings],
+            **({"motors": shared} if shared else {}),
             **({"base": self.base.quarters} if self.base else {}),
         }
 

@@ -33,7 +33,7 @@ def read(path: Path, exact: bool = False, without: Iterable[str] = (), fit: bool
     are left out. With `fit`, tendons that wrap around geoms get constant arms; else they are lost.
     """
     spec, notes = parse(path, exact)
-    driven = {each.target for each in spec.actuators if each.trntype == mujoco.mjtTrn.mjTRN_TENDON}
+    driven = _driven(spec)
     losses = prepare(spec, set(without))
     massless = {body.name for body in spec.bodies[1:] if body.explicitinertial and body.mass <= LEAST_MASS}
     compiled = compile_spec(spec, path)
@@ -52,6 +52,22 @@ def read(path: Path, exact: bool = False, without: Iterable[str] = (), fit: bool
         losses=(*losses, *lost),
         notes=tuple(notes),
     )
+
+
+def _driven(spec: Any) -> dict[str, bool]:
+    """Tendon -> whether its actuators both pull and push it, as far as the file limits their forces."""
+    signs: dict[str, set[bool]] = {}
+    for each in spec.actuators:
+        if each.trntype != mujoco.mjtTrn.mjTRN_TENDON:
+            continue
+        found, ends = signs.setdefault(each.target, set()), [0.0, 0.0]
+        constant = each.gaintype == mujoco.mjtGain.mjGAIN_FIXED and each.biastype == mujoco.mjtBias.mjBIAS_NONE
+        if each.forcerange[0] < each.forcerange[1] and each.forcelimited:
+            ends = [*each.forcerange]
+        elif constant and each.ctrlrange[0] < each.ctrlrange[1] and each.ctrllimited:
+            ends = [each.gainprm[0] * end for end in each.ctrlrange]
+        found |= {bool(end * each.gear[0] > 0) for end in ends if end * each.gear[0]}
+    return {name: len(found) == 2 for name, found in signs.items()}
 
 
 def parse(path: Path, exact: bool) -> tuple[Any, list[str]]:
@@ -316,8 +332,8 @@ def _mimics(compiled: Any) -> tuple[Mimic, ...]:
     return tuple(found)
 
 
-def _tendons(compiled: Any, driven: set[str], fit: bool) -> tuple[tuple[Tendon, ...], list[Loss]]:
-    found, fits, pushed, poly, both = [], [], [], [], []
+def _tendons(compiled: Any, driven: dict[str, bool], fit: bool) -> tuple[tuple[Tendon, ...], list[Loss]]:
+    found, fits, pushed, poly, both, two_way = [], [], [], [], [], []
     losses: dict[str, list[str]] = {}
     joint_wrap = mujoco.mjtWrap.mjWRAP_JOINT
     for index in range(compiled.ntendon):
@@ -337,13 +353,14 @@ def _tendons(compiled: Any, driven: set[str], fit: bool) -> tuple[tuple[Tendon, 
             poly.append(name)
         if kinds == {int(joint_wrap)}:
             arms = {compiled.joint(int(compiled.wrap_objid[k])).name: float(compiled.wrap_prm[k]) for k in places}
-            found.append(Tendon(name, arms=arms, **spring))
+            found.append(Tendon(name, arms=arms, two_way=driven.get(name, False), **spring))
         elif fit and kinds != {int(mujoco.mjtWrap.mjWRAP_SITE)}:
-            tendon, error = fitted(compiled, Tendon(name, **spring), _mimics(compiled))
+            tendon, error = fitted(compiled, Tendon(name, two_way=driven.get(name, False), **spring), _mimics(compiled))
             found.append(tendon)
             fits.append(f"{name} by {error * 1e3:.2g} mm")
         else:
             path, lost = path_of(compiled, places)
+            two_way += [name] * driven.get(name, False)
             if path:
                 found.append(Tendon(name, path=path, **spring))
             for what in lost:
@@ -352,6 +369,7 @@ def _tendons(compiled: Any, driven: set[str], fit: bool) -> tuple[tuple[Tendon, 
         *(Loss(what, tuple(names)) for what, names in losses.items()),
         Loss("wraps of tendons: constant arms fitted, lengths differ at most", tuple(fits)),
         Loss("springs of tendons that also push: the hand's springs only pull", tuple(pushed)),
+        Loss("motors that also push tendons through sites: the hand's motors only pull these", tuple(two_way)),
         Loss("springs of tendons that a motor pulls: the hand's tendons have one or the other", tuple(both)),
         Loss(
             "polynomial stiffness or damping of joints: only the linear term is kept",

@@ -92,7 +92,7 @@ class Tendon:
     """A tendon: either `arms`, length per angle by joint, or a `path` from place to place.
 
     Its length also has a `constant` part [m]. An elastic string has a `stiffness` [N/m] and no force where it is as long
-    as `rest`.
+    as `rest`. A tendon of arms that its motor also pushes is `two_way`.
     """
 
     name: str
@@ -101,6 +101,7 @@ class Tendon:
     stiffness: float = 0.0
     rest: float = 0.0
     constant: float = 0.0
+    two_way: bool = False
 
 
 @dataclass(frozen=True)

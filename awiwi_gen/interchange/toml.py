@@ -149,6 +149,9 @@ def _tendon_lines(tendon: DraftTendon, file: str) -> list[str]:
     if tendon.stiffness:
         stiffness, rest = quantity(tendon.stiffness, "N/m"), length(tendon.slack)
         lines += [f'spring = {{ stiffness = "{stiffness}", rest = "{rest}" }}']
+    if tendon.motor:
+        name, ratio = tendon.motor
+        lines += [f'motor = {{ name = "{name}", ratio = "{quantity(ratio, "").strip()}" }}']
     return [*lines, f"source = {_text(cite(f'{file} tendon {tendon.name}'))}"]
 
 
