@@ -39,6 +39,7 @@ def read_mjcf(text: str) -> Model:
     zero = np.zeros(3)
     bodies, joints, sites = [Body("world", 0, zero, np.eye(3), 0.0, zero, np.zeros((3, 3)))], [], []
     round_ = {}
+    measured = {each.get("joint") for each in root.findall("sensor/jointpos")}
 
     def visit(element: ElementTree.Element, parent: int) -> None:
         inertial, index = element.find("inertial"), len(bodies)
@@ -55,6 +56,8 @@ def read_mjcf(text: str) -> Model:
         for each in element.findall("joint"):
             low, high = numbers(each.get("range")) if each.get("range") else (None, None)
             own = {key: float(each.get(name, 0)) for key, name in ATTRIBUTES.items()}
+            own["effort"] = numbers(each.get("actuatorfrcrange"), "0 0")[1]
+            own["measured"] = each.get("name") in measured
             axis, anchor = numbers(each.get("axis")), numbers(each.get("pos"))
             joints.append(Joint(each.get("name"), index, "hinge", axis, anchor, low, high, **own))
         sites.extend(Site(each.get("name"), index, numbers(each.get("pos"))) for each in element.findall("site"))

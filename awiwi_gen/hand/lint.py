@@ -12,6 +12,7 @@ from typing import Protocol
 
 from awiwi_gen.hand.lint_motors import motor_complaints, names_in_two_fingers
 from awiwi_gen.hand.lint_paths import misplaced, told, without_length
+from awiwi_gen.hand.lint_tick import joint_complaints
 from awiwi_gen.hand.massless import without_inertia
 from awiwi_gen.hand.parts import PALM, Finger, FourBar, Keys, Limits, Link, Part, covers
 from awiwi_gen.hand.pose import Chain
@@ -203,6 +204,7 @@ def _link(link: Link, follows: bool) -> Iterator[Complaint]:
     if link.low and link.high and not follows:
         yield from _range(link)
     yield from _body(link)
+    yield from joint_complaints(link, follows)
     if link.four_bar:
         yield from below(("four_bar",), sources(link.four_bar))
         if link.reference is not None:

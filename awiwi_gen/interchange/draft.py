@@ -103,6 +103,7 @@ class DraftHand:
     names: dict[str, str]
     losses: tuple[Loss, ...]
     notes: tuple[str, ...] = field(default=())
+    tendon_force: float = 0.0
 
 
 def draft(model: Model, palm: str = "", named: Mapping[str, str] | None = None) -> DraftHand:
@@ -136,6 +137,7 @@ def draft(model: Model, palm: str = "", named: Mapping[str, str] | None = None) 
         names={"joint " + old: new for old, new in names.items() if old != new},
         losses=(*model.losses, *losses, *lost, *left, *_approximated(chains, fingers)),
         notes=model.notes,
+        tendon_force=model.tendon_force,
     )
 
 

@@ -50,7 +50,7 @@ def text_and_losses(hand: Hand, motors: str = FORCE) -> tuple[str, list[Loss]]:
     option = SubElement(root, "option", integrator="implicitfast")
     if motors != FORCE:
         option.set("timestep", TIMESTEP)
-    sections = {name: Element(name) for name in ("tendon", "equality", "actuator")}
+    sections = {name: Element(name) for name in ("tendon", "equality", "actuator", "sensor")}
     lost: Lost = {}
     world = SubElement(root, "worldbody")
     drives = Drives(hand, motors, world, sections, lost)
@@ -100,6 +100,10 @@ class _Writer:
         for link in self.finger.links:
             if link.four_bar is not None:
                 self._coupler(link)
+        for link in self.finger.links:
+            if link.sensor is not None:
+                joint = f"{self.name}_{link.joint}"
+                SubElement(self.sections["sensor"], "jointpos", name=f"{joint}.sensor", joint=joint)
         motors = {self.finger.pulled_numbers[t.members[0]]: (i, t) for i, t in enumerate(self.finger.transmissions)}
         for number, tendon in enumerate(self.finger.tendons):
             if tendon.spring is not None:
@@ -107,8 +111,11 @@ class _Writer:
             elif number in motors:
                 self._transmission(*motors[number])
         if not self.finger.tendons:
-            for joint in self.finger.joints:
-                self.drives.turn(f"{self.name}_{joint}")
+            for link in self.finger.links:
+                if link.joint in self.finger.joints:
+                    self.drives.turn(
+                        f"{self.name}_{link.joint}", float(link.effort or self.drives.hand.limits.joint_torque)
+                    )
 
     def _lose(self, what: str, place: str) -> None:
         self.lost.setdefault(what, []).append(place)

@@ -73,9 +73,8 @@ class Drives:
 
     # -- joints ------------------------------------------------------------------------------------------------------
 
-    def turn(self, joint: str) -> None:
-        """A motor in a joint of a finger without tendons."""
-        torque = float(self.hand.limits.joint_torque)
+    def turn(self, joint: str, torque: float) -> None:
+        """A motor in a joint of a finger without tendons, and its largest torque [N m]."""
         if self.motors == POSITION:
             SubElement(self.sections["actuator"], "position", name=f"{joint}.motor", joint=joint,
                        kp=text(torque / (10 * _SHARE)), forcerange=text((-torque, torque)))  # fmt: skip

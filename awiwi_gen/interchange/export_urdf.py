@@ -121,7 +121,8 @@ def _hinge(
     SubElement(joint, "origin", xyz=text(part.position), rpy=text(rpy_of(drawn)))
     SubElement(joint, "axis", xyz="0 0 1")
     low, high = limits
-    SubElement(joint, "limit", lower=text(low), upper=text(high), effort=text(float(hand.limits.joint_torque)),
+    effort = getattr(part.link, "effort", None) or hand.limits.joint_torque
+    SubElement(joint, "limit", lower=text(low), upper=text(high), effort=text(float(effort)),
                velocity=text(float(hand.limits.joint_velocity)))  # fmt: skip
     return joint
 

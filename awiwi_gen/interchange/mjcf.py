@@ -33,7 +33,10 @@ def read(path: Path, exact: bool = False, without: Iterable[str] = (), fit: bool
     are left out. With `fit`, tendons that wrap around geoms get constant arms; else they are lost.
     """
     spec, notes = parse(path, exact)
-    driven = _driven(spec)
+    forces = _forces(spec)
+    most = [max(map(abs, ends)) for ends in forces.values()]
+    driven = {name: min(ends) < 0 < max(ends) for name, ends in forces.items()}
+    measured = {each.objname for each in spec.sensors if each.type == mujoco.mjtSensor.mjSENS_JOINTPOS}
     losses = prepare(spec, set(without))
     massless = {body.name for body in spec.bodies[1:] if body.explicitinertial and body.mass <= LEAST_MASS}
     compiled = compile_spec(spec, path)
@@ -42,7 +45,7 @@ def read(path: Path, exact: bool = False, without: Iterable[str] = (), fit: bool
         name=spec.modelname or path.stem,
         file=path.name,
         bodies=tuple(_body(compiled, index, massless) for index in range(compiled.nbody)),
-        joints=tuple(_joint(compiled, index) for index in range(compiled.njnt)),
+        joints=tuple(_joint(compiled, index, measured) for index in range(compiled.njnt)),
         tendons=tendons,
         mimics=_mimics(compiled),
         sites=tuple(
@@ -51,23 +54,24 @@ def read(path: Path, exact: bool = False, without: Iterable[str] = (), fit: bool
         ),
         losses=(*losses, *lost),
         notes=tuple(notes),
+        tendon_force=max(most) if most and min(most) > 0 else 0.0,
     )
 
 
-def _driven(spec: Any) -> dict[str, bool]:
-    """Tendon -> whether its actuators both pull and push it, as far as the file limits their forces."""
-    signs: dict[str, set[bool]] = {}
+def _forces(spec: Any) -> dict[str, list[float]]:
+    """Tendon -> ends of the forces [N] of its actuators, above zero where they lengthen it; zeros without a limit."""
+    found: dict[str, list[float]] = {}
     for each in spec.actuators:
         if each.trntype != mujoco.mjtTrn.mjTRN_TENDON:
             continue
-        found, ends = signs.setdefault(each.target, set()), [0.0, 0.0]
+        ends = [0.0, 0.0]
         constant = each.gaintype == mujoco.mjtGain.mjGAIN_FIXED and each.biastype == mujoco.mjtBias.mjBIAS_NONE
-        if each.forcerange[0] < each.forcerange[1] and each.forcelimited:
+        if each.forcelimited and each.forcerange[0] < each.forcerange[1]:
             ends = [*each.forcerange]
-        elif constant and each.ctrlrange[0] < each.ctrlrange[1] and each.ctrllimited:
+        elif constant and each.ctrllimited and each.ctrlrange[0] < each.ctrlrange[1]:
             ends = [each.gainprm[0] * end for end in each.ctrlrange]
-        found |= {bool(end * each.gear[0] > 0) for end in ends if end * each.gear[0]}
-    return {name: len(found) == 2 for name, found in signs.items()}
+        found.setdefault(each.target, []).extend(end * each.gear[0] for end in ends)
+    return found
 
 
 def parse(path: Path, exact: bool) -> tuple[Any, list[str]]:
@@ -187,7 +191,7 @@ def prepare(spec: Any, without: set[str]) -> list[Loss]:
             "geoms that collide: the hand file has no contacts", geoms, lambda geom: geom.contype or geom.conaffinity
         ),
         _loss("meshes", spec.meshes),
-        _loss("sensors", spec.sensors),
+        _loss("sensors", spec.sensors, lambda each: each.type != mujoco.mjtSensor.mjSENS_JOINTPOS),
         _loss("keyframes", spec.keys),
         _loss("equality constraints that are no coupling of two joints", spec.equalities, lambda e: not is_lock(e)),
         _loss(
@@ -299,7 +303,7 @@ def _body(compiled: Any, index: int, massless: set[str]) -> Body:
     )
 
 
-def _joint(compiled: Any, index: int) -> Joint:
+def _joint(compiled: Any, index: int, measured: set[str]) -> Joint:
     kind = KINDS[compiled.jnt_type[index]]
     dof, at = int(compiled.jnt_dofadr[index]), int(compiled.jnt_qposadr[index])
     scalar = kind in ("hinge", "slide")
@@ -318,6 +322,8 @@ def _joint(compiled: Any, index: int) -> Joint:
         friction=float(compiled.dof_frictionloss[dof]),
         stiffness=float(compiled.jnt_stiffness[index]),
         spring_reference=float(compiled.qpos_spring[at]) if scalar else 0.0,
+        effort=float(np.abs(compiled.jnt_actfrcrange[index]).min()) if compiled.jnt_actfrclimited[index] else 0.0,
+        measured=compiled.joint(index).name in measured,
     )
 
 

@@ -43,7 +43,8 @@ class Body:
 class Joint:
     """A joint of a body: `axis` (3, a unit vector) through `anchor` (3), both in the body's frame as drawn.
 
-    `kind` is hinge, slide, ball or free; `low` and `high` are None for a joint without limits.
+    `kind` is hinge, slide, ball or free; `low` and `high` are None for a joint without limits. `effort` is the largest
+    torque that the joint bears, 0 if the file says none.
     """
 
     name: str
@@ -59,6 +60,8 @@ class Joint:
     friction: float = 0.0
     stiffness: float = 0.0
     spring_reference: float = 0.0
+    effort: float = 0.0
+    measured: bool = False
 
 
 class Place(NamedTuple):
@@ -151,7 +154,10 @@ class Loss:
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """A whole file. `notes` say what was taken differently than published; `losses` what is not in this tree."""
+    """A whole file. `notes` say what was taken differently than published; `losses` what is not in this tree.
+
+    `tendon_force` is the largest force [N] of motors that pull tendons, 0 if the file does not limit one of them.
+    """
 
     name: str
     file: str
@@ -162,6 +168,7 @@ class Model:
     sites: tuple[Site, ...] = ()
     losses: tuple[Loss, ...] = ()
     notes: tuple[str, ...] = ()
+    tendon_force: float = 0.0
 
     @cached_property
     def poses(self) -> tuple[tuple[Array, Array], ...]:

@@ -24,6 +24,7 @@ _LIMITS = {
     "tendon_stiffness_high": "50000 N/m",
     "gravity": "9.81 m/s^2",
 }
+_MOST_EFFORT = 1000.0  # N m; larger ones stand in files for joints without a limit
 _FRICTION_VELOCITY = "0.05 rad/s"
 _POWERS = {"square": "1/rad", "cube": "1/rad^2", "fourth": "1/rad^3"}
 _RULE = "# " + "-" * 100
@@ -37,13 +38,30 @@ def hand_text(hand: DraftHand, command: str = "") -> str:
     lines += [f"# taken: {note}" for note in hand.notes]
     lines += [f"# {line}" for line in loss_lines(hand.losses)]
     lines += ["", f"prefix = {_text(hand.prefix)}", f"name = {_text(cite(hand.name))}", "", "[limits]"]
-    lines += [f"{key} = {_text(value)}" for key, value in _LIMITS.items()]
-    lines += ['source = "assumed"']
+    lines += _limit_lines(hand)
     if hand.wrist is not None:
         lines += ["", _RULE, *_palm_lines(hand.wrist, hand)]
     for finger in hand.fingers:
         lines += ["", _RULE, *_finger_lines(finger, hand.file)]
     return "\n".join(line.rstrip() for line in lines) + "\n"
+
+
+def _limit_lines(hand: DraftHand) -> list[str]:
+    """Ranges of the kernels' inputs: what the model says of motors and joints, and guesses."""
+    efforts = [_effort(link) for finger in hand.fingers for link in finger.links]
+    limits, known = dict(_LIMITS), {}
+    if max(efforts, default=0.0) > 0:
+        limits["joint_torque"], known["joint_torque"] = quantity(max(efforts), "N m"), cite(f"{hand.file} joints")
+    if hand.tendon_force:
+        limits["tendon_force"], known["tendon_force"] = quantity(hand.tendon_force, "N"), cite(f"{hand.file} actuators")
+    lines = [f"{key} = {_text(value)}" for key, value in limits.items()]
+    return [*lines, f"source = {_sources(known, 'assumed')}"]
+
+
+def _effort(link: DraftLink) -> float:
+    """The largest torque of an independent joint [N m]; 0 where the model says none, or one that no joint of a hand has."""
+    effort = link.published.effort if link.limits else 0.0
+    return effort if effort <= _MOST_EFFORT else 0.0
 
 
 def cite(text: str) -> str:
@@ -132,6 +150,10 @@ def _link_lines(link: DraftLink, file: str) -> list[str]:
         reference_text = angle(tidy([link.spring_reference], 1.0)[0])
         stiffness = quantity(joint.stiffness, "N m/rad")
         lines += [f'spring = {{ stiffness = "{stiffness}", reference = "{reference_text}" }}']
+    if effort := _effort(link):
+        lines += [f"effort = {_text(quantity(effort, 'N m'))}"]
+    if joint.measured:
+        lines += ["sensor = {}"]
     return [*lines, f"source = {_sources(sources, cite(f'{file} joint {joint.name}'))}"]
 
 
