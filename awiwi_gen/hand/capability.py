@@ -89,13 +89,20 @@ def _reasons(finger: Finger, couplings: Sequence[Any]) -> tuple[tuple[str, str],
     torques = _TWO_WAY if both_ways else torques
     if torques and finger.strings and not both_ways:
         torques += "; return strings do not count, for no motor pulls them"
-    found += [
-        (family, f"{lengths}: tendon lengths do not determine the joint angles") for family in _NEED_LENGTHS if lengths
-    ]
+    found += [(family, reason) for family in _NEED_LENGTHS for reason in _unknown_angles(finger, couplings)]
     found += [(family, torques) for family in _NEED_TORQUES if torques]
     if not any(transmission.ratios for transmission in finger.transmissions):
         found += [(family, reason) for family in _NEED_SPANS for reason in _indistinct_base(finger, couplings)]
     return tuple(found)
+
+
+def _unknown_angles(finger: Finger, couplings: Sequence[Any]) -> list[str]:
+    """Why tendon lengths do not tell the angles of the joints without sensors, if so."""
+    free = [column for column in range(len(finger.joints)) if column not in finger.measured]
+    columns = [[[row[column] for column in free] for row in coupling] for coupling in couplings]
+    reason = _indistinct(columns, [finger.joints[column] for column in free])
+    without = " without sensors" if finger.measured else ""
+    return [f"{reason}: tendon lengths do not determine the joint angles{without}"] if reason else []
 
 
 def _none(finger: Finger) -> str:

@@ -6,11 +6,11 @@ branch of a four-bar) is structure, on which derivations depend, while they neve
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any
 
-from pydantic import Field
+from pydantic import Field, model_serializer
 
 from awiwi_gen.hand.links import Base, FourBar, Inertia, Link
 from awiwi_gen.hand.measure import Measure
@@ -258,6 +258,21 @@ class Finger(Part):
         """The n independent joints, base to tip: those that follow no other joint. Their angles are the finger's q."""
         return tuple(link.joint for link in self.links if link.joint not in self.leaders)
 
+    @property
+    def measured(self) -> tuple[int, ...]:
+        """The independent joints whose angles come from sensors, by index; tendon lengths tell those of the others.
+
+        None where all joints have sensors: then lengths tell all angles, as a check of the sensors.
+        """
+        sensed = {link.joint for link in self.links if link.sensor is not None}
+        found = tuple(index for index, joint in enumerate(self.joints) if joint in sensed)
+        return found if len(found) < len(self.joints) else ()
+
+    @model_serializer(mode="wrap")
+    def _with_measured(self, serialized: Callable[[Any], dict[str, Any]]) -> dict[str, Any]:
+        """The values of the digest: of sensors, which of them kernels read."""
+        return {**serialized(self), **({"measured": self.measured} if self.measured else {})}
+
     def motion(self, joint: str) -> tuple[float, ...]:
         """Coefficients of a joint's angle by powers of its leader's, or of its own: offset [rad], ratio, and others."""
         for coupling in self.couplings:
@@ -324,6 +339,7 @@ class Finger(Part):
             "tendons": [tendon.structure() for tendon in self.tendons],
             "couplings": [coupling.structure() for coupling in self.couplings],
             **({"motors": shared} if shared else {}),
+            **({"measured": self.measured} if self.measured else {}),
             **({"base": self.base.quarters} if self.base else {}),
         }
 

@@ -1,6 +1,7 @@
 """What a control tick needs besides kernels: its period, and what motors, joints and sensors bear.
 
-No kernel reads these numbers, so they are no part of a hand's digest: generated C does not depend on them.
+No kernel reads these numbers, so they are no part of a hand's digest: generated C does not depend on them. It does depend
+on which joints have sensors, where others have none.
 """
 
 from __future__ import annotations

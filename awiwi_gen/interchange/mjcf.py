@@ -35,7 +35,7 @@ def read(path: Path, exact: bool = False, without: Iterable[str] = (), fit: bool
     spec, notes = parse(path, exact)
     forces = _forces(spec)
     most = [max(map(abs, ends)) for ends in forces.values()]
-    driven = {name: min(ends) < 0 < max(ends) for name, ends in forces.items()}
+    driven = {name: bool(min(ends) < 0 < max(ends)) for name, ends in forces.items()}
     measured = {each.objname for each in spec.sensors if each.type == mujoco.mjtSensor.mjSENS_JOINTPOS}
     losses = prepare(spec, set(without))
     massless = {body.name for body in spec.bodies[1:] if body.explicitinertial and body.mass <= LEAST_MASS}

@@ -13,7 +13,8 @@ from typing import Any
 from awiwi_gen.hand import Finger, Hand
 from awiwi_gen.kernel import Kernel, Port, Solver
 from awiwi_gen.kernels.declare import Family
-from awiwi_gen.kernels.fingers import Size, input_ports, joint_limits, limit_paths
+from awiwi_gen.kernels.estimates import joint_limits, limit_paths
+from awiwi_gen.kernels.fingers import Size, input_ports
 from awiwi_gen.kernels.routing import moved
 from awiwi_gen.units import rad
 
@@ -37,7 +38,7 @@ def base_kernels(hand: Hand, name: str, finger: Finger) -> list[Kernel]:
     if not base.spans:
         return []
     whole = input_ports(hand, finger, Size.of(finger))
-    ports = {"h": subset(whole["h"], base.spans), "start": subset(whole["start"], base.joints)}
+    ports = {"h": whole["h"].subset(base.spans), "start": whole["start"].subset(base.joints)}
     return of_base.kernels(name, finger, f"fingers.{name}", finger.structure(), ports, base)
 
 
@@ -54,13 +55,6 @@ def base_of(finger: Finger) -> Base:
     if any(run.body for tendon in finger.pulled for run in tendon.runs):
         return Base((), ())  # the slopes of wraps do not bound the gradient's steps
     return Base(spans, joints) if not others and len(joints) <= len(spans) else Base((), ())
-
-
-def subset(port: Port, elements: tuple[int, ...]) -> Port:
-    """Some elements of a port, with their ranges."""
-    bounds = port.bounds()
-    low, high = zip(*(bounds[i] for i in elements), strict=True)
-    return Port((len(elements),), tuple(port.units[i] for i in elements), low, high)
 
 
 def gradient_search(finger: Finger) -> Solver:

@@ -10,10 +10,11 @@ from awiwi_gen.hand import Hand
 from awiwi_gen.hand.lever import Lever
 from awiwi_gen.hand.parts import Finger, PathPoint, Tendon, Transmission
 from awiwi_gen.hand.pose import polynomial
-from awiwi_gen.kernel import STOP, Kernel, Port, Solver
+from awiwi_gen.kernel import Kernel, Port
 from awiwi_gen.kernels.declare import Family, within
-from awiwi_gen.kernels.routing import groups, is_bent, is_curved, least_forces, moved, wraps_hold
-from awiwi_gen.structure import link_number, rolls, wraps
+from awiwi_gen.kernels.estimates import joint_limits, nonlinear_estimate
+from awiwi_gen.kernels.routing import least_forces, wraps_hold
+from awiwi_gen.structure import link_number, rolls
 from awiwi_gen.units import J, N, Unit, kg, m, one, rad, s
 
 
@@ -75,8 +76,10 @@ def input_ports(hand: Hand, finger: Finger, size: Size) -> dict[str, Port]:
     def symmetric(shape: tuple[int, ...], unit: Unit, limit: Any) -> Port:
         return Port(shape, unit, -float(limit), float(limit))
 
-    return {
-        "q": Port(n, rad, low, high),
+    q = Port(n, rad, low, high)
+    measured = {"measured": q.subset(finger.measured)} if finger.measured else {}
+    return measured | {
+        "q": q,
         "qd": symmetric(n, rad / s, limits.joint_velocity),
         "qdd": symmetric(n, rad / s**2, limits.joint_acceleration),
         "tau": symmetric(n, N * m, limits.joint_torque),
@@ -99,18 +102,6 @@ def force_range(hand: Hand) -> tuple[float, float]:
     levers = [Lever(spring) for spring in (hand.spring, *hand.spring.calibrated.values())]
     ends = [(lever.at(lever.slack).force, lever.at(lever.taut).force) for lever in levers]
     return max(slack for slack, _ in ends), min(taut for _, taut in ends)
-
-
-def joint_limits(finger: Finger) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Lower and upper limits of the independent joints [rad]."""
-    free = [link for link in finger.links if link.joint in finger.joints]
-    return tuple(float(k.low or 0) for k in free), tuple(float(k.high or 0) for k in free)
-
-
-def limit_paths(finger: Finger) -> dict[str, tuple[str, ...]]:
-    """Paths of the lower and upper limits of the independent joints; empty where a joint has none."""
-    free = [(i, link) for i, link in enumerate(finger.links) if link.joint in finger.joints]
-    return {end: tuple(f"links[{i}].{end}" if getattr(k, end) else "" for i, k in free) for end in ("low", "high")}
 
 
 def motor_range(finger: Finger, transmission: Transmission) -> tuple[float, float]:
@@ -324,62 +315,13 @@ def return_torque(finger: Any, q: Any) -> Any:
 # -- joint angles from tendon lengths ---------------------------------------------------------------------
 
 
-def estimated_parts(finger: Finger) -> list[tuple[list[int], list[int], bool]]:
-    """Joints and tendons, by index, that depend on no others, and whether their coupling is constant."""
-    found = []
-    for tendons in groups(finger):
-        members = [finger.transmissions[i] for i in tendons]
-        pulled = set().union(*(moved(finger, each) for each in members))
-        joints = [i for i, joint in enumerate(finger.joints) if joint in pulled]
-        found.append((joints, tendons, not any(is_bent(finger, each) for each in members)))
-    return [part for part in found if part[0]]
-
-
-# Steps get shorter more slowly where lengths bend more, and rounding in single precision leaves them longer than 1e-6.
-ROUND_BODIES = {"f64": "1e-13", "f32": "5e-6"}
-
-
-def nonlinear_estimate(finger: Finger, iterations: int = 24) -> Solver | None:
-    """The solver of fingers whose coupling depends on the pose; None for other fingers."""
-    if not is_curved(finger):
-        return None
-    low, high = joint_limits(finger)
-    parts = estimated_parts(finger)
-    curved = sum(not linear for _, _, linear in parts)
-    return Solver(
-        template="joint_estimate.c.j2",
-        problem="least squares",
-        uses=("tendon_lengths", "coupling"),
-        equations=tuple(range(len(finger.transmissions))),
-        unknowns=tuple(range(len(low))),
-        arrays={"low": low, "high": high},
-        strings={
-            "orders": "\n".join(
-                f"    static const int {name}_{i}[] = {{{', '.join(map(str, numbers))}}};"
-                for i, (joints, tendons, _) in enumerate(parts)
-                for name, numbers in (("joints", joints), ("tendons", tendons))
-            ),
-            "parts": ", ".join(
-                f"{{{len(joints)}, joints_{i}, {len(tendons)}, tendons_{i}, {int(linear)}}}"
-                for i, (joints, tendons, linear) in enumerate(parts)
-            ),
-            "part_count": str(len(parts)),
-            "iterations": str(iterations),
-        },
-        iterations=1 + curved * (iterations - 1),
-        tolerance={"f64": 1e-12, "f32": 1e-5},
-        limits=limit_paths(finger),
-        stop=ROUND_BODIES if wraps(finger) else STOP,
-    )
-
-
 @per_finger(
     lambda z: {"q": Port((z.joints,), rad)},
     "eq. 5.14, 5.15, 5.24",
     subject="joint_estimate",
     solver=nonlinear_estimate,
 )
-def joint_estimate(finger: Any, h: Any, start: Any) -> Any:
+def joint_estimate(finger: Any, h: Any, start: Any, measured: Any = None) -> Any:
     """Joint angles whose tendon lengths are nearest to the measured h (least squares); start is the last estimate.
 
     Where the coupling is constant the estimate is linear, and not limited: lengths that no pose has give angles beyond the

@@ -42,11 +42,21 @@ SHARED = {
     "tendon_distribution": "A motor of several tendons has one force.",
 }
 
+SENSED = {
+    "joint_estimate": "Angles of joints with a sensor are inputs, and outputs as they are; their start is not read.",
+    "joint_estimate_error": "Joints with a sensor have no error here.",
+}
+
 
 def documented(finger: Finger, kernels: list[Kernel]) -> list[Kernel]:
     """The kernels of a finger; what their joints and motors add is told in their documentation."""
     shared = any(transmission.ratios for transmission in finger.transmissions)
-    for notes, has in ((ARMATURE, finger.has_armature), (PASSIVE, finger.passive), (SHARED, shared)):
+    for notes, has in (
+        (ARMATURE, finger.has_armature),
+        (PASSIVE, finger.passive),
+        (SHARED, shared),
+        (SENSED, finger.measured),
+    ):
         if has:
             kernels = [replace(k, doc=f"{k.doc}\n{notes[k.family]}") if k.family in notes else k for k in kernels]
     return kernels
