@@ -156,6 +156,7 @@ def check(
     """Check the hand file, and whether the generated C is fresh and unedited."""
     from awiwi_gen.hand import Hand
     from awiwi_gen.hand.capability import left_out_names
+    from awiwi_gen.hand.tick import tick_lines, tick_values
     from awiwi_gen.pipeline import state
     from awiwi_gen.report import counted, print_json, print_left_out, state_lines
 
@@ -164,7 +165,7 @@ def check(
     absent = left_out_names(job.hand)
     found = state(job, output)
     if as_json:
-        extra = {"warnings": [each.as_dict() for each in warnings],
+        extra = {"warnings": [each.as_dict() for each in warnings], "tick": tick_values(read),
                  "left_out": [{"name": name, "reason": reason} for name, reason in absent.items()]}  # fmt: skip
         print_json({"hand": job.hand.name, "fresh": found.fresh, **vars(found), **extra})
     else:
@@ -172,6 +173,7 @@ def check(
         print(printable(f"{hand or 'hand.toml'}: {counted(len(job.hand.fingers), 'finger')}, no faults{more}"))
         print("".join(f"warning: {each}\n" for each in warnings), end="")
         print_left_out(absent)
+        print("".join(f"{line}\n" for line in tick_lines(read)), end="")
         print("\n".join(state_lines(found, str(output), fix(job, hand, output))))
     return 0 if found.fresh or (found.missing and not found.foreign) else 1
 
@@ -219,7 +221,7 @@ def list_(
     assumed: Annotated[bool, typer.Option("--assumed", help="The hand's numbers without a source.")] = False,
 ) -> int:  # fmt: skip
     """List the kernels of the hand with their ports and costs, or its numbers that are assumed."""
-    from awiwi_gen.report import kernel_entries, print_json, print_kernels, print_table
+    from awiwi_gen.report import list_kernels, print_json, print_kernels, print_table
 
     if output is not None and hand is None and not assumed:
         (print_json if as_json else print_kernels)(require(output)["kernels"])
@@ -234,7 +236,7 @@ def list_(
         else:
             print_table(("number", "assumed value"), list(guesses.items()))
         return 0
-    (print_json if as_json else print_kernels)(kernel_entries(Hand.load(hand), output or GENERATED))
+    list_kernels(Hand.load(hand), output or GENERATED, as_json)
     return 0
 
 

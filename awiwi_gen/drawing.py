@@ -182,6 +182,7 @@ def _routes(finger: Finger) -> list[str]:
         parts += [f"arm at {joint}" for joint in tendon.arms]
         parts += [f"span to {tendon.span.joint}"] if tendon.span else []
         parts += [f"path through {len(tendon.path)} places"] if tendon.path else []
+        parts += [f"motor {tendon.motor.name}"] if tendon.motor else []
         kind = "return string" if tendon.spring else "tendon"
         rows.append(f"{kind} {index}: {', '.join(parts) or 'pulls at nothing'}")
     return rows

@@ -17,7 +17,8 @@ from awiwi_gen.emit.files import banner, render
 from awiwi_gen.emit.options import Options
 from awiwi_gen.hand import Hand
 from awiwi_gen.hand.pose import fixed_rotation
-from awiwi_gen.kernels.fingers import force_range, joint_limits
+from awiwi_gen.kernels.estimates import joint_limits
+from awiwi_gen.kernels.fingers import force_range
 
 PER_LINE = 6
 
@@ -55,7 +56,9 @@ def header_files(hand: Hand, options: Options, made_from: Any) -> dict[str, str]
         "build": f"0x{digest[:8]}u",
         "fingers": fingers(hand),
         "joints": enumerators([(name, joint) for name, finger in hand.fingers.items() for joint in finger.joints]),
-        "tendons": enumerators([(name, str(i)) for name, f in hand.fingers.items() for i in range(len(f.pulled))]),
+        "tendons": enumerators(
+            [(name, str(i)) for name, f in hand.fingers.items() for i in range(len(f.transmissions))]
+        ),
         "constants": [(constant, constant.lines(options)) for constant in constants(hand)],
         "numbers": [(name, options.literal(Fraction(value)), doc) for name, value, doc in numbers(hand)],
     }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import import_module
 from math import prod
@@ -69,6 +69,12 @@ class Port:
         """The unit as text; arrays of mixed units list each unit once."""
         return ", ".join(dict.fromkeys(str(unit) for unit in self.units))
 
+    def subset(self, elements: Sequence[int]) -> Port:
+        """Some elements of a vector, with their ranges."""
+        bounds = self.bounds()
+        low, high = zip(*(bounds[i] for i in elements), strict=True)
+        return Port((len(elements),), tuple(self.units[i] for i in elements), low, high)
+
     def bounds(self) -> list[tuple[float, float]]:
         """(low, high) of every element."""
         low = self.low if isinstance(self.low, tuple) else (self.low,) * self.size
@@ -88,7 +94,7 @@ class Solver:
     unchanged. ``problem`` names an entry of `verify.problems.PROBLEMS`, which draws well-posed inputs and has their exact
     solutions; a compiled result may differ from these by ``tolerance`` of the largest element, per scalar type.
     ``iterations`` is the number of calls of the used kernels in the worst case; those in ``once`` are called once.
-    A last step shorter than ``stop``, per scalar type, ends an iteration.
+    A last step shorter than ``stop``, per scalar type, ends an iteration. Unknowns in ``held`` are inputs, not found.
     ``limits`` are the paths of the numbers in ``arrays`` that are read at run time where others are. The solver is
     expected to converge from starts up to ``near`` away in each unknown.
     """
@@ -106,6 +112,7 @@ class Solver:
     limits: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     stop: Mapping[str, str] = field(default_factory=lambda: STOP)
     near: tuple[float, ...] = ()
+    held: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)

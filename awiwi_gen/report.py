@@ -186,6 +186,18 @@ def print_kernels(entries: Sequence[Mapping[str, Any]]) -> None:
     print_left_out({entry["name"]: entry["left_out"] for entry in entries if "left_out" in entry})
 
 
+def list_kernels(hand: Hand, directory: Path, as_json: bool) -> None:
+    """Print the kernels of a hand, and in text what a tick needs."""
+    from awiwi_gen.hand.tick import tick_lines
+
+    entries = kernel_entries(hand, directory)
+    if as_json:
+        print_json(entries)
+        return
+    print_kernels(entries)
+    print("".join(f"{line}\n" for line in tick_lines(hand)), end="")
+
+
 def counted(number: int, noun: str) -> str:
     """A number with its noun: "1 finger", "2 fingers"."""
     return f"{number} {noun}{'' if number == 1 else 's'}"

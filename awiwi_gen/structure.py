@@ -10,6 +10,9 @@ A finger is anything with these attributes (the hand file's `Finger` and its sym
                   carrier of the side (None or a link), inside, and kind), runs (path from point to point:
                   start, body or None, end, counted()), spring (None or stiffness, rest)
     pulled, strings   the tendons without a spring, and those with one
+    transmissions[i]  what each motor pulls: members (indices in pulled), and ratios of all of them, or none by which
+                      the motor's length is that of its only tendon
+    measured          indices in q of the joints with a sensor of their angle
     couplings[i]  follower, leader, ratio (or None), offset (or None), powers (none, or the coefficients of the second
                   to the fourth)
     base          None or position[3], turn, quarters[3], rpy[3]
@@ -39,6 +42,13 @@ def coordinates(finger: Finger) -> dict[str, int]:
     follows = leaders(finger)
     free = [link.joint for link in finger.links if link.joint not in follows]
     return {link.joint: free.index(follows.get(link.joint, link.joint)) for link in finger.links}
+
+
+def unmeasured(finger: Finger) -> list[int]:
+    """Indices in q of the joints without a sensor of their angle."""
+    follows = leaders(finger)
+    free = [link.joint for link in finger.links if link.joint not in follows]
+    return [index for index in range(len(free)) if index not in finger.measured]
 
 
 def straight(finger: Finger) -> list[Any]:

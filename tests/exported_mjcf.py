@@ -39,6 +39,7 @@ def read_mjcf(text: str) -> Model:
     zero = np.zeros(3)
     bodies, joints, sites = [Body("world", 0, zero, np.eye(3), 0.0, zero, np.zeros((3, 3)))], [], []
     round_ = {}
+    measured = {each.get("joint") for each in root.findall("sensor/jointpos")}
 
     def visit(element: ElementTree.Element, parent: int) -> None:
         inertial, index = element.find("inertial"), len(bodies)
@@ -55,6 +56,8 @@ def read_mjcf(text: str) -> Model:
         for each in element.findall("joint"):
             low, high = numbers(each.get("range")) if each.get("range") else (None, None)
             own = {key: float(each.get(name, 0)) for key, name in ATTRIBUTES.items()}
+            own["effort"] = numbers(each.get("actuatorfrcrange"), "0 0")[1]
+            own["measured"] = each.get("name") in measured
             axis, anchor = numbers(each.get("axis")), numbers(each.get("pos"))
             joints.append(Joint(each.get("name"), index, each.get("type", "hinge"), axis, anchor, low, high, **own))
         sites.extend(Site(each.get("name"), index, numbers(each.get("pos"))) for each in element.findall("site"))
@@ -69,6 +72,7 @@ def read_mjcf(text: str) -> Model:
     places = {site.name: Place(site.body, site.position) for site in sites}
     references = {joint.name: joint.reference for joint in joints}
     tendons, mimics = [], []
+    both = {a.get("tendon") for a in root.findall("actuator/*") if numbers(a.get("ctrlrange"), "0 0")[0] < 0}
     for each in root.findall("tendon/*"):
         _, slack = numbers(each.get("springlength"), "0 0")
         spring = {"stiffness": float(each.get("stiffness", 0)), "rest": slack}
@@ -82,7 +86,8 @@ def read_mjcf(text: str) -> Model:
                 path.append(beside(round_[step.get("geom")], places.get(step.get("sidesite"))))
             elif step.tag == "pulley":
                 divisor = float(step.get("divisor"))
-        tendons.append(Tendon(each.get("name"), arms, tuple(path), **spring))
+        two_way = bool(arms) and each.get("name") in both
+        tendons.append(Tendon(each.get("name"), arms, tuple(path), two_way=two_way, **spring))
     for each in root.findall("equality/joint"):
         follower, leader = each.get("joint1"), each.get("joint2")
         curve = Polynomial(numbers(each.get("polycoef")))(Polynomial([-references[leader], 1.0]))

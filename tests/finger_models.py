@@ -131,6 +131,7 @@ def make(kind: str, leaf: Leaf, **special: float) -> Tree:
         for i, links in enumerate(structure.get("paths", []))
     ]
     finger.pulled, finger.strings = routes + spans + paths, []
+    finger.transmissions = [Tree(members=[i], ratios=[]) for i in range(len(finger.pulled))]
     return finger
 
 

@@ -11,7 +11,7 @@ from thumbs import SHIPPED, literal, replaced, thumb, wider
 
 from awiwi_gen.build import load
 from awiwi_gen.hand import Hand
-from awiwi_gen.kernels.fingers import estimated_parts
+from awiwi_gen.kernels.estimates import estimated_parts
 from awiwi_gen.pipeline import Job, cached_tree
 from awiwi_gen.reproduce.base_search import BaseSearch
 from awiwi_gen.tasks import ordered

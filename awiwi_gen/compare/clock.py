@@ -1,4 +1,4 @@
-"""Stability of a law with its gains at 3 kHz and one sample of delay, from the loop of the compiled kernels.
+"""Stability of a law with its gains on the hand's clock and one sample of delay, from the loop of the compiled kernels.
 
 At rest dry friction is a stiff damper, and makes nearly all gains look stable; while a motor slides it is a constant
 torque, and damps nothing. Gains must be stable in both cases.
@@ -17,7 +17,7 @@ from awiwi_gen.errors import InputError
 from awiwi_gen.loops.hand_joint import Joint, loop_around, values_of
 from awiwi_gen.loops.linearised import STABLE, SampledLoop
 from awiwi_gen.loops.nearest import nearest
-from awiwi_gen.simulate import PERIOD, Machine, Scenario, simulate
+from awiwi_gen.simulate import Machine, Scenario, simulate
 
 SPARE = (0.0, 0.25, 0.5, 0.75, 1.0)  # periods of additional delay at which the nearest gains must be stable
 RESTING = 600  # ticks for which noise is recorded
@@ -28,7 +28,8 @@ SETTLING = 12  # ticks until all signals of a law are constant
 class Clocked:
     """A law with gains on the clock: spectral radius, and delay margin [s] beyond the one sample.
 
-    ``noise`` is the largest torque commanded because of sensor noise alone, as a share of the motors' limit.
+    ``noise`` is the largest torque commanded because of sensor noise alone, as a share of the motors' limit; ``period`` [s]
+    is that of the clock.
     """
 
     law: str
@@ -36,6 +37,7 @@ class Clocked:
     radius: float
     margin: float
     noise: float
+    period: float
 
     @property
     def runs(self) -> bool:
@@ -45,7 +47,7 @@ class Clocked:
     @property
     def reason(self) -> str:
         """The reason, in words."""
-        clock = f"{1 / PERIOD:.0f} Hz and one sample of delay"
+        clock = f"{1 / self.period:.0f} Hz and one sample of delay"
         if self.radius >= STABLE:
             return f"unstable at {clock}: spectral radius {self.radius:.4g}"
         if self.noise >= 1:
@@ -62,7 +64,7 @@ def clocked(library: Any, law: Law, gains: Mapping[str, float], joint: Joint, fo
     loops = loops_of(library, law, gains, joint, force)
     radius = max(loop.radius(0.0) for loop in loops)
     spare = min(loop.margin() for loop in loops) if radius < STABLE else 0.0
-    return Clocked(law.name, dict(gains), radius, spare, noise(library, law, gains, joint, force))
+    return Clocked(law.name, dict(gains), radius, spare, noise(library, law, gains, joint, force), joint.period)
 
 
 def noise(library: Any, law: Law, gains: Mapping[str, float], joint: Joint, force: float) -> float:

@@ -17,7 +17,6 @@ from awiwi_gen.hand import Hand
 from awiwi_gen.loops.hand_joint import joint_of
 from awiwi_gen.report import print_json, print_table
 from awiwi_gen.results import Table
-from awiwi_gen.simulate import PERIOD
 
 SHOWN = 30  # ticks between two printed rows of a run
 
@@ -88,7 +87,7 @@ def one_run(hand_file: Path | None, name: str, gains: str, scenario: str, force:
     joint = joint_of(library, hand)
     require_clocked(library, law, own, joint, force)
     trace = run(library, law, own, joint.perturbed(**PLANTS[plant]), joint.believed(), force, [scenario])[scenario]
-    time = trace.time - BEFORE * PERIOD
+    time = trace.time - BEFORE * joint.period
     columns = {"q": trace["x"][:, 0], "tau_1": trace["tau"][:, 0], "tau_2": trace["tau"][:, 1]}
     columns |= {"u_1": trace["u"][:, 0], "u_2": trace["u"][:, 1]}
     rows = [(f"{time[i]:.3f}", *(f"{c[i]:.4f}" for c in columns.values())) for i in range(0, len(time), SHOWN)]

@@ -15,7 +15,7 @@ from awiwi_gen.errors import unknown
 from awiwi_gen.hand import Hand
 from awiwi_gen.loops.hand_joint import joint_of
 from awiwi_gen.results import Figure, Table, curves
-from awiwi_gen.simulate import PERIOD, Trace
+from awiwi_gen.simulate import Trace
 
 COLUMNS = (
     "law", "pretension", "plant", "settling", "overshoot", "steady error", "stiffness error", "sine error", "slack",
@@ -111,7 +111,9 @@ def step_of_all_laws(rows: Iterable[Row]) -> Figure:
     exact, cascade, adaptive = (
         shown[name].score for name in ("backstepping_antagonistic", "cascade", "backstepping_adaptive")
     )
-    lines = {name: ((row.step.time - BEFORE * PERIOD) * 1e3, row.step["x"][:, 0]) for name, row in shown.items()}
+    lines = {
+        name: ((row.step.time - BEFORE * row.step.time[1]) * 1e3, row.step["x"][:, 0]) for name, row in shown.items()
+    }
     return Figure(
         "15.24 (all laws)", "One step under all laws, on a joint of the hand",
         "The antagonistic law settles faster than the cascade, and overshoots less.",

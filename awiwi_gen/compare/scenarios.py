@@ -39,12 +39,12 @@ class Motion:
     load: Array
 
 
-def motions() -> dict[str, Motion]:
-    """A step, a load step, and a sine with its derivatives."""
+def motions(period: float = PERIOD) -> dict[str, Motion]:
+    """A step, a load step, and a sine with its derivatives, on a clock of this period [s]."""
     rest, none = np.zeros((TICKS, 5)), np.zeros(TICKS)
     step, load, sine = rest.copy(), none.copy(), rest.copy()
     step[BEFORE:, 0], load[BEFORE:] = STEP, LOAD
-    w, t = 2 * np.pi * FREQUENCY, np.arange(TICKS - BEFORE) * PERIOD
+    w, t = 2 * np.pi * FREQUENCY, np.arange(TICKS - BEFORE) * period
     waves: list[Callable[[Array], Array]] = [np.cos, lambda a: -np.sin(a), lambda a: -np.cos(a), np.sin, np.cos]
     for order, wave in enumerate(waves):  # 1 - cos starts at rest
         sine[BEFORE:, order] = WAVE / 2 * ((order == 0) - w**order * wave(w * t))
@@ -85,7 +85,7 @@ def run(
     names: Iterable[str] = SCENARIOS, seed: int = 1,
 ) -> dict[str, Trace]:  # fmt: skip
     """Traces of the named scenarios. Raises InputError for an unknown name."""
-    known, names = motions(), list(names)
+    known, names = motions(true.period), list(names)
     for name in names:
         if name not in known:
             raise unknown("scenario", name, known, f"there are {', '.join(known)}")
@@ -101,19 +101,19 @@ def score(traces: Mapping[str, Trace], K_p: float) -> Score:
     failed = any(trace.status or trace.refused or trace.done < TICKS for trace in traces.values())
     if any(trace.done < TICKS for trace in traces.values()):
         return Score(*(float("inf"),) * 8, failed=True)
-    q = step["x"][:, 0]
+    q, period = step["x"][:, 0], float(step.time[1] - step.time[0])
     off = np.flatnonzero(np.abs(q - STEP) > BAND * STEP)
     deflexion = float(load["x"][-LAST:, 0].mean())
     power = step["u"][1:] * step["x"][1:, 3::2]
     changes = np.diff(np.concatenate([trace["wanted"][-LAST:] for trace in (step, load)]), axis=0)
     return Score(
-        settling=float(max(off[-1] + 1 - BEFORE, 0) * PERIOD) if off[-1] + 1 < TICKS else float("inf"),
+        settling=float(max(off[-1] + 1 - BEFORE, 0) * period) if off[-1] + 1 < TICKS else float("inf"),
         overshoot=float(max(q.max() / STEP - 1, 0)),
         steady=float(abs(q[-LAST:].mean() - STEP)),
         stiffness=float(LOAD / deflexion / K_p - 1) if deflexion else float("inf"),
-        sine=float(np.abs(sine["x"][BEFORE:, 0] - motions()["sine"].goal[BEFORE:, 0])[-TICKS // 3 :].max()),
-        slack=float(max(((trace["tau"] <= 0).sum(axis=0).max()) for trace in traces.values()) * PERIOD),
-        energy=float(np.maximum(power, 0).sum() * PERIOD),
+        sine=float(np.abs(sine["x"][BEFORE:, 0] - motions(period)["sine"].goal[BEFORE:, 0])[-TICKS // 3 :].max()),
+        slack=float(max(((trace["tau"] <= 0).sum(axis=0).max()) for trace in traces.values()) * period),
+        energy=float(np.maximum(power, 0).sum() * period),
         chatter=float(np.sqrt((changes**2).mean())),
         failed=bool(failed),
     )

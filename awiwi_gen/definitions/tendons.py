@@ -2,7 +2,8 @@
 
 h are the lengths of the tendons' paths in the finger, and P = dh/dq. Tendons pull, so forces f cause the joint torques
 tau = -P' f. The joint stiffness is -d tau/dq. These are the tendons that motors pull; elastic return strings have a
-function of their own.
+function of their own. Where a motor pulls several tendons, these count as one: its length is a constant combination of
+theirs.
 """
 
 from collections.abc import Iterable
@@ -22,7 +23,7 @@ Tendon = Any
 
 def tendon_lengths(finger: Finger, q: Matrix) -> Matrix:
     """Path lengths h (m) [m]: arcs on pulleys (eq. 5.5), straight lines (eq. 5.20, 5.22), and lines round bodies."""
-    return _lengths(finger, finger.pulled, q, Derivation())
+    return _of_motors(finger, q, Derivation())
 
 
 def coupling(finger: Finger, q: Matrix) -> Matrix:
@@ -99,8 +100,18 @@ def _lengths(finger: Finger, tendons: Iterable[Tendon], q: Matrix, derivation: D
     return Matrix(len(lengths), 1, lengths)
 
 
+def _of_motors(finger: Finger, q: Matrix, derivation: Derivation) -> Matrix:
+    """Lengths h (m) [m] of what each motor pulls: a constant matrix times those of the tendons."""
+    lengths = _lengths(finger, finger.pulled, q, derivation)
+    shares = sympy.zeros(len(finger.transmissions), len(lengths))
+    for row, transmission in enumerate(finger.transmissions):
+        for member, ratio in zip(transmission.members, transmission.ratios or [1], strict=True):
+            shares[row, member] = ratio
+    return shares * lengths
+
+
 def _coupling(finger: Finger, q: Matrix, derivation: Derivation) -> Matrix:
-    h = _lengths(finger, finger.pulled, q, derivation)
+    h = _of_motors(finger, q, derivation)
     return Matrix(len(h), len(q), lambda i, j: derivation.partial(h[i], q[j]))
 
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from awiwi_gen.diff.slopes import Sloped, function, outputs
 from awiwi_gen.kernel import Kernel, Port
-from awiwi_gen.kernels.fingers import joint_limits, limit_paths
+from awiwi_gen.kernels.estimates import joint_limits, limit_paths
 from awiwi_gen.pipeline import Job
 from awiwi_gen.records import fingerprints, load_graphs
 from awiwi_gen.units import rad

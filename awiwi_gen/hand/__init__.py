@@ -22,10 +22,12 @@ from awiwi_gen.hand.file import HandFile
 from awiwi_gen.hand.gains import Gains, gains_complaints, with_gains
 from awiwi_gen.hand.lint import Complaint, below, complaints, sources
 from awiwi_gen.hand.lint_actuation import actuator_complaints
+from awiwi_gen.hand.lint_tick import effort_remarks
 from awiwi_gen.hand.names import FingerName, Prefix, Title
 from awiwi_gen.hand.palm import Palm, palm_complaints
 from awiwi_gen.hand.parts import MOST, Finger, Limits, Link, Part
 from awiwi_gen.hand.plausibility import remarks
+from awiwi_gen.hand.tick import Clock
 from awiwi_gen.hand.wrist import Wrist
 from awiwi_gen.resources import DEFAULT_HAND
 
@@ -47,19 +49,20 @@ class Hand(Part):
     motor: Motor | None = None
     spring: Spring | None = None
     tendon: Fibre | None = None
+    clock: Annotated[Clock | None, Field(exclude=True)] = None
     gains: Gains = ()
 
     @property
     def tendons(self) -> int:
-        """Number of tendons of all fingers that motors pull."""
-        return sum(len(finger.pulled) for finger in self.fingers.values())
+        """Number of tendons of all fingers that motors pull; those of one motor count as one."""
+        return sum(len(finger.transmissions) for finger in self.fingers.values())
 
     @property
     def blocks(self) -> dict[str, tuple[slice, slice]]:
         """Finger -> slices of its tendons and its joints in arrays over all tendons and joints of the hand."""
         found, row, column = {}, 0, 0
         for name, finger in self.fingers.items():
-            tendons, joints = len(finger.pulled), len(finger.joints)
+            tendons, joints = len(finger.transmissions), len(finger.joints)
             found[name] = slice(row, row + tendons), slice(column, column + joints)
             row, column = row + tendons, column + joints
         return found
@@ -82,7 +85,8 @@ class Hand(Part):
         """Like `load`, with the warnings about the file: possible, but unusual numbers."""
         file = with_gains(_read(path))
         hand = _checked(file)
-        warnings = [file.fault(*remark) for remark in remarks(hand.fingers)]
+        unusual = (*remarks(hand.fingers), *effort_remarks(hand.limits, hand.fingers))
+        warnings = [file.fault(*remark) for remark in unusual]
         return hand, sorted(warnings, key=lambda fault: fault.line or 0)
 
     @classmethod
@@ -95,6 +99,8 @@ def _checked(file: HandFile) -> Hand:
     hand = file.validated(Hand)
     found = list(complaints(hand.limits, hand.fingers, hand.wrist))
     found += _palm(hand)
+    if hand.clock:
+        found += below(("clock",), sources(hand.clock))
     found += actuator_complaints(hand.motor, hand.spring, hand.tendon, hand.tendons)
     lacks = [section for section in ("motor", "spring") if getattr(hand, section) is None]
     found += gains_complaints(hand.gains, hand.tendons, lacks)

@@ -12,6 +12,7 @@ from pydantic import Field
 
 from awiwi_gen.hand.names import Source
 from awiwi_gen.hand.parts import Angle, Length, Measure, Moment, Part, Size
+from awiwi_gen.hand.tick import Current
 from awiwi_gen.units import Quantity
 
 __all__ = ["CalibratedUnit", "Fibre", "Friction", "Motor", "Ripple", "Roller", "Sensor", "Spring", "Wheel"]
@@ -60,6 +61,7 @@ class Motor(Part):
     velocity: Annotated[Quantity, Measure("20 rad/s", "0.001 rad/s", "10000 rad/s")]
     acceleration: Annotated[Quantity, Measure("1000 rad/s^2", "0.001 rad/s^2", "10000000 rad/s^2")]
     torque: Torque
+    current: Annotated[Current | None, Field(exclude=True)] = None
     source: Source
 
     def structure(self) -> dict[str, Any]:

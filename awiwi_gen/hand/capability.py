@@ -2,12 +2,13 @@
 
 Tendons only pull: the torques -P' f of forces f >= 0 form a cone. Lengths tell the joint angles where P = dh/dq has as
 many independent columns as there are joints; a torque of any direction needs the cone to be the whole space. Only
-tendons with motors count. Return strings pull with a force of their own that no controller changes.
+tendons with motors count, and those of one motor count as one. Return strings pull with a force of their own that no
+controller changes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -26,6 +27,7 @@ _NEED_TENDONS = ("tendon_lengths", "coupling", "coupling_derivative", "joint_tor
 _NEED_LENGTHS = ("joint_estimate", "joint_estimate_error")
 _NEED_TORQUES = ("tendon_distribution",)
 _NEED_SPANS = ("base_estimate_by_gradient",)
+_TWO_WAY = "a motor of the finger pulls both ways, and the stiffness of its tendons follows from their pretension"
 _RANK = 1e-7  # a singular value below this share of the largest is zero; central differences are good to 1e-10
 _RESIDUAL = 1e-7  # likewise for the part of a torque that no forces give
 
@@ -40,6 +42,8 @@ def left_out(hand: Hand) -> dict[tuple[str, str], str]:
     without = [name for name, finger in hand.fingers.items() if not finger.pulled]
     driven = ("tendon_stiffness", *(["measured_lengths"] if hand.motor else []))
     found |= {("", f"{name}_{family}"): _none(hand.fingers[name]) for name in without for family in driven}
+    two_way = [name for name, finger in hand.fingers.items() if any(each.two_way for each in finger.transmissions)]
+    found |= {("", f"{name}_tendon_stiffness"): _TWO_WAY for name in two_way}
     if not hand.tendons:
         found |= dict.fromkeys(_of_all_tendons(hand), "no motor pulls a tendon of this hand")
     return found
@@ -62,11 +66,17 @@ def _of_finger(finger: Finger) -> tuple[tuple[str, str], ...]:
     """(Kernel family, reason) for every kernel that no pose of the finger allows."""
     if not finger.pulled:
         return tuple((family, _none(finger)) for family in (*_NEED_TENDONS, *_NEED_LENGTHS, *_NEED_TORQUES))
-    rows = [row for row, tendon in enumerate(finger.tendons) if tendon.spring is None]
-    couplings = ([coupling[row] for row in rows] for coupling in Chain(finger).couplings())
+    couplings = of_motors(finger, Chain(finger).couplings())
     first = next(couplings)
     # What one pose allows is no longer in question; most fingers need no second one.
     return _reasons(finger, [first]) and _reasons(finger, [first, *couplings])
+
+
+def of_motors(finger: Finger, couplings: Iterable[list[list[float]]]) -> Iterator[list[list[float]]]:
+    """The coupling of the motors [m/rad], a row for each, from that of all tendons of the file, in some poses."""
+    for coupling in couplings:
+        pulled = [coupling[number] for number in finger.pulled_numbers]
+        yield [transmission.arms(pulled) for transmission in finger.transmissions]
 
 
 def _reasons(finger: Finger, couplings: Sequence[Any]) -> tuple[tuple[str, str], ...]:
@@ -74,15 +84,16 @@ def _reasons(finger: Finger, couplings: Sequence[Any]) -> tuple[tuple[str, str],
     found: list[tuple[str, str]] = []
     lengths = _indistinct(couplings, finger.joints)
     one_sided = _one_sided(couplings, finger.joints)
+    both_ways = any(transmission.two_way for transmission in finger.transmissions)
     torques = "; ".join(filter(None, (lengths, one_sided))) or _beyond_pull(couplings, finger.joints)
-    if torques and finger.strings:
+    torques = _TWO_WAY if both_ways else torques
+    if torques and finger.strings and not both_ways:
         torques += "; return strings do not count, for no motor pulls them"
     torques = _mixed(finger) or torques
-    found += [
-        (family, f"{lengths}: tendon lengths do not determine the joint angles") for family in _NEED_LENGTHS if lengths
-    ]
+    found += [(family, reason) for family in _NEED_LENGTHS for reason in _unknown_angles(finger, couplings)]
     found += [(family, torques) for family in _NEED_TORQUES if torques]
-    found += [(family, reason) for family in _NEED_SPANS for reason in _indistinct_base(finger, couplings)]
+    if not any(transmission.ratios for transmission in finger.transmissions):
+        found += [(family, reason) for family in _NEED_SPANS for reason in _indistinct_base(finger, couplings)]
     return tuple(found)
 
 
@@ -90,6 +101,15 @@ def _mixed(finger: Finger) -> str:
     """That the stiffnesses of a finger's joints have no common measure, because some slide; empty if none does."""
     slide = next((joint for joint in finger.joints if joint in finger.sliding), "")
     return f"the joint {slide} slides: its stiffness has another unit than that of a hinge" if slide else ""
+
+
+def _unknown_angles(finger: Finger, couplings: Sequence[Any]) -> list[str]:
+    """Why tendon lengths do not tell the angles of the joints without sensors, if so."""
+    free = [column for column in range(len(finger.joints)) if column not in finger.measured]
+    columns = [[[row[column] for column in free] for row in coupling] for coupling in couplings]
+    reason = _indistinct(columns, [finger.joints[column] for column in free])
+    without = " without sensors" if finger.measured else ""
+    return [f"{reason}: tendon lengths do not determine the joint angles{without}"] if reason else []
 
 
 def _none(finger: Finger) -> str:

@@ -9,6 +9,7 @@ from pydantic import Field, PrivateAttr
 from awiwi_gen.hand.measure import Measure
 from awiwi_gen.hand.names import JointName, Source
 from awiwi_gen.hand.part import Angle, Mass, Moment, Part, Point, Product, Size
+from awiwi_gen.hand.tick import Effort, JointSensor
 from awiwi_gen.units import Quantity, parse_quantity
 
 Turn = Annotated[Literal["none", "x+90", "x-90", "y+90", "y-90", "z+90", "z-90"], Field(examples=['"none"', '"x+90"'])]
@@ -108,7 +109,8 @@ class Link(Rotated):
 
     The rotation is by the joint angle less `reference`. `offset` leads from this joint to the next one (or to the
     fingertip), `com` to the centre of mass, in link axes. A link without `mass` is a joint only. `armature` is the
-    inertia of a rotor as the joint sees it, `damping` a torque per velocity.
+    inertia of a rotor as the joint sees it, `damping` a torque per velocity. `effort` is the largest torque that the joint
+    bears, as in URDF.
 
     A joint of the `kind` "slide" moves along z instead, by its position less `reference`: lengths stand for angles, forces
     for torques and masses for moments of inertia.
@@ -135,6 +137,8 @@ class Link(Rotated):
     ] = None
     friction: Friction | None = None
     spring: JointSpring | None = None
+    effort: Annotated[Effort | None, Field(exclude=True)] = None
+    sensor: Annotated[JointSensor | None, Field(exclude=True)] = None
     source: Source
     _limit_next_to_zero: str = PrivateAttr("")  # structure: it stays where numbers become symbols
 

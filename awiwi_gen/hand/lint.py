@@ -10,8 +10,10 @@ import math
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Protocol
 
+from awiwi_gen.hand.lint_motors import motor_complaints, names_in_two_fingers
 from awiwi_gen.hand.lint_paths import misplaced, told, without_length
 from awiwi_gen.hand.lint_slides import limit_complaints, link_complaints, misfits
+from awiwi_gen.hand.lint_tick import joint_complaints
 from awiwi_gen.hand.massless import without_inertia
 from awiwi_gen.hand.parts import PALM, Finger, FourBar, Keys, Limits, Link, Part, covers
 from awiwi_gen.hand.pose import Chain
@@ -40,9 +42,10 @@ def complaints(limits: Limits, fingers: Mapping[str, Finger], wrist: Wrist | Non
     yield from below(("limits",), limit_complaints(limits, fingers))
     for name, finger in fingers.items():
         yield from below(("fingers", name), _finger(finger))
+    yield from names_in_two_fingers(fingers)
     yield from tensor_complaints(fingers)
     if wrist:
-        yield from below(("wrist",), _wrist(wrist, sum(len(finger.pulled) for finger in fingers.values())))
+        yield from below(("wrist",), _wrist(wrist, sum(len(finger.transmissions) for finger in fingers.values())))
 
 
 class Sourced(Protocol):
@@ -213,6 +216,8 @@ def _link(link: Link, follows: bool) -> Iterator[Complaint]:
     if link.low and link.high and not follows and not wrong:
         yield from _range(link, link.slides)
     yield from _body(link)
+    if not wrong:
+        yield from joint_complaints(link, follows)
     if link.four_bar and not wrong:
         yield from below(("four_bar",), sources(link.four_bar))
         if link.reference is not None:
@@ -274,3 +279,4 @@ def _tendons(finger: Finger) -> Iterator[Complaint]:
                 ("tendons", index, "spring", "rest"),
                 f"{slack}; expected less than its length, {longest * 1e3:.4g} mm",
             )
+    yield from motor_complaints(finger, arms)

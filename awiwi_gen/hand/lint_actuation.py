@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from awiwi_gen.hand.actuation import CalibratedUnit, Fibre, Motor, Sensor, Spring
 from awiwi_gen.hand.lever import CURVE_NODES, Lever, Pose
 from awiwi_gen.hand.lint import Complaint, below, sources
+from awiwi_gen.hand.lint_tick import current_complaints
 
 __all__ = ["actuator_complaints"]
 
@@ -33,6 +34,7 @@ def actuator_complaints(
 
 def _motor(motor: Motor) -> Iterator[Complaint]:
     yield from sources(motor)
+    yield from current_complaints(motor)
     rotation = float(motor.travel) * float(motor.gear_ratio)
     harmonic = max((ripple.harmonic for ripple in motor.ripple if ripple.shaft == "input"), default=0)
     if rotation * harmonic > _FARTHEST_ANGLE:

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from awiwi_gen.hand.measure import Measure
 from awiwi_gen.hand.parts import Coupling, Finger, Keys, Limits, Link
 from awiwi_gen.hand.ranges import measures
+from awiwi_gen.hand.tick import joint_numbers
 from awiwi_gen.units import Quantity, Unit, m, name_of, rad
 
 __all__ = ["limit_complaints", "link_complaints", "misfits"]
@@ -36,6 +37,8 @@ def link_complaints(link: Link) -> Iterator[Complaint]:
         if measure.others:
             wanted = measure.others[0] if link.slides else measure
             yield from _misfit(tuple(path.split(".")), numbers[path], wanted, f"the joint {moves}")
+    for keys, number, measure in joint_numbers(link):
+        yield from _misfit(keys, number, measure.others[0] if link.slides else measure, f"the joint {moves}")
     if link.friction is not None:
         right, wrong = ("force", "torque") if link.slides else ("torque", "force")
         if getattr(link.friction, wrong) is not None:

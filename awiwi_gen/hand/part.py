@@ -28,6 +28,11 @@ Component = Annotated[Quantity, Measure("0.6", "-1", "1")]
 Direction = Annotated[tuple[Component, Component, Component], Field(strict=False, examples=['["0", "0", "1"]'])]
 
 
+def absent(value: object) -> bool:
+    """Whether an optional key is not in the file: then it is not in the digest either, so that older digests stay."""
+    return value is None
+
+
 # ---------------------------------------------------------------------------------------------------- parts
 
 

@@ -6,22 +6,23 @@ branch of a four-bar) is structure, on which derivations depend, while they neve
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
-from pydantic import Field
+from pydantic import Field, model_serializer
 
 from awiwi_gen.hand.links import Base, FourBar, Inertia, Link
 from awiwi_gen.hand.measure import Measure
 from awiwi_gen.hand.names import FingerName, JointName, Over, Prefix, Source, Title
-from awiwi_gen.hand.part import Angle, Direction, Keys, Length, Moment, Part, Point, Size, covers, join
+from awiwi_gen.hand.part import Angle, Direction, Keys, Length, Moment, Part, Point, Size, absent, covers, join
 from awiwi_gen.units import Quantity, parse_unit
 
 # fmt: off
 __all__ = [
     "MOST", "PALM", "Angle", "Base", "Coupling", "Finger", "FingerName", "FourBar", "Inertia", "Keys", "Length",
     "Limits", "Link", "Measure", "Moment", "Part", "PathPoint", "Point", "Prefix", "Pulley", "ReturnSpring", "Run", "Size",
-    "Source", "Span", "Tendon", "Title", "covers", "join",
+    "Source", "Span", "Tendon", "Title", "Transmission", "covers", "join",
 ]
 # fmt: on
 
@@ -133,12 +134,22 @@ class ReturnSpring(Part):
     rest: Length
 
 
+class MotorShare(Part):
+    """What a tendon has of a motor that pulls several: the motor's name, and length of the motor's per length of its own.
+
+    A force f of the motor is ratio * f in the tendon, for no work is lost between them.
+    """
+
+    name: Annotated[JointName, Field(examples=['"flexor"'])]
+    ratio: Annotated[Quantity, Measure("0.5", "-100", "100")]
+
+
 class Tendon(Part):
     """Path length in the finger: a sum of all that its keys describe.
 
     These are the rest, sense * radius * angle over the pulleys, arm * angle of joints with an arm of this tendon's own,
     the length of the span, and the lines from point to point of the path, straight or round bodies. A motor pulls it
-    unless it has a spring.
+    unless it has a spring: a motor of its own, or one that it shares.
     """
 
     rest: Length
@@ -147,6 +158,7 @@ class Tendon(Part):
     span: Span | None = None
     path: Annotated[tuple[PathPoint, ...], Field(strict=False, min_length=2, max_length=MOST)] = ()
     spring: ReturnSpring | None = None
+    motor: Annotated[MotorShare | None, Field(exclude_if=absent)] = None
     source: Source
 
     @property
@@ -192,6 +204,33 @@ def _coefficient(power: int) -> Measure:
         measure("rad", "m", usual * 100, 10000.0**power),
     )
     return replace(measure("rad", "rad", usual, 100.0), others=slides)
+
+
+@dataclass(frozen=True)
+class Transmission:
+    """What one motor pulls: its tendons in the order of the file, and of each the index among all pulled tendons.
+
+    `ratios` has the length of the motor's per length of each tendon; it is empty for a tendon with a motor of its own.
+    """
+
+    tendons: tuple[Tendon, ...]
+    members: tuple[int, ...]
+    ratios: tuple[Quantity, ...] = ()
+
+    @property
+    def two_way(self) -> bool:
+        """Whether the motor winds some tendons up while it lets others go, so that its force has both signs."""
+        return any(ratio.value < 0 for ratio in self.ratios)
+
+    @property
+    def weights(self) -> list[float]:
+        """The ratios as numbers, one for each tendon."""
+        return [float(ratio) for ratio in self.ratios] or [1.0]
+
+    def arms(self, coupling: Sequence[Sequence[float]]) -> list[float]:
+        """The motor's arms at all joints [m/rad], from those of every pulled tendon."""
+        rows = [coupling[member] for member in self.members]
+        return [sum(w * arm for w, arm in zip(self.weights, arms, strict=True)) for arms in zip(*rows, strict=True)]
 
 
 class Coupling(Part):
@@ -244,6 +283,21 @@ class Finger(Part):
         """The n independent joints, base to tip: those that follow no other joint. Their angles are the finger's q."""
         return tuple(link.joint for link in self.links if link.joint not in self.leaders)
 
+    @property
+    def measured(self) -> tuple[int, ...]:
+        """The independent joints whose angles come from sensors, by index; tendon lengths tell those of the others.
+
+        None where all joints have sensors: then lengths tell all angles, as a check of the sensors.
+        """
+        sensed = {link.joint for link in self.links if link.sensor is not None}
+        found = tuple(index for index, joint in enumerate(self.joints) if joint in sensed)
+        return found if len(found) < len(self.joints) else ()
+
+    @model_serializer(mode="wrap")
+    def _with_measured(self, serialized: Callable[[Any], dict[str, Any]]) -> dict[str, Any]:
+        """The values of the digest: of sensors, which of them kernels read."""
+        return {**serialized(self), **({"measured": self.measured} if self.measured else {})}
+
     def motion(self, joint: str) -> tuple[float, ...]:
         """Coefficients of a joint's angle by powers of its leader's, or of its own: offset [rad], ratio, and others."""
         for coupling in self.couplings:
@@ -271,8 +325,25 @@ class Finger(Part):
 
     @property
     def pulled(self) -> tuple[Tendon, ...]:
-        """The m tendons that motors pull, in the order of the arrays over tendons; the others are return strings."""
+        """The tendons that motors pull; the others are return strings."""
         return tuple(tendon for tendon in self.tendons if tendon.spring is None)
+
+    @property
+    def pulled_numbers(self) -> list[int]:
+        """Of every tendon that motors pull, its number in the file."""
+        return [number for number, tendon in enumerate(self.tendons) if tendon.spring is None]
+
+    @property
+    def transmissions(self) -> tuple[Transmission, ...]:
+        """What each of the m motors pulls, in the order of the arrays over tendons: by its first tendon."""
+        shared: dict[int | str, list[int]] = {}
+        for index, tendon in enumerate(self.pulled):
+            shared.setdefault(tendon.motor.name if tendon.motor else index, []).append(index)
+        found = []
+        for members in shared.values():
+            tendons = tuple(self.pulled[index] for index in members)
+            found.append(Transmission(tendons, tuple(members), tuple(t.motor.ratio for t in tendons if t.motor)))
+        return tuple(found)
 
     @property
     def strings(self) -> tuple[Tendon, ...]:
@@ -286,11 +357,14 @@ class Finger(Part):
 
     def structure(self) -> dict[str, Any]:
         """Everything but the numbers, ready for JSON: fingers with equal structures share their derivations."""
+        shared = [transmission.members for transmission in self.transmissions if transmission.ratios]
         return {
             "links": [link.structure() for link in self.links],
             "pulleys": [pulley.joint for pulley in self.pulleys],
             "tendons": [tendon.structure() for tendon in self.tendons],
             "couplings": [coupling.structure() for coupling in self.couplings],
+            **({"motors": shared} if shared else {}),
+            **({"measured": self.measured} if self.measured else {}),
             **({"base": self.base.quarters} if self.base else {}),
         }
 

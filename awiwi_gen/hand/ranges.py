@@ -23,6 +23,8 @@ def measures(part: Part) -> dict[str, Measure]:
     """What every number must be, by its path relative to the part."""
     found: dict[str, Measure] = {}
     for name, field in type(part).model_fields.items():
+        if field.exclude:  # no number of the kernels
+            continue
         of_field = list(_measures((field.annotation, *field.metadata)))
         _collect(getattr(part, name), field.alias or name, of_field, found)
     return found

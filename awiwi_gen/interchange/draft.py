@@ -51,7 +51,7 @@ class DraftTendon:
     """A tendon of the hand file; each place of a path is in the frame of the link of that joint, or of the "palm".
 
     Length per angle of a joint [m] is `arms`; of joints with a pulley, the sense is in `over` ("+flexion"). The third entry
-    of a place is the link of a side point that another link carries, else None.
+    of a place is the link of a side point that another link carries, else None. A shared `motor` has a name and a ratio.
     """
 
     name: str
@@ -61,6 +61,12 @@ class DraftTendon:
     path: tuple[tuple[str, Place, str | None], ...]
     stiffness: float
     slack: float
+    motor: tuple[str, float] | None = None
+
+    def wound_by(self, motor: str) -> tuple[DraftTendon, DraftTendon]:
+        """A tendon that its motor also pushes, as two on its drum: one is wound up while the other is let go."""
+        back = {joint: -arm for joint, arm in self.arms.items()}
+        return replace(self, motor=(motor, 0.5)), replace(self, rest=-self.rest, arms=back, motor=(motor, -0.5))
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,6 +118,7 @@ class DraftHand:
     names: dict[str, str]
     losses: tuple[Loss, ...]
     notes: tuple[str, ...] = field(default=())
+    tendon_force: float = 0.0
 
 
 def draft(model: Model, palm: str = "", named: Mapping[str, str] | None = None) -> DraftHand:
@@ -127,8 +134,10 @@ def draft(model: Model, palm: str = "", named: Mapping[str, str] | None = None) 
     owner = {joint.name: chain.name for chain in chains for joint in chain.joints}
     mimics, lost = followed(model.mimics, owner, names)
     routed, left = _routed(model, chains, owner)
+    motors = joint_names({"": [tendon.name for tendon in model.tendons if tendon.two_way]})
     fingers = tuple(
-        _finger(model, root, chain, names, {f.published: f for f in mimics}, routed[chain.name]) for chain in chains
+        _finger(model, root, chain, names, {f.published: f for f in mimics}, routed[chain.name], motors)
+        for chain in chains
     )
     wrist = _wrist(model, root)
     if wrist is not None:
@@ -143,6 +152,7 @@ def draft(model: Model, palm: str = "", named: Mapping[str, str] | None = None) 
         names={"joint " + old: new for old, new in names.items() if old != new},
         losses=(*model.losses, *losses, *lost, *left, *_approximated(chains, fingers)),
         notes=model.notes,
+        tendon_force=model.tendon_force,
     )
 
 
@@ -177,8 +187,9 @@ def _approximated(chains: list[Chain], fingers: tuple[DraftFinger, ...]) -> list
 
 
 def _finger(
-    model: Model, palm: int, chain: Chain, names: dict[str, str], mimics: Mapping[str, Followed], tendons: list[Tendon]
-) -> DraftFinger:
+    model: Model, palm: int, chain: Chain, names: dict[str, str], mimics: Mapping[str, Followed], tendons: list[Tendon],
+    motors: Mapping[str, str],
+) -> DraftFinger:  # fmt: skip
     carrier = model.bodies[chain.segments[0].body].parent
     pose_axes, pose_origin = model.poses[palm]
     axes = [_axis(model, joint) for joint in chain.joints]
@@ -195,7 +206,10 @@ def _finger(
             mimic = mimics.get(joint.name)
             links.append(_link(model, segment, joint, names[joint.name], frame, end, holds, mimic, marks))
     places = {body: links[_last(chain, segment)] for segment in chain.segments for body in segment.members}
-    strings = [_tendon(model, tendon, names, mimics, places, (base, axes[0].anchor)) for tendon in tendons]
+    strings: list[DraftTendon] = []
+    for tendon in tendons:
+        string = _tendon(model, tendon, names, mimics, places, (base, axes[0].anchor))
+        strings += string.wound_by(motors[tendon.name]) if tendon.two_way else [string]
     followers = tuple(mimics[joint.name] for joint in chain.joints if joint.name in mimics)
     pulleys = _pulleys(strings, {each.follower for each in followers} | {each.joint for each in links if each.slides})
     return DraftFinger(

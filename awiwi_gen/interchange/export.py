@@ -15,7 +15,7 @@ from awiwi_gen.interchange.fits import coupler_fit
 from awiwi_gen.interchange.frames import about, turn_matrix
 from awiwi_gen.interchange.model import Array, Loss
 
-_OF_JOINTS = ("low", "high", "four_bar", "armature", "damping", "friction", "spring")
+_OF_JOINTS = ("low", "high", "four_bar", "armature", "damping", "friction", "spring", "effort", "sensor")
 FRICTION = (
     "dry friction is a smooth curve in the hand: the format has its torque, without the velocity at which it rises"
 )
@@ -146,7 +146,14 @@ def document(root: ElementTree.Element, hand: Hand) -> str:
 def common_losses(hand: Hand) -> list[Loss]:
     """What neither format holds."""
     rough = [f"{n} {link.joint}" for n, f in hand.fingers.items() for link in f.links if link.friction is not None]
-    return [Loss(FRICTION, tuple(rough))]
+    ranges = [f"{n} {link.joint}" for n, f in hand.fingers.items() for link in f.links
+              if link.sensor is not None and link.sensor.quantities()]  # fmt: skip
+    clock = ["clock"] * (hand.clock is not None) + ["motor.current"] * bool(hand.motor and hand.motor.current)
+    return [
+        Loss(FRICTION, tuple(rough)),
+        Loss("resolution and range of joint sensors", tuple(ranges)),
+        Loss("period of the controller and currents of motors", tuple(clock)),
+    ]
 
 
 def coupler_losses(hand: Hand, degree: int) -> Loss:

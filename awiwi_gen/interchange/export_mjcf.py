@@ -12,7 +12,7 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from awiwi_gen.hand import Finger, Hand, Link
-from awiwi_gen.hand.parts import PALM, PathPoint, Tendon
+from awiwi_gen.hand.parts import PALM, PathPoint, Tendon, Transmission
 from awiwi_gen.hand.pose import Chain
 from awiwi_gen.interchange.export import (
     Drawn,
@@ -37,6 +37,7 @@ from awiwi_gen.interchange.model import Array, Loss
 __all__ = ["MOTORS", "text_and_losses"]
 
 DEGREE = 4  # of MuJoCo's couplings of joints
+Passed = tuple[str, Array, PathPoint | None]
 
 
 def text_and_losses(hand: Hand, motors: str = FORCE) -> tuple[str, list[Loss]]:
@@ -49,7 +50,7 @@ def text_and_losses(hand: Hand, motors: str = FORCE) -> tuple[str, list[Loss]]:
     option = SubElement(root, "option", integrator="implicitfast")
     if motors != FORCE:
         option.set("timestep", TIMESTEP)
-    sections = {name: Element(name) for name in ("tendon", "equality", "actuator")}
+    sections = {name: Element(name) for name in ("tendon", "equality", "actuator", "sensor")}
     lost: Lost = {}
     world = SubElement(root, "worldbody")
     drives = Drives(hand, motors, world, sections, lost)
@@ -99,11 +100,20 @@ class _Writer:
         for link in self.finger.links:
             if link.four_bar is not None:
                 self._coupler(link)
+        for link in self.finger.links:
+            if link.sensor is not None:
+                joint = f"{self.name}_{link.joint}"
+                SubElement(self.sections["sensor"], "jointpos", name=f"{joint}.sensor", joint=joint)
+        motors = {self.finger.pulled_numbers[t.members[0]]: (i, t) for i, t in enumerate(self.finger.transmissions)}
         for number, tendon in enumerate(self.finger.tendons):
-            self._tendon(number, tendon)
+            if tendon.spring is not None:
+                self._string(number, tendon)
+            elif number in motors:
+                self._transmission(*motors[number])
         if not self.finger.tendons:
-            for joint in self.finger.joints:
-                self.drives.move(f"{self.name}_{joint}", joint in self.finger.sliding)
+            for link in self.finger.links:
+                if link.joint in self.finger.joints:
+                    self.drives.move(f"{self.name}_{link.joint}", link.effort, link.slides)
 
     def _lose(self, what: str, place: str) -> None:
         self.lost.setdefault(what, []).append(place)
@@ -164,42 +174,63 @@ class _Writer:
 
     # -- tendons -----------------------------------------------------------------------------------------------------
 
-    def _tendon(self, number: int, tendon: Tendon) -> None:
-        name = f"{self.name}.tendon{number}"
+    def _transmission(self, index: int, transmission: Transmission) -> None:
+        """What a motor of the finger pulls, number `index`, and the motor."""
+        numbers = [self.finger.pulled_numbers[member] for member in transmission.members]
+        shares = [*zip(transmission.weights, numbers, strict=True)]
+        if transmission.two_way:  # the tendons that it lets go mirror those that it winds up
+            shares = [(2 * weight, number) for weight, number in shares if weight > 0]
+        shared, chain = transmission.tendons[0].motor, Chain(self.finger)
+        name = (
+            f"{self.name}.{shared.name.removeprefix(f'{self.name}_')}" if shared else f"{self.name}.tendon{numbers[0]}"
+        )
+        tendons = [(weight, self.finger.tendons[number]) for weight, number in shares]
+        slack = sum(weight * chain.length(number, [0.0] * len(self.finger.joints)) for weight, number in shares)
+        slack -= sum(weight * float(tendon.rest) for weight, tendon in tendons)
+        index += self.drives.hand.blocks[self.name][0].start
+        self.drives.pull(self._tendon(name, tendons), index, slack, transmission.two_way)
+
+    def _tendon(self, name: str, tendons: list[tuple[float, Tendon]]) -> list[Element]:
+        """A tendon of MuJoCo, or one for arcs and one for lines, as long as the sum of weight times length."""
         arms: dict[str, float] = {}
-        for over in tendon.over:
-            arms[over[1:]] = arms.get(over[1:], 0.0) + float(f"{over[0]}1") * float(self.finger.radii[over[1:]])
-        for joint, arm in tendon.arms.items():
-            arms[joint] = arms.get(joint, 0.0) + float(arm)
+        for weight, tendon in tendons:
+            for over in tendon.over:
+                radius = float(f"{over[0]}1") * float(self.finger.radii[over[1:]])
+                arms[over[1:]] = arms.get(over[1:], 0.0) + weight * radius
+            for joint, arm in tendon.arms.items():
+                arms[joint] = arms.get(joint, 0.0) + weight * float(arm)
         written = []
         if arms:
             written.append(SubElement(self.sections["tendon"], "fixed", name=name))
             for joint, coefficient in arms.items():
                 SubElement(written[-1], "joint", joint=f"{self.name}_{joint}", coef=text(coefficient))
-        for line, points in enumerate(self._lines(tendon)):
-            full = name if not written else f"{name}.line{line}"
+        lines = [(weight, points) for weight, tendon in tendons for points in self._lines(tendon)]
+        if lines:
+            full = f"{name}.line0" if written else name
             written.append(SubElement(self.sections["tendon"], "spatial", name=full))
-            for step, (link, at, passed) in enumerate(points):
-                if passed is not None and passed.radius is not None:
-                    self._wrap(written[-1], f"{full}.geom{step}", passed)
-                    continue
-                if passed is not None and passed.divisor is not None:
-                    SubElement(written[-1], "pulley", divisor=text(float(passed.divisor)))
-                SubElement(self.bodies[link], "site", name=f"{full}.site{step}", pos=text(at))
-                SubElement(written[-1], "site", site=f"{full}.site{step}")
+            self._branches(written[-1], full, lines)
         if len(written) > 1:
             self._lose("tendons of arcs and lines: one tendon of MuJoCo for each, and their forces are equal", name)
-        if tendon.rest.value:
+        if any(tendon.rest.value for _, tendon in tendons):
             self._lose("lengths of tendons that no joint changes (rest): not in MuJoCo's length", name)
-        if tendon.spring is not None:
-            self._spring(written, tendon)
-            return
-        slack = Chain(self.finger).length(number, [0.0] * len(self.finger.joints)) - float(tendon.rest)
-        index = self.drives.hand.blocks[self.name][0].start + self.finger.pulled.index(tendon)
-        self.drives.pull(written, index, slack)
+        return written
 
-    def _spring(self, written: list[Element], tendon: Tendon) -> None:
+    def _branches(self, element: Element, name: str, lines: list[tuple[float, list[Passed]]]) -> None:
+        """The places of some paths; lengths of each count so many times."""
+        steps = [(weight, first, *each) for weight, points in lines for first, each in enumerate(points)]
+        for step, (weight, first, link, at, passed) in enumerate(steps):
+            if passed is not None and passed.radius is not None:
+                self._wrap(element, f"{name}.geom{step}", passed)
+                continue
+            divisor = None if passed is None else passed.divisor
+            if divisor is not None or (first == 0 and (step or weight != 1)):
+                SubElement(element, "pulley", divisor=text(float(divisor or 1) / weight))
+            SubElement(self.bodies[link], "site", name=f"{name}.site{step}", pos=text(at))
+            SubElement(element, "site", site=f"{name}.site{step}")
+
+    def _string(self, number: int, tendon: Tendon) -> None:
         """An elastic return string: it never pushes."""
+        written = self._tendon(f"{self.name}.tendon{number}", [(1.0, tendon)])
         if tendon.spring is None or len(written) > 1:
             self._lose("return springs of arcs and lines: MuJoCo has no spring over both", written[0].get("name", ""))
             return
@@ -222,9 +253,9 @@ class _Writer:
             SubElement(carrier, "site", name=f"{name}.side", pos=text(vector(side)))
             step.set("sidesite", f"{name}.side")
 
-    def _lines(self, tendon: Tendon) -> list[list[tuple[str, Array, PathPoint | None]]]:
+    def _lines(self, tendon: Tendon) -> list[list[Passed]]:
         """What the span and the path pass, each as (link, position in its frame, entry of the path or None)."""
-        found: list[list[tuple[str, Array, PathPoint | None]]] = []
+        found: list[list[Passed]] = []
         if tendon.span is not None:
             order = [link.joint for link in self.finger.links]
             seat = order.index(tendon.span.joint)

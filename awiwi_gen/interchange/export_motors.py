@@ -19,6 +19,7 @@ from awiwi_gen.interchange.export import text
 from awiwi_gen.interchange.fits import Fit, elongation_curve, spring_fit
 from awiwi_gen.interchange.mjcf_elements import least_inertia
 from awiwi_gen.interchange.model import LEAST_MASS
+from awiwi_gen.units import Quantity
 
 __all__ = ["FORCE", "MOTORS", "POSITION", "TIMESTEP", "TORQUE", "Drives", "Lost", "Sections", "one_sided"]
 
@@ -74,10 +75,11 @@ class Drives:
 
     # -- joints ------------------------------------------------------------------------------------------------------
 
-    def move(self, joint: str, slides: bool) -> None:
-        """A motor in a joint of a finger without tendons."""
+    def move(self, joint: str, effort: Quantity | None, slides: bool) -> None:
+        """A motor in a joint of a finger without tendons; without an effort of its own, up to the hand's limit."""
         limits = self.hand.limits
         torque, range_ = (float(limits.slide_force or 0), _TRAVEL) if slides else (float(limits.joint_torque), 10.0)
+        torque = float(effort or torque)
         if self.motors == POSITION:
             SubElement(self.sections["actuator"], "position", name=f"{joint}.motor", joint=joint,
                        kp=text(torque / (range_ * _SHARE)), forcerange=text((-torque, torque)))  # fmt: skip
@@ -87,19 +89,21 @@ class Drives:
 
     # -- tendons -----------------------------------------------------------------------------------------------------
 
-    def pull(self, written: list[Element], index: int, slack: float) -> None:
+    def pull(self, written: list[Element], index: int, slack: float, two_way: bool = False) -> None:
         """What pulls a tendon of the hand, number `index`, which may be several of MuJoCo.
 
-        `slack` is the length [m] without the finger's rest, joints at zero.
+        `slack` is the length [m] without the finger's rest, joints at zero. A motor that pulls both ways also pushes.
         """
-        fit = self._fit(index)
+        fit = None if two_way else self._fit(index)
+        if two_way and self.motors != FORCE and (self.hand.spring or self.hand.tendon):
+            self._lose("springs of motors that pull both ways: they pull without", written[0].get("name", ""))
         if self.motors != FORCE and fit is not None and self.hand.motor is not None:
             if len(written) == 1:
                 self._shaft(written[0], fit, slack)
                 return
             self._lose("springs of tendons of arcs and lines: the motor pulls without", written[0].get("name", ""))
         for each in written:
-            self._direct(each)
+            self._direct(each, two_way)
 
     def _fit(self, index: int) -> Fit | None:
         """Force over elongation of a tendon's spring and fibre; None where the hand has neither."""
@@ -119,20 +123,20 @@ class Drives:
                 self._lose(what, f"{name} by {self.fits[key].error:.2g} N")
         return self.fits[key]
 
-    def _direct(self, element: Element) -> None:
-        """An actuator on the tendon itself: it pulls, and does not push."""
-        name, limits = element.get("name", ""), self.hand.limits
+    def _direct(self, element: Element, two_way: bool) -> None:
+        """An actuator on the tendon itself: it pulls, and pushes only if it pulls both ways."""
+        name, limits, back = element.get("name", ""), self.hand.limits, float(two_way)
         most = float(limits.tendon_force)
         if self.motors == POSITION:
             SubElement(self.sections["actuator"], "position", name=f"{name}.motor", tendon=name,
-                       kp=text(float(limits.tendon_stiffness_high)), forcerange=text((-most, 0)))  # fmt: skip
+                       kp=text(float(limits.tendon_stiffness_high)), forcerange=text((-most, back * most)))  # fmt: skip
         elif self.motors == TORQUE and self.hand.motor is not None:
             SubElement(self.sections["actuator"], "motor", name=f"{name}.motor", tendon=name,
                        gear=text(-1 / float(self.hand.motor.pulley)),
-                       ctrlrange=text((0, float(self.hand.motor.torque))))  # fmt: skip
+                       ctrlrange=text(np.array([-back, 1]) * float(self.hand.motor.torque)))  # fmt: skip
         else:
             SubElement(self.sections["actuator"], "motor", name=f"{name}.motor", tendon=name, gear="-1",
-                       ctrlrange=text((0, most)))  # fmt: skip
+                       ctrlrange=text((-back * most, most)))  # fmt: skip
 
     def _shaft(self, element: Element, fit: Fit, slack: float) -> None:
         """The motor's shaft winds up the tendon, which is a spring."""
@@ -153,7 +157,9 @@ class Drives:
             SubElement(self.world, "site", name=f"{name}.anchor", pos=text((-_LEG, 0, 0)))
             SubElement(body, "site", name=f"{name}.end")
             leg = [Element("site", site=f"{name}.anchor"), Element("site", site=f"{name}.end")]
-            for place, each in enumerate([*leg, Element("pulley", divisor="1")]):
+            if element[0].tag != "pulley":
+                leg.append(Element("pulley", divisor="1"))
+            for place, each in enumerate(leg):
                 element.insert(place, each)
             slack += _LEG
         element.set("stiffness", text(np.array(fit.coefficients[1:])))

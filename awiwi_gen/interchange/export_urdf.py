@@ -122,8 +122,11 @@ def _moving(
     SubElement(joint, "axis", xyz="0 0 1")
     low, high = limits
     most = ("slide_force", "slide_velocity") if slides else ("joint_torque", "joint_velocity")
-    effort, velocity = (text(value(getattr(hand.limits, key))) for key in most)
-    SubElement(joint, "limit", lower=text(low), upper=text(high), effort=effort, velocity=velocity)
+    effort, velocity = (value(getattr(hand.limits, key)) for key in most)
+    own = getattr(part.link, "effort", None)
+    SubElement(
+        joint, "limit", lower=text(low), upper=text(high), effort=text(float(own or effort)), velocity=text(velocity)
+    )
     return joint
 
 

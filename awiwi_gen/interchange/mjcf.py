@@ -33,7 +33,10 @@ def read(path: Path, exact: bool = False, without: Iterable[str] = (), fit: bool
     are left out. With `fit`, tendons that wrap around geoms get constant arms; else they are lost.
     """
     spec, notes = parse(path, exact)
-    driven = {each.target for each in spec.actuators if each.trntype == mujoco.mjtTrn.mjTRN_TENDON}
+    forces = _forces(spec)
+    most = [max(map(abs, ends)) for ends in forces.values()]
+    driven = {name: bool(min(ends) < 0 < max(ends)) for name, ends in forces.items()}
+    measured = {each.objname for each in spec.sensors if each.type == mujoco.mjtSensor.mjSENS_JOINTPOS}
     losses = prepare(spec, set(without))
     massless = {body.name for body in spec.bodies[1:] if body.explicitinertial and body.mass <= LEAST_MASS}
     compiled = compile_spec(spec, path)
@@ -42,7 +45,7 @@ def read(path: Path, exact: bool = False, without: Iterable[str] = (), fit: bool
         name=spec.modelname or path.stem,
         file=path.name,
         bodies=tuple(_body(compiled, index, massless) for index in range(compiled.nbody)),
-        joints=tuple(_joint(compiled, index) for index in range(compiled.njnt)),
+        joints=tuple(_joint(compiled, index, measured) for index in range(compiled.njnt)),
         tendons=tendons,
         mimics=_mimics(compiled),
         sites=tuple(
@@ -51,7 +54,24 @@ def read(path: Path, exact: bool = False, without: Iterable[str] = (), fit: bool
         ),
         losses=(*losses, *lost),
         notes=tuple(notes),
+        tendon_force=max(most) if most and min(most) > 0 else 0.0,
     )
+
+
+def _forces(spec: Any) -> dict[str, list[float]]:
+    """Tendon -> ends of the forces [N] of its actuators, above zero where they lengthen it; zeros without a limit."""
+    found: dict[str, list[float]] = {}
+    for each in spec.actuators:
+        if each.trntype != mujoco.mjtTrn.mjTRN_TENDON:
+            continue
+        ends = [0.0, 0.0]
+        constant = each.gaintype == mujoco.mjtGain.mjGAIN_FIXED and each.biastype == mujoco.mjtBias.mjBIAS_NONE
+        if each.forcelimited and each.forcerange[0] < each.forcerange[1]:
+            ends = [*each.forcerange]
+        elif constant and each.ctrllimited and each.ctrlrange[0] < each.ctrlrange[1]:
+            ends = [each.gainprm[0] * end for end in each.ctrlrange]
+        found.setdefault(each.target, []).extend(end * each.gear[0] for end in ends)
+    return found
 
 
 def parse(path: Path, exact: bool) -> tuple[Any, list[str]]:
@@ -171,7 +191,7 @@ def prepare(spec: Any, without: set[str]) -> list[Loss]:
             "geoms that collide: the hand file has no contacts", geoms, lambda geom: geom.contype or geom.conaffinity
         ),
         _loss("meshes", spec.meshes),
-        _loss("sensors", spec.sensors),
+        _loss("sensors", spec.sensors, lambda each: each.type != mujoco.mjtSensor.mjSENS_JOINTPOS),
         _loss("keyframes", spec.keys),
         _loss("equality constraints that are no coupling of two joints", spec.equalities, lambda e: not is_lock(e)),
         _loss(
@@ -283,7 +303,7 @@ def _body(compiled: Any, index: int, massless: set[str]) -> Body:
     )
 
 
-def _joint(compiled: Any, index: int) -> Joint:
+def _joint(compiled: Any, index: int, measured: set[str]) -> Joint:
     kind = KINDS[compiled.jnt_type[index]]
     dof, at = int(compiled.jnt_dofadr[index]), int(compiled.jnt_qposadr[index])
     scalar = kind in ("hinge", "slide")
@@ -302,6 +322,8 @@ def _joint(compiled: Any, index: int) -> Joint:
         friction=float(compiled.dof_frictionloss[dof]),
         stiffness=float(compiled.jnt_stiffness[index]),
         spring_reference=float(compiled.qpos_spring[at]) if scalar else 0.0,
+        effort=float(np.abs(compiled.jnt_actfrcrange[index]).min()) if compiled.jnt_actfrclimited[index] else 0.0,
+        measured=compiled.joint(index).name in measured,
     )
 
 
@@ -316,8 +338,8 @@ def _mimics(compiled: Any) -> tuple[Mimic, ...]:
     return tuple(found)
 
 
-def _tendons(compiled: Any, driven: set[str], fit: bool) -> tuple[tuple[Tendon, ...], list[Loss]]:
-    found, fits, pushed, poly, both = [], [], [], [], []
+def _tendons(compiled: Any, driven: dict[str, bool], fit: bool) -> tuple[tuple[Tendon, ...], list[Loss]]:
+    found, fits, pushed, poly, both, two_way = [], [], [], [], [], []
     losses: dict[str, list[str]] = {}
     joint_wrap = mujoco.mjtWrap.mjWRAP_JOINT
     for index in range(compiled.ntendon):
@@ -337,13 +359,14 @@ def _tendons(compiled: Any, driven: set[str], fit: bool) -> tuple[tuple[Tendon, 
             poly.append(name)
         if kinds == {int(joint_wrap)}:
             arms = {compiled.joint(int(compiled.wrap_objid[k])).name: float(compiled.wrap_prm[k]) for k in places}
-            found.append(Tendon(name, arms=arms, **spring))
+            found.append(Tendon(name, arms=arms, two_way=driven.get(name, False), **spring))
         elif fit and kinds != {int(mujoco.mjtWrap.mjWRAP_SITE)}:
-            tendon, error = fitted(compiled, Tendon(name, **spring), _mimics(compiled))
+            tendon, error = fitted(compiled, Tendon(name, two_way=driven.get(name, False), **spring), _mimics(compiled))
             found.append(tendon)
             fits.append(f"{name} by {error * 1e3:.2g} mm")
         else:
             path, lost = path_of(compiled, places)
+            two_way += [name] * driven.get(name, False)
             if path:
                 found.append(Tendon(name, path=path, **spring))
             for what in lost:
@@ -352,6 +375,7 @@ def _tendons(compiled: Any, driven: set[str], fit: bool) -> tuple[tuple[Tendon, 
         *(Loss(what, tuple(names)) for what, names in losses.items()),
         Loss("wraps of tendons: constant arms fitted, lengths differ at most", tuple(fits)),
         Loss("springs of tendons that also push: the hand's springs only pull", tuple(pushed)),
+        Loss("motors that also push tendons through sites: the hand's motors only pull these", tuple(two_way)),
         Loss("springs of tendons that a motor pulls: the hand's tendons have one or the other", tuple(both)),
         Loss(
             "polynomial stiffness or damping of joints: only the linear term is kept",

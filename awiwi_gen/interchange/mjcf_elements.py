@@ -25,6 +25,8 @@ def joint_of(body: Element, name: str, part: Part, axis: Array, anchor: Array) -
         joint.set("range", text((float(link.low), float(link.high))))
     if not isinstance(link, Link):
         return
+    if link.effort is not None:
+        joint.set("actuatorfrcrange", text((-float(link.effort), float(link.effort))))
     for key in ("armature", "damping"):
         if getattr(link, key) is not None:
             joint.set(key, text(value(getattr(link, key))))

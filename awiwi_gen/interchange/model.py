@@ -44,7 +44,8 @@ class Body:
 class Joint:
     """A joint of a body: `axis` (3, a unit vector) through `anchor` (3), both in the body's frame as drawn.
 
-    `kind` is hinge, slide, ball or free; `low` and `high` are None for a joint without limits.
+    `kind` is hinge, slide, ball or free; `low` and `high` are None for a joint without limits. `effort` is the largest
+    torque that the joint bears, 0 if the file says none.
     """
 
     name: str
@@ -60,6 +61,8 @@ class Joint:
     friction: float = 0.0
     stiffness: float = 0.0
     spring_reference: float = 0.0
+    effort: float = 0.0
+    measured: bool = False
 
 
 class Place(NamedTuple):
@@ -93,7 +96,7 @@ class Tendon:
     """A tendon: either `arms`, length per angle by joint, or a `path` from place to place.
 
     Its length also has a `constant` part [m]. An elastic string has a `stiffness` [N/m] and no force where it is as long
-    as `rest`.
+    as `rest`. A tendon of arms that its motor also pushes is `two_way`.
     """
 
     name: str
@@ -102,6 +105,7 @@ class Tendon:
     stiffness: float = 0.0
     rest: float = 0.0
     constant: float = 0.0
+    two_way: bool = False
 
 
 @dataclass(frozen=True)
@@ -151,7 +155,10 @@ class Loss:
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """A whole file. `notes` say what was taken differently than published; `losses` what is not in this tree."""
+    """A whole file. `notes` say what was taken differently than published; `losses` what is not in this tree.
+
+    `tendon_force` is the largest force [N] of motors that pull tendons, 0 if the file does not limit one of them.
+    """
 
     name: str
     file: str
@@ -162,6 +169,7 @@ class Model:
     sites: tuple[Site, ...] = ()
     losses: tuple[Loss, ...] = ()
     notes: tuple[str, ...] = ()
+    tendon_force: float = 0.0
 
     @cached_property
     def poses(self) -> tuple[tuple[Array, Array], ...]:

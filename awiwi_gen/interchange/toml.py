@@ -26,6 +26,7 @@ _LIMITS = {
     "gravity": "9.81 m/s^2",
 }
 _SLIDE_LIMITS = {"slide_velocity": "0.5 m/s", "slide_acceleration": "50 m/s^2", "slide_force": "50 N"}
+_MOST_EFFORT = 1000.0  # N m, or N of a slide; larger ones stand in files for joints without a limit
 _FRICTION_VELOCITY, _SLIDE_FRICTION_VELOCITY = "0.05 rad/s", "2 mm/s"
 _POWERS = ("square", "cube", "fourth")
 _RULE = "# " + "-" * 100
@@ -39,14 +40,36 @@ def hand_text(hand: DraftHand, command: str = "") -> str:
     lines += [f"# taken: {note}" for note in hand.notes]
     lines += [f"# {line}" for line in loss_lines(hand.losses)]
     lines += ["", f"prefix = {_text(hand.prefix)}", f"name = {_text(cite(hand.name))}", "", "[limits]"]
-    limits = _LIMITS | (_SLIDE_LIMITS if any(finger.sliding for finger in hand.fingers) else {})
-    lines += [f"{key} = {_text(value)}" for key, value in limits.items()]
-    lines += ['source = "assumed"']
+    lines += _limit_lines(hand)
     if hand.wrist is not None:
         lines += ["", _RULE, *_palm_lines(hand.wrist, hand)]
     for finger in hand.fingers:
         lines += ["", _RULE, *_finger_lines(finger, hand.file)]
     return "\n".join(line.rstrip() for line in lines) + "\n"
+
+
+def _limit_lines(hand: DraftHand) -> list[str]:
+    """Ranges of the kernels' inputs: what the model says of motors and joints, and guesses."""
+    links = [link for finger in hand.fingers for link in finger.links]
+    limits = _LIMITS | (_SLIDE_LIMITS if any(finger.sliding for finger in hand.fingers) else {})
+    known = {}
+    for key, unit, slides in (("joint_torque", "N m", False), ("slide_force", "N", True)):
+        most = max((_effort(link) for link in links if link.slides == slides), default=0.0)
+        if most > 0:
+            limits[key], known[key] = quantity(most, unit), cite(f"{hand.file} joints")
+    if hand.tendon_force:
+        limits["tendon_force"], known["tendon_force"] = quantity(hand.tendon_force, "N"), cite(f"{hand.file} actuators")
+    lines = [f"{key} = {_text(value)}" for key, value in limits.items()]
+    return [*lines, f"source = {_sources(known, 'assumed')}"]
+
+
+def _effort(link: DraftLink) -> float:
+    """The largest torque [N m] or force [N] of an independent joint.
+
+    It is 0 where the model says none, or one that no joint of a hand has.
+    """
+    effort = link.published.effort if link.limits else 0.0
+    return effort if effort <= _MOST_EFFORT else 0.0
 
 
 def cite(text: str) -> str:
@@ -142,6 +165,10 @@ def _link_lines(link: DraftLink, file: str) -> list[str]:
         reference_text = place(tidy([link.spring_reference], 1.0)[0], link.slides)
         stiffness = quantity(joint.stiffness, f"{torque}/{unit}")
         lines += [f'spring = {{ stiffness = "{stiffness}", reference = "{reference_text}" }}']
+    if effort := _effort(link):
+        lines += [f"effort = {_text(quantity(effort, torque))}"]
+    if joint.measured:
+        lines += ["sensor = {}"]
     return [*lines, f"source = {_sources(sources, cite(f'{file} joint {joint.name}'))}"]
 
 
@@ -162,6 +189,9 @@ def _tendon_lines(tendon: DraftTendon, file: str, sliding: set[str]) -> list[str
     if tendon.stiffness:
         stiffness, rest = quantity(tendon.stiffness, "N/m"), length(tendon.slack)
         lines += [f'spring = {{ stiffness = "{stiffness}", rest = "{rest}" }}']
+    if tendon.motor:
+        name, ratio = tendon.motor
+        lines += [f'motor = {{ name = "{name}", ratio = "{quantity(ratio, "").strip()}" }}']
     return [*lines, f"source = {_text(cite(f'{file} tendon {tendon.name}'))}"]
 
 

@@ -13,7 +13,8 @@ from typing import Any
 from awiwi_gen.hand import Finger, Hand
 from awiwi_gen.kernel import Kernel, Port, Solver
 from awiwi_gen.kernels.declare import Family
-from awiwi_gen.kernels.fingers import NEAR, input_ports, joint_limits, limit_paths
+from awiwi_gen.kernels.estimates import NEAR, joint_limits, limit_paths
+from awiwi_gen.kernels.fingers import input_ports
 from awiwi_gen.kernels.routing import moved
 from awiwi_gen.kernels.sizes import Size
 from awiwi_gen.units import rad
@@ -38,28 +39,23 @@ def base_kernels(hand: Hand, name: str, finger: Finger) -> list[Kernel]:
     if not base.spans:
         return []
     whole = input_ports(hand, finger, Size.of(finger))
-    ports = {"h": subset(whole["h"], base.spans), "start": subset(whole["start"], base.joints)}
+    ports = {"h": whole["h"].subset(base.spans), "start": whole["start"].subset(base.joints)}
     return of_base.kernels(name, finger, f"fingers.{name}", finger.structure(), ports, base)
 
 
 def base_of(finger: Finger) -> Base:
     """The spans, and the joints between them and the palm; empty if the tendons of spans run over other joints too."""
+    if any(transmission.ratios for transmission in finger.transmissions):
+        return Base((), ())  # the lengths of spans are not measured one by one
     order = [link.joint for link in finger.links]
     spans = tuple(i for i, tendon in enumerate(finger.pulled) if tendon.span)
     ends = [order.index(tendon.span.joint) for tendon in finger.pulled if tendon.span]
     leaders = [finger.leaders.get(joint, joint) for joint in order[: max(ends, default=0)]]
     joints = tuple(i for i, joint in enumerate(finger.joints) if joint in leaders)
-    others = set().union(*(moved(finger, finger.pulled[i]) for i in spans)) - set(leaders)
+    others = set().union(*(moved(finger, finger.transmissions[i]) for i in spans)) - set(leaders)
     if any(run.body for tendon in finger.pulled for run in tendon.runs):
         return Base((), ())  # the slopes of wraps do not bound the gradient's steps
     return Base(spans, joints) if not others and len(joints) <= len(spans) else Base((), ())
-
-
-def subset(port: Port, elements: tuple[int, ...]) -> Port:
-    """Some elements of a port, with their ranges."""
-    bounds = port.bounds()
-    low, high = zip(*(bounds[i] for i in elements), strict=True)
-    return Port((len(elements),), tuple(port.units[i] for i in elements), low, high)
 
 
 def gradient_search(finger: Finger) -> Solver:
@@ -74,7 +70,7 @@ def gradient_search(finger: Finger) -> Solver:
         arrays={"low": tuple(low[j] for j in base.joints), "high": tuple(high[j] for j in base.joints)},
         strings={
             "joints": str(len(finger.joints)),
-            "tendons": str(len(finger.pulled)),
+            "tendons": str(len(finger.transmissions)),
             "search": f"awiwi_gradient_search(&problem, h_in, start_in, {TRIALS}, 0, q_out)",
         },
         iterations=TRIALS + 1,

@@ -10,6 +10,7 @@ from typing import Any
 
 from awiwi_gen.hand import Hand
 from awiwi_gen.hand.lever import Lever
+from awiwi_gen.hand.parts import Transmission
 from awiwi_gen.kernel import Kernel, Port
 from awiwi_gen.kernels.declare import Family, Parameterless
 from awiwi_gen.units import N, Unit, kg, m, one, rad, s
@@ -38,12 +39,12 @@ def joint_stiffness(hand: Hand) -> tuple[float, float]:
             own = float(fibre.modulus) * float(fibre.section) / float(fibre.length)
             low, high = (1 / (1 / end + 1 / own) for end in (low, high))
     squares = [
-        float(pulley.radius) ** 2 * sum(over[1:] == pulley.joint for tendon in finger.pulled for over in tendon.over)
+        float(pulley.radius) ** 2 * sum(_turns(each, pulley.joint) ** 2 for each in finger.transmissions)
         for finger in hand.fingers.values()
         for pulley in finger.pulleys
     ]
     squares += [
-        sum(float(tendon.arms[joint]) ** 2 for tendon in finger.pulled if joint in tendon.arms)
+        sum(_arm(each, joint) ** 2 for each in finger.transmissions)
         for finger in hand.fingers.values()
         for joint in finger.joints
         if joint not in finger.sliding
@@ -51,6 +52,18 @@ def joint_stiffness(hand: Hand) -> tuple[float, float]:
     found = [square for square in squares if square > 0] or [1.0]
     # Two digits; 5 % is the most that rounding can lose.
     return float(f"{low * min(found) / 1.05:.2g}"), float(f"{high * max(found) * 1.05:.2g}")
+
+
+def _turns(transmission: Transmission, joint: str) -> float:
+    """How often a motor's tendons run over a joint's pulley, with their senses and shares."""
+    senses = [(f"+{joint}" in tendon.over) - (f"-{joint}" in tendon.over) for tendon in transmission.tendons]
+    return sum(weight * sense for weight, sense in zip(transmission.weights, senses, strict=True))
+
+
+def _arm(transmission: Transmission, joint: str) -> float:
+    """The arm [m/rad] that a motor's tendons have of their own at a joint, with their shares."""
+    arms = [float(tendon.arms.get(joint, 0)) for tendon in transmission.tendons]
+    return sum(weight * arm for weight, arm in zip(transmission.weights, arms, strict=True))
 
 
 def stiffness_ports(low: float, high: float) -> dict[str, Port]:

@@ -8,11 +8,12 @@ from typing import Any
 
 from awiwi_gen.hand import Hand
 from awiwi_gen.hand.lever import Lever
-from awiwi_gen.hand.parts import Finger, PathPoint, Tendon
+from awiwi_gen.hand.parts import Finger, PathPoint, Tendon, Transmission
 from awiwi_gen.hand.pose import polynomial
-from awiwi_gen.kernel import STOP, Kernel, Port, Solver
+from awiwi_gen.kernel import Kernel, Port
 from awiwi_gen.kernels.declare import Family, within
-from awiwi_gen.kernels.routing import groups, moved, wraps_hold
+from awiwi_gen.kernels.estimates import joint_limits, nonlinear_estimate
+from awiwi_gen.kernels.routing import least_forces, wraps_hold
 from awiwi_gen.kernels.sizes import (
     POSE,
     Size,
@@ -26,7 +27,7 @@ from awiwi_gen.kernels.sizes import (
     stiffness,
     torque,
 )
-from awiwi_gen.structure import link_number, rolls, wraps
+from awiwi_gen.structure import link_number, rolls
 from awiwi_gen.units import J, N, Unit, m, one, s
 
 per_finger: Family[Size] = Family()
@@ -67,7 +68,8 @@ def input_ports(hand: Hand, finger: Finger, size: Size) -> dict[str, Port]:
     limits = hand.limits
     low, high = joint_limits(finger)
     slack, taut = force_range(hand)
-    lengths = [length_range(finger, tendon) for tendon in finger.pulled]
+    least = least_forces(finger, limits)
+    lengths = [motor_range(finger, transmission) for transmission in finger.transmissions]
 
     def symmetric(shape: tuple[int, ...], unit: Unit, limit: Any) -> Port:
         return Port(shape, unit, -float(limit), float(limit))
@@ -76,12 +78,14 @@ def input_ports(hand: Hand, finger: Finger, size: Size) -> dict[str, Port]:
         most = size.choose(float(hinge), float(slide or 0))
         return replace(port, low=tuple(-each for each in most) if isinstance(most, tuple) else -most, high=most)
 
-    return {
-        "q": replace(motion(size), low=low, high=high),
+    q = replace(motion(size), low=low, high=high)
+    measured = {"measured": q.subset(finger.measured)} if finger.measured else {}
+    return measured | {
+        "q": q,
         "qd": of_joints(motion(size, one / s), limits.joint_velocity, limits.slide_velocity),
         "qdd": of_joints(motion(size, one / s**2), limits.joint_acceleration, limits.slide_acceleration),
         "tau": of_joints(torque(size), limits.joint_torque, limits.slide_force),
-        "f": Port((size.tendons,), N, 0.0, float(limits.tendon_force)),
+        "f": Port((size.tendons,), N, least if any(least) else 0.0, float(limits.tendon_force)),
         "k": Port((size.tendons,), N / m, float(limits.tendon_stiffness_low), float(limits.tendon_stiffness_high)),
         "h": Port((size.tendons,), m, tuple(low for low, _ in lengths), tuple(high for _, high in lengths)),
         "start": replace(motion(size), low=low, high=high),
@@ -102,16 +106,12 @@ def force_range(hand: Hand) -> tuple[float, float]:
     return max(slack for slack, _ in ends), min(taut for _, taut in ends)
 
 
-def joint_limits(finger: Finger) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Lower and upper limits of the independent joints [rad], or [m] of slides."""
-    free = [link for link in finger.links if link.joint in finger.joints]
-    return tuple(float(k.low or 0) for k in free), tuple(float(k.high or 0) for k in free)
-
-
-def limit_paths(finger: Finger) -> dict[str, tuple[str, ...]]:
-    """Paths of the lower and upper limits of the independent joints; empty where a joint has none."""
-    free = [(i, link) for i, link in enumerate(finger.links) if link.joint in finger.joints]
-    return {end: tuple(f"links[{i}].{end}" if getattr(k, end) else "" for i, k in free) for end in ("low", "high")}
+def motor_range(finger: Finger, transmission: Transmission) -> tuple[float, float]:
+    """Bounds of the length of what a motor pulls [m]."""
+    ranges = [length_range(finger, tendon) for tendon in transmission.tendons]
+    ends = [sorted((weight * low, weight * high))
+            for weight, (low, high) in zip(transmission.weights, ranges, strict=True)]  # fmt: skip
+    return sum(low for low, _ in ends), sum(high for _, high in ends)
 
 
 def length_range(finger: Finger, tendon: Tendon) -> tuple[float, float]:
@@ -303,79 +303,13 @@ def return_torque(finger: Any, q: Any) -> Any:
 # -- joint angles from tendon lengths ---------------------------------------------------------------------
 
 
-def is_curved(finger: Finger) -> bool:
-    """Whether the coupling depends on the pose, as that of lines from link to link does."""
-    return any(is_bent(finger, tendon) for tendon in finger.pulled)
-
-
-def is_bent(finger: Finger, tendon: Tendon) -> bool:
-    """Whether a tendon has lines from point to point, straight or round bodies, or joints that follow others by a curve."""
-    curves = {coupling.follower for coupling in finger.couplings if coupling.powers}
-    return bool(tendon.span or tendon.path or curves & {*tendon.arms, *(over[1:] for over in tendon.over)})
-
-
-def estimated_parts(finger: Finger) -> list[tuple[list[int], list[int], bool]]:
-    """Joints and tendons, by index, that depend on no others, and whether their coupling is constant."""
-    found = []
-    for tendons in groups(finger):
-        pulled = set().union(*(moved(finger, finger.pulled[i]) for i in tendons))
-        joints = [i for i, joint in enumerate(finger.joints) if joint in pulled]
-        found.append((joints, tendons, not any(is_bent(finger, finger.pulled[i]) for i in tendons)))
-    return [part for part in found if part[0]]
-
-
-# Steps get shorter more slowly where lengths bend more, and rounding in single precision leaves them longer than 1e-6.
-ROUND_BODIES = {"f64": "1e-13", "f32": "5e-6"}
-
-
-SLIDE_UNIT = "(awiwi_real)0.0078125"  # m, a power of two near the arms that tendons have at hinges
-NEAR = {"hinge": 0.2, "slide": 0.005}  # rad and m: how far an estimate may be away from the next one
-
-
-def nonlinear_estimate(finger: Finger, iterations: int = 24) -> Solver | None:
-    """The solver of fingers whose coupling depends on the pose; None for other fingers."""
-    if not is_curved(finger):
-        return None
-    low, high = joint_limits(finger)
-    parts = estimated_parts(finger)
-    scales = [SLIDE_UNIT if joint in finger.sliding else "1" for joint in finger.joints]
-    curved = sum(not linear for _, _, linear in parts)
-    return Solver(
-        template="joint_estimate.c.j2",
-        problem="least squares",
-        uses=("tendon_lengths", "coupling"),
-        equations=tuple(range(len(finger.pulled))),
-        unknowns=tuple(range(len(low))),
-        arrays={"low": low, "high": high},
-        strings={
-            "orders": "\n".join(
-                f"    static const int {name}_{i}[] = {{{', '.join(map(str, numbers))}}};"
-                for i, (joints, tendons, _) in enumerate(parts)
-                for name, numbers in (("joints", joints), ("tendons", tendons))
-            ),
-            "parts": ", ".join(
-                f"{{{len(joints)}, joints_{i}, {len(tendons)}, tendons_{i}, {int(linear)}}}"
-                for i, (joints, tendons, linear) in enumerate(parts)
-            ),
-            "part_count": str(len(parts)),
-            "iterations": str(iterations),
-            "scale": ", ".join(scales) if SLIDE_UNIT in scales else "",
-        },
-        iterations=1 + curved * (iterations - 1),
-        tolerance={"f64": 1e-12, "f32": 1e-5},
-        limits=limit_paths(finger),
-        stop=ROUND_BODIES if wraps(finger) else STOP,
-        near=tuple(NEAR["slide" if joint in finger.sliding else "hinge"] for joint in finger.joints),
-    )
-
-
 @per_finger(
     lambda z: {"q": motion(z)},
     "eq. 5.14, 5.15, 5.24",
     subject="joint_estimate",
     solver=nonlinear_estimate,
 )
-def joint_estimate(finger: Any, h: Any, start: Any) -> Any:
+def joint_estimate(finger: Any, h: Any, start: Any, measured: Any = None) -> Any:
     """Joint angles whose tendon lengths are nearest to the measured h (least squares); start is the last estimate.
 
     Where the coupling is constant the estimate is linear, and not limited: lengths that no pose has give angles beyond the

@@ -11,8 +11,8 @@ from awiwi_gen.hand.lever import Lever
 from awiwi_gen.hand.parts import Tendon
 from awiwi_gen.kernel import Kernel, Port, Solver
 from awiwi_gen.kernels.declare import Family
-from awiwi_gen.kernels.fingers import force_range, is_curved, per_finger
-from awiwi_gen.kernels.routing import geared, groups, senses
+from awiwi_gen.kernels.fingers import force_range, per_finger
+from awiwi_gen.kernels.routing import geared, groups, is_curved, senses
 from awiwi_gen.units import N, m, one
 
 SEARCHES, INVERSIONS = 2 + 4 * 97, 66  # evaluations of the curve in the worst case, see csrc/awiwi_distribution.h
@@ -82,8 +82,9 @@ def elastic_kernels(hand: Hand, name: str, finger: Finger) -> list[Kernel]:
     """The kernels of a finger's tendons."""
     rows, _ = hand.blocks[name]
     elastic = Elastic(hand, range(rows.start, rows.stop))
-    ports = {"tension": Port((len(finger.pulled),), N, *force_range(hand))}
-    return of_elastic.kernels(name, elastic, "", elastic.structure(), ports, len(finger.pulled))
+    count = len(elastic.tendons)
+    ports = {"tension": Port((count,), N, *force_range(hand))}
+    return of_elastic.kernels(name, elastic, "", elastic.structure(), ports, count)
 
 
 @of_elastic(
@@ -105,18 +106,22 @@ def tendon_stiffness(elastic: Any, tension: Any) -> Any:
 
 def antagonists(finger: Finger, group: list[int]) -> list[tuple[int, int]]:
     """A group as one or two independent pairs of tendons with opposite couplings; empty if it is not such a group."""
+    motors = [finger.transmissions[i] for i in group]
+    if any(motor.ratios for motor in motors):
+        return []
+    tendons = {i: motor.tendons[0] for i, motor in zip(group, motors, strict=True)}
     rest, pairs = list(group), []
     while rest:
         first = rest.pop(0)
-        signs = senses(finger, finger.pulled[first])
-        second = next((i for i in rest if _opposite(signs, senses(finger, finger.pulled[i]))), None)
-        pair = [finger.pulled[i] for i in (first, second) if i is not None]
+        signs = senses(finger, tendons[first])
+        second = next((i for i in rest if _opposite(signs, senses(finger, tendons[i]))), None)
+        pair = [tendons[i] for i in (first, second) if i is not None]
         if second is None or not signs or not all(_counts(finger, tendon) for tendon in pair):
             return []
         rest.remove(second)
         pairs.append((first, second))
     if len(pairs) == 2:
-        a, b = (senses(finger, finger.pulled[first]) for first, _ in pairs)
+        a, b = (senses(finger, tendons[first]) for first, _ in pairs)
         if all(a[x] * b[y] == a[y] * b[x] for x in {*a, *b} for y in {*a, *b}):
             return []
     return pairs if len(pairs) <= 2 else []
@@ -143,7 +148,7 @@ def distribution(finger: Finger) -> Solver:
         template="tendon_distribution.c.j2",
         problem="distribution",
         uses=("coupling", "tendon_stiffness", *(["coupling_derivative"] if is_curved(finger) else [])),
-        equations=tuple(range(len(finger.pulled))),
+        equations=tuple(range(len(finger.transmissions))),
         unknowns=tuple(range(len(finger.joints))),
         arrays={},
         strings={

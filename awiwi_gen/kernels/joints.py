@@ -1,4 +1,5 @@
-"""What only some fingers have: armature, damping, friction and springs in their joints, and a place in the palm."""
+"""What only some fingers have: armature, damping, friction and springs in their joints, motors with several tendons, and
+a place in the palm."""
 
 from __future__ import annotations
 
@@ -33,10 +34,30 @@ PASSIVE = {
     "energy": "The potential energy has that of the joints' springs.",
 }
 
+SHARED = {
+    "tendon_lengths": "Tendons of one motor count as one, whose length is the sum of ratio times length.",
+    "coupling": "Tendons of one motor count as one, whose length is the sum of ratio times length.",
+    "joint_torque": "A motor of several tendons pulls each with ratio times its force.",
+    "joint_stiffness": "Those of a motor of several tendons are on the side of the motor.",
+    "joint_torque_and_stiffness": "Those of a motor of several tendons are on the side of the motor.",
+    "tendon_distribution": "A motor of several tendons has one force.",
+}
+
+SENSED = {
+    "joint_estimate": "Angles of joints with a sensor are inputs, and outputs as they are; their start is not read.",
+    "joint_estimate_error": "Joints with a sensor have no error here.",
+}
+
 
 def documented(finger: Finger, kernels: list[Kernel]) -> list[Kernel]:
-    """The kernels of a finger; what their joints add is told in their documentation, and which of them slide."""
-    for notes, has in ((ARMATURE, finger.has_armature), (PASSIVE, finger.passive)):
+    """The kernels of a finger; what their joints and motors add is told in their documentation, and which joints slide."""
+    shared = any(transmission.ratios for transmission in finger.transmissions)
+    for notes, has in (
+        (ARMATURE, finger.has_armature),
+        (PASSIVE, finger.passive),
+        (SHARED, shared),
+        (SENSED, finger.measured),
+    ):
         if has:
             kernels = [replace(k, doc=f"{k.doc}\n{notes[k.family]}") if k.family in notes else k for k in kernels]
     slides = [f"{index} ({joint})" for index, joint in enumerate(finger.joints) if joint in finger.sliding]

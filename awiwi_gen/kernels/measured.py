@@ -31,7 +31,8 @@ def measured_ports(hand: Hand) -> dict[str, Port]:
     """Motor angles, elongations and path lengths in the wrist, with the ranges of this hand."""
     shape, limits = (hand.tendons,), hand.limits
     longest = float(limits.tendon_force) / float(limits.tendon_stiffness_low)
-    ports = {"x": Port(shape, m, 0.0, longest)}
+    both = [transmission.two_way for finger in hand.fingers.values() for transmission in finger.transmissions]
+    ports = {"x": Port(shape, m, tuple(-longest * way for way in both) if any(both) else 0.0, longest)}
     if hand.motor:
         ports["theta"] = Port(shape, rad, -float(hand.motor.travel), float(hand.motor.travel))
     if hand.wrist:

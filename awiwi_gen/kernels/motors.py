@@ -7,6 +7,7 @@ from typing import Any
 from awiwi_gen.hand import Hand, Motor
 from awiwi_gen.kernel import Kernel, Port
 from awiwi_gen.kernels.declare import Family, within
+from awiwi_gen.kernels.routing import least_forces
 from awiwi_gen.units import J, N, Unit, m, rad, s
 
 of_motor: Family[None] = Family("motor")
@@ -26,12 +27,13 @@ def motor_ports(hand: Hand, motor: Motor) -> dict[str, Port]:
     def symmetric(unit: Unit, limit: Any) -> Port:
         return Port((), unit, -float(limit), float(limit))
 
+    least = [0.0, *(force for finger in hand.fingers.values() for force in least_forces(finger, hand.limits))]
     return {
         "theta": symmetric(rad, motor.travel),
         "thd": symmetric(rad / s, motor.velocity),
         "thdd": symmetric(rad / s**2, motor.acceleration),
         "tau": symmetric(N * m, motor.torque),
-        "f": Port((), N, 0.0, float(hand.limits.tendon_force)),
+        "f": Port((), N, min(least), float(hand.limits.tendon_force)),
     }
 
 

@@ -15,7 +15,10 @@ POSE = (one, one, one, m) * 3 + (one,) * 4
 
 @dataclass(frozen=True)
 class Size:
-    """Sizes of a finger's arrays: independent joints, of which some slide, tendons, links."""
+    """Sizes of a finger's arrays: independent joints, of which some slide, tendons, links.
+
+    Tendons of one motor count as one.
+    """
 
     sliding: tuple[bool, ...]
     tendons: int
@@ -24,7 +27,9 @@ class Size:
     @classmethod
     def of(cls, finger: Finger) -> Size:
         """The sizes of a finger."""
-        return cls(tuple(joint in finger.sliding for joint in finger.joints), len(finger.pulled), len(finger.links))
+        return cls(
+            tuple(joint in finger.sliding for joint in finger.joints), len(finger.transmissions), len(finger.links)
+        )
 
     @property
     def joints(self) -> int:

@@ -33,7 +33,8 @@ class Joint:
 
     A row of ``tendons`` is (k1, k2, k3) of a spring's torque k1 p + k2 p^2 + k3 p^3 at the elongation p [rad];
     ``friction`` is (steepness, level, viscosity) of either motor, ``known`` the share of it that laws compensate;
-    ``arm`` [m] is the lever arm of the tendons; ``limit`` is the motors' largest torque [N m].
+    ``arm`` [m] is the lever arm of the tendons; ``limit`` is the motors' largest torque [N m];
+    ``period`` [s] is that of the hand's clock.
     """
 
     inertias: Array
@@ -44,6 +45,7 @@ class Joint:
     arm: float
     limit: float
     encoder: float
+    period: float = PERIOD
 
     def believed(self) -> Joint:
         """The same with the friction that a law knows."""
@@ -99,7 +101,13 @@ def joint_of(library: Any, hand: Hand, finger: str = FINGER, joint: str = JOINT)
         arm=arm,
         limit=float(hand.motor.torque) * ratio,
         encoder=ENCODER / float(hand.motor.gear_ratio) / ratio,
+        period=period_of(hand),
     )
+
+
+def period_of(hand: Hand) -> float:
+    """The period of the hand's clock [s]; that of 3 kHz for a hand without one."""
+    return float(hand.clock.period) if hand.clock else PERIOD
 
 
 @dataclass(frozen=True)
@@ -155,7 +163,7 @@ def loop_around(joint: Joint, law: Sequence[Element]) -> Loop:
             Sensor("u", "acted"),
         ],
         actuators=[Actuator("wanted", "u", limit=joint.limit)],
-        period=PERIOD,
+        period=joint.period,
     )
 
 
@@ -167,7 +175,7 @@ def values_of(joint: Joint, believed: Joint, force: float) -> dict[str, Any]:
         "x": [0, 0, theta[0], 0, theta[1], 0], "u": [torque, torque], "wanted": [torque, torque], "load": 0.0,
         "inertias": joint.inertias, "tendons": joint.tendons, "damping": joint.damping, "friction": joint.friction,
         "memory": [0, 0, 0, theta[0], 0, 0, theta[1], 0, 0, torque, torque, 1, 1],
-        "motion": np.zeros(5), "goal": np.zeros(5), "period": PERIOD,
+        "motion": np.zeros(5), "goal": np.zeros(5), "period": joint.period,
         "known_inertias": believed.inertias, "known_tendons": believed.tendons, "known_damping": believed.damping,
         "known_friction": believed.friction, "pretension": [torque, 0, 0], "nothing": 0.0, "acted": [torque, torque],
     }  # fmt: skip

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from awiwi_gen.loops.sampled import delay_margin, sampled
-from awiwi_gen.simulate import Array
+from awiwi_gen.simulate import PERIOD, Array
 
 UNIT_WEIGHTS = (1.0, 1.0)
 
@@ -132,9 +132,9 @@ class Loop:
         drift: Array = (self.E + self.B @ self.H) @ np.broadcast_to(np.asarray(w, float), self.E.shape[1:])
         return drift
 
-    def sampled_radius(self, delay: int = 1) -> float:
-        """Spectral radius when the law runs on the hand's clock and acts ``delay`` ticks later."""
-        return float(np.abs(np.linalg.eigvals(sampled(self.A, self.B, self.K, delay=delay))).max())
+    def sampled_radius(self, delay: int = 1, period: float = PERIOD) -> float:
+        """Spectral radius when the law runs on a clock of this period [s] and acts ``delay`` ticks later."""
+        return float(np.abs(np.linalg.eigvals(sampled(self.A, self.B, self.K, period, delay))).max())
 
     def delay_margin(self) -> float:
         """The shortest delay [s] that moves a pole to the imaginary axis; infinite if none does."""

@@ -17,7 +17,7 @@ from scipy.linalg import solve_continuous_are
 
 from awiwi_gen.errors import InputError
 from awiwi_gen.loops.joint import Loop, Plant, joint_loop
-from awiwi_gen.simulate import Array
+from awiwi_gen.simulate import PERIOD, Array
 
 Quadratic = tuple[float, float]
 
@@ -59,11 +59,11 @@ def cancelling(plant: Plant) -> Array:
     return np.array([0, 0, (plant.m + plant.b) / plant.m, 0])
 
 
-def exact_gains(library: Any, plant: Plant, wanted: Array) -> Gains:
+def exact_gains(library: Any, plant: Plant, wanted: Array, period: float = PERIOD) -> Gains:
     """Gains whose feedback on the plant of table 16.1 is exactly ``wanted``.
 
-    Of several, those that settle a pretension fastest. Raises InputError where the closed loop is not stable, or four
-    equal poles leave no two pairs.
+    Of several, those that settle a pretension fastest on a clock of this period [s]. Raises InputError where the closed
+    loop is not stable, or four equal poles leave no two pairs.
     """
     m, b, k = plant.numbers
     c = k / b * wanted
@@ -75,7 +75,7 @@ def exact_gains(library: Any, plant: Plant, wanted: Array) -> Gains:
     found = [gains for link, torque in pairs(poles) for gains in _near(library, plant, wanted, link, torque)]
     if not found:
         raise InputError(f"the feedback gains {_short(wanted)} leave no two different pairs of poles: {_short(poles)}")
-    return min(found, key=lambda gains: pretension_loop(plant, gains).sampled_radius())
+    return min(found, key=lambda gains: pretension_loop(plant, gains).sampled_radius(period=period))
 
 
 def _near(library: Any, plant: Plant, wanted: Array, link: Quadratic, torque: Quadratic) -> Iterator[Gains]:

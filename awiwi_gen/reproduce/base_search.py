@@ -12,7 +12,7 @@ import numpy as np
 
 from awiwi_gen.hand import Hand
 from awiwi_gen.kernels.base_estimate import base_of
-from awiwi_gen.kernels.fingers import joint_limits
+from awiwi_gen.kernels.estimates import joint_limits
 from awiwi_gen.simulate import Array
 
 

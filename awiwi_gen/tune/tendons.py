@@ -10,8 +10,8 @@
 
 Every tendon is tuned as one half of its joint; each joint has the same number of tendons. Two motors of
 inertia b behind springs k move the link as one motor 2 b behind a spring 2 k does, with half the weights (section
-15.5); so the regulator is that of a single joint, and its gains are those of either motor. Gains that a clock of 3 kHz
-would make unstable are refused.
+15.5); so the regulator is that of a single joint, and its gains are those of either motor. Gains that the hand's
+clock, of 3 kHz without `[clock]`, would make unstable are refused.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from awiwi_gen.hand import Finger, Hand
 from awiwi_gen.hand.file import HandFile
 from awiwi_gen.hand.gains import TendonGains
 from awiwi_gen.hand.parts import Measure, Part
-from awiwi_gen.loops.hand_joint import drives
+from awiwi_gen.loops.hand_joint import drives, period_of
 from awiwi_gen.loops.joint import Loop, Plant
 from awiwi_gen.loops.nearest import least
 from awiwi_gen.loops.regulator import Gains, cancelling, exact_gains, loop_of, pretension_loop, regulator
@@ -154,7 +154,7 @@ def tune(library: Any, hand: Hand, costs: CostFile) -> list[Tuned]:
         for index, (joint, plant) in enumerate(driven):
             tendon = hand.blocks[name][0].start + index
             try:
-                tuned.append(tune_tendon(library, tendon, joint, plant, np.array(cost.Q), cost.R))
+                tuned.append(tune_tendon(library, tendon, joint, plant, np.array(cost.Q), cost.R, period_of(hand)))
             except InputError as error:
                 faults.append(Fault(message=f"tendon {tendon} ({name}, {joint}): {error}"))
     if faults:
@@ -181,31 +181,37 @@ def plants(library: Any, hand: Hand, name: str, finger: Finger, force: float) ->
     ]
 
 
-def tune_tendon(library: Any, tendon: int, joint: str, plant: Plant, Q: Array, R: float) -> Tuned:
-    """Gains of one tendon of a pair. Raises InputError with the least stable R if they are unstable."""
-    single, loops = _regulated(library, plant, Q, R)
-    radius, margin = max(loop.sampled_radius() for loop in loops), min(loop.delay_margin() for loop in loops)
+def tune_tendon(
+    library: Any, tendon: int, joint: str, plant: Plant, Q: Array, R: float, period: float = PERIOD
+) -> Tuned:
+    """Gains of one tendon of a pair, on a clock of this period [s].
+
+    Raises InputError with the least stable R if they are unstable.
+    """
+    single, loops = _regulated(library, plant, Q, R, period)
+    radius = max(loop.sampled_radius(period=period) for loop in loops)
+    margin = min(loop.delay_margin() for loop in loops)
     if radius >= 1:
         raise InputError(
-            f"R = {R:g} gives gains that are unstable at {1 / PERIOD:.0f} Hz and a delay of one sample (spectral "
-            f"radius {radius:.3g}, delay margin {margin * 1e6:.0f} us); {_way_out(library, plant, Q, R)}"
+            f"R = {R:g} gives gains that are unstable at {1 / period:.0f} Hz and a delay of one sample (spectral "
+            f"radius {radius:.3g}, delay margin {margin * 1e6:.0f} us); {_way_out(library, plant, Q, R, period)}"
         )
     return Tuned(tendon, joint, plant, Gains(single.gains, 2 * single.weights), radius, margin)
 
 
-def _regulated(library: Any, plant: Plant, Q: Array, R: float) -> tuple[Gains, tuple[Loop, Loop]]:
+def _regulated(library: Any, plant: Plant, Q: Array, R: float, period: float) -> tuple[Gains, tuple[Loop, Loop]]:
     """The gains of the regulator, and the loops of the link and of the pretension."""
     wanted = regulator(plant, Q, R) + cancelling(plant)
-    gains = exact_gains(library, plant, wanted)
+    gains = exact_gains(library, plant, wanted, period)
     return gains, (loop_of(plant, wanted), pretension_loop(plant, gains))
 
 
-def _way_out(library: Any, plant: Plant, Q: Array, R: float) -> str:
+def _way_out(library: Any, plant: Plant, Q: Array, R: float, period: float) -> str:
     """The least stable R, found by bisection, in words."""
 
     def works(share: float) -> bool:
-        _, loops = _regulated(library, plant, Q, 10 ** (DECADES * share) * R)
-        return all(loop.sampled_radius() < 1 for loop in loops)
+        _, loops = _regulated(library, plant, Q, 10 ** (DECADES * share) * R, period)
+        return all(loop.sampled_radius(period=period) < 1 for loop in loops)
 
     bracket = least(works, DECADES, HALVINGS)
     if bracket is None:

@@ -77,7 +77,7 @@ class LeastSquares(Problem):
     """Joint angles whose tendon lengths are nearest to the measured ones (eq. 5.14, 5.24).
 
     Half of the samples are exact lengths of poses in the whole range, limits included; the others carry noise, on
-    poses in the middle of the range.
+    poses in the middle of the range. Angles of joints that are held are exactly those of the pose.
     """
 
     def sample(self, drawn: dict[str, Array]) -> dict[str, Array]:
@@ -90,7 +90,9 @@ class LeastSquares(Problem):
         lengths, _ = self.model(pose.astype(np.float64))
         lengths = lengths + np.where(noisy[:, None], random.uniform(-NOISE, NOISE, lengths.shape), 0)
         nearby = np.clip(pose + random.uniform(-near, near, pose.shape), low, high)
-        return {"h": lengths.astype(start.dtype), "start": nearby.astype(start.dtype)}
+        found = {"h": lengths.astype(start.dtype), "start": nearby.astype(start.dtype)}
+        held = [*self.solver.held]
+        return found | ({"measured": pose[:, held].astype(start.dtype)} if held else {})
 
     def model(self, q: Array, own: bool = False) -> tuple[Array, Array]:
         """Lengths (samples, m) and coupling (samples, m, n) at q (samples, n), in the precision of q, bit for bit as C."""
@@ -114,9 +116,11 @@ class LeastSquares(Problem):
         samples, n = inputs["start"].shape
         q = [[arb(x) for x in column] for column in inputs["start"].T.astype(np.float64).tolist()]
         measured = [[arb(x) for x in column] for column in inputs["h"].T.astype(np.float64).tolist()]
-        low, high = ([arb(float(x)) for x in end] for end in self.limits(inputs["start"].dtype))
+        low, high = ([[arb(float(x))] * samples for x in end] for end in self.limits(inputs["start"].dtype))
+        for index, column in zip(self.solver.held, inputs.get("measured", np.empty((0, 0))).T, strict=True):
+            q[index] = low[index] = high[index] = [arb(float(x)) for x in column]
         at_rest = [arb(0)] * samples
-        minima = [Descent([column[s] for column in q], low, high) for s in range(samples)]
+        minima = [Descent(*([column[s] for column in each] for each in (q, low, high))) for s in range(samples)]
         for _ in range(ROUNDS):
 
             def leaf(node: Node, q: Any = q) -> list[arb]:

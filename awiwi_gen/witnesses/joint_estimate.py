@@ -7,7 +7,7 @@ from typing import Any
 import casadi as ca
 from casadi import SX
 
-from awiwi_gen.structure import Finger, straight
+from awiwi_gen.structure import Finger, straight, unmeasured
 from awiwi_gen.witnesses.tendons import coupling, tendon_lengths
 
 Hand = Any
@@ -24,20 +24,28 @@ def measured_lengths(hand: Hand, theta: SX, x: SX, w: SX | None = None) -> SX:
     return -ca.solve(ca.jacobian(excess, h), ca.substitute(excess, h, SX.zeros(h.numel())))
 
 
-def joint_estimate(finger: Finger, h: SX, start: SX) -> SX:
-    """Joint angles (n) [rad] whose lengths are nearest to h (m) [m]: R^-1 Q' (h - h(0)) (eq. 5.15, mended)."""
-    at = SX.sym("q", start.numel())
-    zero = SX.zeros(start.numel())
-    P, rest = (ca.substitute(e, at, zero) for e in (coupling(finger, at), tendon_lengths(finger, at)))
-    Q, R = _gram_schmidt(P)
-    return _solve_upper(R, Q.T @ (h - rest))
+def joint_estimate(finger: Finger, h: SX, start: SX, measured: SX | None = None) -> SX:
+    """Joint angles (n) [rad] whose lengths are nearest to h (m) [m]: R^-1 Q' (h - h(0)) (eq. 5.15, mended).
+
+    Joints with a sensor move the point about which lengths are linear: they are at their `measured` angles there.
+    """
+    at, about = SX.sym("q", start.numel()), SX.zeros(start.numel())
+    if measured is not None:
+        about[list(finger.measured)] = measured
+    P, rest = (ca.substitute(e, at, about) for e in (coupling(finger, at), tendon_lengths(finger, at)))
+    Q, R = _gram_schmidt(P[:, unmeasured(finger)])
+    about[unmeasured(finger)] = _solve_upper(R, Q.T @ (h - rest))
+    return about
 
 
 def joint_estimate_error(finger: Finger, q: SX, noise: SX) -> tuple[SX, SX]:
-    """Covariance (n x n) [rad^2] and worst errors (n) [rad], from R alone: (P'P)^-1 = R^-1 R^-T."""
-    Q, R = _gram_schmidt(coupling(finger, q))
-    inverse = _solve_upper(R, SX.eye(q.numel()))
-    return noise**2 * inverse @ inverse.T, noise * ca.sum2(ca.fabs(inverse @ Q.T))
+    """Covariance (n x n) [rad^2] and worst errors (n) [rad], from R alone: (P'P)^-1 = R^-1 R^-T; zero where measured."""
+    free = unmeasured(finger)
+    Q, R = _gram_schmidt(coupling(finger, q)[:, free])
+    inverse, covariance, worst = _solve_upper(R, SX.eye(len(free))), SX.zeros(q.numel(), q.numel()), SX.zeros(q.numel())
+    covariance[free, free] = noise**2 * inverse @ inverse.T
+    worst[free] = noise * ca.sum2(ca.fabs(inverse @ Q.T))
+    return covariance, worst
 
 
 def _gram_schmidt(P: SX) -> tuple[SX, SX]:

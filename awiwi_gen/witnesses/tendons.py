@@ -2,7 +2,8 @@
 
 The lengths are written down, with points of straight lines from the recursion along the chain. The coupling of a path
 from point to point needs no derivative: a tight string pulls its ends by unit forces, and presses on the bodies that it
-wraps round; the moments of these forces about the joints' axes are its arms.
+wraps round; the moments of these forces about the joints' axes are its arms. What a motor with several tendons does is
+their work, by its force.
 """
 
 from collections.abc import Iterable, Iterator
@@ -22,7 +23,20 @@ Tendon = Any
 
 def tendon_lengths(finger: Finger, q: SX) -> SX:
     """Path lengths h (m) [m] (eq. 5.5, 5.20, 5.22)."""
-    return _column(_lengths(finger, finger.pulled, q))
+    return _of_motors(finger, _column(_lengths(finger, finger.pulled, q)))
+
+
+def _of_motors(finger: Finger, tendons: SX) -> SX:
+    """What each motor has (m x ...) of a quantity of every pulled tendon: the work per force of the motor."""
+    if not any(transmission.ratios for transmission in finger.transmissions):
+        return tendons
+    forces = SX.sym("motor", len(finger.transmissions))
+    pulls = SX.zeros(tendons.size1())
+    for force, transmission in zip(ca.vertsplit(forces), finger.transmissions, strict=True):
+        for member, ratio in zip(transmission.members, transmission.ratios or [1], strict=True):
+            pulls[member] = ratio * force
+    work = (ca.gradient(ca.dot(pulls, tendons[:, column]), forces) for column in range(tendons.size2()))
+    return ca.horzcat(*work)
 
 
 def _lengths(finger: Finger, tendons: Iterable[Tendon], q: SX, paths: bool = True) -> list[SX]:
@@ -57,7 +71,8 @@ def _lengths(finger: Finger, tendons: Iterable[Tendon], q: SX, paths: bool = Tru
 def coupling(finger: Finger, q: SX) -> SX:
     """P = dh/dq (m x n) [m/rad] (eq. 5.6): a derivative, and moments of unit vectors for paths from point to point."""
     rows = [_arms(finger, tendon, q) for tendon in finger.pulled]
-    return ca.densify(ca.jacobian(_column(_lengths(finger, finger.pulled, q, paths=False)), q)) + ca.vertcat(*rows)
+    slopes = ca.densify(ca.jacobian(_column(_lengths(finger, finger.pulled, q, paths=False)), q))
+    return _of_motors(finger, slopes + ca.vertcat(*rows))
 
 
 def return_torque(finger: Finger, q: SX) -> tuple[SX, SX]:

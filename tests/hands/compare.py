@@ -69,7 +69,8 @@ def worst_differences(simulated: Any, hand: Hand, generated: Path) -> dict[str, 
             known = ~np.isnan(theirs)
             compare("link_poses", mine[known], theirs[known])
         if hand.fingers[finger].pulled:
-            pulled = [number for number, tendon in enumerate(hand.fingers[finger].tendons) if tendon.spring is None]
+            own = hand.fingers[finger]  # of tendons that are wound both ways, the first is the model's
+            pulled = [own.pulled_numbers[transmission.members[0]] for transmission in own.transmissions]
             h, arms = library[f"{finger}_tendon_lengths"](q), library[f"{finger}_coupling"](q)
             compare("tendon_lengths", within_domain(h, "h"), simulated.lengths()[pulled])
             compare("coupling", within_domain(arms, "P"), simulated.arms()[pulled])
