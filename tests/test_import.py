@@ -249,6 +249,24 @@ def test_a_finger_with_a_joint_that_neither_turns_nor_slides_is_refused_by_its_n
         draft(changed)
 
 
+def test_a_slide_along_any_axis_moves_the_finger_as_the_tree_says():
+    model = finger()
+    push = joint("IF:Push", 2, (3.0, -1.0, 0.5), low=-0.01, high=0.03, reference=0.004, kind="slide")
+    swing, bend, tip = model.joints
+    changed = Model("Pushed", "pushed.xml", model.bodies, (swing, push, bend, tip), sites=model.sites)
+    hand, tables = imported(changed)
+    (found,) = hand.fingers.values()
+
+    assert [link.kind for link in found.links] == ["hinge", "slide", "hinge", "hinge"]
+    assert (float(found.links[1].low), float(found.links[1].reference)) == (-0.01, 0.004)
+    (written,) = tables.values()
+    frames = [poses(written, np.array([0.0, x, 0.2, 0.0]))[-1] for x in (0.004, 0.014)]  # as drawn, and 10 mm further
+    axis = model.bodies[2].axes @ np.array([3.0, -1.0, 0.5]) / np.linalg.norm([3.0, -1.0, 0.5])
+    base = rpy_matrix(written["base"]["rpy"])
+    assert base @ (frames[1][1] - frames[0][1]) == pytest.approx(0.01 * axis, abs=1e-16)
+    assert frames[1][0] == pytest.approx(frames[0][0], abs=1e-16)
+
+
 def test_a_finger_that_branches_is_refused_with_both_branches():
     model = finger()
     fork = body("fork", 2)
