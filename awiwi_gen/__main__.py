@@ -18,16 +18,8 @@ from awiwi_gen.errors import AwiwiError, InputError, printable
 from awiwi_gen.extras import GENERATE, HAND
 from awiwi_gen.patterns import matches
 from awiwi_gen.terminal import (
-    find_kernel,
-    fix,
-    listing,
-    no_kernel,
-    parse_inputs,
-    prove,
-    read_json_inputs,
-    require,
-    why_absent,
-)
+    find_kernel, fix, listing, no_kernel, parse_inputs, prove, read_json_inputs, require, why_absent,
+)  # fmt: skip
 
 if absent := extras.missing("awiwi-gen", *extras.COMMAND_LINE):
     exits.leave(exits.SYSTEM, f'{absent}; Python alone has awiwi_gen.load("generated")')
