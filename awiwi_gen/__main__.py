@@ -13,13 +13,10 @@ from functools import wraps
 from pathlib import Path
 from typing import Annotated, Any
 
-from awiwi_gen import exits, extras
+from awiwi_gen import exits, extras, terminal
 from awiwi_gen.errors import AwiwiError, InputError, printable
 from awiwi_gen.extras import GENERATE, HAND
 from awiwi_gen.patterns import matches
-from awiwi_gen.terminal import (
-    find_kernel, fix, listing, no_kernel, parse_inputs, prove, read_json_inputs, require, why_absent,
-)  # fmt: skip
 
 if absent := extras.missing("awiwi-gen", *extras.COMMAND_LINE):
     exits.leave(exits.SYSTEM, f'{absent}; Python alone has awiwi_gen.load("generated")')
@@ -103,9 +100,8 @@ def make_job(
 
     job = Job(read or Hand.load(hand), Options(scalar.value, params.value, math.value), only, progress=Progress())
     if not any(matches(kernel.name, only) for kernel in job.catalog):
-        raise InputError(
-            f"--only {only}: {why_absent(job.hand, only) or f'no kernel has such a name; see {listing(hand)}'}"
-        )
+        why = terminal.why_absent(job.hand, only) or f"no kernel has such a name; see {terminal.listing(hand)}"
+        raise InputError(f"--only {only}: {why}")
     return job
 
 
@@ -132,7 +128,7 @@ def generate(
         require_running_gains(job.hand, job.store)
     changed = generate(job, output)
     if verify:
-        return prove(job, hand, output, as_json)
+        return terminal.prove(job, hand, output, as_json)
     if as_json:
         print_json({"directory": str(output), "changed": changed, "digest": job.hand.digest()})
     else:
@@ -166,7 +162,7 @@ def check(
         print("".join(f"warning: {each}\n" for each in warnings), end="")
         print_left_out(absent)
         print("".join(f"{line}\n" for line in tick_lines(read)), end="")
-        print("\n".join(state_lines(found, str(output), fix(job, hand, output))))
+        print("\n".join(state_lines(found, str(output), terminal.fix(job, hand, output))))
     return 0 if found.fresh or (found.missing and not found.foreign) else 1
 
 
@@ -186,7 +182,7 @@ def build(hand: HandFile = None, output: Output = GENERATED, as_json: Json = Fal
     from awiwi_gen.build import load
     from awiwi_gen.report import print_json
 
-    require(output, hand)
+    terminal.require(output, hand)
     library = load(output)
     summary = {"kernels": len(library), "digest": library.digest, "scalar": library.manifest["c_type"]}
     if as_json:
@@ -202,8 +198,8 @@ def verify(
     params: ParamsOption = Params.baked, math: MathOption = Math.own, only: Only = "*", as_json: Json = False,
 ) -> int:  # fmt: skip
     """Compile the generated C as it stands and compare every kernel with its reference."""
-    require(output, hand)
-    return prove(make_job(hand, scalar, params, only, math), hand, output, as_json)
+    terminal.require(output, hand)
+    return terminal.prove(make_job(hand, scalar, params, only, math), hand, output, as_json)
 
 
 @command()
@@ -216,7 +212,7 @@ def list_(
     from awiwi_gen.report import list_kernels, print_json, print_kernels, print_table
 
     if output is not None and hand is None and not assumed:
-        (print_json if as_json else print_kernels)(require(output)["kernels"])
+        (print_json if as_json else print_kernels)(terminal.require(output)["kernels"])
         return 0
     extras.require("list without -o", *HAND)
     from awiwi_gen.hand import Hand
@@ -244,8 +240,8 @@ def call(
 
     from awiwi_gen.report import print_json
 
-    function = find_kernel(kernel, hand, output)
-    given = parse_inputs(inputs or [], function) if inputs or not as_json else read_json_inputs()
+    function = terminal.find_kernel(kernel, hand, output)
+    given = terminal.parse_inputs(inputs or [], function) if inputs or not as_json else terminal.read_json_inputs()
     result = function(**given)
     values = result._asdict() if hasattr(result, "_asdict") else {function.outputs[0]["name"]: result}
     if as_json:
@@ -271,7 +267,7 @@ def explain(
     job = make_job(hand)
     known = [each.name for each in job.catalog]
     if kernel not in known:
-        raise no_kernel(job.hand, hand, kernel, known)
+        raise terminal.no_kernel(job.hand, hand, kernel, known)
     explained = explanation(job, kernel)
     if as_json:
         print_json(explained)
@@ -291,7 +287,7 @@ def params(
     from awiwi_gen.parameters import numbers_file
     from awiwi_gen.report import print_json, print_numbers
 
-    found = numbers_file(Hand.load(hand), require(generated, hand), str(generated))
+    found = numbers_file(Hand.load(hand), terminal.require(generated, hand), str(generated))
     if output is not None:
         found.write(output)
     if as_json:
