@@ -17,6 +17,7 @@ from awiwi_gen.emit.files import banner, render
 from awiwi_gen.emit.options import Options
 from awiwi_gen.hand import Hand
 from awiwi_gen.hand.pose import fixed_rotation
+from awiwi_gen.hand.tick import tick_values
 from awiwi_gen.kernels.estimates import joint_limits
 from awiwi_gen.kernels.fingers import force_range
 
@@ -46,7 +47,7 @@ class Constant:
 
 def header_files(hand: Hand, options: Options, made_from: Any) -> dict[str, str]:
     """hand.h, and hand.c with its constants; ``made_from`` are the digests of all other files."""
-    prefix, digest = hand.prefix, key(hand.digest(), options, made_from)
+    prefix, digest = hand.prefix, key(hand.digest(), tick_values(hand), options, made_from)
     found = {
         "banner": banner(),
         "prefix": prefix,
@@ -83,6 +84,10 @@ def enumerators(pairs: Sequence[tuple[str, str]]) -> list[str]:
 def constants(hand: Hand) -> Iterator[Constant]:
     """The arrays of a hand; those over tendons only where motors pull some."""
     ends = [joint_limits(finger) for finger in hand.fingers.values()]
+    doc = "The largest torques that the joints bear in N m, of slides in N: their own, or the hand's limit."
+    yield Constant(
+        "joint_effort", "JOINTS", [most for finger in hand.fingers.values() for most in efforts(hand, finger)], doc
+    )
     radii = [finger.radii.get(joint, 0) for finger in hand.fingers.values() for joint in finger.joints]
     for name, which in (("low", 0), ("high", 1)):
         doc = f"The {name} limits of the joints in rad, of slides in m."
@@ -103,8 +108,18 @@ def constants(hand: Hand) -> Iterator[Constant]:
         yield Constant("sensor_taut", "TENDONS", taut, "The same where it is taut.")
 
 
+def efforts(hand: Hand, finger: Any) -> Iterator[float]:
+    """The largest torque or force of each independent joint of a finger."""
+    for link in finger.links:
+        if link.joint in finger.joints:
+            limit = hand.limits.slide_force if link.slides else hand.limits.joint_torque
+            yield float(link.effort or limit or 0)
+
+
 def numbers(hand: Hand) -> Iterator[tuple[str, float, str]]:
     """The single numbers of a hand: a macro's name behind the prefix, the value, and what it is."""
+    if hand.clock:
+        yield "PERIOD", float(hand.clock.period), "of the clock on which the controller runs [s]"
     if motor := hand.motor:
         ratio = float(motor.gear_ratio)
         inertia = float(motor.rotor_inertia) * ratio**2 + float(motor.gear_inertia)
@@ -113,6 +128,13 @@ def numbers(hand: Hand) -> Iterator[tuple[str, float, str]]:
         yield "MOTOR_PULLEY", float(motor.pulley), "radius that winds the tendon [m]"
         yield "MOTOR_TORQUE", float(motor.torque), "largest torque of the output shaft [N m]"
         yield "MOTOR_VELOCITY", float(motor.velocity), "largest velocity of the output shaft [rad/s]"
+        if motor.current:
+            yield "MOTOR_CURRENT", float(motor.current.largest), "largest current [A]"
+            yield (
+                "MOTOR_CURRENT_TORQUE",
+                float(motor.current.constant),
+                "torque of the output shaft per current [N m/A]",
+            )
         yield "MOTOR_TRAVEL", float(motor.travel), "the output shaft turns by this much to either side [rad]"
 
 

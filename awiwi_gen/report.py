@@ -216,7 +216,12 @@ def error_entry(error: AwiwiError) -> dict[str, Any]:
     return entry | {"faults": [fault.as_dict() for fault in error.faults]} if isinstance(error, InputError) else entry
 
 
-REASONS = {"hand": "hand file", "generator": "version of awiwi_gen", "libraries": "set of libraries"}
+REASONS = {
+    "hand": "hand file",
+    "tick": "period, current, effort or sensor",
+    "generator": "version of awiwi_gen",
+    "libraries": "set of libraries",
+}
 
 
 class Progress:

@@ -10,8 +10,8 @@
 #define AWIWI_PARAMS "baked"
 
 /* SHA-256 of the hand's numbers, the options and the generated C; and its first digits as a number. */
-#define AWIWI_BUILD_DIGEST "7775001d51944ef829d18653afda46b1d76a0437b18d86951bcaf5a2e564a5a6"
-#define AWIWI_BUILD_ID 0x7775001du
+#define AWIWI_BUILD_DIGEST "788ceda20dfe6e9edaf4ab911cba7d3e6fbce1d29ecc3a2b54ab2038bad508a0"
+#define AWIWI_BUILD_ID 0x788ceda2u
 
 /* -- counts and names ------------------------------------------------------------------------------------------------ */
 
@@ -129,6 +129,8 @@ extern "C" {
 extern const unsigned long awiwi_build_id;
 extern const char awiwi_build_digest[65];
 
+/* The largest torques that the joints bear in N m, of slides in N: their own, or the hand's limit. */
+extern const double awiwi_joint_effort[AWIWI_JOINTS];
 /* The low limits of the joints in rad, of slides in m. */
 extern const double awiwi_joint_low[AWIWI_JOINTS];
 /* The high limits of the joints in rad, of slides in m. */

@@ -117,6 +117,21 @@ def test_a_base_is_a_pose_with_exact_quarter_turns():
     assert np.array_equal(np.reshape(base_pose(awiwi_gen.Hand.parse(ONE_FINGER).fingers["jaw"]), (4, 4)), np.eye(4))
 
 
+def test_what_a_tick_needs_is_there(tmp_path):
+    text = (
+        ONE_FINGER.replace("[limits]", '[clock]\nperiod = "250 us"\nsource = "assumed"\n\n[limits]')
+        .replace('joint = "mid"\nturn', 'joint = "mid"\neffort = "0.25 N m"\nturn')
+    )  # fmt: skip
+    body = 'printf("%g %g %g", CLAW_PERIOD, claw_joint_effort[0], claw_joint_effort[CLAW_JOINT_JAW_MID]); return 0;'
+
+    directory = tree(text, only="jaw_gravity")
+    assert run(directory, body, tmp_path, "hand.c") == ["0.00025", "1", "0.25"]
+    plain = tree(ONE_FINGER, only="jaw_gravity")
+    differ = {p.name for p in directory.glob("*.[ch]") if p.read_bytes() != (plain / p.name).read_bytes()}
+    assert differ == {"hand.h", "hand.c"}
+    assert Job(awiwi_gen.Hand.parse(text)).inputs["tick"] != Job(awiwi_gen.Hand.parse(ONE_FINGER)).inputs["tick"]
+
+
 def test_equal_names_are_told_apart_by_their_places():
     pairs = [("a_b", "c"), ("a", "b_c"), ("a", "b")]
 

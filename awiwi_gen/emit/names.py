@@ -23,7 +23,7 @@ C99_SIGNIFICANT = 31  # and those that C99 guarantees
 OWN_NAMES = (
     "model_digest", "api_version", "default_numbers", "params_derive", "params_load", "self_test", "self_test_of",
     "build_id", "build_digest", "joint_low", "joint_high", "pulley_radius", "finger_base", "tendon_low", "tendon_high",
-    "sensor_slack", "sensor_taut",
+    "sensor_slack", "sensor_taut", "joint_effort",
 )  # fmt: skip
 LONGEST_PORT = 48  # leaves room for the suffixes of batch loops within 63 characters
 PORT = re.compile(r"[A-Za-z](_?[A-Za-z0-9])*")

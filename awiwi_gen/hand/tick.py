@@ -1,7 +1,7 @@
 """What a control tick needs besides kernels: its period, and what motors, joints and sensors bear.
 
-No kernel reads these numbers, so they are no part of a hand's digest: generated C does not depend on them. It does depend
-on which joints have sensors, where others have none.
+No kernel reads these numbers, so they are no part of a hand's digest: of the generated C only hand.h has them. Kernels do
+depend on which joints have sensors, where others have none.
 """
 
 from __future__ import annotations
