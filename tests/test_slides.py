@@ -195,6 +195,9 @@ def test_a_urdf_has_prismatic_joints_with_force_and_mimics():
 
 
 FAULTS = {
+    "an effort": ('kind = "slide"', 'kind = "slide"\neffort = "1 N m"', 'effort = "1 N m" is a torque; expected a force'),
+    "a sensor": ('kind = "slide"', 'kind = "slide"\nsensor = { resolution = "1 deg" }',
+        'resolution = "1 deg" is an angle; expected a length'),
     "an angle at a slide": ('high = "25 mm"', 'high = "25 deg"',
         '.links[0].high = "25 deg" is an angle; expected a length such as "12 mm", for the joint slides'),
     "a length at a hinge": ('high = "80 deg"', 'high = "80 mm"',
@@ -230,6 +233,15 @@ def test_what_a_slide_cannot_have_is_told(old, new, expected):
     with pytest.raises(InputError) as caught:
         Hand.parse(TEXT.replace(old, new, 1))
     assert expected in str(caught.value)
+
+
+def test_a_slide_has_an_effort_and_a_sensor_of_its_own_units():
+    own = 'kind = "slide"\neffort = "5 N"\nsensor = { resolution = "0.1 mm", low = "-5 mm", high = "30 mm" }'
+    (finger,) = Hand.parse(TEXT.replace('kind = "slide"', own, 1)).fingers.values()
+    link = next(link for link in finger.links if link.slides)
+
+    assert float(link.effort) == 5
+    assert float(link.sensor.resolution) == pytest.approx(1e-4)
 
 
 COUPLINGS = {
