@@ -46,8 +46,8 @@ def show(
 ) -> int:
     """Draw the hand: links in the middle of their ranges and at both ends, joints, pulleys and tendons."""
     from awiwi_gen.hand import Hand
-    from awiwi_gen.interchange.loss import write_whole
     from awiwi_gen.report import counted
+    from awiwi_gen.writing import write_whole
 
     drawn = Hand.load(hand)
     write_whole(output, drawing(drawn))

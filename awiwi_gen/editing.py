@@ -47,7 +47,7 @@ def set_(
     """Change one value of a hand file; comments, order and all other text stay. A hand with faults is not written."""
     from awiwi_gen.hand import Hand
     from awiwi_gen.hand.file import HandFile
-    from awiwi_gen.interchange.loss import write_whole
+    from awiwi_gen.writing import write_whole
 
     file = HandFile.read(hand)
     text, line, old, new = changed(file, key, value)

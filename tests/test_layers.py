@@ -32,7 +32,7 @@ COMPILER = [
 ]
 ROOMS = ("reproduce", "compare", "tune")
 TOP = [
-    ["patterns", "derive", "records", "budget", "parameters"],
+    ["patterns", "writing", "derive", "records", "budget", "parameters"],
     ["judge", "golden", "hand_header"],
     ["parallel", "tasks"],
     ["pipeline"],

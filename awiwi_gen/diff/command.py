@@ -26,9 +26,9 @@ def diff(
     from awiwi_gen.diff.hands import both
     from awiwi_gen.diff.text import print_markdown, print_terminal
     from awiwi_gen.drawing import drawing
-    from awiwi_gen.interchange.loss import write_whole
     from awiwi_gen.pipeline import Job
     from awiwi_gen.report import Progress, print_json
+    from awiwi_gen.writing import write_whole
 
     (old_name, before), (new_name, after) = both(old, new, hand)
     common = [name for name in after.fingers if name in before.fingers]

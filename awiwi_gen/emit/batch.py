@@ -59,7 +59,7 @@ def has_batch(entry: Entry) -> bool:
 
 def prototype(entry: Entry, prefix: str, c_type: str) -> str:
     """The prototype of a kernel's function over many samples."""
-    arrays = [f"{kind}*{n}, ptrdiff_t {n}_sample, ptrdiff_t {n}_element" for kind, n, _ in _ports(entry, c_type)]
+    arrays = [f"{kind}*{n}, ptrdiff_t {n}_sample, ptrdiff_t {n}_element" for kind, n, _ in c_arrays(entry, c_type)]
     arguments = ["ptrdiff_t samples", *_params(entry, prefix), *arrays, *["int *status"] * entry["status"]]
     return f"void {function_name(prefix, entry['name'])}_batch({', '.join(arguments)})"
 
@@ -69,7 +69,7 @@ def batch_file(entry: Entry, prefix: str, c_type: str) -> str:
     from awiwi_gen.emit.files import banner, render
 
     name, status = entry["name"], bool(entry["status"])
-    ports, params = _ports(entry, c_type), _params(entry, prefix)
+    ports, params = c_arrays(entry, c_type), _params(entry, prefix)
     given = ["params"] * len(params)
     alone = [f"{kind}{n}[{size}]" for kind, n, size in ports]
     rows = [f"{kind}*restrict {n}_at, ptrdiff_t {n}_row" for kind, n, _ in ports]
@@ -93,7 +93,7 @@ def batch_file(entry: Entry, prefix: str, c_type: str) -> str:
     )
 
 
-def _ports(entry: Entry, c_type: str) -> list[tuple[str, str, int]]:
+def c_arrays(entry: Entry, c_type: str) -> list[tuple[str, str, int]]:
     """The element type, the C parameter and the size of every port."""
     inputs = [(f"const {c_type} ", input_name(port["name"]), prod(port["shape"])) for port in entry["inputs"]]
     return inputs + [(f"{c_type} ", output_name(port["name"]), prod(port["shape"])) for port in entry["outputs"]]

@@ -10,11 +10,10 @@ import re
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from math import prod
 
-from awiwi_gen.emit.batch import Entry, worthwhile
+from awiwi_gen.emit.batch import Entry, c_arrays, worthwhile
 from awiwi_gen.emit.c import CFunction
-from awiwi_gen.emit.names import function_name, input_name, output_name
+from awiwi_gen.emit.names import function_name
 
 NUMBER = re.compile(r"(?<![\w.])(?:\d+\.\d*(?:e[-+]?\d+)?|\d+e[-+]?\d+)f?(?![\w.])")
 
@@ -32,7 +31,7 @@ class Lanes:
 
     def prototype(self, prefix: str, c_type: str) -> str:
         """The prototype of the function over all lanes."""
-        arrays = [f"{kind}{port}[{size * len(self.fingers)}]" for kind, port, size in self._ports(c_type)]
+        arrays = [f"{kind}{port}[{size * len(self.fingers)}]" for kind, port, size in c_arrays(self.entry, c_type)]
         status = [f"int status[{len(self.fingers)}]"] * bool(self.entry["status"])
         return f"void {function_name(prefix, self.name)}({', '.join(arrays + status)})"
 
@@ -40,7 +39,7 @@ class Lanes:
         """The C of the function over all lanes."""
         from awiwi_gen.emit.files import banner, render  # here, because a library is loaded without Jinja
 
-        ports = self._ports(c_type)
+        ports = c_arrays(self.entry, c_type)
         return render(
             "lanes.c.j2",
             banner=banner(f"{self.entry['family']} of {', '.join(self.fingers)} at once; see batches.h."),
@@ -55,10 +54,6 @@ class Lanes:
             status=bool(self.entry["status"]),
             c_type=c_type,
         )
-
-    def _ports(self, c_type: str) -> list[tuple[str, str, int]]:
-        inputs = [(f"const {c_type} ", input_name(p["name"]), prod(p["shape"])) for p in self.entry["inputs"]]
-        return inputs + [(f"{c_type} ", output_name(p["name"]), prod(p["shape"])) for p in self.entry["outputs"]]
 
 
 def shared_programs(entries: Iterable[Entry], functions: Mapping[str, CFunction]) -> Iterator[Lanes]:

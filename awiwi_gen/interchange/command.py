@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from awiwi_gen import extras
+from awiwi_gen.arguments import Json
 from awiwi_gen.errors import InputError, printable
 
 if TYPE_CHECKING:
     from awiwi_gen.interchange.draft import DraftHand
 
-Json = Annotated[bool, typer.Option("--json", help="Print JSON for programs.")]
 Replace = Annotated[bool, typer.Option("--replace", help="Replace a file that exists.")]
 
 
@@ -37,9 +37,10 @@ def import_(
         raise InputError(f"--into {into}: only a table in CSV goes into a hand file; expected a file named *.csv")
     extras.require("import of models", "mujoco")
     from awiwi_gen.interchange.draft import draft
-    from awiwi_gen.interchange.loss import loss_lines, write_whole
+    from awiwi_gen.interchange.loss import loss_lines
     from awiwi_gen.interchange.mjcf import read
     from awiwi_gen.interchange.toml import hand_text
+    from awiwi_gen.writing import write_whole
 
     target = output or Path(f"{file.stem}.toml")
     hand = draft(read(file, exact, without or (), fit), palm, _named(finger or []))
@@ -77,7 +78,8 @@ def export(
     """Write the hand as a model of MuJoCo (mjcf) or as URDF, and say what the format cannot hold."""
     from awiwi_gen.hand import Hand
     from awiwi_gen.interchange import export_mjcf, export_urdf
-    from awiwi_gen.interchange.loss import loss_lines, write_whole
+    from awiwi_gen.interchange.loss import loss_lines
+    from awiwi_gen.writing import write_whole
 
     endings = {"mjcf": ".xml", "urdf": ".urdf"}
     if form not in endings:
@@ -99,8 +101,8 @@ def export(
 
 
 def _import_table(file: Path, into: Path | None, output: Path | None, as_json: bool) -> int:
-    from awiwi_gen.interchange.loss import write_whole
     from awiwi_gen.interchange.masses import updated
+    from awiwi_gen.writing import write_whole
 
     if into is None:
         raise InputError(f"{file} is a table of masses; name the hand file that takes them with --into FILE")

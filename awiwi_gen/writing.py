@@ -1,0 +1,23 @@
+"""Text files that are written whole or not at all."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from awiwi_gen.errors import OutputError
+
+
+def write_whole(path: Path, text: str, replace: bool = True) -> None:
+    """Write a text file, all or nothing. Raises OutputError where the system refuses, or where a file would be lost."""
+    if path.exists() and not replace:
+        raise OutputError(f"{path} exists; choose another name with -o, or replace it with --replace")
+    unfinished = path.with_name(f"{path.name}.{os.getpid()}.tmp")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        unfinished.write_text(text, encoding="utf-8", newline="\n")
+        os.replace(unfinished, path)
+    except OSError as error:
+        raise OutputError(f"{path} cannot be written: {error.strerror}") from None
+    finally:
+        unfinished.unlink(missing_ok=True)
