@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import sys
+import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from awiwi_gen.verify.objects import Seal
     from awiwi_gen.verify.verdict import Verdict
 
+NARROW = 80  # characters of a line on the narrowest terminal
 COLUMNS = ("kernel", "operations", "sincos", "worst ulp", "scaled error", "witnesses agree", "verdict")
 
 
@@ -170,20 +172,27 @@ def _entry(kernel: Kernel, reason: str) -> dict[str, Any]:
 
 
 def print_kernels(entries: Sequence[Mapping[str, Any]]) -> None:
-    """The kernels as a table; below it, those that the hand cannot have."""
-    rows = [
-        (
-            entry["name"],
-            ", ".join(port["name"] for port in entry["inputs"]),
-            ", ".join(port["name"] for port in entry["outputs"]),
-            operations_text(entry) if entry["cost"] else "?",
-            entry["source"],
-        )
-        for entry in entries
-        if "left_out" not in entry
-    ]
-    print_table(("kernel", "inputs", "outputs", "operations", "source"), rows)
+    """Each kernel with its ports, then its operations and source, in lines of at most 80 characters; none is shortened.
+
+    Those that the hand cannot have come last.
+    """
+    for entry in entries:
+        if "left_out" not in entry:
+            given, found = (", ".join(port["name"] for port in entry[side]) for side in ("inputs", "outputs"))
+            count = f"{operations_text(entry)} operations" if entry["cost"] else "? operations"
+            print(wrapped(f"{entry['name']}({given}) -> {found}", ""))
+            print(wrapped(f"{count}; {entry['source']}", "    "))
     print_left_out({entry["name"]: entry["left_out"] for entry in entries if "left_out" in entry})
+
+
+def wrapped(text: str, indent: str) -> str:
+    """Text in lines of at most 80 characters, but for words that are longer; the second and later ones are indented."""
+    return printable(
+        textwrap.fill(
+            text, NARROW, initial_indent=indent, subsequent_indent=f"{indent}    ", break_long_words=False,
+            break_on_hyphens=False,
+        )
+    )  # fmt: skip
 
 
 def list_kernels(hand: Hand, directory: Path, as_json: bool) -> None:

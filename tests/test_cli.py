@@ -208,11 +208,22 @@ def test_generating_and_verifying_is_one_command(tmp_path):
 
 
 def test_the_list_names_kernels_ports_costs_and_sources(small):
-    lines = told("list", "-o", small).splitlines()
+    told_of = told("list", "-o", small)
+    names = [entry["name"] for entry in json.loads((small / "manifest.json").read_text())["kernels"]]
 
-    assert lines[0].split() == ["kernel", "inputs", "outputs", "operations", "source"]
-    assert len(lines) == 1 + len(json.loads((small / "manifest.json").read_text())["kernels"])
-    assert any(re.match(r"jaw_joint_torque +q, f +tau +\d+ +eq\. 5\.8", line) for line in lines)
+    assert re.findall(r"^(\w+)\(", told_of, re.MULTILINE) == names
+    assert re.search(r"^jaw_joint_torque\(q, f\) -> tau\n    \d+ operations; eq\. 5\.8$", told_of, re.MULTILINE)
+
+
+def test_the_list_fits_80_columns_and_shortens_nothing():
+    lines = told("list").splitlines()
+
+    assert max(map(len, lines)) <= 80
+    text = " ".join(" ".join(lines).split())
+    for entry in answer("list"):
+        ports = (", ".join(port["name"] for port in entry[side]) for side in ("inputs", "outputs"))
+        assert "{}({}) -> {} ".format(entry["name"], *ports) in text
+        assert entry["source"] in text
 
 
 def test_the_list_in_json_has_shapes_units_ranges_and_costs(small):
