@@ -35,6 +35,7 @@ typedef struct awiwi_tendons {
     const awiwi_real *coupling; /* P [tendons][joints] */
     const awiwi_real *slope;    /* dP/dq [tendons][joints][joints]; null if the coupling is constant */
     awiwi_curve curve;
+    awiwi_curve searched_curve; /* of the tendons in no pair alone, in their order */
     const void *context;
     awiwi_real low, high; /* limits of every force */
     int pairs;

@@ -28,7 +28,6 @@ typedef struct task {
     awiwi_real torque[AWIWI_MOST_JOINTS];                /* wanted */
     int keep_torque, within_reach; /* by the limits */
     awiwi_real tolerance;
-    awiwi_real *f; /* of all tendons */
     awiwi_real times[MOST_ENTRIES], wanted[MOST_ENTRIES];
     place at[MOST_ENTRIES];
     const awiwi_real *constant[AWIWI_MOST_TENDONS];
@@ -64,10 +63,9 @@ typedef struct rates {
 /* -- entries ------------------------------------------------------------------------------------------------------- */
 
 /* Set up for the searched tendons of a finger. */
-static void start_task(task *s, const awiwi_tendons *t, const awiwi_real *torque, awiwi_real *f)
+static void start_task(task *s, const awiwi_tendons *t, const awiwi_real *torque)
 {
     s->t = t;
-    s->f = f;
     s->by_chords = 0;
     s->count = t->searched;
     s->joints = s->within_reach = 0;
@@ -125,23 +123,14 @@ static void want_stiffness(task *s, const awiwi_real *K, awiwi_real tolerance)
 /* Stiffness k of the searched tendons at forces f, and its derivatives; not 0 outside the curve. */
 static int follow_curve(const task *s, const vector f, vector k, model *c)
 {
-    vector all, slope, curvature;
-    for (int i = 0; i < s->count && s->by_chords; i++) {
+    if (!s->by_chords)
+        return s->t->searched_curve(s->t->context, f, k, c->slope, c->curvature);
+    for (int i = 0; i < s->count; i++) {
         k[i] = s->start[i] + s->rise[i] * (f[i] - s->t->low);
         c->slope[i] = s->rise[i];
         c->curvature[i] = 0;
     }
-    if (s->by_chords)
-        return 0;
-    for (int i = 0; i < s->count; i++)
-        s->f[s->t->searched_tendons[i]] = f[i];
-    const int off = s->t->curve(s->t->context, s->f, all, slope, curvature);
-    for (int i = 0; i < s->count && !off; i++) {
-        k[i] = all[s->t->searched_tendons[i]];
-        c->slope[i] = slope[s->t->searched_tendons[i]];
-        c->curvature[i] = curvature[s->t->searched_tendons[i]];
-    }
-    return off;
+    return 0;
 }
 
 /* Let chords between the limits take the place of the curve: with them the cost has no other minimum than the least.

@@ -128,19 +128,19 @@ static void accelerate(const task *s, const model *c, const moves *m, rates *d, 
 }
 
 /* Take a share of a step, or as much of that as the cost permits: at most `most` afterwards. With the moves that the step
-   is made of, trials bend from the second on. Each trial is one of the steps left. */
+   is made of, trials begin again after the second, and bend. Each trial is one of the steps left. */
 static int take(const task *s, const vector step, awiwi_real share, awiwi_real most, const moves *m, rates *d, int *steps,
                 vector f, model *here, int *stopped)
 {
     vector bend;
-    int bent = 0;
+    int refused = 0;
     while (share > 0) {
         vector trial;
         model there;
         int inside = 1;
         for (int i = 0; i < s->count; i++)
             trial[i] = awiwi_clamp(f[i] + share * step[i], s->t->low, s->t->high);
-        for (int i = 0; i < s->count && bent; i++) {
+        for (int i = 0; i < s->count && refused > 1; i++) {
             trial[i] = f[i] + share * (step[i] + share * bend[i]);
             inside = inside && trial[i] >= s->t->low && trial[i] <= s->t->high;
         }
@@ -154,9 +154,9 @@ static int take(const task *s, const vector step, awiwi_real share, awiwi_real m
         }
         if (inside && --*steps <= 0)
             break;
-        if (m && !bent) { /* rather than to halve the step at once */
+        if (m && ++refused == 2) {
             accelerate(s, here, m, d, step, bend);
-            bent = 1;
+            share *= 2;
         } else {
             share /= 2;
         }
@@ -359,7 +359,7 @@ int awiwi_search_forces(const awiwi_tendons *t, const awiwi_real *tau, const awi
     rates d;
     task s;
     d.bent = 0;
-    start_task(&s, t, tau, f);
+    start_task(&s, t, tau);
     want_torque(&s, 4 * AWIWI_REAL_EPSILON);
     split(&s, 1, held, &all);
     int status = begin(&s, &all, best, &d);

@@ -26,6 +26,7 @@ static int curve(const void *context, const awiwi_real *f, awiwi_real *k, awiwi_
     return awiwi_fifth_tendon_stiffness(f, k, slope, curvature);
 }
 
+
 int awiwi_fifth_tendon_distribution(const double q_in[restrict 4], const double tau_in[restrict 4], const double K_in[restrict 16], const double f_min_in[restrict 1], const double f_max_in[restrict 1], double f_out[restrict 8])
 {
     static const awiwi_pair pairs[] = {{0, 1, 0}, {2, 5, 2}, {3, 4, 1}, {6, 7, 3}};
@@ -33,7 +34,7 @@ int awiwi_fifth_tendon_distribution(const double q_in[restrict 4], const double 
     const void *const context = 0;
     awiwi_real P[8 * 4];
     const awiwi_tendons tendons = {
-        4, 8, P, 0, curve, context, f_min_in[0], f_max_in[0],
+        4, 8, P, 0, curve, curve, context, f_min_in[0], f_max_in[0],
         4, pairs, 0, 0,
     };
 

@@ -15,6 +15,7 @@
 
 /* For toolchains that use only 31 characters of a name: define AWIWI_SHORT_NAMES in every file. */
 #ifdef AWIWI_SHORT_NAMES
+#define awiwi_thumb_searched_tendon_stiffness awiwi_thumb_searched_t_c52394b5
 #define awiwi_thumb_inverse_dynamics_derivatives awiwi_thumb_inverse_dy_c9173c4f
 #define awiwi_thumb_joint_torque_and_stiffness awiwi_thumb_joint_torq_9ffb34a1
 #define awiwi_thumb_joint_estimate_error awiwi_thumb_joint_esti_4bc2145a
@@ -72,6 +73,20 @@ extern const int awiwi_api_version;
  * Cost: 198 add, 198 mul, 7 calls.
  */
 AWIWI_MUST_CHECK int awiwi_thumb_tendon_stiffness(const double tension_in[8], double k_out[8], double slope_out[8], double curvature_out[8]);
+
+/*
+ * Stiffness of every tendon at its tension, spring and fibre in series, and its derivatives. slope and
+ * curvature are dk/df and d2k/df2.
+ * Source: figure 4.7, section 4.3.
+ *   in   tension[4] in N, 3.87595 to 100.149
+ *   out  k[4] in N/m
+ *   out  slope[4] in 1/m
+ *   out  curvature[4] in 1/(N m)
+ * Returns 0 where all inputs and outputs are finite and every tension is on its spring's curve, with a
+ * margin of 0.4 %; else 1, and outputs without a value are NaN.
+ * Cost: 98 add, 98 mul, 3 calls.
+ */
+AWIWI_MUST_CHECK int awiwi_thumb_searched_tendon_stiffness(const double tension_in[4], double k_out[4], double slope_out[4], double curvature_out[4]);
 
 /*
  * Pose of the fingertip: maps fingertip coordinates into the finger's base frame.
@@ -327,7 +342,7 @@ void awiwi_thumb_joint_estimate_error(const double q_in[4], const double noise_i
  *   out  f[8] in N
  * Returns an awiwi_status, see awiwi_solvers.h, never 0 if an input is not finite; the outputs are
  * always defined.
- * Cost: the solver's own work and calls, at most: 1 of thumb_coupling, 456 of thumb_tendon_stiffness, 1 of thumb_coupling_derivative.
+ * Cost: the solver's own work and calls, at most: 1 of thumb_coupling, 66 of thumb_tendon_stiffness, 390 of thumb_searched_tendon_stiffness, 1 of thumb_coupling_derivative.
  */
 AWIWI_MUST_CHECK int awiwi_thumb_tendon_distribution(const double q_in[4], const double tau_in[4], const double K_in[16], const double f_min_in[1], const double f_max_in[1], double f_out[8]);
 

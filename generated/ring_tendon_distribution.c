@@ -26,6 +26,7 @@ static int curve(const void *context, const awiwi_real *f, awiwi_real *k, awiwi_
     return awiwi_ring_tendon_stiffness(f, k, slope, curvature);
 }
 
+
 int awiwi_ring_tendon_distribution(const double q_in[restrict 3], const double tau_in[restrict 3], const double K_in[restrict 9], const double f_min_in[restrict 1], const double f_max_in[restrict 1], double f_out[restrict 6])
 {
     static const awiwi_pair pairs[] = {{0, 3, 1}, {1, 2, 0}, {4, 5, 2}};
@@ -33,7 +34,7 @@ int awiwi_ring_tendon_distribution(const double q_in[restrict 3], const double t
     const void *const context = 0;
     awiwi_real P[6 * 3];
     const awiwi_tendons tendons = {
-        3, 6, P, 0, curve, context, f_min_in[0], f_max_in[0],
+        3, 6, P, 0, curve, curve, context, f_min_in[0], f_max_in[0],
         3, pairs, 0, 0,
     };
 

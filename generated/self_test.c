@@ -35,6 +35,16 @@ static int run_thumb_tendon_stiffness(const parameters *params, const awiwi_real
     (void)params; return awiwi_thumb_tendon_stiffness(in, out, out + 8, out + 16);
 }
 
+static const awiwi_real in_thumb_searched_tendon_stiffness[] = {
+    46.84821492572043, 68.80403855723588, 11.360626396902411, 98.53383222843544,
+    81.67445632465288, 66.471937170279, 92.08922979330426, 67.53688722521976,
+    30.16411850911903, 79.28252976207693, 10.559274230038433, 34.37165496129275,
+};
+static int run_thumb_searched_tendon_stiffness(const parameters *params, const awiwi_real *in, awiwi_real *out)
+{
+    (void)params; return awiwi_thumb_searched_tendon_stiffness(in, out, out + 4, out + 8);
+}
+
 static const awiwi_real in_thumb_fingertip_pose[] = {
     0.01640592391961415, -0.4761514895380321, 0.45137979559520214, 0.5205986692143287,
     0.27323064623751714, 0.37282876116494423, 0.04002607877475621, 0.5228275744461657,
@@ -3201,6 +3211,7 @@ static int run_plant_finger(const parameters *params, const awiwi_real *in, awiw
 
 static const golden tests[] = {
     {"thumb_tendon_stiffness", run_thumb_tendon_stiffness, in_thumb_tendon_stiffness, 0, 0x8805f544u, 3, 8, 24},
+    {"thumb_searched_tendon_stiffness", run_thumb_searched_tendon_stiffness, in_thumb_searched_tendon_stiffness, 0, 0xe4422d12u, 3, 4, 12},
     {"thumb_fingertip_pose", run_thumb_fingertip_pose, in_thumb_fingertip_pose, 0, 0xa2ef660du, 3, 4, 16},
     {"thumb_link_poses", run_thumb_link_poses, in_thumb_link_poses, 0, 0x48caa3acu, 3, 4, 64},
     {"thumb_jacobian", run_thumb_jacobian, in_thumb_jacobian, 0, 0x28bc1a88u, 3, 4, 24},

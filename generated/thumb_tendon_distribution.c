@@ -13,7 +13,7 @@
  *   out  f[8] in N
  * Returns an awiwi_status, see awiwi_solvers.h, never 0 if an input is not finite; the outputs are
  * always defined.
- * Cost: the solver's own work and calls, at most: 1 of thumb_coupling, 456 of thumb_tendon_stiffness, 1 of thumb_coupling_derivative.
+ * Cost: the solver's own work and calls, at most: 1 of thumb_coupling, 66 of thumb_tendon_stiffness, 390 of thumb_searched_tendon_stiffness, 1 of thumb_coupling_derivative.
  */
 #include "numerics.h"
 #include "awiwi_distribution.h"
@@ -26,6 +26,13 @@ static int curve(const void *context, const awiwi_real *f, awiwi_real *k, awiwi_
     return awiwi_thumb_tendon_stiffness(f, k, slope, curvature);
 }
 
+static int searched_curve(const void *context, const awiwi_real *f, awiwi_real *k, awiwi_real *slope, awiwi_real *curvature)
+{
+    (void)context;
+    return awiwi_thumb_searched_tendon_stiffness(f, k, slope, curvature);
+}
+
+
 int awiwi_thumb_tendon_distribution(const double q_in[restrict 4], const double tau_in[restrict 4], const double K_in[restrict 16], const double f_min_in[restrict 1], const double f_max_in[restrict 1], double f_out[restrict 8])
 {
     static const awiwi_pair pairs[] = {{4, 5, 1}, {6, 7, 0}};
@@ -35,7 +42,7 @@ int awiwi_thumb_tendon_distribution(const double q_in[restrict 4], const double 
     awiwi_real P[8 * 4];
     awiwi_real dP[8 * 4 * 4];
     const awiwi_tendons tendons = {
-        4, 8, P, dP, curve, context, f_min_in[0], f_max_in[0],
+        4, 8, P, dP, curve, searched_curve, context, f_min_in[0], f_max_in[0],
         2, pairs, 4, searched,
     };
 

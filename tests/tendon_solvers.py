@@ -27,8 +27,9 @@ class Pair(ctypes.Structure):
 class Tendons(ctypes.Structure):
     _fields_ = (
         ("n", ctypes.c_int), ("m", ctypes.c_int), ("P", NUMBERS), ("dP", NUMBERS), ("curve", CURVE),
-        ("context", ctypes.c_void_p), ("low", ctypes.c_double), ("high", ctypes.c_double), ("pairs", ctypes.c_int),
-        ("pair", ctypes.POINTER(Pair)), ("searched", ctypes.c_int), ("searched_tendons", ctypes.POINTER(ctypes.c_int)),
+        ("searched_curve", CURVE), ("context", ctypes.c_void_p), ("low", ctypes.c_double), ("high", ctypes.c_double),
+        ("pairs", ctypes.c_int), ("pair", ctypes.POINTER(Pair)), ("searched", ctypes.c_int),
+        ("searched_tendons", ctypes.POINTER(ctypes.c_int)),
     )  # fmt: skip
 
 
@@ -68,8 +69,11 @@ class Finger:
         self.P = np.array(self.P, float)
 
     def called(self, _: Any, f: Any, k: Any, slope: Any, curvature: Any) -> int:
+        return self._evaluated(len(self.P), f, k, slope, curvature)
+
+    def _evaluated(self, count: int, f: Any, k: Any, slope: Any, curvature: Any) -> int:
         self.calls += 1
-        for i in range(len(self.P)):
+        for i in range(count):
             found = self.curve(f[i])
             if found is None:
                 return 1
@@ -89,9 +93,10 @@ class Finger:
         in_pairs = {i for first, second, _ in self.pairs for i in (first, second)}
         others = [i for i in range(m) if i not in in_pairs]
         f, callback = np.full(m, np.nan), CURVE(self.called)
+        alone = CURVE(lambda _, *arrays: self._evaluated(len(others), *arrays))
         P, dP = np.ascontiguousarray(self.P), None if self.dP is None else np.ascontiguousarray(self.dP, float)
         tendons = Tendons(
-            n, m, numbers(P), None if dP is None else numbers(dP), callback, None, self.low, self.high,
+            n, m, numbers(P), None if dP is None else numbers(dP), callback, alone, None, self.low, self.high,
             len(self.pairs), (Pair * max(len(self.pairs), 1))(*(Pair(*pair) for pair in self.pairs)),
             len(others), (ctypes.c_int * max(len(others), 1))(*others),
         )  # fmt: skip

@@ -27,7 +27,8 @@ def solver_function(
         options,
         runtime and prefix,
     )
-    calls = {family: 1 if family in solver.once else solver.iterations for family in used}
+    often = dict.fromkeys(used, solver.iterations) | dict.fromkeys(solver.once, 1) | dict(solver.calls)
+    calls = {family: often[family] for family in used}
     listed = [f"{count} of {used[family].name}" for family, count in calls.items()]
     comment = describe(
         kernel, f"Cost: the solver's own work{' and calls, at most: ' * bool(listed)}{', '.join(listed)}."

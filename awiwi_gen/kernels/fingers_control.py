@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 from awiwi_gen.hand import Finger, Hand
+from awiwi_gen.hand.capability import left_out
 from awiwi_gen.hand.lever import Lever
 from awiwi_gen.hand.parts import Tendon
 from awiwi_gen.kernel import Kernel, Port, Solver
@@ -25,11 +27,11 @@ SEARCHES, INVERSIONS = 2 + 4 * 97, 66  # evaluations of the curve in the worst c
 class Elastic:
     """The elastic elements of a finger's tendons: springs and fibres of the hand, or its limits if it has no springs.
 
-    `tendons` are the indices of the finger's tendons in the hand.
+    `tendons` are the indices of these tendons in the hand.
     """
 
     hand: Any
-    tendons: range
+    tendons: Sequence[int]
 
     @property
     def springs(self) -> list[Any]:
@@ -79,12 +81,17 @@ of_elastic: Family[int] = Family("tendon_stiffness")  # sized by the number of t
 
 
 def elastic_kernels(hand: Hand, name: str, finger: Finger) -> list[Kernel]:
-    """The kernels of a finger's tendons."""
+    """The kernels of a finger's tendons, and those of the tendons in no pair alone, if the force distribution has both."""
     rows, _ = hand.blocks[name]
-    elastic = Elastic(hand, range(rows.start, rows.stop))
-    count = len(elastic.tendons)
-    ports = {"tension": Port((count,), N, *force_range(hand))}
-    return of_elastic.kernels(name, elastic, "", elastic.structure(), ports, count)
+    chosen = {name: [*range(rows.start, rows.stop)]}
+    pairs, searched = by_pairs_and_search(finger)
+    if pairs and searched and (f"fingers.{name}", "tendon_distribution") not in left_out(hand):
+        chosen[f"{name}_searched"] = [rows.start + i for i in searched]
+    found = []
+    for prefix, tendons in chosen.items():
+        elastic, ports = Elastic(hand, tendons), {"tension": Port((len(tendons),), N, *force_range(hand))}
+        found += of_elastic.kernels(prefix, elastic, "", elastic.structure(), ports, len(tendons))
+    return found
 
 
 @of_elastic(
@@ -136,18 +143,30 @@ def _opposite(a: Counter[str], b: Counter[str]) -> bool:
     return all(a[joint] == -b[joint] for joint in {*a, *b})
 
 
-def distribution(finger: Finger) -> Solver:
-    """Closed forms for antagonistic pairs of tendons, a search for all others."""
+def by_pairs_and_search(finger: Finger) -> tuple[list[tuple[int, int, int]], list[int]]:
+    """The antagonistic pairs of a finger (first, second, number of the partner), and all other tendons."""
     pairs: list[tuple[int, int, int]] = []
     searched: list[int] = []
     for group in groups(finger):
         found, first = antagonists(finger, group), len(pairs)
         pairs += [(a, b, first + (len(found) - 1 - i)) for i, (a, b) in enumerate(found)]
         searched += [] if found else group
+    return pairs, sorted(searched)
+
+
+def distribution(finger: Finger) -> Solver:
+    """Closed forms for antagonistic pairs of tendons, a search for all others."""
+    pairs, searched = by_pairs_and_search(finger)
+    both = bool(pairs and searched)
     return Solver(
         template="tendon_distribution.c.j2",
         problem="distribution",
-        uses=("coupling", "tendon_stiffness", *(["coupling_derivative"] if is_curved(finger) else [])),
+        uses=(
+            "coupling",
+            "tendon_stiffness",
+            *(["searched_tendon_stiffness"] if both else []),
+            *(["coupling_derivative"] if is_curved(finger) else []),
+        ),
         equations=tuple(range(len(finger.transmissions))),
         unknowns=tuple(range(len(finger.joints))),
         arrays={},
@@ -160,6 +179,7 @@ def distribution(finger: Finger) -> Solver:
         iterations=(INVERSIONS if pairs else 0) + (SEARCHES if searched else 0),
         tolerance={"f64": 1e-11, "f32": 1e-4},
         once=("coupling", "coupling_derivative"),
+        calls={"tendon_stiffness": INVERSIONS, "searched_tendon_stiffness": SEARCHES} if both else {},
     )
 
 

@@ -24,6 +24,7 @@ extern "C" {
 struct awiwi_params;
 
 void awiwi_thumb_tendon_stiffness_batch(ptrdiff_t samples, const double *tension_in, ptrdiff_t tension_in_sample, ptrdiff_t tension_in_element, double *k_out, ptrdiff_t k_out_sample, ptrdiff_t k_out_element, double *slope_out, ptrdiff_t slope_out_sample, ptrdiff_t slope_out_element, double *curvature_out, ptrdiff_t curvature_out_sample, ptrdiff_t curvature_out_element, int *status);
+void awiwi_thumb_searched_tendon_stiffness_batch(ptrdiff_t samples, const double *tension_in, ptrdiff_t tension_in_sample, ptrdiff_t tension_in_element, double *k_out, ptrdiff_t k_out_sample, ptrdiff_t k_out_element, double *slope_out, ptrdiff_t slope_out_sample, ptrdiff_t slope_out_element, double *curvature_out, ptrdiff_t curvature_out_sample, ptrdiff_t curvature_out_element, int *status);
 void awiwi_thumb_fingertip_pose_batch(ptrdiff_t samples, const double *q_in, ptrdiff_t q_in_sample, ptrdiff_t q_in_element, double *T_out, ptrdiff_t T_out_sample, ptrdiff_t T_out_element);
 void awiwi_thumb_link_poses_batch(ptrdiff_t samples, const double *q_in, ptrdiff_t q_in_sample, ptrdiff_t q_in_element, double *T_out, ptrdiff_t T_out_sample, ptrdiff_t T_out_element);
 void awiwi_thumb_jacobian_batch(ptrdiff_t samples, const double *q_in, ptrdiff_t q_in_sample, ptrdiff_t q_in_element, double *J_out, ptrdiff_t J_out_sample, ptrdiff_t J_out_element);

@@ -5,19 +5,18 @@
 #include <stdlib.h>
 
 typedef struct springs {
-    int tendons, kind;
+    int tendons, kind, searched; /* the first of those in no pair */
     double unit; /* of stiffness */
     calls calls;
 } springs;
 
 /* Springs of 5 kinds: that stiffen, that stiffen a lot at the end, with a constant stiffness at first, that soften
    towards the end, or with a jump after 1 N. All are refused below 0 N and beyond 200 N. */
-static int curve(const void *context, const double *f, double *k, double *slope, double *curvature)
+static int follow(springs *s, int first, const double *f, double *k, double *slope, double *curvature)
 {
-    springs *s = (springs *)context;
-    record(&s->calls, f, s->tendons);
-    for (int i = 0; i < s->tendons; i++) {
-        const double x = f[i], bend = 0.1 * (i + 1), late = x > 30 ? x - 30 : 0;
+    record(&s->calls, f, s->tendons - first);
+    for (int i = 0; i < s->tendons - first; i++) {
+        const double x = f[i], bend = 0.1 * (first + i + 1), late = x > 30 ? x - 30 : 0;
         if (!(x >= 0 && x <= 200))
             return 1;
         k[i] = 100 + 20 * x + bend * x * x;
@@ -44,6 +43,17 @@ static int curve(const void *context, const double *f, double *k, double *slope,
         curvature[i] *= s->unit;
     }
     return 0;
+}
+
+static int curve(const void *context, const double *f, double *k, double *slope, double *curvature)
+{
+    return follow((springs *)context, 0, f, k, slope, curvature);
+}
+
+static int searched_curve(const void *context, const double *f, double *k, double *slope, double *curvature)
+{
+    springs *s = (springs *)context;
+    return follow(s, s->searched, f, k, slope, curvature);
 }
 
 /* Ask for the torque of some forces, and for their stiffness or about that; at the edge for the most torque that the
@@ -91,7 +101,7 @@ void try_tendons(int number)
     const int n = 1 + number % AWIWI_MOST_JOINTS, pairs = number % 5 < 3 ? number % 5 : number / 5 % 9;
     const int rest = (int)random_in(0, AWIWI_MOST_TENDONS + 0.99 - 2 * pairs), m = 2 * pairs + rest + !(pairs + rest);
     const int sloped = number % 3 == 0, size = number % 4;
-    springs s = {m, number / 2 % 9 % 5, number % 11 == 4 ? 1e-4 : 1, {0, 0}};
+    springs s = {m, number / 2 % 9 % 5, 2 * pairs, number % 11 == 4 ? 1e-4 : 1, {0, 0}};
     double *P = random_array(m * n, -0.01, 0.01), *dP = random_array(m * n * n, -0.002, 0.002);
     double *K = random_array(n * n, 0, 4 * pow(10, -size)), *tau = random_array(n, -0.3 / (1 + size), 0.3);
     awiwi_pair *pair = malloc((size_t)pairs * sizeof *pair);
@@ -119,7 +129,7 @@ void try_tendons(int number)
     for (int i = 0; number % 16 == 9 && i < m * n; i++)
         P[i] *= 1e-6;
     const double usual = number % 7 ? 20 * (1 + number % 5) : number % 2 ? 205 : number % 5 + 0.25 * (number % 4);
-    const awiwi_tendons t = {n, m, P, sloped ? dP : 0, curve, &s, limit(number, number % 5), limit(number + 11, usual),
+    const awiwi_tendons t = {n, m, P, sloped ? dP : 0, curve, searched_curve, &s, limit(number, number % 5), limit(number + 11, usual),
                              pairs, pair, m - 2 * pairs, indices(m - 2 * pairs, 2 * pairs, 1)};
     if (number % 37 == 0)
         try_large_fingers(&t, tau, K, output(m));
