@@ -18,6 +18,7 @@ from awiwi_gen.errors import BudgetError
 from awiwi_gen.hand import Hand
 from awiwi_gen.ir.cost import Cost, operations_text
 from awiwi_gen.kernels import catalog
+from awiwi_gen.kernels.fingers_control import INVERSIONS, SEARCHES
 from awiwi_gen.pipeline import Job, generate
 from awiwi_gen.records import make_records
 from bench.sizes import excesses
@@ -110,13 +111,19 @@ def test_a_solver_costs_every_kernel_as_often_as_it_calls_it(hand):
     (kernel,) = (kernel for kernel in catalog(hand) if kernel.name == "thumb_tendon_distribution")
     used = {
         family: CFunction(family, "void f(void)", "", (), (), Cost(add=number), ())
-        for family, number in (("coupling", 1), ("coupling_derivative", 10), ("tendon_stiffness", 100))
+        for family, number in (
+            ("coupling", 1),
+            ("coupling_derivative", 10),
+            ("tendon_stiffness", 100),
+            ("searched_tendon_stiffness", 10**6),
+        )  # fmt: skip
     }
     function, _ = solver_function(kernel, kernel.solver, "awiwi", Options(), used, runtime=False)
 
-    assert function.cost == Cost(add=1 + 10 + 100 * kernel.solver.iterations)
-    assert function.comment[-1] == (
-        "Cost: the solver's own work and calls, at most: 1 of coupling, 1 of coupling_derivative, 456 of tendon_stiffness."
+    assert function.cost == Cost(add=1 + 10 + 100 * INVERSIONS + 10**6 * SEARCHES)
+    assert " ".join(function.comment).endswith(
+        "Cost: the solver's own work and calls, at most: 1 of coupling, 1 of coupling_derivative, 66 of tendon_stiffness, "
+        "390 of searched_tendon_stiffness."
     )
 
 
