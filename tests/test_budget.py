@@ -116,7 +116,7 @@ def test_a_solver_costs_every_kernel_as_often_as_it_calls_it(hand):
             ("coupling_derivative", 10),
             ("tendon_stiffness", 100),
             ("searched_tendon_stiffness", 10**6),
-        )  # fmt: skip
+        )
     }
     function, _ = solver_function(kernel, kernel.solver, "awiwi", Options(), used, runtime=False)
 
