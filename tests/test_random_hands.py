@@ -30,6 +30,7 @@ SEEDS = {  # of hands on which a kernel or its proof once failed
     "the search follows a curved valley": (175, "two_tendon_distribution"),
     "an output is exact, its reference at 256 bits is not": (17, "one_joint_estimate_error"),
     "lengths bend over a slide and a hinge at once": (50, "two_coupling_derivative"),
+    "a joint slides along the axis of the hinge before it": (129, "one_coriolis_matrix"),
 }
 WHOLE = {"wrist", "motor", "spring", "fibre"}  # of the hand: with these all of its kernels are proved
 

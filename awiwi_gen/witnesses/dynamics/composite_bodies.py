@@ -74,7 +74,7 @@ class _Composite:
             force_rate=ratio * force_rate + ratio_rate * force,
             moment_rate=ratio * moment_rate + ratio_rate * moment,
             velocity_moment=ratio * velocity_moment,
-            row=ratio * ca.dot(axis, moment_rate),
+            row=None if joint.slides else ratio * ca.dot(axis, moment_rate),
         )
 
 
