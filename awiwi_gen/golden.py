@@ -127,9 +127,8 @@ def _near(
         else:
             value = known[name][rows]
             if record.graph is None:
-                solver = solver_of(kernel)
-                units = port.units if solver.near else ()  # of joints that may slide
-                limit = np.broadcast_to(solver.tolerance[options.scalar] * scales(known[name], units), value.shape)
+                tolerance = solver_of(kernel).tolerance[options.scalar]
+                limit = np.broadcast_to(tolerance * scales(known[name], port.units), value.shape)
             else:
                 limit = stack([bound[1] for bound in bounds[name]], len(rows)) + np.spacing(np.abs(value))
         columns.append(np.stack([value, limit], axis=2))

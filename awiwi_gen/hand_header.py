@@ -121,10 +121,8 @@ def numbers(hand: Hand) -> Iterator[tuple[str, float, str]]:
     if hand.clock:
         yield "PERIOD", float(hand.clock.period), "of the clock on which the controller runs [s]"
     if motor := hand.motor:
-        ratio = float(motor.gear_ratio)
-        inertia = float(motor.rotor_inertia) * ratio**2 + float(motor.gear_inertia)
-        yield "MOTOR_INERTIA", inertia, "rotor and gear at the output shaft [kg m^2]"
-        yield "MOTOR_GEAR_RATIO", ratio, "turns of the input per turn of the output shaft"
+        yield "MOTOR_INERTIA", motor.inertia, "rotor and gear at the output shaft [kg m^2]"
+        yield "MOTOR_GEAR_RATIO", float(motor.gear_ratio), "turns of the input per turn of the output shaft"
         yield "MOTOR_PULLEY", float(motor.pulley), "radius that winds the tendon [m]"
         yield "MOTOR_TORQUE", float(motor.torque), "largest torque of the output shaft [N m]"
         yield "MOTOR_VELOCITY", float(motor.velocity), "largest velocity of the output shaft [rad/s]"

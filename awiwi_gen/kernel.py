@@ -93,8 +93,8 @@ class Solver:
     indices of the tendons and joints that take part. ``arrays`` become C constants, ``strings`` go to the template
     unchanged. ``problem`` names an entry of `verify.problems.PROBLEMS`, which draws well-posed inputs and has their exact
     solutions; a compiled result may differ from these by ``tolerance`` of the largest element, per scalar type.
-    ``iterations`` is the number of calls of the used kernels in the worst case; those in ``once`` are called once, and
-    those in ``calls`` as often as that says.
+    ``iterations`` is the number of calls of the used kernels in the worst case; ``calls`` has other numbers, by
+    family.
     A last step shorter than ``stop``, per scalar type, ends an iteration. Unknowns in ``held`` are inputs, not found.
     ``limits`` are the paths of the numbers in ``arrays`` that are read at run time where others are. The solver is
     expected to converge from starts up to ``near`` away in each unknown.
@@ -109,7 +109,6 @@ class Solver:
     strings: Mapping[str, str]
     iterations: int
     tolerance: Mapping[str, float]
-    once: tuple[str, ...] = ()
     limits: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     stop: Mapping[str, str] = field(default_factory=lambda: STOP)
     near: tuple[float, ...] = ()

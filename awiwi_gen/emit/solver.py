@@ -27,8 +27,7 @@ def solver_function(
         options,
         runtime and prefix,
     )
-    often = dict.fromkeys(used, solver.iterations) | dict.fromkeys(solver.once, 1) | dict(solver.calls)
-    calls = {family: often[family] for family in used}
+    calls = {family: solver.calls.get(family, solver.iterations) for family in used}
     listed = [f"{count} of {used[family].name}" for family, count in calls.items()]
     comment = describe(
         kernel, f"Cost: the solver's own work{' and calls, at most: ' * bool(listed)}{', '.join(listed)}."

@@ -64,6 +64,11 @@ class Motor(Part):
     current: Annotated[Current | None, Field(exclude=True)] = None
     source: Source
 
+    @property
+    def inertia(self) -> float:
+        """Of rotor and gear, as seen at the output shaft [kg m^2]."""
+        return float(self.rotor_inertia) * float(self.gear_ratio) ** 2 + float(self.gear_inertia)
+
     def structure(self) -> dict[str, Any]:
         """Everything but the numbers, ready for JSON."""
         return {"ripple": [[ripple.shaft, ripple.harmonic] for ripple in self.ripple]}

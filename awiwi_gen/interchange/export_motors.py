@@ -143,8 +143,7 @@ class Drives:
         motor, name = self.hand.motor, element.get("name", "")
         if motor is None:
             raise ValueError("a shaft needs a motor")
-        radius, torque = float(motor.pulley), float(motor.torque)
-        inertia = float(motor.rotor_inertia) * float(motor.gear_ratio) ** 2 + float(motor.gear_inertia)
+        radius, torque, inertia = float(motor.pulley), float(motor.torque), motor.inertia
         friction = motor.friction
         body = SubElement(self.world, "body", name=f"{name}.rotor")
         least_inertia(body, {})

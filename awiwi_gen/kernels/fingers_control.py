@@ -178,8 +178,11 @@ def distribution(finger: Finger) -> Solver:
         },
         iterations=(INVERSIONS if pairs else 0) + (SEARCHES if searched else 0),
         tolerance={"f64": 1e-11, "f32": 1e-4},
-        once=("coupling", "coupling_derivative"),
-        calls={"tendon_stiffness": INVERSIONS, "searched_tendon_stiffness": SEARCHES} if both else {},
+        calls={
+            "coupling": 1,
+            "coupling_derivative": 1,
+            **({"tendon_stiffness": INVERSIONS, "searched_tendon_stiffness": SEARCHES} if both else {}),
+        },
     )
 
 

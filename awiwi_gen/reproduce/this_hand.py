@@ -53,7 +53,7 @@ def this_hand(job: Job) -> ThisHand:
 
 
 def _rows(job: Job, finger: str) -> Iterator[Row]:
-    """The figures of a finger but for the entries of its coupling, which are a page of their own."""
+    """The figures of a finger but for the entries of its coupling, of which there are too many."""
     for figure in figures(job, finger):
         if not figure.name.startswith("P["):
             yield figure.name, f"{figure.value:.4g}", figure.unit
