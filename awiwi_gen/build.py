@@ -254,6 +254,8 @@ def _glue_source(manifest: dict[str, Any], declared: str) -> str:
         prototypes.append(f"int {prefix}_params_load(const void *bytes, size_t size, {prefix}_params *out);")
         prototypes.append(f"extern {prefix}_params FlatParams;")
         loops.append(f"static {prefix}_params FlatParams;")  # of the kernels that are called with flat arrays
+    if manifest.get("tick"):
+        prototypes.append(f"extern const awiwi_hand {prefix}_hand_model; extern const awiwi_hand_gains {prefix}_default_gains; extern const awiwi_hand_plant {prefix}_simulated_hand;")
     for entry in manifest["kernels"]:
         inputs = [input_name(p["name"]) for p in entry["inputs"]]
         sizes = {output_name(p["name"]): prod(p["shape"]) for p in entry["outputs"]}
@@ -309,6 +311,7 @@ def _glue_object(name: str, glue: str, directory: Path, store: Cache, scratch: P
     ffi = cffi.FFI()
     ffi.cdef(re.sub(r"^#.*$", "", parts["declared"], flags=re.M) + "\n".join(parts["prototypes"]))
     own = '#include "params.h"\n' if "_params_load" in glue else ""
+    own += '#include "hand.h"\n' * ("extern const awiwi_hand " in glue)
     preamble = f'#include "awiwi.h"\n{own}' + OPTIMISED.format("\n".join(parts["loops"]))
     source = scratch / f"{name}.c"
     cffi.recompiler.make_c_source(ffi, name, preamble, str(source))

@@ -45,11 +45,12 @@ class Constant:
         return [", ".join(texts[i : i + PER_LINE]) + "," for i in range(0, len(texts), PER_LINE)]
 
 
-def header_files(hand: Hand, options: Options, made_from: Any) -> dict[str, str]:
+def header_files(hand: Hand, options: Options, made_from: Any, has_tick: bool) -> dict[str, str]:
     """hand.h, and hand.c with its constants; ``made_from`` are the digests of all other files."""
     prefix, digest = hand.prefix, key(hand.digest(), tick_values(hand), options, made_from)
     found = {
         "banner": banner(),
+        "tick": has_tick,
         "prefix": prefix,
         "c_type": options.c_type,
         "options": {"SCALAR": options.scalar, "MATH": options.math, "PARAMS": options.params},

@@ -50,7 +50,7 @@ if TYPE_CHECKING:
 GENERATOR = (
     *(f"awiwi_gen/{room}" for room in ("definitions", "witnesses", "kernels", "ir", "emit", "verify")),
     *(f"awiwi_gen/{file}.py" for file in ("structure", "kernel", "units", "derive", "records", "golden", "budget")),
-    *(f"awiwi_gen/{file}.py" for file in ("hand_header", "parameters", "pipeline")),
+    *(f"awiwi_gen/{file}.py" for file in ("hand_header", "hand_model", "parameters", "pipeline")),
     "templates",
 )
 
@@ -217,6 +217,7 @@ def emit(job: Job, records: Mapping[str, Record], directory: Path) -> dict[str, 
     from awiwi_gen.emit.params import params_files, struct_fields
     from awiwi_gen.golden import self_test_files
     from awiwi_gen.hand_header import header_files
+    from awiwi_gen.hand_model import model_files, no_tick
     from awiwi_gen.parameters import numbers_of
     from awiwi_gen.records import manifest_entry
 
@@ -227,13 +228,16 @@ def emit(job: Job, records: Mapping[str, Record], directory: Path) -> dict[str, 
     functions = [record.function for record in records.values()]
     numbers = numbers_of(job.hand, job.kernels, records) if job.options.params == "runtime" else None
     fields = struct_fields(numbers, job.options) if numbers else ((), ())
-    files |= shared_files(job.hand.prefix, functions, job.hand.digest(), job.options, room_of(job.kernels), fields)
+    room, whole = room_of(job.kernels), _whole(job.hand)
+    files |= shared_files(job.hand.prefix, functions, job.hand.digest(), job.options, room, whole, fields)
     files |= self_test_files(job.hand, job.kernels, records, job.options)
     if numbers:
         files |= params_files(job.hand.prefix, numbers, job.options)
-    files |= header_files(
-        job.hand, job.options, {n: sha256(text) for n, text in sorted(files.items()) if n.endswith((".c", ".h"))}
-    )
+    has_tick = not no_tick(job.hand, job.kernels, job.options)
+    if has_tick:
+        files |= model_files(job.hand, job.kernels, functions, job.options)
+    made_from = {n: sha256(text) for n, text in sorted(files.items()) if n.endswith((".c", ".h"))}
+    files |= header_files(job.hand, job.options, made_from, has_tick)
     entries = [manifest_entry(kernel, records[kernel.name]) for kernel in job.kernels]
     shared = list(shared_programs(entries, {name: record.function for name, record in records.items()}))
     naming = (job.hand.prefix, job.options.c_type)
@@ -246,10 +250,16 @@ def emit(job: Job, records: Mapping[str, Record], directory: Path) -> dict[str, 
         "digest": job.hand.digest(),
         "inputs": job.inputs,
         "files": {name: sha256(text) for name, text in sorted(files.items())},
+        "tick": has_tick,
         "kernels": entries,
         **({"params": numbers.layout()} if numbers else {}),
     }
     return {**files, MANIFEST: sealed(manifest)}
+
+
+def _whole(hand: Hand) -> tuple[int, int, int]:
+    """Fingers, joints and tendons of a hand."""
+    return len(hand.fingers), sum(len(finger.joints) for finger in hand.fingers.values()), hand.tendons
 
 
 # -- verify --------------------------------------------------------------------------------------------------

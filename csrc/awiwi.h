@@ -4,6 +4,8 @@
 #define AWIWI_H
 
 #include "awiwi_distribution.h"
+#include "awiwi_hand.h"
+#include "awiwi_hand_plant.h"
 #include "awiwi_regulators.h"
 #include "awiwi_simulate.h"
 #include "awiwi_solvers.h"

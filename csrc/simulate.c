@@ -1,8 +1,8 @@
 /* A control law on a clock, and a plant in continuous time: loops of kernels, simulated. */
 #include "numerics.h"
+#include "noise.h"
 #include "awiwi_simulate.h"
 
-#include <stdint.h>
 #include <string.h>
 
 static int finite(awiwi_real x)
@@ -84,39 +84,14 @@ static int advance(const awiwi_loop *loop, awiwi_real h, awiwi_real *signals)
     return AWIWI_OK;
 }
 
-/* Random bits that depend on the counter only (a mixer with full avalanche). */
-static uint32_t mixed(uint32_t x)
-{
-    x = (x ^ (x >> 16)) * UINT32_C(0x7feb352d);
-    x = (x ^ (x >> 15)) * UINT32_C(0x846ca68b);
-    return x ^ (x >> 16);
-}
-
-/* Nearly normal, of variance 1: four uniform numbers of 16 bits each. */
-static awiwi_real normal(uint32_t seed, uint32_t tick, uint32_t sensor)
-{
-    const uint32_t a = mixed(mixed(mixed(seed + 1) ^ tick) ^ sensor), b = mixed(a + UINT32_C(0x9e3779b9));
-    const uint32_t total = (a >> 16) + (a & 0xffff) + (b >> 16) + (b & 0xffff);
-    const awiwi_real root_of_three = (awiwi_real)1.7320508075688772935;
-    return root_of_three * ((awiwi_real)total / 65535 - 2);
-}
-
-static awiwi_real rounded(awiwi_real x, awiwi_real step)
-{
-    const awiwi_real steps = x / step, half = (awiwi_real)0.5;
-    if (!(steps > -(awiwi_real)1e9 && steps < (awiwi_real)1e9))
-        return x;
-    return step * (awiwi_real)(int32_t)(steps < 0 ? steps - half : steps + half);
-}
-
 static void sense(const awiwi_loop *loop, unsigned tick, awiwi_real *signals)
 {
     for (int i = 0; i < loop->sensors; i++) {
         const awiwi_sensor *sensor = loop->sensor + i;
         awiwi_real x = signals[sensor->from];
         if (sensor->noise > 0)
-            x += sensor->noise * normal((uint32_t)loop->seed, (uint32_t)tick, (uint32_t)i);
-        signals[sensor->to] = sensor->step > 0 ? rounded(x, sensor->step) : x;
+            x += sensor->noise * awiwi_normal((uint32_t)loop->seed, (uint32_t)tick, (uint32_t)i);
+        signals[sensor->to] = sensor->step > 0 ? awiwi_rounded(x, sensor->step) : x;
     }
 }
 

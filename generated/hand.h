@@ -10,8 +10,8 @@
 #define AWIWI_PARAMS "baked"
 
 /* SHA-256 of the hand's numbers, the options and the generated C; and its first digits as a number. */
-#define AWIWI_BUILD_DIGEST "fec4e2b2dfac0331412f03ae7c37fc0c415dc6736327c7bf41762f3f5f448750"
-#define AWIWI_BUILD_ID 0xfec4e2b2u
+#define AWIWI_BUILD_DIGEST "14f86d8453db79965f29fcbea159a17d735ffa978db8faa026cc8b2d9e5a6ce0"
+#define AWIWI_BUILD_ID 0x14f86d84u
 
 /* -- counts and names ------------------------------------------------------------------------------------------------ */
 
@@ -121,6 +121,8 @@ enum {
 #define AWIWI_MOTOR_VELOCITY 20.0 /* largest velocity of the output shaft [rad/s] */
 #define AWIWI_MOTOR_TRAVEL 5.0 /* the output shaft turns by this much to either side [rad] */
 
+#include "awiwi_hand_plant.h"
+
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -128,6 +130,12 @@ extern "C" {
 /* AWIWI_BUILD_ID and the digest of the compiled library; others in your headers mean that they are not its own. */
 extern const unsigned long awiwi_build_id;
 extern const char awiwi_build_digest[65];
+
+/* The hand for awiwi_hand_step, and gains to begin with. */
+extern const awiwi_hand awiwi_hand_model;
+extern const awiwi_hand_gains awiwi_default_gains;
+/* The same hand, simulated. */
+extern const awiwi_hand_plant awiwi_simulated_hand;
 
 /* The largest torques that the joints bear in N m, of slides in N: their own, or the hand's limit. */
 extern const double awiwi_joint_effort[AWIWI_JOINTS];

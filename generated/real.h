@@ -12,4 +12,9 @@ typedef double awiwi_real;
 #define AWIWI_MOST_JOINTS 4
 #define AWIWI_MOST_TENDONS 8
 
+/* Fingers, joints and tendons of the whole hand, for its tick; at least 1. */
+#define AWIWI_ALL_FINGERS 5
+#define AWIWI_ALL_JOINTS 19
+#define AWIWI_ALL_TENDONS 38
+
 #endif

@@ -115,7 +115,7 @@ def entry(one_kernel: Kernel) -> dict[str, object]:
 def write_tree(directory: Path, prefix: str, kernels: list[Kernel]) -> None:
     functions = [printed(one_kernel, prefix) for one_kernel in kernels]
     entries = [entry(one_kernel) for one_kernel in kernels]
-    files = shared_files(prefix, functions, "0" * 64, Options(), (8, 16)) | batch_files(entries, prefix, Options())
+    files = shared_files(prefix, functions, "0" * 64, Options(), (8, 16), (2, 8, 16)) | batch_files(entries, prefix, Options())
     files |= {f"{function.name}.c": kernel_file(function, "0" * 64) for function in functions}
     files["manifest.json"] = sealed({"hand": "", "prefix": prefix, "c_type": "double", "kernels": entries})
     for name, text in files.items():
@@ -279,7 +279,7 @@ def test_words_as_prefix_finger_and_joint_compile_or_are_refused_with_their_line
             continue
         options = Options(params="runtime")
         numbers = Numbers(hand.quantities(), ranges(hand), {}, [], "0" * 64)
-        shared = shared_files(hand.prefix, [], "0" * 64, options, (8, 16), struct_fields(numbers, options))
+        shared = shared_files(hand.prefix, [], "0" * 64, options, (8, 16), (2, 8, 16), struct_fields(numbers, options))
         (tmp_path / f"{word}_kernels.h").write_text(shared["kernels.h"])
     headers = sorted(path.name for path in tmp_path.glob("*_kernels.h"))
     (tmp_path / "all.c").write_text("".join(f'#include "{name}"\n' for name in headers) + "int main(void);\n")

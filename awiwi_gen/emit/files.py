@@ -25,6 +25,7 @@ SOLVED = (
 WIDTH = 100
 
 Size = tuple[int, int]  # joints and tendons
+Whole = tuple[int, int, int]  # fingers, joints and tendons
 LEAST_ROOM = (4, 4)  # what laws solve for, whatever the hand
 
 
@@ -105,13 +106,14 @@ def shared_files(
     digest: str,
     options: Options,
     room: Size,
+    whole: Whole,
     fields: tuple[Sequence[str], Sequence[str]] = ((), ()),
 ) -> dict[str, str]:
-    """The headers and the model file; ``room`` is what solvers need.
+    """The headers and the model file; ``room`` is what solvers need, ``whole`` are the sizes of the hand.
 
     ``fields`` are those of the structs of numbers and of derived ones, if any are read.
     """
-    return csrc_headers(options, room) | {
+    return csrc_headers(options, room, whole) | {
         "kernels.h": render(
             "kernels.h.j2",
             banner=banner(),
@@ -140,7 +142,7 @@ def room_of(kernels: Sequence[Kernel]) -> Size:
     return max(joints), max(tendons)
 
 
-def csrc_headers(options: Options, room: Size = (8, 16)) -> dict[str, str]:
+def csrc_headers(options: Options, room: Size = (8, 16), whole: Whole = (2, 8, 16)) -> dict[str, str]:
     """The headers that csrc includes: for the scalar type, and for the joints and tendons that solvers have room for."""
     limits = np.finfo(options.dtype)
     return {
@@ -154,6 +156,7 @@ def csrc_headers(options: Options, room: Size = (8, 16)) -> dict[str, str]:
             epsilon=options.literal(Fraction(float(limits.eps))),
             joints=room[0],
             tendons=room[1],
+            whole=[max(1, size) for size in whole],
         ),
     }
 

@@ -1,0 +1,94 @@
+/* The sensors of a hand: which are good, and what they tell of tendons and wrist. */
+#include "numerics.h"
+#include "dense.h"
+#include "hand_parts.h"
+
+static const awiwi_real WITHIN = (awiwi_real)0.02;  /* of a sensor's span: so far beyond its ends a reading is believed */
+static const awiwi_real FASTEST = (awiwi_real)4;    /* of the motors' velocity: a faster change is a jump */
+
+static int finite(awiwi_real x)
+{
+    return awiwi_all_finite(&x, 1);
+}
+
+/* A lever at its end stop reads as the end, up to noise. */
+static unsigned take_reading(const awiwi_tick_of *now, int i)
+{
+    const awiwi_real slack = now->hand->sensor_slack[i], taut = now->hand->sensor_taut[i];
+    const awiwi_real reading = now->input->reading[i], share = (reading - slack) / (taut - slack);
+    if (!now->input->reading_valid[i] || !finite(reading))
+        return AWIWI_READING_LOST;
+    if (share < -WITHIN || share > 1 + WITHIN)
+        return AWIWI_READING_RANGE;
+    now->state->reading[i] = share < 0 ? slack : share > 1 ? taut : reading;
+    return 0;
+}
+
+static unsigned take_theta(const awiwi_tick_of *now, int i)
+{
+    const awiwi_real theta = now->input->theta[i], change = awiwi_size(theta - now->state->theta[i]);
+    const awiwi_real fastest = FASTEST * now->hand->motor_velocity * now->gains->period;
+    if (!now->input->theta_valid[i] || !finite(theta) || awiwi_size(theta) > now->hand->motor_travel)
+        return AWIWI_MOTOR_LOST;
+    if (now->state->ready && change > fastest * (awiwi_real)(1 + now->state->lost[i]))
+        return AWIWI_MOTOR_LOST;
+    now->state->theta[i] = theta;
+    return 0;
+}
+
+static void elongate(const awiwi_tick_of *now)
+{
+    const int n = now->hand->tendons;
+    awiwi_real travel[AWIWI_ALL_TENDONS], stiffness[AWIWI_ALL_TENDONS], stretch;
+    (void)now->hand->sensors(now->state->reading, travel, now->state->f, stiffness);
+    for (int i = 0; i < n; i++) {
+        const awiwi_real last = now->state->x[i];
+        stretch = 0;
+        if (now->hand->tendon_stretch)
+            (void)now->hand->tendon_stretch(now->state->f + i, &stretch);
+        now->state->x[i] = now->state->slack[i] - travel[i] + stretch;
+        now->state->xd[i] = awiwi_rate(now->state->xd[i], now->state->x[i] - last, now->gains);
+    }
+}
+
+static unsigned wrist(const awiwi_tick_of *now)
+{
+    awiwi_real lengths[AWIWI_ALL_TENDONS];
+    if (!now->hand->wrist_lengths)
+        return 0;
+    if (now->hand->wrist_lengths(now->input->wrist, lengths) != AWIWI_OK)
+        return AWIWI_WRIST_LOST;
+    for (int i = 0; i < now->hand->tendons; i++)
+        now->state->wrist[i] = lengths[i];
+    return 0;
+}
+
+awiwi_real awiwi_rate(awiwi_real rate, awiwi_real change, const awiwi_hand_gains *gains)
+{
+    const awiwi_real share = gains->velocity_bandwidth * gains->period;
+    return rate + share / (1 + share) * (change / gains->period - rate);
+}
+
+unsigned awiwi_sense(const awiwi_tick_of *now)
+{
+    for (int i = 0; i < now->hand->tendons; i++) {
+        const awiwi_real last = now->state->theta[i];
+        const unsigned motor = take_theta(now, i);
+        now->state->lost[i] = motor ? now->state->lost[i] + 1 : 0;
+        now->state->tendon_status[i] = take_reading(now, i) | motor;
+        now->state->thd[i] = awiwi_rate(now->state->thd[i], now->state->theta[i] - last, now->gains);
+    }
+    elongate(now);
+    return wrist(now);
+}
+
+void awiwi_lengths(const awiwi_tick_of *now, const awiwi_finger *finger, awiwi_real *h)
+{
+    const awiwi_hand_state *state = now->state;
+    awiwi_real theta[AWIWI_MOST_TENDONS], w[AWIWI_MOST_TENDONS];
+    for (int i = 0, k = finger->first_tendon; i < finger->tendons; i++, k++) {
+        theta[i] = state->theta[k] + state->offset[k];
+        w[i] = state->wrist[k] - state->wrist_start[k];
+    }
+    (void)finger->measured_lengths(theta, state->x + finger->first_tendon, w, h);
+}

@@ -1,0 +1,210 @@
+/* The tick of a whole hand: sensors, laws, and what becomes of faults. */
+#include "numerics.h"
+#include "dense.h"
+#include "hand_parts.h"
+
+#include <stddef.h>
+#include <string.h>
+
+static const awiwi_real HOT = (awiwi_real)0.9; /* heat from which on a motor's limit falls to what it bears for ever */
+
+/* -- motors ---------------------------------------------------------------------------------------------------------- */
+
+/* The largest torque of a motor as hot as this. */
+static awiwi_real limit_of(const awiwi_tick_of *now, int k)
+{
+    const awiwi_real most = now->hand->motor_torque, lasting = now->gains->continuous_torque;
+    const awiwi_real share = (now->state->heat[k] - HOT) / (1 - HOT);
+    return share <= 0 || lasting >= most ? most : share >= 1 ? lasting : most + share * (lasting - most);
+}
+
+/* A motor's torque within its limit; its heat follows the square of the torque. */
+static unsigned drive(const awiwi_tick_of *now, int k, awiwi_real wanted)
+{
+    const awiwi_real limit = limit_of(now, k), torque = awiwi_clamp(wanted, -limit, limit);
+    const awiwi_real load = torque / now->gains->continuous_torque;
+    now->state->heat[k] += now->gains->period / now->gains->heating_time * (load * load - now->state->heat[k]);
+    now->state->torque[k] = torque;
+    return (torque < wanted || torque > wanted ? AWIWI_SATURATED : 0u) | (limit < now->hand->motor_torque ? AWIWI_HOT : 0u);
+}
+
+/* -- modes ----------------------------------------------------------------------------------------------------------- */
+
+/* A finger's next mode. A fault that lasted longer than hold_ticks ends in AWIWI_FAULT, whether or not it goes away. */
+static int mode_after(const awiwi_tick_of *now, int index, int faulty)
+{
+    const awiwi_hand_state *state = now->state;
+    const int lasting = state->waited[index] > now->gains->hold_ticks, enabled = now->input->enable != 0;
+    switch (state->mode[index]) {
+    case AWIWI_OFF:
+        return enabled && !faulty ? AWIWI_RUN : AWIWI_OFF;
+    case AWIWI_RAMP:
+        if (state->share[index] <= 0)
+            return lasting ? AWIWI_FAULT : AWIWI_OFF;
+        return enabled && !lasting && !faulty ? AWIWI_RUN : AWIWI_RAMP;
+    case AWIWI_FAULT:
+        return now->input->reset && !faulty ? AWIWI_OFF : AWIWI_FAULT;
+    default:
+        return lasting || !enabled ? AWIWI_RAMP : faulty ? AWIWI_HOLD : AWIWI_RUN;
+    }
+}
+
+static void change_mode(const awiwi_tick_of *now, int index, int faulty)
+{
+    awiwi_hand_state *state = now->state;
+    const awiwi_real step = 1 / (awiwi_real)now->gains->ramp_ticks;
+    const int lasting = state->waited[index] > now->gains->hold_ticks;
+    state->waited[index] = lasting ? state->waited[index] : faulty ? state->waited[index] + 1 : 0;
+    state->mode[index] = mode_after(now, index, faulty);
+    if (state->mode[index] == AWIWI_RUN)
+        state->share[index] = awiwi_clamp(state->share[index] + step, 0, 1);
+    else if (state->mode[index] == AWIWI_RAMP)
+        state->share[index] = awiwi_clamp(state->share[index] - step, 0, 1);
+    else if (state->mode[index] == AWIWI_OFF)
+        state->waited[index] = 0;
+}
+
+/* A finger without torque wants to be where it is. */
+static void rest(awiwi_hand_state *state, const awiwi_finger *finger)
+{
+    for (int j = finger->first_joint; j < finger->first_joint + finger->joints; j++) {
+        memset(state->motion[j], 0, sizeof state->motion[j]);
+        state->motion[j][0] = state->q[j];
+        state->yield[j] = 0;
+    }
+}
+
+/* Offsets of a finger's motors, from its pose q of the whole hand's joints. */
+static unsigned place(const awiwi_tick_of *now, const awiwi_finger *finger, const awiwi_real *q)
+{
+    awiwi_hand_state *state = now->state;
+    awiwi_real measured[AWIWI_MOST_TENDONS], known[AWIWI_MOST_TENDONS];
+    const int t = finger->first_tendon, j = finger->first_joint;
+    if (!awiwi_all_finite(q + j, finger->joints) || finger->tendon_lengths(q + j, known) != AWIWI_OK)
+        return AWIWI_NO_ESTIMATE;
+    awiwi_lengths(now, finger, measured);
+    for (int i = 0; i < finger->tendons; i++) {
+        state->offset[t + i] = (measured[i] - known[i]) / now->hand->motor_pulley;
+        state->f_des[t + i] = state->f_solved[t + i] = state->f[t + i];
+    }
+    for (int i = 0; i < finger->joints; i++)
+        state->q[j + i] = state->demand[j + i] = q[j + i];
+    rest(state, finger);
+    return finger->joint_torque(q + j, state->f + t, state->tau_solved + j) == AWIWI_OK ? 0u : AWIWI_NO_LAW;
+}
+
+/* Torques of a finger's motors: those of its law, where it has a result, else the last ones. After a pause or a change
+   they begin with the last ones. */
+static unsigned give(const awiwi_tick_of *now, int index, const awiwi_real *torque)
+{
+    const awiwi_finger *finger = now->hand->finger + index;
+    awiwi_hand_state *state = now->state;
+    const int begins = torque && (!state->alive[index] || state->changed);
+    unsigned status = 0;
+    for (int i = 0, k = finger->first_tendon; i < finger->tendons; i++, k++) {
+        if (begins)
+            state->jump[k] = state->share[index] > 0 ? state->wanted[k] - torque[i] : 0;
+        if (torque)
+            state->wanted[k] = torque[i] + state->jump[k];
+        state->jump[k] -= state->jump[k] / (awiwi_real)now->gains->ramp_ticks;
+        const unsigned found = drive(now, k, state->share[index] * state->wanted[k]);
+        state->tendon_status[k] |= found;
+        status |= found;
+    }
+    state->alive[index] = torque != 0;
+    return status;
+}
+
+static unsigned step_finger(const awiwi_tick_of *now, int index, unsigned status)
+{
+    const awiwi_finger *finger = now->hand->finger + index;
+    awiwi_hand_state *state = now->state;
+    awiwi_real torque[AWIWI_MOST_TENDONS];
+    for (int i = 0; i < finger->tendons; i++)
+        status |= state->tendon_status[finger->first_tendon + i];
+    status |= awiwi_finger_law(now, index, torque);
+    if (!(status & AWIWI_FAULTS) && !awiwi_all_finite(torque, finger->tendons))
+        status |= AWIWI_NO_LAW;
+    const int faulty = (status & AWIWI_FAULTS) != 0;
+    change_mode(now, index, faulty);
+    if (state->mode[index] == AWIWI_OFF || state->mode[index] == AWIWI_FAULT) {
+        state->share[index] = 0;
+        rest(state, finger);
+    }
+    status |= give(now, index, faulty ? 0 : torque);
+    state->finger_status[index] = status;
+    return status;
+}
+
+/* -- interface ------------------------------------------------------------------------------------------------------- */
+
+enum { REALS_OF_GAINS = offsetof(awiwi_hand_gains, hold_ticks) / sizeof(awiwi_real) };
+
+/* Whether all gains are numbers that a law can take. */
+static int usable(const awiwi_hand_gains *gains)
+{
+    const awiwi_real *number = &gains->period;
+    for (int i = 0; i < REALS_OF_GAINS; i++)
+        if (!(number[i] > 0 && number[i] <= AWIWI_REAL_MAX))
+            return 0;
+    return gains->force_low < gains->force_high && gains->hold_ticks >= 0 && gains->ramp_ticks > 0;
+}
+
+/* Take over new gains and another law; says whether something changed. Gains that no law can take change nothing. */
+static unsigned adopt(const awiwi_tick_of *now)
+{
+    awiwi_hand_state *state = now->state;
+    const int law = now->input->law, known = law >= 0 && law < AWIWI_LAWS, good = usable(now->gains);
+    state->changed = (known && law != state->law) || (good && memcmp(&state->gains, now->gains, sizeof state->gains) != 0);
+    if (known)
+        state->law = law;
+    if (good)
+        state->gains = *now->gains;
+    return known && good ? 0u : AWIWI_REFERENCE;
+}
+
+unsigned awiwi_hand_init(const awiwi_hand *hand, const awiwi_hand_gains *gains, const awiwi_hand_input *input,
+                         const awiwi_real *q, awiwi_hand_state *state)
+{
+    const awiwi_tick_of now = {hand, gains, input, state};
+    awiwi_real ignored_force[AWIWI_ALL_TENDONS], ignored_stiffness[AWIWI_ALL_TENDONS];
+    memset(state, 0, sizeof *state);
+    if (!usable(gains) || hand->sensors(hand->sensor_slack, state->slack, ignored_force, ignored_stiffness) != AWIWI_OK)
+        return AWIWI_NO_LAW;
+    (void)adopt(&now);
+    memcpy(state->reading, hand->sensor_slack, (size_t)hand->tendons * sizeof *state->reading);
+    unsigned status = awiwi_sense(&now);
+    for (int k = 0; k < hand->tendons; k++) {
+        state->thd[k] = state->xd[k] = 0;
+        state->wrist_start[k] = state->wrist[k];
+        if (state->f[k] <= hand->tendon_low[k])
+            state->tendon_status[k] |= AWIWI_READING_RANGE; /* a slack tendon: its length is unknown */
+        status |= state->tendon_status[k];
+    }
+    for (int i = 0; i < hand->fingers; i++)
+        status |= place(&now, hand->finger + i, q);
+    state->ready = !(status & AWIWI_FAULTS);
+    state->status = status;
+    return status;
+}
+
+unsigned awiwi_hand_step(const awiwi_hand *hand, const awiwi_hand_gains *gains, const awiwi_hand_input *input,
+                         awiwi_hand_state *state, awiwi_real *torque)
+{
+    const awiwi_tick_of now = {hand, &state->gains, input, state};
+    for (int k = 0; k < hand->tendons; k++)
+        torque[k] = 0;
+    if (!state->ready)
+        return AWIWI_NO_LAW;
+    const awiwi_tick_of given = {hand, gains, input, state};
+    unsigned status = adopt(&given);
+    const unsigned of_all = awiwi_sense(&now);
+    for (int i = 0; i < hand->fingers; i++)
+        status |= step_finger(&now, i, of_all);
+    for (int k = 0; k < hand->tendons; k++)
+        torque[k] = state->torque[k];
+    state->turn = (state->turn + 1) % hand->fingers;
+    state->tick++;
+    state->status = status;
+    return status;
+}
