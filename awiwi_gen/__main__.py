@@ -43,6 +43,7 @@ from awiwi_gen.diff.command import diff
 from awiwi_gen.drawing import show
 from awiwi_gen.editing import init, set_
 from awiwi_gen.interchange.command import export, import_
+from awiwi_gen.tick.command import replay, tick
 
 app = typer.Typer(
     help="From the CAD numbers of a tendon-driven hand to verified real-time C.",
@@ -361,6 +362,8 @@ command()(init)
 command(*HAND, ignore_unknown_options=True)(set_)  # "-5 deg" is a value
 command(*HAND)(import_)
 command(*HAND)(export)
+command()(tick)
+command()(replay)
 
 
 def main() -> None:

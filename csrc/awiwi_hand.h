@@ -39,6 +39,7 @@ typedef struct awiwi_finger {
 
 /* A hand: its fingers, limits by joint and by tendon, sensors, the motor, and kernels that all its parts share. */
 typedef struct awiwi_hand {
+    unsigned build_id;
     int fingers; /* at most AWIWI_ALL_FINGERS, and so on */
     int joints;
     int tendons;
@@ -93,7 +94,7 @@ typedef struct awiwi_hand_input {
     awiwi_real qdd_des[AWIWI_ALL_JOINTS];
     awiwi_real torque[AWIWI_ALL_JOINTS];    /* to add [N m] */
     awiwi_real stiffness[AWIWI_ALL_JOINTS]; /* K of every joint [N m/rad] */
-    awiwi_real damping[AWIWI_ALL_JOINTS];   /* D of every joint [N m s/rad] */
+    awiwi_real damping[AWIWI_ALL_JOINTS];   /* D of every joint [N m s/rad]; this and all below only by AWIWI_CASCADE */
     awiwi_real tip[AWIWI_ALL_FINGERS][3];   /* desired place of every fingertip in its finger's base frame [m] */
     awiwi_real tip_stiffness[AWIWI_ALL_FINGERS]; /* [N/m]; 0 for none */
     awiwi_real tip_damping[AWIWI_ALL_FINGERS];   /* [N s/m] */
@@ -122,6 +123,7 @@ typedef struct awiwi_hand_gains {
     awiwi_real continuous_torque; /* that a motor bears for ever [N m] */
     awiwi_real heating_time;      /* time constant of a motor's heat [s] */
     int hold_ticks;               /* for which a fault is borne with the last torques */
+    int slack_ticks;              /* for which a tendon may be slack */
     int ramp_ticks;               /* in which torques then fall to zero, and in which any change is faded in */
 } awiwi_hand_gains;
 
@@ -144,7 +146,8 @@ enum {
     AWIWI_WRIST_LOST = 1 << 4,    /* wrist angles that the wrist cannot have */
     AWIWI_NO_ESTIMATE = 1 << 5,   /* the joint estimate failed */
     AWIWI_NO_LAW = 1 << 6,        /* the dynamics, the forces or the law have no result */
-    AWIWI_FAULTS = (1 << 7) - 1,
+    AWIWI_BROKEN = 1 << 7,        /* a tendon has been slack for slack_ticks */
+    AWIWI_FAULTS = (1 << 8) - 1,
     AWIWI_SATURATED = 1 << 8,     /* a motor's torque is at its limit */
     AWIWI_HOT = 1 << 9,           /* a motor's limit is lowered, so that it cools */
     AWIWI_FORCE_LIMIT = 1 << 10,  /* a measured force is outside the limits */
@@ -152,7 +155,9 @@ enum {
     AWIWI_TORQUE_LIMIT = 1 << 12, /* a joint's torque is at its limit */
     AWIWI_STIFFER = 1 << 13,      /* tendons are softer than the stiffness asked for: a joint has theirs */
     AWIWI_END_STOP = 1 << 14,     /* a joint is in a soft end stop */
-    AWIWI_REFERENCE = 1 << 15     /* a demand is not a number, or beyond limits: the last, or the nearest, is used */
+    AWIWI_REFERENCE = 1 << 15,    /* a demand is not a number, or beyond limits: the last, or the nearest, is used */
+    AWIWI_TRAVEL = 1 << 16,       /* a motor is at an end of its travel, and is held back */
+    AWIWI_SLACK = 1 << 17         /* a tendon is slack: its length is unknown */
 };
 
 /* All memory of a hand. Read it as telemetry; write it by awiwi_hand_init only. */
@@ -186,6 +191,7 @@ typedef struct awiwi_hand_state {
     unsigned finger_status[AWIWI_ALL_FINGERS]; /* with those of its tendons */
     unsigned status;                           /* with those of all fingers */
     int mode[AWIWI_ALL_FINGERS];               /* an awiwi_mode each */
+    int slack_for[AWIWI_ALL_TENDONS];          /* ticks for which a tendon has been slack */
     int lost[AWIWI_ALL_TENDONS];               /* ticks since a motor was last seen */
     int waited[AWIWI_ALL_FINGERS];             /* ticks of the present fault */
     int alive[AWIWI_ALL_FINGERS];              /* whether the law had a result in the last tick */
@@ -195,6 +201,44 @@ typedef struct awiwi_hand_state {
     int ready;
     unsigned tick;
 } awiwi_hand_state;
+
+/* -- what firmware may log ------------------------------------------------------------------------------------------- */
+
+enum { AWIWI_LOG_VERSION = 1 };
+
+/* A log is this head, and then a record for each tick, as they are in memory. `awiwi-gen replay` runs it again. */
+typedef struct awiwi_hand_log {
+    char magic[8]; /* AWIWILOG */
+    unsigned version;
+    unsigned build_id; /* of the library that ran */
+    unsigned real_size;
+    unsigned record_size;
+    awiwi_hand_gains gains; /* with which the hand was initialised, */
+    awiwi_hand_input input; /* the sensors of then, */
+    awiwi_real q[AWIWI_ALL_JOINTS]; /* and the pose */
+} awiwi_hand_log;
+
+typedef struct awiwi_hand_record {
+    awiwi_hand_gains gains;
+    awiwi_hand_input input;
+    awiwi_real torque[AWIWI_ALL_TENDONS];
+    unsigned status;
+} awiwi_hand_record;
+
+/* Fill in the head of a log, at the call of awiwi_hand_init and with its arguments. */
+void awiwi_hand_log_begin(const awiwi_hand *hand, const awiwi_hand_gains *gains, const awiwi_hand_input *input,
+                          const awiwi_real *q, awiwi_hand_log *log);
+
+/* Fill in the record of the tick that just ended. */
+void awiwi_hand_log_tick(const awiwi_hand *hand, const awiwi_hand_gains *gains, const awiwi_hand_input *input,
+                         const awiwi_hand_state *state, awiwi_hand_record *record);
+
+/* -- the tick -------------------------------------------------------------------------------------------------------- */
+
+/* Stiffness and damping of every joint that suit the hand in the pose q [joints]: a quarter of what its tendons have at the
+   lower limit of their forces, and critical damping. Returns an awiwi_status. */
+int awiwi_hand_suggest(const awiwi_hand *hand, const awiwi_hand_gains *gains, const awiwi_real *q,
+                       awiwi_hand_input *input);
 
 /* Begin with the hand at rest in a known pose q [joints], all tendons taut: finds the offsets of the motors. Returns the
    status: where it has a fault, nothing runs, and `tendon_status` names the sensors. */

@@ -3,13 +3,16 @@
 #include "dense.h"
 #include "hand_parts.h"
 
+static const awiwi_real MOST_TRAVEL = (awiwi_real)0.98; /* of the motors' travel is used */
+
 enum { JOINTS = AWIWI_MOST_JOINTS, TENDONS = AWIWI_MOST_TENDONS };
 
 /* What the parts of one finger's tick hand on. */
 typedef struct finger_now {
     const awiwi_finger *finger;
     int index;
-    awiwi_real h[TENDONS];                  /* lengths as measured */
+    awiwi_real measured[TENDONS];           /* lengths as measured, */
+    awiwi_real h[TENDONS];                  /* and with those of the last estimate where they are unknown */
     awiwi_real M[JOINTS * JOINTS];          /* dynamics */
     awiwi_real C[JOINTS * JOINTS];
     awiwi_real gravity[JOINTS];
@@ -20,6 +23,26 @@ typedef struct finger_now {
 
 /* -- where the finger is --------------------------------------------------------------------------------------------- */
 
+/* Tendons of unknown length have that of the last estimate. */
+static int fill_in(const awiwi_tick_of *now, finger_now *own)
+{
+    const awiwi_finger *finger = own->finger;
+    const unsigned *status = now->state->tendon_status + finger->first_tendon;
+    awiwi_real expected[TENDONS];
+    unsigned unseen = 0;
+    for (int i = 0; i < finger->tendons; i++) {
+        own->h[i] = own->measured[i];
+        unseen |= awiwi_unseen(status[i]);
+    }
+    if (!unseen)
+        return AWIWI_OK;
+    const int found = finger->tendon_lengths(now->state->q + finger->first_joint, expected);
+    for (int i = 0; i < finger->tendons; i++)
+        if (awiwi_unseen(status[i]))
+            own->h[i] = expected[i];
+    return found;
+}
+
 /* Tendons whose lengths disagree with those of the estimated joints. */
 static unsigned compare(const awiwi_tick_of *now, const finger_now *own)
 {
@@ -29,8 +52,9 @@ static unsigned compare(const awiwi_tick_of *now, const finger_now *own)
     if (finger->tendon_lengths(now->state->q + finger->first_joint, expected) != AWIWI_OK)
         return AWIWI_NO_ESTIMATE;
     for (int i = 0; i < finger->tendons; i++) {
-        if (awiwi_size(own->h[i] - expected[i]) > now->gains->residual) {
-            now->state->tendon_status[finger->first_tendon + i] |= AWIWI_INCONSISTENT;
+        unsigned *known = now->state->tendon_status + finger->first_tendon + i;
+        if (!awiwi_unseen(*known) && awiwi_size(own->h[i] - expected[i]) > now->gains->residual) {
+            *known |= AWIWI_INCONSISTENT;
             status = AWIWI_INCONSISTENT;
         }
     }
@@ -41,7 +65,9 @@ static unsigned estimate(const awiwi_tick_of *now, finger_now *own)
 {
     const awiwi_finger *finger = own->finger;
     awiwi_real *q = now->state->q + finger->first_joint, *qd = now->state->qd + finger->first_joint, found[JOINTS];
-    awiwi_lengths(now, finger, own->h);
+    awiwi_lengths(now, finger, own->measured);
+    if (fill_in(now, own) != AWIWI_OK)
+        return AWIWI_NO_ESTIMATE;
     const int status = finger->joint_estimate(own->h, q, found);
     if (status != AWIWI_OK || !awiwi_all_finite(found, finger->joints))
         return AWIWI_NO_ESTIMATE;
@@ -69,7 +95,8 @@ static unsigned refer(const awiwi_tick_of *now, const awiwi_finger *finger)
     unsigned status = 0;
     for (int i = 0, j = finger->first_joint; i < finger->joints; i++, j++) {
         const awiwi_real wanted = given(now->input->q_des[j], state->demand[j], &status);
-        const awiwi_real within = awiwi_clamp(wanted, now->hand->joint_low[j], now->hand->joint_high[j]);
+        const awiwi_real within = awiwi_clamp(wanted, now->hand->joint_low[j] + now->gains->stop_margin,
+                                              now->hand->joint_high[j] - now->gains->stop_margin);
         awiwi_real desired[5] = {within, given(now->input->qd_des[j], 0, &status),
                                  given(now->input->qdd_des[j], 0, &status), 0, 0};
         awiwi_real next[5];
@@ -132,26 +159,36 @@ static unsigned hold_tip(const awiwi_tick_of *now, const finger_now *own, awiwi_
     return status;
 }
 
-/* Joint torques: those of the filtered motion, of the caller, of end stops and of the fingertip; of the joints' springs
-   and dampers (eq. 11.4, 11.10) where the law controls torques. */
+/* What the law of joint torques adds (eq. 11.4, 11.10): springs and dampers of the joints, soft end stops, the fingertip. */
+static unsigned impedance(const awiwi_tick_of *now, const finger_now *own, awiwi_real *tau)
+{
+    const awiwi_hand_state *state = now->state;
+    const int n = own->finger->joints, first = own->finger->first_joint;
+    unsigned status = 0;
+    for (int i = 0, j = first; i < n; i++, j++) {
+        const awiwi_real K = given(now->input->stiffness[j], 0, &status);
+        const awiwi_real D = given(now->input->damping[j], 0, &status);
+        tau[i] += K * (state->motion[j][0] - state->q[j]) + D * (state->motion[j][1] - state->qd[j]);
+        tau[i] += end_stop(now, j, &status);
+    }
+    return status | hold_tip(now, own, tau);
+}
+
+/* Joint torques of the filtered motion and of the caller, and of the impedance where the law controls torques. */
 static unsigned torques(const awiwi_tick_of *now, const finger_now *own)
 {
     const awiwi_finger *finger = own->finger;
-    const awiwi_hand_input *input = now->input;
     awiwi_hand_state *state = now->state;
     const int n = finger->joints, first = finger->first_joint;
-    unsigned status = 0;
     awiwi_real *tau = state->tau + first;
+    unsigned status = 0;
     for (int i = 0; i < n; i++) {
-        const int j = first + i;
-        tau[i] = own->gravity[i] + given(input->torque[j], 0, &status) + end_stop(now, j, &status);
+        tau[i] = own->gravity[i] + given(now->input->torque[first + i], 0, &status);
         for (int k = 0; k < n; k++)
             tau[i] += own->M[i * n + k] * state->motion[first + k][2] + own->C[i * n + k] * state->motion[first + k][1];
-        tau[i] += given(input->damping[j], 0, &status) * (state->motion[j][1] - state->qd[j]);
-        if (state->law == AWIWI_CASCADE)
-            tau[i] += given(input->stiffness[j], 0, &status) * (state->motion[j][0] - state->q[j]);
     }
-    status |= hold_tip(now, own, tau);
+    if (state->law == AWIWI_CASCADE)
+        status |= impedance(now, own, tau);
     for (int i = 0; i < n; i++) {
         const awiwi_real most = now->hand->joint_effort[first + i], within = awiwi_clamp(tau[i], -most, most);
         if (within < tau[i] || within > tau[i])
@@ -191,7 +228,6 @@ static unsigned follow(const awiwi_tick_of *now, const finger_now *own)
     awiwi_hand_state *state = now->state;
     const int n = finger->joints, m = finger->tendons, j = finger->first_joint, t = finger->first_tendon;
     awiwi_real P[TENDONS * JOINTS], A[JOINTS * JOINTS], change[JOINTS];
-    unsigned status = 0;
     if (finger->coupling(own->pose, P) != AWIWI_OK)
         return AWIWI_NO_LAW;
     for (int i = 0; i < n; i++) {
@@ -206,12 +242,9 @@ static unsigned follow(const awiwi_tick_of *now, const finger_now *own)
         return AWIWI_NO_LAW;
     for (int i = 0; i < m; i++) {
         const awiwi_real f = state->f_solved[t + i] + awiwi_dot(P + i * n, change, n);
-        const awiwi_real within = awiwi_clamp(f, now->gains->force_low, now->gains->force_high);
-        if (within < f || within > f)
-            status |= AWIWI_UNREACHABLE;
-        state->f_des[t + i] = within;
+        state->f_des[t + i] = awiwi_clamp(f, now->gains->force_low, now->gains->force_high);
     }
-    return status;
+    return 0;
 }
 
 static unsigned forces(const awiwi_tick_of *now, finger_now *own)
@@ -223,7 +256,7 @@ static unsigned forces(const awiwi_tick_of *now, finger_now *own)
         const int j = finger->first_joint + i;
         own->pose[i] = now->state->law == AWIWI_CASCADE ? now->state->q[j] : now->state->motion[j][0];
     }
-    unsigned status = fresh ? solve(now, own) : 0;
+    unsigned status = fresh ? solve(now, own) : now->state->finger_status[own->index] & AWIWI_UNREACHABLE;
     if (!(status & AWIWI_FAULTS))
         status |= follow(now, own);
     if (!(status & AWIWI_FAULTS)
@@ -293,8 +326,9 @@ static unsigned motor_impedance(const awiwi_tick_of *now, const finger_now *own,
             return status | AWIWI_NO_LAW;
         if (hand->tendon_stretch)
             (void)hand->tendon_stretch(state->f_des + k, &stretch);
-        const awiwi_real shorter = own->h[i] - h[i] + (x + stretch - state->x[k]);
-        const awiwi_real theta_des = state->theta[k] + shorter / hand->motor_pulley;
+        const awiwi_real shorter = own->measured[i] - h[i] + (x + stretch - state->x[k]);
+        const awiwi_real end = MOST_TRAVEL * hand->motor_travel;
+        const awiwi_real theta_des = awiwi_clamp(state->theta[k] + shorter / hand->motor_pulley, -end, end);
         if (hand->motor_impedance(state->theta + k, state->thd + k, &theta_des, state->f_des + k, &resistance,
                                   &hand->motor_pulley, &gains->motor_kp, &gains->motor_kd, torque + i) != AWIWI_OK)
             return status | AWIWI_NO_LAW;
@@ -321,6 +355,22 @@ static unsigned cascade(const awiwi_tick_of *now, const finger_now *own, awiwi_r
     return 0;
 }
 
+/* Motors are held back before the ends of their travel. */
+static unsigned hold_back(const awiwi_tick_of *now, const awiwi_finger *finger, awiwi_real *torque)
+{
+    const awiwi_real end = MOST_TRAVEL * now->hand->motor_travel;
+    unsigned status = 0;
+    for (int i = 0, k = finger->first_tendon; i < finger->tendons; i++, k++) {
+        const awiwi_real theta = now->state->theta[k], beyond = theta - awiwi_clamp(theta, -end, end);
+        if (beyond < 0 || beyond > 0) {
+            torque[i] -= now->gains->motor_kp * beyond;
+            now->state->tendon_status[k] |= AWIWI_TRAVEL;
+            status = AWIWI_TRAVEL;
+        }
+    }
+    return status;
+}
+
 unsigned awiwi_finger_law(const awiwi_tick_of *now, int index, awiwi_real *torque)
 {
     finger_now own;
@@ -337,5 +387,28 @@ unsigned awiwi_finger_law(const awiwi_tick_of *now, int index, awiwi_real *torqu
     if (status & AWIWI_FAULTS)
         return status;
     status |= now->state->law == AWIWI_CASCADE ? cascade(now, &own, torque) : motor_impedance(now, &own, torque);
-    return status;
+    return status | hold_back(now, own.finger, torque);
+}
+
+int awiwi_hand_suggest(const awiwi_hand *hand, const awiwi_hand_gains *gains, const awiwi_real *q,
+                       awiwi_hand_input *input)
+{
+    static const awiwi_real rest[JOINTS], nowhere[3];
+    awiwi_real f[TENDONS], k[TENDONS], slope[TENDONS], curvature[TENDONS];
+    awiwi_real K[JOINTS * JOINTS], M[JOINTS * JOINTS], C[JOINTS * JOINTS], gravity[JOINTS];
+    for (int i = 0; i < TENDONS; i++)
+        f[i] = gains->force_low;
+    for (int i = 0; i < hand->fingers; i++) {
+        const awiwi_finger *finger = hand->finger + i;
+        const int n = finger->joints, first = finger->first_joint;
+        if (finger->tendon_stiffness(f, k, slope, curvature) != AWIWI_OK
+            || finger->joint_stiffness(q + first, f, k, K) != AWIWI_OK
+            || finger->dynamics(q + first, rest, nowhere, M, C, gravity) != AWIWI_OK)
+            return AWIWI_OUT_OF_DOMAIN;
+        for (int j = 0; j < n; j++) {
+            input->stiffness[first + j] = K[j * n + j] / 4;
+            input->damping[first + j] = 2 * awiwi_sqrt(input->stiffness[first + j] * M[j * n + j]);
+        }
+    }
+    return AWIWI_OK;
 }

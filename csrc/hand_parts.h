@@ -19,6 +19,9 @@ unsigned awiwi_sense(const awiwi_tick_of *now);
 /* Rates of motors and elongations by filtered differences to the values before, a share of 1/period a tick. */
 awiwi_real awiwi_rate(awiwi_real rate, awiwi_real change, const awiwi_hand_gains *gains);
 
+/* Whether a tendon of this status has an unknown length. */
+unsigned awiwi_unseen(unsigned status);
+
 /* Lengths [tendons] of a finger as measured. */
 void awiwi_lengths(const awiwi_tick_of *now, const awiwi_finger *finger, awiwi_real *h);
 

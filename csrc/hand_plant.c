@@ -51,6 +51,8 @@ static int pull(const awiwi_hand_plant *plant, awiwi_hand_world *world, const aw
             line = one / yields;
         world->lever[k] = lever;
         world->f[k] = force[k] + slope * moved + line * (elongation[k] - x[k] - moved);
+        if (world->spring[k] <= 0)
+            world->lever[k] = slack;
         if (world->spring[k] <= 0 || world->f[k] < 0)
             world->f[k] = 0;
     }
@@ -107,6 +109,10 @@ static int move_motor(const awiwi_hand_plant *plant, int k, awiwi_real h, awiwi_
     status |= plant->motor_acceleration(world->theta + k, world->thd + k, &torque, world->f + k, &acceleration);
     world->thd[k] += h * acceleration;
     world->theta[k] += h * world->thd[k];
+    if (awiwi_size(world->theta[k]) > plant->hand->motor_travel) {
+        world->theta[k] = awiwi_clamp(world->theta[k], -plant->hand->motor_travel, plant->hand->motor_travel);
+        world->thd[k] = 0;
+    }
     return status;
 }
 

@@ -4,6 +4,7 @@
 #include "hand_parts.h"
 
 static const awiwi_real WITHIN = (awiwi_real)0.02;  /* of a sensor's span: so far beyond its ends a reading is believed */
+static const awiwi_real LOOSE = (awiwi_real)0.002;  /* of the span: up to here the lever is at its slack end */
 static const awiwi_real FASTEST = (awiwi_real)4;    /* of the motors' velocity: a faster change is a jump */
 
 static int finite(awiwi_real x)
@@ -21,7 +22,12 @@ static unsigned take_reading(const awiwi_tick_of *now, int i)
     if (share < -WITHIN || share > 1 + WITHIN)
         return AWIWI_READING_RANGE;
     now->state->reading[i] = share < 0 ? slack : share > 1 ? taut : reading;
-    return 0;
+    if (share > LOOSE) {
+        now->state->slack_for[i] = 0;
+        return 0;
+    }
+    now->state->slack_for[i] += now->state->slack_for[i] <= now->gains->slack_ticks;
+    return AWIWI_SLACK | (now->state->slack_for[i] > now->gains->slack_ticks ? AWIWI_BROKEN : 0u);
 }
 
 static unsigned take_theta(const awiwi_tick_of *now, int i)
@@ -80,6 +86,11 @@ unsigned awiwi_sense(const awiwi_tick_of *now)
     }
     elongate(now);
     return wrist(now);
+}
+
+unsigned awiwi_unseen(unsigned status)
+{
+    return status & (AWIWI_FAULTS | AWIWI_SLACK);
 }
 
 void awiwi_lengths(const awiwi_tick_of *now, const awiwi_finger *finger, awiwi_real *h)

@@ -147,7 +147,7 @@ static int usable(const awiwi_hand_gains *gains)
     for (int i = 0; i < REALS_OF_GAINS; i++)
         if (!(number[i] > 0 && number[i] <= AWIWI_REAL_MAX))
             return 0;
-    return gains->force_low < gains->force_high && gains->hold_ticks >= 0 && gains->ramp_ticks > 0;
+    return gains->force_low < gains->force_high && gains->hold_ticks >= 0 && gains->slack_ticks >= 0 && gains->ramp_ticks > 0;
 }
 
 /* Take over new gains and another law; says whether something changed. Gains that no law can take change nothing. */
@@ -207,4 +207,28 @@ unsigned awiwi_hand_step(const awiwi_hand *hand, const awiwi_hand_gains *gains, 
     state->tick++;
     state->status = status;
     return status;
+}
+
+void awiwi_hand_log_begin(const awiwi_hand *hand, const awiwi_hand_gains *gains, const awiwi_hand_input *input,
+                          const awiwi_real *q, awiwi_hand_log *log)
+{
+    memset(log, 0, sizeof *log);
+    memcpy(log->magic, "AWIWILOG", sizeof log->magic);
+    log->version = AWIWI_LOG_VERSION;
+    log->build_id = hand->build_id;
+    log->real_size = (unsigned)sizeof(awiwi_real);
+    log->record_size = (unsigned)sizeof(awiwi_hand_record);
+    log->gains = *gains;
+    log->input = *input;
+    memcpy(log->q, q, (size_t)hand->joints * sizeof *q);
+}
+
+void awiwi_hand_log_tick(const awiwi_hand *hand, const awiwi_hand_gains *gains, const awiwi_hand_input *input,
+                         const awiwi_hand_state *state, awiwi_hand_record *record)
+{
+    memset(record, 0, sizeof *record);
+    record->gains = *gains;
+    record->input = *input;
+    memcpy(record->torque, state->torque, (size_t)hand->tendons * sizeof *state->torque);
+    record->status = state->status;
 }

@@ -312,6 +312,7 @@ static const awiwi_finger fingers[] = {
 };
 
 const awiwi_hand awiwi_hand_model = {
+    AWIWI_BUILD_ID,
     AWIWI_FINGERS,
     AWIWI_JOINTS,
     AWIWI_TENDONS,
@@ -342,13 +343,13 @@ const awiwi_hand awiwi_hand_model = {
 const awiwi_hand_gains awiwi_default_gains = {
     0.0003333333333333333, /* period */
     0.03, /* delay */
-    600.0, /* velocity_bandwidth */
+    300.0, /* velocity_bandwidth */
     20.0, /* compliance_bandwidth */
     45.0225, /* motor_kp */
     0.6003000000000001, /* motor_kd */
-    10000.0, /* force_kp */
-    200.0, /* force_kd */
-    8.0, /* force_low */
+    22500.0, /* force_kp */
+    300.0, /* force_kd */
+    12.0, /* force_low */
     80.0, /* force_high */
     0.05, /* stop_margin */
     1.0, /* stop_stiffness */
@@ -356,5 +357,6 @@ const awiwi_hand_gains awiwi_default_gains = {
     1.5, /* continuous_torque */
     20.0, /* heating_time */
     30, /* hold_ticks */
+    1500, /* slack_ticks */
     300, /* ramp_ticks */
 };
