@@ -60,7 +60,7 @@ typedef struct awiwi_hand {
     awiwi_of_one wrist_lengths; /* two wrist angles -> length of every tendon in the wrist; null without a wrist */
     awiwi_of_one spring_elongation;
     awiwi_of_one tendon_stretch; /* null for tendons that do not stretch */
-    awiwi_of_two compensation;   /* theta, thd -> friction and ripple of a motor; null where none is known */
+    awiwi_of_one motor_friction; /* thd -> tau; null where none is known */
     int (*stiffness_correction)(const awiwi_real *k_eff, const awiwi_real *k_mech, awiwi_real *k_imp,
                                 awiwi_real *sensitivity);
     int (*reference_filter)(const awiwi_real *motion, const awiwi_real *desired, const awiwi_real *delay,
@@ -113,6 +113,7 @@ typedef struct awiwi_hand_gains {
     awiwi_real compliance_bandwidth; /* of what joints yield to loads [rad/s] */
     awiwi_real motor_kp;             /* [N m/rad] */
     awiwi_real motor_kd;             /* [N m s/rad] */
+    awiwi_real friction_share;       /* of the motors' friction that is compensated */
     awiwi_real force_kp;             /* [1/s^2] */
     awiwi_real force_kd;             /* [1/s] */
     awiwi_real force_low;            /* limits of the tendon forces [N] */
@@ -179,14 +180,20 @@ typedef struct awiwi_hand_state {
     awiwi_real motion[AWIWI_ALL_JOINTS][5]; /* filtered references and their derivatives */
     awiwi_real yield[AWIWI_ALL_JOINTS];     /* angle by which a joint yields to its load */
     awiwi_real tau[AWIWI_ALL_JOINTS];       /* wanted joint torques [N m] */
-    awiwi_real tau_solved[AWIWI_ALL_JOINTS]; /* those of the last distribution */
-    awiwi_real f_solved[AWIWI_ALL_TENDONS];
+    awiwi_real feed[AWIWI_ALL_JOINTS];    /* what every finger planned at its last turn: torques that are fed forward, */
+    awiwi_real planned_tau[AWIWI_ALL_JOINTS];
+    awiwi_real planned_f[AWIWI_ALL_TENDONS]; /* forces, elongations, stiffnesses and their slopes, */
+    awiwi_real planned_x[AWIWI_ALL_TENDONS];
+    awiwi_real stiffness[AWIWI_ALL_TENDONS];
+    awiwi_real slope[AWIWI_ALL_TENDONS];
+    awiwi_real spread[AWIWI_ALL_TENDONS][AWIWI_MOST_JOINTS]; /* and forces per torque */
     awiwi_real heat[AWIWI_ALL_TENDONS];   /* 1 where a motor is as hot as it may be */
     awiwi_real jump[AWIWI_ALL_TENDONS];   /* torque that is still to be faded out after a change */
     awiwi_real wanted[AWIWI_ALL_TENDONS]; /* torques before they are faded and limited */
     awiwi_real torque[AWIWI_ALL_TENDONS]; /* of the motors, as returned [N m] */
     awiwi_real share[AWIWI_ALL_FINGERS];  /* of the torques that motors get, from 0 to 1 */
     awiwi_hand_gains gains;               /* of the last tick */
+    unsigned plan_status[AWIWI_ALL_FINGERS];
     unsigned tendon_status[AWIWI_ALL_TENDONS];
     unsigned finger_status[AWIWI_ALL_FINGERS]; /* with those of its tendons */
     unsigned status;                           /* with those of all fingers */
@@ -197,7 +204,7 @@ typedef struct awiwi_hand_state {
     int alive[AWIWI_ALL_FINGERS];              /* whether the law had a result in the last tick */
     int changed;                               /* whether law or gains are others than in the last tick */
     int law;
-    int turn; /* the finger whose forces are distributed anew */
+    int turn; /* the finger that plans anew */
     int ready;
     unsigned tick;
 } awiwi_hand_state;

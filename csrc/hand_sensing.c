@@ -7,24 +7,19 @@ static const awiwi_real WITHIN = (awiwi_real)0.02;  /* of a sensor's span: so fa
 static const awiwi_real LOOSE = (awiwi_real)0.002;  /* of the span: up to here the lever is at its slack end */
 static const awiwi_real FASTEST = (awiwi_real)4;    /* of the motors' velocity: a faster change is a jump */
 
-static int finite(awiwi_real x)
-{
-    return awiwi_all_finite(&x, 1);
-}
-
 /* A lever at its end stop reads as the end, up to noise. */
 static unsigned take_reading(const awiwi_tick_of *now, int i)
 {
     const awiwi_real slack = now->hand->sensor_slack[i], taut = now->hand->sensor_taut[i];
     const awiwi_real reading = now->input->reading[i], share = (reading - slack) / (taut - slack);
-    if (!now->input->reading_valid[i] || !finite(reading))
+    if (!now->input->reading_valid[i] || !awiwi_is_number(reading))
         return AWIWI_READING_LOST;
     if (share < -WITHIN || share > 1 + WITHIN)
         return AWIWI_READING_RANGE;
     now->state->reading[i] = share < 0 ? slack : share > 1 ? taut : reading;
-    if (share > LOOSE) {
+    if (share > LOOSE || now->input->reset) {
         now->state->slack_for[i] = 0;
-        return 0;
+        return share > LOOSE ? 0u : AWIWI_SLACK;
     }
     now->state->slack_for[i] += now->state->slack_for[i] <= now->gains->slack_ticks;
     return AWIWI_SLACK | (now->state->slack_for[i] > now->gains->slack_ticks ? AWIWI_BROKEN : 0u);
@@ -34,7 +29,7 @@ static unsigned take_theta(const awiwi_tick_of *now, int i)
 {
     const awiwi_real theta = now->input->theta[i], change = awiwi_size(theta - now->state->theta[i]);
     const awiwi_real fastest = FASTEST * now->hand->motor_velocity * now->gains->period;
-    if (!now->input->theta_valid[i] || !finite(theta) || awiwi_size(theta) > now->hand->motor_travel)
+    if (!now->input->theta_valid[i] || !awiwi_is_number(theta) || awiwi_size(theta) > now->hand->motor_travel)
         return AWIWI_MOTOR_LOST;
     if (now->state->ready && change > fastest * (awiwi_real)(1 + now->state->lost[i]))
         return AWIWI_MOTOR_LOST;
@@ -53,7 +48,7 @@ static void elongate(const awiwi_tick_of *now)
         if (now->hand->tendon_stretch)
             (void)now->hand->tendon_stretch(now->state->f + i, &stretch);
         now->state->x[i] = now->state->slack[i] - travel[i] + stretch;
-        now->state->xd[i] = awiwi_rate(now->state->xd[i], now->state->x[i] - last, now->gains);
+        now->state->xd[i] = awiwi_rate(now, now->state->xd[i], now->state->x[i] - last);
     }
 }
 
@@ -69,10 +64,12 @@ static unsigned wrist(const awiwi_tick_of *now)
     return 0;
 }
 
-awiwi_real awiwi_rate(awiwi_real rate, awiwi_real change, const awiwi_hand_gains *gains)
+awiwi_tick_of awiwi_tick_with(const awiwi_hand *hand, const awiwi_hand_gains *gains, const awiwi_hand_input *input,
+                              awiwi_hand_state *state)
 {
     const awiwi_real share = gains->velocity_bandwidth * gains->period;
-    return rate + share / (1 + share) * (change / gains->period - rate);
+    const awiwi_tick_of now = {hand, gains, input, state, 1 / gains->period, share / (1 + share)};
+    return now;
 }
 
 unsigned awiwi_sense(const awiwi_tick_of *now)
@@ -82,7 +79,7 @@ unsigned awiwi_sense(const awiwi_tick_of *now)
         const unsigned motor = take_theta(now, i);
         now->state->lost[i] = motor ? now->state->lost[i] + 1 : 0;
         now->state->tendon_status[i] = take_reading(now, i) | motor;
-        now->state->thd[i] = awiwi_rate(now->state->thd[i], now->state->theta[i] - last, now->gains);
+        now->state->thd[i] = awiwi_rate(now, now->state->thd[i], now->state->theta[i] - last);
     }
     elongate(now);
     return wrist(now);

@@ -85,12 +85,12 @@ static unsigned place(const awiwi_tick_of *now, const awiwi_finger *finger, cons
     awiwi_lengths(now, finger, measured);
     for (int i = 0; i < finger->tendons; i++) {
         state->offset[t + i] = (measured[i] - known[i]) / now->hand->motor_pulley;
-        state->f_des[t + i] = state->f_solved[t + i] = state->f[t + i];
+        state->f_des[t + i] = state->f[t + i];
     }
     for (int i = 0; i < finger->joints; i++)
         state->q[j + i] = state->demand[j + i] = q[j + i];
     rest(state, finger);
-    return finger->joint_torque(q + j, state->f + t, state->tau_solved + j) == AWIWI_OK ? 0u : AWIWI_NO_LAW;
+    return 0;
 }
 
 /* Torques of a finger's motors: those of its law, where it has a result, else the last ones. After a pause or a change
@@ -151,27 +151,26 @@ static int usable(const awiwi_hand_gains *gains)
 }
 
 /* Take over new gains and another law; says whether something changed. Gains that no law can take change nothing. */
-static unsigned adopt(const awiwi_tick_of *now)
+static unsigned adopt(const awiwi_hand_gains *gains, const awiwi_hand_input *input, awiwi_hand_state *state)
 {
-    awiwi_hand_state *state = now->state;
-    const int law = now->input->law, known = law >= 0 && law < AWIWI_LAWS, good = usable(now->gains);
-    state->changed = (known && law != state->law) || (good && memcmp(&state->gains, now->gains, sizeof state->gains) != 0);
+    const int law = input->law, known = law >= 0 && law < AWIWI_LAWS, good = usable(gains);
+    state->changed = (known && law != state->law) || (good && memcmp(&state->gains, gains, sizeof state->gains) != 0);
     if (known)
         state->law = law;
     if (good)
-        state->gains = *now->gains;
+        state->gains = *gains;
     return known && good ? 0u : AWIWI_REFERENCE;
 }
 
 unsigned awiwi_hand_init(const awiwi_hand *hand, const awiwi_hand_gains *gains, const awiwi_hand_input *input,
                          const awiwi_real *q, awiwi_hand_state *state)
 {
-    const awiwi_tick_of now = {hand, gains, input, state};
     awiwi_real ignored_force[AWIWI_ALL_TENDONS], ignored_stiffness[AWIWI_ALL_TENDONS];
+    const awiwi_tick_of now = awiwi_tick_with(hand, gains, input, state);
     memset(state, 0, sizeof *state);
     if (!usable(gains) || hand->sensors(hand->sensor_slack, state->slack, ignored_force, ignored_stiffness) != AWIWI_OK)
         return AWIWI_NO_LAW;
-    (void)adopt(&now);
+    (void)adopt(gains, input, state);
     memcpy(state->reading, hand->sensor_slack, (size_t)hand->tendons * sizeof *state->reading);
     unsigned status = awiwi_sense(&now);
     for (int k = 0; k < hand->tendons; k++) {
@@ -181,8 +180,11 @@ unsigned awiwi_hand_init(const awiwi_hand *hand, const awiwi_hand_gains *gains, 
             state->tendon_status[k] |= AWIWI_READING_RANGE; /* a slack tendon: its length is unknown */
         status |= state->tendon_status[k];
     }
-    for (int i = 0; i < hand->fingers; i++)
+    for (int i = 0; i < hand->fingers; i++) {
         status |= place(&now, hand->finger + i, q);
+        if (!(status & AWIWI_FAULTS))
+            status |= state->plan_status[i] = awiwi_plan(&now, i);
+    }
     state->ready = !(status & AWIWI_FAULTS);
     state->status = status;
     return status;
@@ -191,13 +193,12 @@ unsigned awiwi_hand_init(const awiwi_hand *hand, const awiwi_hand_gains *gains, 
 unsigned awiwi_hand_step(const awiwi_hand *hand, const awiwi_hand_gains *gains, const awiwi_hand_input *input,
                          awiwi_hand_state *state, awiwi_real *torque)
 {
-    const awiwi_tick_of now = {hand, &state->gains, input, state};
     for (int k = 0; k < hand->tendons; k++)
         torque[k] = 0;
     if (!state->ready)
         return AWIWI_NO_LAW;
-    const awiwi_tick_of given = {hand, gains, input, state};
-    unsigned status = adopt(&given);
+    unsigned status = adopt(gains, input, state);
+    const awiwi_tick_of now = awiwi_tick_with(hand, &state->gains, input, state);
     const unsigned of_all = awiwi_sense(&now);
     for (int i = 0; i < hand->fingers; i++)
         status |= step_finger(&now, i, of_all);

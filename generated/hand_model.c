@@ -238,6 +238,12 @@ static int run_tendon_stretch(const awiwi_real *in_0, awiwi_real *out_0)
     return 0;
 }
 
+static int run_motor_friction(const awiwi_real *in_0, awiwi_real *out_0)
+{
+    awiwi_motor_friction(in_0, out_0);
+    return 0;
+}
+
 static const awiwi_finger fingers[] = {
     {
         0, 4, 0, 8,
@@ -333,7 +339,7 @@ const awiwi_hand awiwi_hand_model = {
     run_wrist_tendon_lengths,
     awiwi_spring_elongation,
     run_tendon_stretch,
-    awiwi_motor_compensation,
+    run_motor_friction,
     awiwi_stiffness_correction_scalar,
     awiwi_reference_filter,
     awiwi_motor_impedance,
@@ -344,9 +350,10 @@ const awiwi_hand_gains awiwi_default_gains = {
     0.0003333333333333333, /* period */
     0.03, /* delay */
     300.0, /* velocity_bandwidth */
-    20.0, /* compliance_bandwidth */
-    45.0225, /* motor_kp */
-    0.6003000000000001, /* motor_kd */
+    10.0, /* compliance_bandwidth */
+    180.09, /* motor_kp */
+    1.2006000000000001, /* motor_kd */
+    0.9, /* friction_share */
     22500.0, /* force_kp */
     300.0, /* force_kd */
     12.0, /* force_low */
