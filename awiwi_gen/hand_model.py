@@ -17,6 +17,7 @@ from awiwi_gen.emit.options import Options
 from awiwi_gen.hand import Hand
 from awiwi_gen.hand_header import base_pose
 from awiwi_gen.kernel import Kernel
+from awiwi_gen.kernels.fingers import force_range
 
 
 @dataclass(frozen=True)
@@ -177,6 +178,7 @@ def gains(hand: Hand) -> list[tuple[str, Any]]:
     period = hand.clock.period.value if hand.clock else Fraction(1, 3000)
     inertia = Fraction(motor.inertia)
     torque = Fraction(float(motor.torque))
+    low, high = map(Fraction, force_range(hand))
     return [
         ("period", Fraction(period)),
         ("delay", Fraction(3, 100)),
@@ -187,8 +189,8 @@ def gains(hand: Hand) -> list[tuple[str, Any]]:
         ("friction_share", Fraction(float(motor.compensation))),
         ("force_kp", Fraction(150**2)),
         ("force_kd", Fraction(300)),
-        ("force_low", Fraction(12)),
-        ("force_high", Fraction(80)),
+        ("force_low", low + (high - low) / 12),
+        ("force_high", high - (high - low) / 5),
         ("stop_margin", Fraction(5, 100)),
         ("stop_stiffness", Fraction(1)),
         ("residual", Fraction(1, 1000)),

@@ -187,7 +187,10 @@ static unsigned yield(const awiwi_tick_of *now, const awiwi_finger *finger)
         } else {
             status |= AWIWI_STIFFER;
         }
-        state->yield[first + i] += pace / (1 + pace) * (aim - state->yield[first + i]);
+        const awiwi_real yields = state->yield[first + i], wanted_angle = state->motion[first + i][0];
+        state->yield[first + i] = awiwi_clamp(yields + pace / (1 + pace) * (aim - yields),
+                                              now->hand->joint_low[first + i] - wanted_angle,
+                                              now->hand->joint_high[first + i] - wanted_angle);
     }
     return status;
 }

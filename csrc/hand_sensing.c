@@ -4,6 +4,7 @@
 #include "hand_parts.h"
 
 static const awiwi_real WITHIN = (awiwi_real)0.02;  /* of a sensor's span: so far beyond its ends a reading is believed */
+static const awiwi_real BEYOND = (awiwi_real)1.004; /* of the motors' travel: so far kernels compute */
 static const awiwi_real LOOSE = (awiwi_real)0.002;  /* of the span: up to here the lever is at its slack end */
 static const awiwi_real FASTEST = (awiwi_real)4;    /* of the motors' velocity: a faster change is a jump */
 
@@ -29,7 +30,7 @@ static unsigned take_theta(const awiwi_tick_of *now, int i)
 {
     const awiwi_real theta = now->input->theta[i], change = awiwi_size(theta - now->state->theta[i]);
     const awiwi_real fastest = FASTEST * now->hand->motor_velocity * now->gains->period;
-    if (!now->input->theta_valid[i] || !awiwi_is_number(theta) || awiwi_size(theta) > now->hand->motor_travel)
+    if (!now->input->theta_valid[i] || !awiwi_is_number(theta) || awiwi_size(theta) > BEYOND * now->hand->motor_travel)
         return AWIWI_MOTOR_LOST;
     if (now->state->ready && change > fastest * (awiwi_real)(1 + now->state->lost[i]))
         return AWIWI_MOTOR_LOST;

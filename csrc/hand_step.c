@@ -176,7 +176,7 @@ unsigned awiwi_hand_init(const awiwi_hand *hand, const awiwi_hand_gains *gains, 
     for (int k = 0; k < hand->tendons; k++) {
         state->thd[k] = state->xd[k] = 0;
         state->wrist_start[k] = state->wrist[k];
-        if (state->f[k] <= hand->tendon_low[k])
+        if (state->tendon_status[k] & AWIWI_SLACK)
             state->tendon_status[k] |= AWIWI_READING_RANGE; /* a slack tendon: its length is unknown */
         status |= state->tendon_status[k];
     }

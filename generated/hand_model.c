@@ -356,8 +356,8 @@ const awiwi_hand_gains awiwi_default_gains = {
     0.9, /* friction_share */
     22500.0, /* force_kp */
     300.0, /* force_kd */
-    12.0, /* force_low */
-    80.0, /* force_high */
+    11.898741939122948, /* force_low */
+    80.89476314307657, /* force_high */
     0.05, /* stop_margin */
     1.0, /* stop_stiffness */
     0.001, /* residual */

@@ -34,6 +34,7 @@ ROOMS = ("reproduce", "compare", "tune")
 TOP = [
     ["patterns", "writing", "derive", "records", "budget", "parameters"],
     ["judge", "golden", "hand_header"],
+    ["hand_model"],
     ["parallel", "tasks"],
     ["pipeline"],
     [
@@ -49,7 +50,7 @@ TOP = [
         "drawing",
         "diff",
     ],
-    ["loops", "identify"],
+    ["loops", "identify", "tick"],
     [*ROOMS],
     ["__init__"],
     ["__main__"],

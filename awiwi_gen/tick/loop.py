@@ -18,6 +18,8 @@ Array = np.ndarray[Any, Any]
 GRAVITY = (0.0, 0.0, -9.81)  # m/s^2, of a palm that looks up
 DAMPING = 2e-4  # N m s/rad, of the simulated links
 READING_NOISE = 0.5  # counts
+PRETENSION = 1.5  # of the least force that the law asks for
+WRIST = (0.6239, 0.9725)  # rad
 ENCODER = 2 * np.pi / 4096  # rad, one step of the motor's sensor before the gear
 
 
@@ -110,16 +112,19 @@ class SimulatedHand:
 
 
 class ClosedLoop:
-    """The tick and the simulated hand, begun in a pose (joints,) [rad], by default in the middle of the joints' ranges."""
+    """The tick and the simulated hand, begun in a pose (joints,) [rad], by default in the middle of the joints' ranges.
 
-    def __init__(self, library: Library, q: ArrayLike | None = None, seed: int = 0, force: float = 20.0) -> None:
+    ``force`` [N] is the pretension at the start.
+    """
+
+    def __init__(self, library: Library, q: ArrayLike | None = None, seed: int = 0, force: float = 0.0) -> None:
         self.step, self.hand = HandStep(library), SimulatedHand(library, seed)
         low, high = self.step.limits()
         self.start: Array = np.array((low + high) / 2 if q is None else q, library.dtype)
         motors = np.random.default_rng(seed).uniform(-0.3, 0.3, self.step.tendons)
         if self.step.model.wrist_lengths:
             self.hand.world.wrist = WRIST
-        self.hand.place(self.start, motors, force)
+        self.hand.place(self.start, motors, force or PRETENSION * float(self.step.gains.force_low[0]))
         self.hand.measure(self.step.input)
         self.step.suggest(self.start)
         self.step.input.q_des, self.step.input.enable = self.start, 1
@@ -139,4 +144,3 @@ class ClosedLoop:
         return seen
 
 
-WRIST = (0.6239, 0.9725)  # rad

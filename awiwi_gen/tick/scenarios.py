@@ -96,7 +96,7 @@ def _demands(ticks: int, period: float, rates: Array, phases: Array, random: Any
 
 # -- faults --------------------------------------------------------------------------------------------------
 
-BEFORE, DURING, AFTER = 1500, 3000, 4500  # ticks; the reset comes a third into the last part
+BEFORE, DURING, AFTER = 600, 1800, 3000  # ticks; the reset comes after a tenth of the last part
 VICTIM, JOINT = 11, 5  # a tendon and a joint of the second finger
 
 
@@ -156,7 +156,7 @@ FAULTS_BY_NAME: dict[str, Callable[[ClosedLoop], None]] = {
 
 
 def suffered(library: Library, name: str, law: int) -> Outcome:
-    """One fault for a second, while all joints swing; then a reset."""
+    """One fault for 0.6 s, while all joints swing; then a reset."""
     loop = ClosedLoop(library)
     fault, last, second = FAULTS_BY_NAME[name], loop.step.torque.copy(), 1
     modes, others, seen, delay = set[int](), set[int](), 0, -1
@@ -166,7 +166,7 @@ def suffered(library: Library, name: str, law: int) -> Outcome:
         loop.step.input.q_des = loop.start + 0.1 * np.sin(2 * np.pi * tick / 3000)
         loop.step.input.law, loop.step.input.torque = law, 0
         loop.hand.world.load, loop.hand.world.spring = 0, 1
-        loop.step.input.reset = int(tick >= BEFORE + DURING + AFTER // 3)
+        loop.step.input.reset = int(tick >= BEFORE + DURING + AFTER // 10)
         if BEFORE <= tick < BEFORE + DURING:
             fault(loop)
         torque = loop.step.step()
