@@ -255,7 +255,11 @@ def _glue_source(manifest: dict[str, Any], declared: str) -> str:
         prototypes.append(f"extern {prefix}_params FlatParams;")
         loops.append(f"static {prefix}_params FlatParams;")  # of the kernels that are called with flat arrays
     if manifest.get("tick"):
-        prototypes.append(f"extern const awiwi_hand {prefix}_hand_model; extern const awiwi_hand_gains {prefix}_default_gains; extern const awiwi_hand_plant {prefix}_simulated_hand;")
+        prototypes += [
+            f"extern const awiwi_hand {prefix}_hand_model;",
+            f"extern const awiwi_hand_gains {prefix}_default_gains;",
+            f"extern const awiwi_hand_plant {prefix}_simulated_hand;",
+        ]
     for entry in manifest["kernels"]:
         inputs = [input_name(p["name"]) for p in entry["inputs"]]
         sizes = {output_name(p["name"]): prod(p["shape"]) for p in entry["outputs"]}

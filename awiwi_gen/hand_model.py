@@ -63,7 +63,21 @@ OF_HAND = (
     Slot(
         "cascade",
         "cascade",
-        ("f", "xd", "stiffness", "slope", "hdd", "f_des", "fd_des", "fdd_des", "friction", "r", "B", "force_kp", "force_kd"),
+        (
+            "f",
+            "xd",
+            "stiffness",
+            "slope",
+            "hdd",
+            "f_des",
+            "fd_des",
+            "fdd_des",
+            "friction",
+            "r",
+            "B",
+            "force_kp",
+            "force_kd",
+        ),
         1,
     ),
 )
@@ -102,7 +116,9 @@ def _slots(hand: Hand) -> Iterator[tuple[str, Slot]]:
         yield slot.kernel, slot
 
 
-def model_files(hand: Hand, kernels: Sequence[Kernel], functions: Sequence[CFunction], options: Options) -> dict[str, str]:
+def model_files(
+    hand: Hand, kernels: Sequence[Kernel], functions: Sequence[CFunction], options: Options
+) -> dict[str, str]:
     """hand_model.c for the tick and simulated_hand.c for the simulated hand. The hand must have a tick."""
     table = _Table(hand.prefix, {kernel.name: kernel for kernel in kernels}, functions)
     fingers = []
@@ -173,8 +189,7 @@ def _adapter(kernel: Kernel, slot: Slot, prefix: str, refuses: bool) -> str:
 
 def gains(hand: Hand) -> list[tuple[str, Any]]:
     """Gains that run on any hand, in the order of the struct; reals as fractions."""
-    motor = hand.motor
-    assert motor is not None
+    motor: Any = hand.motor
     period = hand.clock.period.value if hand.clock else Fraction(1, 3000)
     inertia = Fraction(motor.inertia)
     torque = Fraction(float(motor.torque))

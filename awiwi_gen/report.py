@@ -197,7 +197,10 @@ def wrapped(text: str, indent: str) -> str:
 
 def list_kernels(hand: Hand, directory: Path, as_json: bool) -> None:
     """Print the kernels of a hand, and in text what a tick needs."""
+    from awiwi_gen.emit.options import Options
     from awiwi_gen.hand.tick import tick_lines
+    from awiwi_gen.hand_model import no_tick
+    from awiwi_gen.kernels import catalog
 
     entries = kernel_entries(hand, directory)
     if as_json:
@@ -205,6 +208,8 @@ def list_kernels(hand: Hand, directory: Path, as_json: bool) -> None:
         return
     print_kernels(entries)
     print("".join(f"{line}\n" for line in tick_lines(hand)), end="")
+    reason = no_tick(hand, catalog(hand), Options())
+    print(f"tick: none, for {reason}" if reason else "tick: awiwi_hand_step, docs/tick.md")
 
 
 def counted(number: int, noun: str) -> str:

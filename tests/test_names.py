@@ -115,7 +115,9 @@ def entry(one_kernel: Kernel) -> dict[str, object]:
 def write_tree(directory: Path, prefix: str, kernels: list[Kernel]) -> None:
     functions = [printed(one_kernel, prefix) for one_kernel in kernels]
     entries = [entry(one_kernel) for one_kernel in kernels]
-    files = shared_files(prefix, functions, "0" * 64, Options(), (8, 16), (2, 8, 16)) | batch_files(entries, prefix, Options())
+    files = shared_files(prefix, functions, "0" * 64, Options(), (8, 16), (2, 8, 16)) | batch_files(
+        entries, prefix, Options()
+    )
     files |= {f"{function.name}.c": kernel_file(function, "0" * 64) for function in functions}
     files["manifest.json"] = sealed({"hand": "", "prefix": prefix, "c_type": "double", "kernels": entries})
     for name, text in files.items():

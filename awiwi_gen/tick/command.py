@@ -9,11 +9,12 @@ import typer
 
 from awiwi_gen.arguments import GENERATED, Json, Output
 from awiwi_gen.errors import InputError, unknown
-from awiwi_gen.tick.status import LAWS, names_of
+from awiwi_gen.tick.status import LAWS, MODES, names_of
 
 if TYPE_CHECKING:
+    from awiwi_gen.tick.faults import Outcome
     from awiwi_gen.tick.log import Replay
-    from awiwi_gen.tick.scenarios import Motion, Outcome
+    from awiwi_gen.tick.motion import Motion
 
 Law = Annotated[str, typer.Option("--law", help=f"{' or '.join(LAWS)}; both if left out.")]
 LONGEST = 100_000.0  # s
@@ -31,7 +32,8 @@ def tick(
     """Run the tick of the whole hand on the simulated hand: all joints move, loads come and go, sensors fail."""
     from awiwi_gen.build import load
     from awiwi_gen.report import print_json
-    from awiwi_gen.tick.scenarios import FAULTS_BY_NAME, moved, suffered
+    from awiwi_gen.tick.faults import FAULTS_BY_NAME, suffered
+    from awiwi_gen.tick.motion import moved
 
     if law and law not in LAWS:
         raise unknown("law", law, LAWS, f"the tick has {', '.join(LAWS)}")
@@ -61,19 +63,13 @@ def tick(
 def _logged(library: Any, seconds: float, law: int, seed: int, path: Path) -> Motion:
     """A motion whose log is written to a file, whole or not at all."""
     from awiwi_gen.tick.log import Writer
-    from awiwi_gen.tick.scenarios import moved
+    from awiwi_gen.tick.motion import moved
     from awiwi_gen.writing import whole_file
 
     with whole_file(path) as stream:
         writer: list[Writer] = []
-        return moved(
-            library,
-            seconds,
-            law,
-            seed,
-            begin=lambda loop: writer.append(Writer(stream, loop)),
-            log=lambda loop: writer[0](loop),
-        )
+        begin, watch = lambda loop: writer.append(Writer(stream, loop)), lambda loop: writer[0](loop)
+        return moved(library, seconds, law, seed, begin, watch)
 
 
 def _motions(motions: list[Motion]) -> list[str]:
@@ -81,11 +77,15 @@ def _motions(motions: list[Motion]) -> list[str]:
     for m in motions:
         lines += [
             f"{LAWS[m.law]}, {m.seconds:g} s: joints {m.rms * 1e3:.1f} mrad (rms) and {m.worst * 1e3:.0f} mrad (most) off",
-            f"    forces {m.least_force:.1f} to {m.greatest_force:.1f} N, slack {m.slack:.2%} of the time, "
+            f"    forces {m.least_force:.1f} to {m.greatest_force:.1f} N, slack {m.slack / m.ticks:.2%} of the time, "
             f"torques up to {m.greatest_torque:.2f} N m",
             f"    status: {', '.join(names_of(m.seen)) or 'nothing'}",
         ]
     return lines
+
+
+def _modes(seen: set[str]) -> str:
+    return ", ".join(mode for mode in MODES if mode in seen)
 
 
 def _outcomes(outcomes: list[tuple[int, Outcome]]) -> list[str]:
@@ -94,7 +94,7 @@ def _outcomes(outcomes: list[tuple[int, Outcome]]) -> list[str]:
         lines += [
             f"{LAWS[law]}, {o.name}:",
             f"    {', '.join(names_of(o.seen)) or 'nothing'}",
-            f"    finger {', '.join(o.modes)}; others {', '.join(o.others)}; at the end {o.recovered * 1e3:.0f} mrad off",
+            f"    finger {_modes(o.modes)}; others {_modes(o.others)}; at the end {o.recovered * 1e3:.0f} mrad off",
         ]
     return lines
 
@@ -136,4 +136,5 @@ def _save(path: Path, found: Replay) -> None:
     from awiwi_gen.writing import whole_file
 
     with whole_file(path) as stream:
-        np.savez_compressed(stream, status=found.status, logged_torque=found.torque, **found.telemetry)
+        arrays: dict[str, Any] = {"status": found.status, "logged_torque": found.torque, **found.telemetry}
+        np.savez_compressed(stream, **arrays)

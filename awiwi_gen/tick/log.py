@@ -72,7 +72,8 @@ def replay(library: Library, path: Path) -> Replay:
     ffi.memmove(step.gains.pointer, ffi.addressof(head.pointer, "gains"), ffi.sizeof("awiwi_hand_gains"))
     ffi.memmove(step.input.pointer, ffi.addressof(head.pointer, "input"), ffi.sizeof("awiwi_hand_input"))
     step.init(head.q[: step.joints])
-    torque, status, telemetry, first = [], [], {name: [] for name in TELEMETRY}, -1
+    torque, status, first = [], [], -1
+    telemetry: dict[str, list[Any]] = {name: [] for name in TELEMETRY}
     for tick, chunk in enumerate(_records(data, len(head.bytes), len(record.bytes))):
         record.bytes[:] = chunk
         ffi.memmove(step.gains.pointer, ffi.addressof(record.pointer, "gains"), ffi.sizeof("awiwi_hand_gains"))

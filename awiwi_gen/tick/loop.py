@@ -142,5 +142,3 @@ class ClosedLoop:
             seen |= self.step.status
             self.hand.move(torque)
         return seen
-
-
