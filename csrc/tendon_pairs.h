@@ -6,11 +6,13 @@
 #include "awiwi_distribution.h"
 #include "dense.h"
 
-/* What has to be inlined for loops to become vectors. */
+/* What has to be inlined for loops to become vectors, and what must not add its frame to that of a search. */
 #if defined(__GNUC__)
 #define AWIWI_INLINED static inline __attribute__((always_inline))
+#define AWIWI_APART static __attribute__((noinline))
 #else
 #define AWIWI_INLINED static inline
+#define AWIWI_APART static
 #endif
 
 typedef awiwi_real awiwi_couple[2];
@@ -43,11 +45,12 @@ AWIWI_INLINED awiwi_real awiwi_halley(awiwi_sum at, awiwi_real wanted, awiwi_rea
     return newton / (1 - *bend);
 }
 
-/* What is surely more than the next of Halley's steps: they shrink by the third power. */
+/* What is surely more than the next of Halley's steps: they shrink by the third power, down to rounding. */
 AWIWI_INLINED awiwi_real awiwi_left(awiwi_real last, awiwi_real step, awiwi_real bend)
 {
     const awiwi_real share = step / last, cube = awiwi_size(share * share * share), square = bend * bend;
-    return 64 * (cube > square ? cube : square) * awiwi_size(step);
+    const awiwi_real rate = 64 * (cube > square ? cube : square);
+    return (rate < 1 ? rate : 1) * awiwi_size(step);
 }
 
 /* Whether a torque is missing by rounding only; `sizes` is that of what it is the sum of. */

@@ -69,7 +69,7 @@ AWIWI_INLINED awiwi_sum both(awiwi_real a, awiwi_real b)
 
 /* The forces of all pairs by formulas and two steps that triple the digits, in loops that become vectors. Returns 0 where
    they may be wrong: where an input is, a limit is outside the curve, or the steps do not end. */
-static int place_pairs(const awiwi_real *P, const awiwi_real *q, const awiwi_real *tau, const awiwi_real *K, awiwi_real low, awiwi_real high, awiwi_real *f)
+AWIWI_APART int place_pairs(const awiwi_real *P, const awiwi_real *q, const awiwi_real *tau, const awiwi_real *K, awiwi_real low, awiwi_real high, awiwi_real *f)
 {
     const awiwi_real range = high - low, near = 1e-11 * high;
     const awiwi_couple lowest = {-range, -range}, highest = {range, range};
