@@ -25,7 +25,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 from awiwi_gen.build import FLAGS, compiler, load
 from awiwi_gen.cache import Cache
 from awiwi_gen.resources import CSRC
-from bench.tick import HIGH, LOW, TICKS, Case, count, effects, joint_costs
+from bench.tick import HIGH, LOW, TICKS, Case, count, effects, joint_costs, laws
 
 ROOT = Path(__file__).resolve().parent.parent
 KEPT, BROOD = 200, 50  # demands that are changed, and rounds between two draws of the better half
@@ -49,6 +49,7 @@ def starts(lib: Any, samples: int) -> Iterator[Start]:
     A, B, Q, R = joint_costs(np.random.default_rng(7), samples)
     inputs = {"A": A.reshape(samples, -1), "B": B.reshape(samples, -1), "Q": Q.reshape(samples, -1), "R": R}
     yield Start("lqr", inputs, dict.fromkeys(("A", "R"), (-np.inf, np.inf)))
+    yield impedance(lib, samples)
 
 
 def distribution(lib: Any, finger: str, samples: int) -> Start:
@@ -79,6 +80,16 @@ def estimate(lib: Any, samples: int) -> Start:
     h = h + random.normal(size=h.shape) * 10 ** random.uniform(-5, -1, (samples, 1))
     start = random.uniform(low, high, (samples, len(low)))
     return Start("thumb_joint_estimate", {"h": h, "start": start}, {"h": (-np.inf, np.inf), "start": (low, high)})
+
+
+def impedance(lib: Any, samples: int) -> Start:
+    """Feedback gains of known ones, off by up to 10 times each."""
+    (known,) = [case for case in laws(lib) if case.kernel == "optimal_backstepping"]
+    random = np.random.default_rng(4)
+    inputs = {port: x[random.integers(0, len(x), samples)] for port, x in known.inputs.items()}
+    off = 10 ** random.uniform(-1, 1, inputs["K_opt"].shape)
+    free = dict.fromkeys(("K_opt", "start"), (-np.inf, np.inf))
+    return Start(known.kernel, inputs | {"K_opt": inputs["K_opt"] * off}, free)
 
 
 class Blocks:
