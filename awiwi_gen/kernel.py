@@ -97,7 +97,8 @@ class Solver:
     family.
     A last step shorter than ``stop``, per scalar type, ends an iteration. Unknowns in ``held`` are inputs, not found.
     ``limits`` are the paths of the numbers in ``arrays`` that are read at run time where others are. The solver is
-    expected to converge from starts up to ``near`` away in each unknown.
+    expected to converge from starts up to ``near`` away in each unknown. ``pairs`` are antagonistic tendons (first,
+    second, number of the pair that shares joints with it).
     """
 
     template: str
@@ -114,6 +115,7 @@ class Solver:
     near: tuple[float, ...] = ()
     held: tuple[int, ...] = ()
     calls: Mapping[str, int] = field(default_factory=dict)
+    pairs: tuple[tuple[int, int, int], ...] = ()
 
 
 @dataclass(frozen=True)

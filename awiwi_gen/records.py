@@ -300,7 +300,8 @@ def make_solver_record(
     runtime = any(record.graph is not None and record.graph.params for record in used.values())
     runtime |= options.params == "runtime" and bool(solver.limits)
     functions = {family: record.function for family, record in used.items()}
-    function, text = solver_function(kernel, solver, prefix, options, functions, runtime)
+    graphs = {family: record.graph for family, record in used.items() if record.graph is not None}
+    function, text = solver_function(kernel, solver, prefix, options, functions, graphs, runtime)
     problem = problem_of(kernel, used)
     inputs = problem.sample(draw(kernel.inputs, kernel.path, options.dtype))
     costs = (("solver", function.cost.operations, round(function.cost.weight)),)

@@ -1,7 +1,8 @@
 """`make bench`: everything that is measured, one section after another, and all numbers in build/bench.json.
 
 python -m bench                 all sections
-python -m bench peers           one of them: peers, passes, skew, sizes, tick, batches, generation
+python -m bench peers           one of them: peers, passes, skew, sizes, tick, batches, whole_hands,
+                                generation
 """
 
 from __future__ import annotations
@@ -16,7 +17,15 @@ from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent
 RESULTS = ROOT / "build" / "bench.json"
-PROGRAMS = ("passes", "skew", "sizes", "tick", "batches", "generation")  # sections that are programs of their own
+PROGRAMS = (
+    "passes",
+    "skew",
+    "sizes",
+    "tick",
+    "batches",
+    "whole_hands",
+    "generation",
+)  # sections that are programs of their own
 
 
 def main() -> int:

@@ -79,18 +79,18 @@ def distributions(lib: Any, finger: str) -> Iterator[Case]:
 
     time = np.arange(TICKS)[:, None] / RATE
     q = (low + high) / 2 + (high - low) / 4 * np.sin(2 * np.pi * time + np.arange(len(low)))
-    tau, _ = _effects(lib, finger, q, 35 + 5 * np.sin(2 * np.pi * time + np.arange(tendons)))
-    _, K = _effects(lib, finger, q[:1], np.full((1, tendons), 40.0))
+    tau, _ = effects(lib, finger, q, 35 + 5 * np.sin(2 * np.pi * time + np.arange(tendons)))
+    _, K = effects(lib, finger, q[:1], np.full((1, tendons), 40.0))
     yield case("slow movement", q, tau, np.repeat(K, TICKS, axis=0))
     q = random.uniform(low, high, (TICKS, len(low)))
-    tau, K = _effects(lib, finger, q, random.uniform(LOW, HIGH, (TICKS, tendons)))
+    tau, K = effects(lib, finger, q, random.uniform(LOW, HIGH, (TICKS, tendons)))
     yield case("reachable", q, tau, K)
     off = random.normal(size=K.shape) * np.abs(K).max(axis=(1, 2), keepdims=True) * 0.4
     far = np.where(np.arange(TICKS)[:, None, None] % 2, K + off + off.swapaxes(1, 2), K * random.uniform(0.2, 3.0))
     yield case("unreachable", q, tau, far)
 
 
-def _effects(lib: Any, finger: str, q: Array, f: Array) -> tuple[Array, Array]:
+def effects(lib: Any, finger: str, q: Array, f: Array) -> tuple[Array, Array]:
     """Torque and stiffness of the joints under tendon forces."""
     P, bent = lib[f"{finger}_coupling"](q), lib[f"{finger}_coupling_derivative"](q)
     k = lib[f"{finger}_tendon_stiffness"](f).k
@@ -130,11 +130,9 @@ def dynamics(lib: Any) -> Iterator[Case]:
 def laws(lib: Any) -> Iterator[Case]:
     """Optimal gains of plausible joints, and gains of the impedance law from the feedback gains of known ones."""
     random = np.random.default_rng(2)
-    joints = 10 ** random.uniform([-6.5, -3.5, -0.5], [-5, -2, 0.3], (TICKS, 3))
-    plants = [joint(m, b, k, random.uniform(1e-4, 5e-3), random.uniform(0, 0.1)) for m, b, k in joints]
-    A, B = (np.array(parts) for parts in zip(*plants, strict=True))
-    Q = np.array([np.diag(weights) for weights in 10 ** random.uniform([0, -3, -1, -3], [2, 0, 1, 0], (TICKS, 4))])
-    yield Case("lqr, plausible joints", "lqr", {"A": A, "B": B, "Q": Q, "R": 10 ** random.uniform(-4, 0, (TICKS, 1))})
+    joints = plausible(random, TICKS)
+    A, B, Q, R = joint_costs(random, TICKS, joints)
+    yield Case("lqr, plausible joints", "lqr", {"A": A, "B": B, "Q": Q, "R": R})
     m, _, k = joints.T
     stiffness = k * random.uniform(0.2, 2, TICKS)
     pace = np.sqrt(stiffness / m)
@@ -145,6 +143,21 @@ def laws(lib: Any) -> Iterator[Case]:
     start = gains * random.uniform(0.95, 1.05, gains.shape)
     inputs = {"K_opt": K, "plant": joints, "weights": weights, "start": start}
     yield Case("optimal_backstepping, nearby start", "optimal_backstepping", inputs)
+
+
+def plausible(random: Any, count: int) -> Array:
+    """Inertia, damping and stiffness of joints (count, 3)."""
+    joints: Array = 10 ** random.uniform([-6.5, -3.5, -0.5], [-5, -2, 0.3], (count, 3))
+    return joints
+
+
+def joint_costs(random: Any, count: int, joints: Array | None = None) -> tuple[Array, Array, Array, Array]:
+    """A, B, Q and R of joints with a motor behind a spring."""
+    joints = plausible(random, count) if joints is None else joints
+    plants = [joint(m, b, k, random.uniform(1e-4, 5e-3), random.uniform(0, 0.1)) for m, b, k in joints]
+    A, B = (np.array(parts) for parts in zip(*plants, strict=True))
+    Q = np.array([np.diag(weights) for weights in 10 ** random.uniform([0, -3, -1, -3], [2, 0, 1, 0], (count, 4))])
+    return A, B, Q, 10 ** random.uniform(-4, 0, (count, 1))
 
 
 # -- counts --------------------------------------------------------------------------------------------------

@@ -4,14 +4,13 @@
    tells all differences of forces; what is left is one number for each pair, on which k1 + k2 grows. The stiffness is
    linear in these sums and the limits are a box for them: a convex problem of two sums, for pairs that share joints. */
 #include "numerics.h"
-#include "awiwi_distribution.h"
-#include "dense.h"
+#include "tendon_pairs.h"
 
 enum { MOST_PAIRS = (AWIWI_MOST_TENDONS + 1) / 2 };
 
 typedef awiwi_real vector[AWIWI_MOST_TENDONS]; /* of all tendons */
 typedef awiwi_real numbers[MOST_PAIRS];         /* of all pairs */
-typedef awiwi_real couple[2];
+typedef awiwi_couple couple;
 
 /* Stiffnesses of all tendons, and their derivatives by the force. */
 typedef struct curves {
@@ -30,16 +29,13 @@ typedef struct products {
     awiwi_real own, mixed, other;
 } products;
 
-/* The least of x' G x / 2 - c' x in a box, G = (a, b; b, d) positive definite. Where the least of all lies outside,
-   one of the sides it lies beyond holds the answer; the other number is then the best for that side. */
-static void nearest(awiwi_real a, awiwi_real b, awiwi_real d, const couple c, const couple low, const couple high,
-                    couple x)
+/* Where the least of all lies outside, one of the sides it lies beyond holds the answer; the other number is then the
+   best for that side. */
+void awiwi_nearest_edge(awiwi_real a, awiwi_real b, awiwi_real d, const couple c, const couple low, const couple high,
+                        couple x)
 {
-    const awiwi_real determinant = a * d - b * b;
-    const couple G = {a, d}, free = {(d * c[0] - b * c[1]) / determinant, (a * c[1] - b * c[0]) / determinant};
+    const couple G = {a, d}, free = {x[0], x[1]};
     awiwi_real best = AWIWI_REAL_MAX;
-    x[0] = free[0];
-    x[1] = free[1];
     for (int i = 0; i < 2; i++) {
         const int o = 1 - i;
         couple edge;
@@ -82,7 +78,7 @@ static void nearest_of_both(const awiwi_pair *pair, int i, products G, const num
     } else {
         const couple c = {aim[i], aim[o]}, least = {low[i], low[o]}, most = {high[i], high[o]};
         couple found;
-        nearest(G.own, G.mixed, G.other, c, least, most, found);
+        awiwi_nearest(G.own, G.mixed, G.other, c, least, most, found);
         x[i] = found[0];
         x[o] = found[1];
     }
@@ -241,7 +237,7 @@ static int gives(const awiwi_tendons *t, const awiwi_real *f, const awiwi_real *
             missing += *p * f[i];
             sizes += awiwi_size(*p);
         }
-        if (!(awiwi_size(missing) <= 16 * AWIWI_REAL_EPSILON * (awiwi_size(tau[j]) + sizes * t->high)))
+        if (!awiwi_is_rounding(missing, tau[j], sizes * t->high))
             return 0;
     }
     return 1;
@@ -268,6 +264,24 @@ static int fall_back(const awiwi_tendons *t, int status, awiwi_real *f)
     return status;
 }
 
+/* The status, and the forces that go with it. */
+static int end(const awiwi_tendons *t, int status, const awiwi_real *tau, awiwi_real *f)
+{
+    if (!awiwi_all_finite(f, t->tendons))
+        status = AWIWI_NOT_FINITE;
+    if (status == AWIWI_OUT_OF_DOMAIN || status == AWIWI_NOT_FINITE)
+        return fall_back(t, status, f);
+    return status == AWIWI_OK && !gives(t, f, tau) ? AWIWI_INFEASIBLE : status;
+}
+
+int awiwi_distribute_others(const awiwi_tendons *t, const awiwi_real *tau, const awiwi_real *K, awiwi_real tolerance,
+                            awiwi_real *f)
+{
+    for (int i = 0; i < t->searched; i++)
+        f[t->searched_tendons[i]] = t->low + (t->high - t->low) / 2;
+    return end(t, awiwi_search_forces(t, tau, K, tolerance, f), tau, f);
+}
+
 int awiwi_distribute(const awiwi_tendons *t, const awiwi_real *tau, const awiwi_real *K, awiwi_real tolerance,
                      awiwi_real *f)
 {
@@ -285,9 +299,5 @@ int awiwi_distribute(const awiwi_tendons *t, const awiwi_real *tau, const awiwi_
         status = distribute_pairs(t, tau, K, tolerance, f);
     if (t->searched > 0 && status == AWIWI_OK)
         status = awiwi_search_forces(t, tau, K, tolerance, f);
-    if (!awiwi_all_finite(f, t->tendons))
-        status = AWIWI_NOT_FINITE;
-    if (status == AWIWI_OUT_OF_DOMAIN || status == AWIWI_NOT_FINITE)
-        return fall_back(t, status, f);
-    return status == AWIWI_OK && !gives(t, f, tau) ? AWIWI_INFEASIBLE : status;
+    return end(t, status, tau, f);
 }

@@ -10,8 +10,8 @@
 #define AWIWI_PARAMS "baked"
 
 /* SHA-256 of the hand's numbers, the options and the generated C; and its first digits as a number. */
-#define AWIWI_BUILD_DIGEST "685beaa90898303ccef7ab2de7cd40c51b3b5652fb2acff8cf0f13b933776c62"
-#define AWIWI_BUILD_ID 0x685beaa9u
+#define AWIWI_BUILD_DIGEST "e6f3d68e0540541c94d84c858316e3b144e750ba08ac3b363c123c8fbf7a0198"
+#define AWIWI_BUILD_ID 0xe6f3d68eu
 
 /* -- counts and names ------------------------------------------------------------------------------------------------ */
 
@@ -121,8 +121,6 @@ enum {
 #define AWIWI_MOTOR_VELOCITY 20.0 /* largest velocity of the output shaft [rad/s] */
 #define AWIWI_MOTOR_TRAVEL 5.0 /* the output shaft turns by this much to either side [rad] */
 
-#include "awiwi_hand_plant.h"
-
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -130,12 +128,6 @@ extern "C" {
 /* AWIWI_BUILD_ID and the digest of the compiled library; others in your headers mean that they are not its own. */
 extern const unsigned long awiwi_build_id;
 extern const char awiwi_build_digest[65];
-
-/* The hand for awiwi_hand_step, and gains to begin with. */
-extern const awiwi_hand awiwi_hand_model;
-extern const awiwi_hand_gains awiwi_default_gains;
-/* The same hand, simulated. */
-extern const awiwi_hand_plant awiwi_simulated_hand;
 
 /* The largest torques that the joints bear in N m, of slides in N: their own, or the hand's limit. */
 extern const double awiwi_joint_effort[AWIWI_JOINTS];

@@ -624,7 +624,7 @@ void awiwi_index_joint_estimate_error(const double q_in[4], const double noise_i
  *   out  f[8] in N
  * Returns an awiwi_status, see awiwi_solvers.h, never 0 if an input is not finite; the outputs are
  * always defined.
- * Cost: the solver's own work and calls, at most: 1 of index_coupling, 66 of index_tendon_stiffness.
+ * Cost: the solver's own work and calls, at most: 66 of index_tendon_stiffness.
  */
 AWIWI_MUST_CHECK int awiwi_index_tendon_distribution(const double q_in[4], const double tau_in[4], const double K_in[16], const double f_min_in[1], const double f_max_in[1], double f_out[8]);
 
@@ -894,7 +894,7 @@ void awiwi_middle_joint_estimate_error(const double q_in[4], const double noise_
  *   out  f[8] in N
  * Returns an awiwi_status, see awiwi_solvers.h, never 0 if an input is not finite; the outputs are
  * always defined.
- * Cost: the solver's own work and calls, at most: 1 of middle_coupling, 66 of middle_tendon_stiffness.
+ * Cost: the solver's own work and calls, at most: 66 of middle_tendon_stiffness.
  */
 AWIWI_MUST_CHECK int awiwi_middle_tendon_distribution(const double q_in[4], const double tau_in[4], const double K_in[16], const double f_min_in[1], const double f_max_in[1], double f_out[8]);
 
@@ -1164,7 +1164,7 @@ void awiwi_ring_joint_estimate_error(const double q_in[3], const double noise_in
  *   out  f[6] in N
  * Returns an awiwi_status, see awiwi_solvers.h, never 0 if an input is not finite; the outputs are
  * always defined.
- * Cost: the solver's own work and calls, at most: 1 of ring_coupling, 66 of ring_tendon_stiffness.
+ * Cost: the solver's own work and calls, at most: 66 of ring_tendon_stiffness.
  */
 AWIWI_MUST_CHECK int awiwi_ring_tendon_distribution(const double q_in[3], const double tau_in[3], const double K_in[9], const double f_min_in[1], const double f_max_in[1], double f_out[6]);
 
@@ -1462,7 +1462,7 @@ void awiwi_fifth_joint_estimate_error(const double q_in[4], const double noise_i
  *   out  f[8] in N
  * Returns an awiwi_status, see awiwi_solvers.h, never 0 if an input is not finite; the outputs are
  * always defined.
- * Cost: the solver's own work and calls, at most: 1 of fifth_coupling, 66 of fifth_tendon_stiffness.
+ * Cost: the solver's own work and calls, at most: 66 of fifth_tendon_stiffness.
  */
 AWIWI_MUST_CHECK int awiwi_fifth_tendon_distribution(const double q_in[4], const double tau_in[4], const double K_in[16], const double f_min_in[1], const double f_max_in[1], double f_out[8]);
 

@@ -13,12 +13,13 @@
  *   out  f[8] in N
  * Returns an awiwi_status, see awiwi_solvers.h, never 0 if an input is not finite; the outputs are
  * always defined.
- * Cost: the solver's own work and calls, at most: 1 of middle_coupling, 66 of middle_tendon_stiffness.
+ * Cost: the solver's own work and calls, at most: 66 of middle_tendon_stiffness.
  */
 #include "numerics.h"
 #include "awiwi_distribution.h"
 #include "dense.h"
 #include "kernels.h"
+#include "tendon_pairs.h"
 
 static int curve(const void *context, const awiwi_real *f, awiwi_real *k, awiwi_real *slope, awiwi_real *curvature)
 {
@@ -27,18 +28,139 @@ static int curve(const void *context, const awiwi_real *f, awiwi_real *k, awiwi_
 }
 
 
+enum { PAIRS = 4 };
+
+/* Stiffness of one tendon, and its derivatives. */
+AWIWI_INLINED void spring(const awiwi_real tension_in[1], awiwi_real k_out[1], awiwi_real slope_out[1], awiwi_real curvature_out[1])
+{
+    const double t0 = 0.01468953864317384*tension_in[0] - 0.764042680508689;
+    const double t1 = t0*(t0*(t0*(674.9873243523099*t0 - 628.2620395181062) - 958.8066633596277) + 1802.0905581554348) - 529.5543454197376;
+    k_out[0] = t0*(t0*(t0*(t0*t1 - 2684.8157970315797) + 4972.416806983404) + 9352.096143289928) + 8724.567610373055;
+    const double t2 = t0*(t0*(t0*(t0*(t0 - 0.814429048880052) - 1.065360743195799) + 1.6686337034964387) - 0.39226984442106094);
+    slope_out[0] = 79.32201907780617*(t0*(t0*(t2 - 1.4915923419049861) + 1.8416704386836935) + 1.7319021791008842);
+    const double t3 = t0*(t0*(t0*(t0 - 0.6980820418971875) - 0.7609719594255707) + 0.9535049734265364) - 0.16811564760902611;
+    curvature_out[0] = 8.156427051486046*(t0*(t0*t3 - 0.42616924054428174) + 0.26309577695481334);
+}
+
+/* Whether a force is not on the curves of all tendons. */
+AWIWI_INLINED int is_outside(const awiwi_real tension_in[1])
+{
+    const double t0 = tension_in[0] - 52.01270775537501;
+    return 1.015625 - 0.00043156509109859516*t0*t0 > 0.0 ? 0 : 1;
+}
+
+/* Stiffness of pair i with the forces a and b. */
+AWIWI_INLINED awiwi_sum both(awiwi_real a, awiwi_real b)
+{
+    awiwi_sum x, y;
+    spring(&a, &x.k, &x.slope, &x.curvature);
+    spring(&b, &y.k, &y.slope, &y.curvature);
+    x.k += y.k;
+    x.slope += y.slope;
+    x.curvature += y.curvature;
+    return x;
+}
+
+/* The forces of all pairs by formulas and two steps that triple the digits, in loops that become vectors. Returns 0 where
+   they may be wrong: where an input is, a limit is outside the curve, or the steps do not end. */
+static int place_pairs(const awiwi_real *P, const awiwi_real *q, const awiwi_real *tau, const awiwi_real *K, awiwi_real low, awiwi_real high, awiwi_real *f)
+{
+    const awiwi_real range = high - low, near = 1e-11 * high;
+    const awiwi_couple lowest = {-range, -range}, highest = {range, range};
+    awiwi_real d[PAIRS], a[PAIRS], b[PAIRS], most[PAIRS], least[PAIRS], greatest[PAIRS], slope[PAIRS], wanted[PAIRS];
+    awiwi_real root[PAIRS], left[PAIRS], all = 0;
+
+    for (int j = 0; j < 4; j++)
+        all += q[j] + tau[j] + K[j] + K[4 + j] + K[8 + j] + K[12 + j];
+    if (!(awiwi_size(all) <= AWIWI_REAL_MAX && low <= high) || is_outside(&low) || is_outside(&high))
+        return 0;
+    const awiwi_real own0 = P[0]*P[0] + P[1]*P[1];
+    const awiwi_real own1 = P[4]*P[4] + P[5]*P[5];
+    const awiwi_real own2 = P[18]*P[18];
+    const awiwi_real own3 = P[26]*P[26] + P[27]*P[27];
+    const awiwi_real mixed0 = P[0]*P[4] + P[1]*P[5];
+    const awiwi_real mixed2 = P[18]*P[26];
+    /* The torque is -sum d_i p_i. */
+    {
+        const awiwi_couple aim = {-P[0]*tau[0] - P[1]*tau[1], -P[4]*tau[0] - P[5]*tau[1]};
+        awiwi_nearest(own0, mixed0, own1, aim, lowest, highest, &d[0]);
+    }
+    {
+        const awiwi_couple aim = {-P[18]*tau[2], -P[26]*tau[2] - P[27]*tau[3]};
+        awiwi_nearest(own2, mixed2, own3, aim, lowest, highest, &d[2]);
+    }
+    for (int i = 0; i < PAIRS; i++) {
+        const awiwi_real apart = awiwi_size(d[i]);
+        a[i] = low + (d[i] > 0 ? d[i] : 0);
+        b[i] = low + (d[i] < 0 ? -d[i] : 0);
+        most[i] = range - apart;
+        const awiwi_sum first = both(low, low + apart), last = both(high, high - apart);
+        least[i] = first.k;
+        slope[i] = first.slope;
+        greatest[i] = last.k;
+    }
+    /* The stiffness is sum (k_i1 + k_i2) p_i p_i'. */
+    {
+        const awiwi_couple aim = {P[0]*(K[0]*P[0] + K[1]*P[1]) + P[1]*(K[4]*P[0] + K[5]*P[1]), P[4]*(K[0]*P[4] + K[1]*P[5]) + P[5]*(K[4]*P[4] + K[5]*P[5])};
+        awiwi_nearest(own0*own0, mixed0*mixed0, own1*own1, aim, &least[0], &greatest[0], &wanted[0]);
+    }
+    {
+        const awiwi_couple aim = {P[18]*(K[10]*P[18]), P[26]*(K[10]*P[26] + K[11]*P[27]) + P[27]*(K[14]*P[26] + K[15]*P[27])};
+        awiwi_nearest(own2*own2, mixed2*mixed2, own3*own3, aim, &least[2], &greatest[2], &wanted[2]);
+    }
+    /* A parabola through both ends, with the slope of the first, is near. */
+    for (int i = 0; i < PAIRS; i++) {
+        const awiwi_real bow = (greatest[i] - least[i] - slope[i]*most[i]) / (most[i]*most[i]);
+        root[i] = slope[i]*slope[i] + 4*bow*(wanted[i] - least[i]);
+    }
+    root[0] = awiwi_sqrt(root[0]);
+    root[1] = awiwi_sqrt(root[1]);
+    root[2] = awiwi_sqrt(root[2]);
+    root[3] = awiwi_sqrt(root[3]);
+    for (int i = 0; i < PAIRS; i++) {
+        awiwi_real x = 2*(wanted[i] - least[i]) / (slope[i] + root[i]), bend;
+        x = x >= 0 ? x : 0;
+        x = x < most[i] ? x : most[i];
+        const awiwi_real step = awiwi_halley(both(a[i] + x, b[i] + x), wanted[i], &bend);
+        x = awiwi_clamp(x - step, 0, most[i]);
+        const awiwi_real last = awiwi_halley(both(a[i] + x, b[i] + x), wanted[i], &bend);
+        left[i] = awiwi_left(step, last, bend);
+        x = awiwi_clamp(x - last, 0, most[i]);
+        a[i] = a[i] + x > high ? high : a[i] + x;
+        b[i] = b[i] + x > high ? high : b[i] + x;
+    }
+    if (!(left[0] + left[1] + left[2] + left[3] <= near))
+        return 0;
+    f[0] = a[0];
+    f[3] = b[0];
+    f[1] = a[1];
+    f[2] = b[1];
+    f[4] = a[2];
+    f[5] = b[2];
+    f[6] = a[3];
+    f[7] = b[3];
+    return 1;
+}
+
 int awiwi_middle_tendon_distribution(const double q_in[restrict 4], const double tau_in[restrict 4], const double K_in[restrict 16], const double f_min_in[restrict 1], const double f_max_in[restrict 1], double f_out[restrict 8])
 {
     static const awiwi_pair pairs[] = {{0, 3, 1}, {1, 2, 0}, {4, 5, 3}, {6, 7, 2}};
     const awiwi_real tolerance = 1e-11;
     const void *const context = 0;
-    awiwi_real P[8 * 4];
+    static const awiwi_real P[8 * 4] = {0.009, 0.0065, 0.0, 0.0, 0.009, -0.0065, 0.0, 0.0, -0.009, 0.0065, 0.0, 0.0, -0.009, -0.0065, 0.0, 0.0, 0.0, 0.0, 0.006, 0.0, 0.0, 0.0, -0.006, 0.0, 0.0, 0.0, 0.006, -0.0045, 0.0, 0.0, -0.006, 0.0045};
+
+    if (place_pairs(P, q_in, tau_in, K_in, f_min_in[0], f_max_in[0], f_out)) {
+        int gives = 1;
+        gives &= awiwi_is_rounding(tau_in[0] + P[0]*(f_out[0] - f_out[3]) + P[4]*(f_out[1] - f_out[2]), tau_in[0], 2*f_max_in[0]*(awiwi_size(P[0]) + awiwi_size(P[4])));
+        gives &= awiwi_is_rounding(tau_in[1] + P[1]*(f_out[0] - f_out[3]) + P[5]*(f_out[1] - f_out[2]), tau_in[1], 2*f_max_in[0]*(awiwi_size(P[1]) + awiwi_size(P[5])));
+        gives &= awiwi_is_rounding(tau_in[2] + P[18]*(f_out[4] - f_out[5]) + P[26]*(f_out[6] - f_out[7]), tau_in[2], 2*f_max_in[0]*(awiwi_size(P[18]) + awiwi_size(P[26])));
+        gives &= awiwi_is_rounding(tau_in[3] + P[27]*(f_out[6] - f_out[7]), tau_in[3], 2*f_max_in[0]*(awiwi_size(P[27])));
+        return gives ? AWIWI_OK : AWIWI_INFEASIBLE;
+    }
     const awiwi_tendons tendons = {
         4, 8, P, 0, curve, curve, context, f_min_in[0], f_max_in[0],
         4, pairs, 0, 0,
     };
-
-    awiwi_middle_coupling(q_in, P);
     const int status = awiwi_distribute(&tendons, tau_in, K_in, tolerance, f_out);
     /* the solver looks at all other inputs */
     return status == AWIWI_OK && !awiwi_all_finite(q_in, 4) ? AWIWI_NOT_FINITE : status;

@@ -69,10 +69,10 @@ def shared_programs(entries: Iterable[Entry], functions: Mapping[str, CFunction]
         if len(kernels) > 1:
             fingers, found, texts = zip(*kernels, strict=True)
             includes = functions[found[0]["name"]].includes
-            yield Lanes(f"{'_'.join(fingers)}_{family}_lanes", found[0], fingers, includes, *_merged(texts))
+            yield Lanes(f"{'_'.join(fingers)}_{family}_lanes", found[0], fingers, includes, *merged(texts))
 
 
-def _merged(texts: Sequence[str]) -> tuple[tuple[str, ...], tuple[tuple[str, ...], ...]]:
+def merged(texts: Sequence[str]) -> tuple[tuple[str, ...], tuple[tuple[str, ...], ...]]:
     """One text for all, in which numbers that differ are elements of ``n_``, and those numbers, lane by lane."""
     places = zip(*(NUMBER.findall(text) for text in texts), strict=True)
     numbers: dict[tuple[str, ...], int] = {}

@@ -9,14 +9,22 @@ from awiwi_gen.emit.c import CFunction, identifier, signature
 from awiwi_gen.emit.files import banner, describe, render
 from awiwi_gen.emit.names import function_name, input_name
 from awiwi_gen.emit.options import Options
+from awiwi_gen.emit.pairs import straight_line
 from awiwi_gen.ir.cost import Cost
+from awiwi_gen.ir.graph import Graph
 from awiwi_gen.kernel import Kernel, Solver
 
 
 def solver_function(
-    kernel: Kernel, solver: Solver, prefix: str, options: Options, used: Mapping[str, CFunction], runtime: bool
+    kernel: Kernel,
+    solver: Solver,
+    prefix: str,
+    options: Options,
+    used: Mapping[str, CFunction],
+    graphs: Mapping[str, Graph],
+    runtime: bool,
 ) -> tuple[CFunction, str]:
-    """The function and the C file of a kernel with a solver; ``used`` are the kernels it calls, by family.
+    """The function and the C file of a kernel with a solver; ``used`` are the kernels it calls, and ``graphs`` theirs.
 
     The cost is that of all calls in the worst case, without the solver's own work, which nobody counts.
     """
@@ -27,7 +35,9 @@ def solver_function(
         options,
         runtime and prefix,
     )
-    calls = {family: solver.calls.get(family, solver.iterations) for family in used}
+    straight = straight_line(solver, graphs, options) if solver.pairs else None
+    known = {"coupling"} if straight and straight.coupling else set()  # printed as numbers, not called
+    calls = {family: solver.calls.get(family, solver.iterations) for family in used if family not in known}
     listed = [f"{count} of {used[family].name}" for family, count in calls.items()]
     comment = describe(
         kernel, f"Cost: the solver's own work{' and calls, at most: ' * bool(listed)}{', '.join(listed)}."
@@ -52,10 +62,12 @@ def solver_function(
             _array(name, values, options, kernel.path, solver.limits.get(name, ()) if runtime else ())
             for name, values in solver.arrays.items()
         ],
+        straight=straight,
+        params=f"const {prefix}_params *",
         tolerance=options.literal(Fraction(solver.stop[options.scalar])),
         **solver.strings,
     )
-    total = sum((function.cost * calls[family] for family, function in used.items()), Cost())
+    total = sum((used[family].cost * count for family, count in calls.items()), Cost())
     function = CFunction(kernel.name, prototype, definition, comment, (), total, ())
     return function, text
 

@@ -183,6 +183,7 @@ def distribution(finger: Finger) -> Solver:
             "coupling_derivative": 1,
             **({"tendon_stiffness": INVERSIONS, "searched_tendon_stiffness": SEARCHES} if both else {}),
         },
+        pairs=tuple(pairs),
     )
 
 
