@@ -106,7 +106,8 @@ class Scenario:
 class Trace:
     """Watched signals (rows, size) of one run at the times (rows) [s].
 
-    ``done`` ticks were simulated, and in ``refused`` of them the law failed. ``status`` is that of the last, 0 for success.
+    ``done`` ticks of those ``asked`` were simulated, and in ``refused`` of them the law failed. ``status`` is that of the
+    last, 0 for success.
     """
 
     time: Array
@@ -114,6 +115,7 @@ class Trace:
     done: int
     refused: int
     status: int
+    asked: int
 
     def __getitem__(self, name: str) -> Array:
         return self.signals[name]
@@ -322,7 +324,7 @@ class Machine:
         record = record[: ceil(done / every)]
         ends = np.cumsum([len(part) for part in parts.values()])[:-1]
         split = dict(zip(parts, np.split(record, ends, axis=1), strict=True))
-        return Trace(np.arange(len(record)) * every * self.loop.period, split, done, refused[0], status[0])
+        return Trace(np.arange(len(record)) * every * self.loop.period, split, done, refused[0], status[0], scenario.ticks)
 
     @staticmethod
     def _rows(value: Any, scenario: Scenario) -> Array:

@@ -10,7 +10,7 @@ from test_cli import answer, complaint, told
 
 pytest.importorskip("scipy")
 
-from awiwi_gen.compare.laws import LAWS
+from awiwi_gen.loops.laws import LAWS
 from awiwi_gen.hand import Hand
 from awiwi_gen.tune import hand_gains
 from awiwi_gen.tune.hand_gains import failing

@@ -10,7 +10,7 @@ import pytest
 from commands import answer, told
 from exported_mjcf import read_mjcf
 
-from awiwi_gen.compare.scenarios import motions
+from awiwi_gen.loops.scenarios import motions
 from awiwi_gen.errors import InputError
 from awiwi_gen.hand import Hand
 from awiwi_gen.hand.tick import tick_values

@@ -9,9 +9,9 @@ from typing import Any
 
 import awiwi_gen
 from awiwi_gen.compare import comparison
-from awiwi_gen.compare.clock import require_clocked
-from awiwi_gen.compare.laws import LAWS, law_of
-from awiwi_gen.compare.scenarios import BEFORE, FORCES, PLANTS, run
+from awiwi_gen.loops.clock import require_clocked
+from awiwi_gen.loops.laws import LAWS, law_of
+from awiwi_gen.loops.scenarios import BEFORE, FORCES, PLANTS, run
 from awiwi_gen.errors import InputError, unknown
 from awiwi_gen.hand import Hand
 from awiwi_gen.loops.hand_joint import joint_of

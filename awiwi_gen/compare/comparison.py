@@ -6,11 +6,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from awiwi_gen.compare.clock import Clocked, clocked
-from awiwi_gen.compare.laws import LAWS, STIFFNESS, Law
+from awiwi_gen.loops.clock import Clocked, clocked
+from awiwi_gen.loops.laws import LAWS, STIFFNESS, Law
 from awiwi_gen.compare.printed_gains import COLUMNS as PRINTED_COLUMNS
 from awiwi_gen.compare.printed_gains import printed_gains
-from awiwi_gen.compare.scenarios import BEFORE, FORCES, PLANTS, Score, run, score
+from awiwi_gen.loops.scenarios import BEFORE, FORCES, PLANTS, Score, run, score
 from awiwi_gen.errors import unknown
 from awiwi_gen.hand import Hand
 from awiwi_gen.loops.hand_joint import joint_of
