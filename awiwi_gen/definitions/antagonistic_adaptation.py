@@ -4,10 +4,12 @@ A wrong inertia looks like a load: with the modelled inertia m = m_0 / n and the
 
     load = (n_t / n - 1) F w + F L        w = tau_1 - tau_2 - d q'
 
-with the true load L and the low-pass F of its triple pole. Springs of which one is stronger by the share a than the law
-has it, and the other weaker, add a F s to it, with s = tau_1 + tau_2. With all slow parts removed, the correlations of
-load and w, and of load and s, lead n and a to their true values. Steps are normalised by the squares of both signals, so
-that they do not depend on the size of a motion, and a load that explains nothing moves little.
+with the true load L and the low-pass F of its triple pole. Where the law follows a desired motion, w is nearly the torque
+that this motion needs, which no load and no noise disturbs: the correlation of it with the seen load leads n to its true
+value, and without a desired motion nothing is learnt. Springs of which one is stronger by the share a than the law has it,
+and the other weaker, add a F s to the load, with s = tau_1 + tau_2; so the correlation of load and s leads a. From all
+signals slow parts are removed. Steps are normalised by the squares of both signals, so that they do not depend on the
+size of a motion, and a load that explains nothing moves little.
 """
 
 from __future__ import annotations
@@ -23,13 +25,13 @@ SHARES, FILTERS, SLOW = (0, 1), (2, 5), (8, 9, 10)  # indices in the memory
 
 
 def antagonistic_identifier(
-    _: Any, adaptation: Matrix, joint: Matrix, torques: Matrix, load: Matrix, inertia: Matrix, damping: Matrix,
+    _: Any, adaptation: Matrix, driven: Matrix, torques: Matrix, load: Matrix, inertia: Matrix,
     learning: Matrix, ranges: Matrix, noise: Matrix, period: Matrix,
 ) -> tuple[Matrix, Expr, Matrix, list[Expr]]:  # fmt: skip
     """The memory (11), the link's inertia, and the factors (2) of both springs' torques."""
     names, T = Derivation(), period[0]
     follow, slow, *steps = [names.name(1 - exp(-rate * T)) for rate in learning]
-    signals = [torques[0] - torques[2] - damping[0] * joint[1], torques[0] + torques[2]]
+    signals = [driven[0], torques[0] + torques[2]]
     chains = []
     for start, signal in zip(FILTERS, signals, strict=True):
         for index in range(start, start + 3):

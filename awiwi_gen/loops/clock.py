@@ -15,7 +15,7 @@ import numpy as np
 from awiwi_gen.loops.laws import Law
 from awiwi_gen.errors import InputError
 from awiwi_gen.loops.hand_joint import Joint, loop_around, values_of
-from awiwi_gen.loops.linearised import STABLE, SampledLoop
+from awiwi_gen.loops.linearised import LONGEST, STABLE, SampledLoop
 from awiwi_gen.loops.nearest import nearest
 from awiwi_gen.loops.scenarios import CYCLE, PLANTS
 from awiwi_gen.loops.search import judged
@@ -23,6 +23,7 @@ from awiwi_gen.simulate import Machine, Scenario, simulate
 
 SPARE = (0.0, 0.25, 0.5, 0.75, 1.0)  # periods of additional delay at which the nearest gains must be stable
 RESTING = 600  # ticks for which noise is recorded
+TRIED = (0.5, 0.999)  # shares of the smallest margin so far, at which other plants must be stable
 SETTLING = 12  # ticks until all signals of a law are constant
 
 
@@ -100,11 +101,11 @@ def _margin(loops: Mapping[str, Sequence[SampledLoop]]) -> tuple[float, str]:
     """The smallest delay margin [s], and its plant. Loops that bear the smallest one so far are not looked at closer."""
     smallest, where = float("inf"), next(iter(loops))
     period = loops[where][0].period
-    slowest_first = sorted(loops, key=lambda name: -max(loop.radius(1.0) for loop in loops[name]))
-    for name in slowest_first:
+    nearest_first = sorted(loops, key=lambda name: -max(loop.radius(1.0) for loop in loops[name]))
+    for name in nearest_first:
         for loop in loops[name]:
-            shares = np.linspace(0, min(smallest / period, 1.0), 5)[1:]
-            if smallest == float("inf") or any(loop.radius(float(late)) >= STABLE for late in shares):
+            most = min(smallest / period, float(LONGEST))
+            if any(loop.radius(share * most) >= STABLE for share in TRIED):
                 found = loop.margin()
                 if found < smallest:
                     smallest, where = found, name

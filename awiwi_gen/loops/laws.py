@@ -296,11 +296,11 @@ def adaptive_blocks(learns: bool) -> tuple[Element, ...]:
     identifier = Block(
         "antagonistic_identifier",
         {
-            "load": "load_seen", "inertia": "known_inertias[0]", "damping": "known_damping",
-            "adaptation_next": "adaptation", "noise": "least_torque",
+            "load": "load_seen", "inertia": "known_inertias[0]", "adaptation_next": "adaptation", "noise": "least_torque",
         },
     )
-    needed = Sum("link_torque", ("link_inertia", "motion[2]"), ("known_damping", "motion[1]"), (-1.0, "load_seen"))
+    driven = Sum("driven", ("link_inertia", "motion[2]"), ("known_damping", "motion[1]"))
+    needed = Sum("link_torque", (1.0, "driven"), (-1.0, "load_seen"))
     plan = Block(
         "antagonistic_pretension",
         {
@@ -312,7 +312,7 @@ def adaptive_blocks(learns: bool) -> tuple[Element, ...]:
         "backstepping_adaptive", PAIR | {"damping": "known_damping", "tau_m": "wanted", "inertias": bodies}
     )
     watching = replace(observer, wires={**observer.wires, "inertias": bodies})
-    return (filtered, watching, *([identifier] if learns else []), needed, plan, law)
+    return (filtered, watching, driven, *([identifier] if learns else []), needed, plan, law)
 
 
 def adaptive(library: Any, believed: Joint, force: float, gains: Mapping[str, float]) -> Values:

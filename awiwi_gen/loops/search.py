@@ -21,7 +21,7 @@ from awiwi_gen.loops.laws import STIFFNESS, Law
 from awiwi_gen.loops.scenarios import FORCES, GOALS, JUDGED, TICKS, Score, load_of, run, score
 from awiwi_gen.simulate import Array
 
-TRIES, SEED = 400, 1
+TRIES, SEED = 300, 1
 DRAWN, KEPT = 12, 4  # of a generation
 SPREAD, NARROWEST, WIDEST = 0.25, 0.02, 0.6  # of the logarithm of a factor
 BANDWIDTHS = (1.0, 0.7, 0.5, 0.35, 0.25)  # of the defaults, that a search may start from

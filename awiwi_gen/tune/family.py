@@ -8,7 +8,6 @@ file: `awiwi-gen check` reads it from there.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -139,6 +138,3 @@ def write(path: Path, text: str) -> None:
         raise InputError(f"{path} cannot be written: {error.strerror}") from None
 
 
-def certificate_text(digest: str, rows: Any) -> str:
-    """The certificate as a file: a row for each joint, under the digest of what it is about."""
-    return json.dumps({"digest": digest, "joints": rows}, indent=1) + "\n"
