@@ -7,13 +7,13 @@ import pytest
 
 pytest.importorskip("scipy")
 
-from awiwi_gen.loops.clock import clocked, require_clocked, running_gains
 from awiwi_gen.compare.comparison import compare
-from awiwi_gen.loops.laws import LAWS
 from awiwi_gen.compare.printed_gains import printed_gains
-from awiwi_gen.loops.scenarios import FORCES, PLANTS
 from awiwi_gen.errors import InputError
+from awiwi_gen.loops.clock import clocked, require_clocked, running_gains
 from awiwi_gen.loops.hand_joint import joint_of, loop_around, values_of
+from awiwi_gen.loops.laws import LAWS
+from awiwi_gen.loops.scenarios import FORCES, PLANTS
 from awiwi_gen.simulate import Scenario, simulate
 
 BEST = LAWS["backstepping_adaptive"]

@@ -48,6 +48,7 @@ TOP = [
         "editing",
         "drawing",
         "diff",
+        "certificates",
     ],
     ["loops", "identify"],
     [*ROOMS],

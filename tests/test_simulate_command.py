@@ -10,8 +10,8 @@ from test_cli import answer, complaint, told
 
 pytest.importorskip("scipy")
 
-from awiwi_gen.loops.laws import LAWS
 from awiwi_gen.hand import Hand
+from awiwi_gen.loops.laws import LAWS
 from awiwi_gen.tune import hand_gains
 from awiwi_gen.tune.hand_gains import failing
 from awiwi_gen.tune.tendons import GAINS, plants, tune_tendon

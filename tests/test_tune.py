@@ -7,13 +7,13 @@ import re
 
 import numpy as np
 import pytest
+from actuators import AWIWI
 from typer.testing import CliRunner
 
 import awiwi_gen
 from awiwi_gen.__main__ import app
 from awiwi_gen.loops.joint import Plant
 from awiwi_gen.loops.regulator import cancelling, regulator
-from awiwi_gen.resources import DEFAULT_HAND
 from awiwi_gen.tune.tendons import GAINS, plants
 
 TENDONS = 38
@@ -51,7 +51,7 @@ def own(tuned):
     """The hand that takes these gains in."""
     directory, _ = tuned
     file = directory / "hand.toml"
-    file.write_text('gains = "gains.toml"\n' + DEFAULT_HAND.read_text(encoding="utf-8"), encoding="utf-8")
+    file.write_text('gains = "gains.toml"\n' + AWIWI, encoding="utf-8")
     return file
 
 

@@ -7,8 +7,10 @@ A wrong inertia looks like a load: with the modelled inertia m = m_0 / n and the
 with the true load L and the low-pass F of its triple pole. Where the law follows a desired motion, w is nearly the torque
 that this motion needs, which no load and no noise disturbs: the correlation of it with the seen load leads n to its true
 value, and without a desired motion nothing is learnt. Springs of which one is stronger by the share a than the law has it,
-and the other weaker, add a F s to the load, with s = tau_1 + tau_2; so the correlation of load and s leads a. From all
-signals slow parts are removed. Steps are normalised by the squares of both signals, so that they do not depend on the
+and the other weaker, add a F s to the load, with s = tau_1 + tau_2. At rest this is one equation for a, the common scale of
+both springs, and the load: it has the same solutions multiplied by any factor, so nothing can be learnt. A co-contraction
+that is known, s = s_0 + excited, changes with a alone; so the correlation of load and excitation leads a. The scale of both
+springs stays unknown: no torque but theirs is known. From all signals slow parts are removed. Steps are normalised by the squares of both signals, so that they do not depend on the
 size of a motion, and a load that explains nothing moves little.
 """
 
@@ -25,22 +27,27 @@ SHARES, FILTERS, SLOW = (0, 1), (2, 5), (8, 9, 10)  # indices in the memory
 
 
 def antagonistic_identifier(
-    _: Any, adaptation: Matrix, driven: Matrix, torques: Matrix, load: Matrix, inertia: Matrix,
+    _: Any, adaptation: Matrix, driven: Matrix, excited: Matrix, load: Matrix, inertia: Matrix,
     learning: Matrix, ranges: Matrix, noise: Matrix, period: Matrix,
 ) -> tuple[Matrix, Expr, Matrix, list[Expr]]:  # fmt: skip
     """The memory (11), the link's inertia, and the factors (2) of both springs' torques."""
     names, T = Derivation(), period[0]
     follow, slow, *steps = [names.name(1 - exp(-rate * T)) for rate in learning]
-    signals = [driven[0], torques[0] + torques[2]]
+    signals = [driven[0], excited[0]]
     chains = []
     for start, signal in zip(FILTERS, signals, strict=True):
         for index in range(start, start + 3):
             signal = names.name(adaptation[index] + follow * (signal - adaptation[index]))
             chains.append(signal)
     fast = [chains[2], chains[5], load[0]]
-    means = [names.name(adaptation[index] + slow * (value - adaptation[index])) for index, value in zip(SLOW, fast, strict=True)]
+    means = [
+        names.name(adaptation[index] + slow * (value - adaptation[index]))
+        for index, value in zip(SLOW, fast, strict=True)
+    ]
     w, s, seen = [names.name(value - mean) for value, mean in zip(fast, means, strict=True)]
-    moved = [names.name(step * seen * by / (noise[0] ** 2 + seen**2 + by**2)) for step, by in zip(steps, (w, s), strict=True)]
+    moved = [
+        names.name(step * seen * by / (noise[0] ** 2 + seen**2 + by**2)) for step, by in zip(steps, (w, s), strict=True)
+    ]
     share = names.name(_within(adaptation[0] * (1 + moved[0]), ranges[0], ranges[1]))
     unequal = names.name(_within(adaptation[1] + moved[1], -ranges[2], ranges[2]))
     memory = Matrix([share, unequal, *chains, *means])

@@ -83,16 +83,17 @@ class GainsFile(Part):
     gains: Gains
 
 
-def with_gains(file: HandFile) -> HandFile:
+def with_gains(file: HandFile, folder: Path | None = None) -> HandFile:
     """A hand file with the gains of the file it names in place of that name.
 
-    Only a regular file in or below the folder of the hand file is read. Raises `InputError` with the faults of that
+    Only a regular file in or below the folder of the hand file is read; ``folder`` is that folder, where the file has
+    another name in messages. Raises `InputError` with the faults of that
     file, or with the line that names it if it cannot be read.
     """
     name = file.data.get("gains")
     if not isinstance(name, str):
         return file
-    folder = Path(file.name).parent
+    folder = folder or Path(file.name).parent
     try:
         inside = (folder / name).resolve().is_relative_to(folder.resolve())
     except (OSError, ValueError, RuntimeError):  # a null character, a loop of links
@@ -102,7 +103,7 @@ def with_gains(file: HandFile) -> HandFile:
         message = f'{shown} is no file in or below the folder of the hand file; expected a path such as "gains.toml"'
         raise InputError(file.fault(("gains",), message))
     try:
-        included = HandFile.read(folder / name)
+        included = HandFile.read(folder / name, None if folder == Path(file.name).parent else name)
     except InputError as error:
         if any(fault.line for fault in error.faults):
             raise

@@ -51,11 +51,11 @@ INPUTS = {
     "resistance": Port((2,), Nm, -4.0, 4.0),
     "friction": plants.FRICTION["friction"],
     "adaptation": box(
-        (one, one, *(Nm,) * 9), (0.2, -0.5, -1.0, -1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0, -1.0),
-        (2.0, 0.5, 1.0, 1.0, 1.0, 4.0, 4.0, 4.0, 1.0, 4.0, 1.0),
+        (one, one, *(Nm,) * 9), (0.2, -0.5, *(-1.0,) * 9), (2.0, 0.5, *(1.0,) * 9),
     ),
     "load": Port((), Nm, -1.0, 1.0),
     "driven": Port((), Nm, -1.0, 1.0),
+    "excited": Port((), Nm, -1.0, 1.0),
     "inertia": Port((), INERTIA, 5e-7, 1e-3),
     "learning": Port((4,), one / s, 1.0, 2e3),
     "ranges": box((one, one, one), (0.1, 1.5, 0.1), (0.6, 3.0, 0.9)),
@@ -164,16 +164,16 @@ def backstepping_adaptive(
     guards=positive("the period", "the inertia", "the noise", "the least share"),
 )
 def antagonistic_identifier(
-    _: Any, adaptation: Any, driven: Any, torques: Any, load: Any, inertia: Any,
+    _: Any, adaptation: Any, driven: Any, excited: Any, load: Any, inertia: Any,
     learning: Any, ranges: Any, noise: Any, period: Any,
 ) -> Any:  # fmt: skip
     """Learns the link's inertia and how much stronger one spring is than the other, from the observer's outputs.
 
-    driven is the torque that the desired motion needs. Pass link_inertia to the observer and the law in the next sample, and multiply torques that are known through the
-    springs' calibration by factors. learning are the bandwidth of the observer's link, the rate below which signals are
-    ignored, and the rates of learning inertia and springs; a rate of zero learns nothing. ranges limit inertia over
-    link_inertia (low, high) and the springs' difference. noise is the torque below which nothing is learnt. Start the
-    memory with 1 and zeros.
+    driven is the torque that the desired motion needs, excited the sum of torques that is added to both springs. Pass link_inertia to the observer and the law in the next sample,
+    and multiply torques that are known through the springs' calibration by factors. learning are the bandwidth of the
+    observer's link, the rate below which signals are ignored, and the rates of learning inertia and springs; a rate of
+    zero learns nothing. ranges limit inertia over link_inertia (low, high) and the springs' difference. noise is the
+    torque below which nothing is learnt. Start the memory with 1 and zeros.
     """
 
 

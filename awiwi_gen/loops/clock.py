@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from awiwi_gen.loops.laws import Law
 from awiwi_gen.errors import InputError
 from awiwi_gen.loops.hand_joint import Joint, loop_around, values_of
+from awiwi_gen.loops.laws import Law
 from awiwi_gen.loops.linearised import LONGEST, STABLE, SampledLoop
 from awiwi_gen.loops.nearest import nearest
 from awiwi_gen.loops.scenarios import CYCLE, PLANTS
@@ -122,7 +122,12 @@ def noise(library: Any, law: Law, gains: Mapping[str, float], joint: Joint, forc
 
 
 def loops_of(
-    library: Any, law: Law, gains: Mapping[str, float], joint: Joint, force: float, plant: Mapping[str, Any] = PLANTS["as known"]
+    library: Any,
+    law: Law,
+    gains: Mapping[str, float],
+    joint: Joint,
+    force: float,
+    plant: Mapping[str, Any] = PLANTS["as known"],
 ) -> list[SampledLoop]:
     """The linearised loop with sliding motors, then with motors at rest, of a law that has learnt the springs only."""
     loops, true, believed = [], joint.perturbed(**plant), joint.believed()

@@ -17,6 +17,7 @@ from scipy.optimize import linear_sum_assignment
 
 from awiwi_gen.errors import InputError
 from awiwi_gen.hand import Hand
+from awiwi_gen.hand.gains import TendonGains
 from awiwi_gen.simulate import PERIOD, Actuator, Array, Block, Element, Loop, Sensor, Sum
 
 FINGER, JOINT = "index", "pip"
@@ -86,14 +87,8 @@ def joint_of(library: Any, hand: Hand, finger: str = FINGER, joint: str = JOINT)
     """A joint of a hand, with the finger straight and its other joints held. Raises InputError where there is none."""
     if hand.motor is None or hand.spring is None or hand.motor.friction is None:
         raise InputError("a joint between tendons needs a hand with the sections [motor], with friction, and [spring]")
-    pulled = [name for name, each in hand.fingers.items() if each.pulled and not each.sliding]
-    if not pulled:
-        raise InputError(
-            "a joint between tendons needs a finger with tendons that motors pull, none of whose joints slide"
-        )
-    finger = finger if finger in pulled else pulled[0]
+    finger, index = place_of(hand, finger, joint)
     names = hand.fingers[finger].joints
-    index = names.index(joint) if joint in names else 0
     pulley, friction = float(hand.motor.pulley), hand.motor.friction
     both = pair_of(drives(library, finger, pulley), index)
     if both is None:
@@ -115,6 +110,26 @@ def joint_of(library: Any, hand: Hand, finger: str = FINGER, joint: str = JOINT)
         encoder=ENCODER / float(hand.motor.gear_ratio) / ratio,
         period=period_of(hand),
     )
+
+
+def place_of(hand: Hand, finger: str, joint: str) -> tuple[str, int]:
+    """The finger and the index of a joint; of a hand that has no such joint, its first that motors turn."""
+    pulled = [name for name, each in hand.fingers.items() if each.pulled and not each.sliding]
+    if not pulled:
+        raise InputError(
+            "a joint between tendons needs a finger with tendons that motors pull, none of whose joints slide"
+        )
+    finger = finger if finger in pulled else pulled[0]
+    names = hand.fingers[finger].joints
+    return finger, names.index(joint) if joint in names else 0
+
+
+def gains_of(library: Any, hand: Hand, finger: str = FINGER, joint: str = JOINT) -> TendonGains | None:
+    """The gains in the hand file of a joint's own tendons, if there are any."""
+    finger, index = place_of(hand, finger, joint)
+    driven, first = drives(library, finger, float(hand.motor.pulley)), hand.blocks[finger][0].start  # type: ignore[union-attr]
+    own = {first + each.tendon for each in driven if each.joint == index}
+    return next((gains for gains in hand.gains if gains.tendon in own), None)
 
 
 def period_of(hand: Hand) -> float:
@@ -144,17 +159,16 @@ def pair_of(driven: Sequence[Drive], joint: int) -> tuple[Drive, Drive] | None:
         found = [each for each in driven if sign * each.pulls[joint] > 0]
         return max(found, key=lambda each: (each.joint == joint, abs(each.pulls[joint])), default=None)
 
-    ends = longest(-1), longest(1)  # a tendon that gets shorter pulls forward
-    if ends[0] is None or ends[1] is None:
-        return None
-    own = max(abs(each.pulls[joint]) for each in ends)
+    forward, back = longest(-1), longest(1)  # a tendon that gets shorter pulls forward
     link = next((each.link for each in driven if each.joint == joint), None)
-    if link is None:
+    if forward is None or back is None or link is None:
         return None
-    first, second = (
-        replace(each, arm=own, link=link, motor=each.motor * (own / each.arm) ** 2, joint=joint) for each in ends
-    )
-    return first, second
+    arm = float(max(abs(each.pulls[joint]) for each in (forward, back)))
+
+    def on_joint(each: Drive) -> Drive:
+        return replace(each, arm=arm, link=link, motor=each.motor * (arm / each.arm) ** 2, joint=joint)
+
+    return on_joint(forward), on_joint(back)
 
 
 def drives(library: Any, finger: str, pulley: float) -> list[Drive]:

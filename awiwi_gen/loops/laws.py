@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from awiwi_gen.errors import InputError, unknown
+from awiwi_gen.hand.gains import TendonGains
 from awiwi_gen.loops.hand_joint import TORQUE_NOISE, Joint
 from awiwi_gen.loops.joint import Plant
 from awiwi_gen.simulate import Array, Block, Element, Sum, Wire
@@ -53,19 +54,25 @@ class Law:
     def gains_for(self, joint: Joint, bandwidth: float = 1.0) -> dict[str, float]:
         """Gains for another joint: the defaults, scaled to its inertias and by a factor on the bandwidth."""
         ratio = float(joint.inertias[self.body]) / INERTIAS[self.body]
-        return {
-            name: each.value * ratio**each.mass * bandwidth**each.power
-            for name, each in self.gains.items()
-        }
+        return {name: each.value * ratio**each.mass * bandwidth**each.power for name, each in self.gains.items()}
 
-    def gains_with(self, chosen: Mapping[str, float]) -> dict[str, float]:
-        """All gains, the chosen ones replaced. Raises InputError for an unknown one, or one that is not positive."""
+    def gains_from(self, joint: Joint, tendon: TendonGains) -> dict[str, float]:
+        """The gains that a hand file has for a tendon; what it leaves out is as for such a joint."""
+        given = {name: getattr(tendon, name, None) for name in self.gains}
+        return self.gains_for(joint) | {name: float(value) for name, value in given.items() if value is not None}
+
+    def gains_with(self, chosen: Mapping[str, float], joint: Joint | None = None) -> dict[str, float]:
+        """All gains, for a joint or the usual one, the chosen ones replaced.
+
+        Raises InputError for an unknown one, or one that is not positive.
+        """
         for name, value in chosen.items():
             if name not in self.gains:
                 raise InputError(f"{self.name} has no gain {name!r}; it has {', '.join(self.gains)}")
             if not (value > 0 and np.isfinite(value)):
                 raise InputError(f"{self.name}: the gain {name} = {value:g} is not positive and finite")
-        return {name: float(chosen.get(name, gain.value)) for name, gain in self.gains.items()}
+        usual = {name: gain.value for name, gain in self.gains.items()} if joint is None else self.gains_for(joint)
+        return {name: float(chosen.get(name, value)) for name, value in usual.items()}
 
     def values(self, library: Any, believed: Joint, force: float, gains: Mapping[str, float]) -> Values:
         """Signals of the law besides those of the joint, at a pretension [N]."""
@@ -278,8 +285,8 @@ TUNED = {
     name: replace(gain, value=value)
     for (name, gain), value in zip(
         (STIFFNESS | STEPS | SHARED | LEARNING).items(),
-        (0.3358, 0.003508, 368.5, 235.5, 314.2, 0.06563, 0.0223, 1570.0, 956.4,
-         1100.0, 33.76, 258.2, 1.841, 163.5, 818.0, 0.0005366),
+        (0.2847, 0.003383, 550.1, 228.4, 435.4, 0.3735, 0.02229, 1041.0, 686.3, 1223.0, 26.18, 335.0, 2.911, 167.0, 1149.0,
+         2.579e-4),
         strict=True,
     )
 }  # fmt: skip
@@ -296,23 +303,33 @@ def adaptive_blocks(learns: bool) -> tuple[Element, ...]:
     identifier = Block(
         "antagonistic_identifier",
         {
-            "load": "load_seen", "inertia": "known_inertias[0]", "adaptation_next": "adaptation", "noise": "least_torque",
+            "load": "load_seen",
+            "inertia": "known_inertias[0]",
+            "adaptation_next": "adaptation",
+            "noise": "least_torque",
         },
     )
     driven = Sum("driven", ("link_inertia", "motion[2]"), ("known_damping", "motion[1]"))
+    excited = Sum("excited", (2.0, "dither[0]"))
+    held = Sum("held", (1.0, "pretension"), (1.0, "dither"))
     needed = Sum("link_torque", (1.0, "driven"), (-1.0, "load_seen"))
     plan = Block(
         "antagonistic_pretension",
         {
-            "plan": "pretension", "plan_next": "pretension", "torque": "link_torque", "stiffness": "stiffness_wanted",
-            "curves": "known_tendons", "rate": "plan_rate",
+            "plan": "pretension",
+            "plan_next": "pretension",
+            "torque": "link_torque",
+            "stiffness": "stiffness_wanted",
+            "curves": "known_tendons",
+            "rate": "plan_rate",
         },
     )
     law = Block(
-        "backstepping_adaptive", PAIR | {"damping": "known_damping", "tau_m": "wanted", "inertias": bodies}
+        "backstepping_adaptive",
+        PAIR | {"damping": "known_damping", "tau_m": "wanted", "inertias": bodies, "pretension": "held"},
     )
     watching = replace(observer, wires={**observer.wires, "inertias": bodies})
-    return (filtered, watching, driven, *([identifier] if learns else []), needed, plan, law)
+    return (filtered, watching, driven, excited, *([identifier] if learns else []), needed, plan, held, law)
 
 
 def adaptive(library: Any, believed: Joint, force: float, gains: Mapping[str, float]) -> Values:
@@ -320,8 +337,9 @@ def adaptive(library: Any, believed: Joint, force: float, gains: Mapping[str, fl
     rest_torque = force * believed.arm
     return backstepped(library, believed, force, gains) | {
         "learning": [gains["link_rate"], gains["memory_rate"], gains["inertia_rate"], gains["balance_rate"]],
-        "adaptation": [1.0, 0.0, *[0.0] * 3, *[2 * rest_torque] * 3, 0.0, 2 * rest_torque, 0.0],
-        "ranges": SHARES, "least_torque": max(gains["least_torque"], QUIET), "plan_rate": gains["pretension_rate"], "stiffness_wanted": 0.0,
+        "adaptation": [1.0, *[0.0] * 10], "dither": np.zeros(3),
+        "ranges": SHARES, "least_torque": max(gains["least_torque"], QUIET), "plan_rate": gains["pretension_rate"],
+        "stiffness_wanted": 0.0,
         "bounds": [rest_torque, RESERVE * rest_torque, max(rest_torque, MOST * believed.limit)],
     }  # fmt: skip
 
@@ -352,7 +370,8 @@ LAWS = {
         ),
         Law(
             "cascade", "eq. 10.8 to 10.12, 11.10", "impedance of the link over force loops of the tendons",
-            STIFFNESS | {"K_d": Gain(0.006, "N m s/rad", 1, 1), "omega": Gain(100.0, "rad/s"), "xi": Gain(1.0, "1", 0)} | SHARED,
+            STIFFNESS | {"K_d": Gain(0.006, "N m s/rad", 1, 1), "omega": Gain(100.0, "rad/s"), "xi": Gain(1.0, "1", 0)}
+            | SHARED,
             (*OBSERVED, IMPEDANCE, SHARING, *FORCES), scheduled,
         ),
         pair_law(
@@ -365,7 +384,7 @@ LAWS = {
         ),
         Law(
             "backstepping_adaptive", "eq. 15.82 to 15.106, mended and extended",
-            "the same with damping; springs, inertia and whatever the motors must overcome are learnt, pretension is planned",
+            "the same with damping; springs, inertia and what the motors must overcome are learnt, pretension is planned",
             TUNED, adaptive_blocks(True), adaptive, frozen=adaptive_blocks(False),
         ),
     )

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from awiwi_gen.loops.laws import Law
 from awiwi_gen.errors import unknown
 from awiwi_gen.loops.hand_joint import SENSING, Joint, loop_around, values_of
-from awiwi_gen.simulate import PERIOD, Array, Scenario, Trace, simulate
+from awiwi_gen.loops.laws import Law
+from awiwi_gen.simulate import PERIOD, Array, Loop, Scenario, Trace, simulate
 
 BEFORE, TICKS = 150, 1500  # ticks at rest, and in all
 STEP = 0.2  # rad
@@ -36,7 +36,8 @@ PLANTS: Mapping[str, Mapping[str, Any]] = {
     "damping doubled": {"damping": 2.0},
 }
 SPRINGS = ((1.0, 1.0), (1.3, 1.3), (0.7, 0.7), (1.3, 0.7), (0.7, 1.3))
-LINKS, DAMPINGS, FRICTIONS = (1.0, 0.7, 3.0), (1.0, 0.5, 2.0), (1.0, 0.7, 1.3)
+BETWEEN = {"link": (0.7, 1.3, 1.7, 3.0), "damping": (0.5, 0.75, 1.3, 2.0), "friction": (0.7, 1.3)}
+CORNERS = {name: (factors[0], factors[-1]) for name, factors in BETWEEN.items()}
 
 
 def _named(springs: tuple[float, float], link: float, damping: float, friction: float) -> tuple[str, dict[str, Any]]:
@@ -47,9 +48,15 @@ def _named(springs: tuple[float, float], link: float, damping: float, friction: 
     return ", ".join(parts) or "as known", {"springs": springs, **factors}
 
 
-FAMILY: Mapping[str, Mapping[str, Any]] = dict(
-    _named(*each) for each in product(SPRINGS, LINKS, DAMPINGS, FRICTIONS)
-)
+def _family() -> dict[str, dict[str, Any]]:
+    """All corners of the family, and every factor for itself, at values between its limits too."""
+    nothing = dict.fromkeys(BETWEEN, 1.0)
+    alone = [_named((1.0, 1.0), **nothing | {name: each}) for name, factors in BETWEEN.items() for each in factors]
+    springs = [_named(each, **nothing) for each in SPRINGS]
+    corners = [_named(each, *factors) for each in SPRINGS for factors in product(*CORNERS.values())]
+    return dict([*springs, *alone, *corners])
+
+
 JUDGED: Mapping[str, Mapping[str, Any]] = {
     "as known": {},
     **dict(
@@ -62,6 +69,7 @@ JUDGED: Mapping[str, Mapping[str, Any]] = {
         )
     ),
 }  # fmt: skip
+FAMILY: Mapping[str, Mapping[str, Any]] = {**_family(), **JUDGED}
 FORCES = (10.0, 20.0)  # N, pretensions
 BANDWIDTH = 256.0  # rad/s, of the default impedance
 
@@ -75,7 +83,7 @@ class Motion:
 
 
 def load_of(joint: Joint) -> float:
-    """The load step [N m]: what a tendon and its spring bear, but not more than accelerates the link within its bandwidth."""
+    """The load step [N m]: what a tendon and its spring bear, but not more than moves the link within its bandwidth."""
     softer = min(2 * joint.slopes(FORCES[0] * joint.arm).mean(), joint.inertias[0] * BANDWIDTH**2)
     return float(min(LOAD * joint.arm, YIELD * softer))
 
@@ -142,6 +150,7 @@ class Goal:
 
 
 GOALS = (Goal(0.040, 0.01, 0.01), Goal(0.045, 0.04, 0.04))  # of the plant as known, of the family
+CALIBRATION, CONTRACTIONS, DEPTH = 2.0, 16, 0.3  # s; how often; share of the pretension
 CYCLE, SLACK = 1e-3, 5e-3  # rad; s of a slack tendon that count as much as missing a goal by its own size
 
 
@@ -156,8 +165,26 @@ def run(
             raise unknown("scenario", name, known, f"there are {', '.join(known)}")
     values = values_of(true, believed, force) | law.values(library, believed, force, gains)
     loop = loop_around(true, list(law.blocks), sensing)
-    cases = [Scenario(values, ticks, {"goal": known[n].goal[:ticks], "load": known[n].load[:ticks]}, seed) for n in names]
+    if sensing != SENSING[0] and law.frozen is not None:
+        values |= balanced(library, loop, values, true.period)
+    cases = [
+        Scenario(values, ticks, {"goal": known[n].goal[:ticks], "load": known[n].load[:ticks]}, seed) for n in names
+    ]
     return dict(zip(names, simulate(library, loop, cases, WATCHED), strict=True))
+
+
+def balanced(library: Any, loop: Loop, values: Mapping[str, Any], period: float) -> dict[str, Any]:
+    """What a law learns of the springs' difference in a co-contraction at rest; nothing if that run ends early."""
+    t = np.arange(round(CALIBRATION / period)) * period
+    w, depth = 2 * np.pi * CONTRACTIONS / CALIBRATION, DEPTH * values["pretension"][0]
+    waves = depth * np.stack([np.sin(w * t), w * np.cos(w * t), -(w**2) * np.sin(w * t)], axis=1)
+    given = {name: value for name, value in values.items() if name != "dither"}
+    (trace,) = simulate(library, loop, [Scenario(given, len(t), {"dither": waves})], ["adaptation"])
+    if trace.done < len(t):
+        return {}
+    last = len(t) // CONTRACTIONS  # ticks of the last contraction, over which a ripple of this period has no mean
+    unequal = trace["adaptation"][-last:, 1].mean()
+    return {"adaptation": [1.0, unequal, *[0.0] * 9], "factors": [1 + unequal, 1 - unequal]}
 
 
 def score(traces: Mapping[str, Trace], K_p: float, load: float) -> Score:

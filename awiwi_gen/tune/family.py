@@ -21,6 +21,7 @@ from awiwi_gen.hand import Hand
 from awiwi_gen.hand.gains import OPTIONAL, REQUIRED
 from awiwi_gen.loops.hand_joint import drives, joint_of, pair_of
 from awiwi_gen.loops.laws import LAWS
+from awiwi_gen.loops.scenarios import GOALS
 from awiwi_gen.loops.search import SEED, TRIES, Found, search
 from awiwi_gen.parallel import Progress, silent
 
@@ -81,7 +82,9 @@ def tune_family(
     work = [(hand, each, seed, tries, digest, store) for each, digest in zip(joints, digests, strict=True)]
     parallel.run("tune", find, [piece for piece in work if piece[-2] in missing], progress)
     found = [store.get("tuned", digest) for digest in digests]
-    faults = [Fault(message=f"{each.name}: {why}") for each, why in zip(joints, found, strict=True) if isinstance(why, str)]
+    faults = [
+        Fault(message=f"{each.name}: {why}") for each, why in zip(joints, found, strict=True) if isinstance(why, str)
+    ]
     if faults:
         raise InputError(faults)
     return list(zip(joints, found, strict=True)), without  # type: ignore[arg-type]
@@ -138,3 +141,27 @@ def write(path: Path, text: str) -> None:
         raise InputError(f"{path} cannot be written: {error.strerror}") from None
 
 
+COLUMNS = ("joint", "fastest", "settling", "family", "overshoot", "family", "stiffness", "family", "slack", "cycle",
+           "pretension", "K_p", "goal")  # fmt: skip
+
+
+def rows(found: list[tuple[Pulled, Found]]) -> list[tuple[str, ...]]:
+    """A row for each joint: the plant as known beside the worst of the family."""
+    return [_row(each, result) for each, result in found]
+
+
+def _row(each: Pulled, result: Found) -> tuple[str, ...]:
+    known, worst = result.worst(plants=False), result.worst()
+    reached = known.within(GOALS[0]), all(score.good for score in result.scores.values())
+    return (
+        f"{each.finger} {each.joint}",
+        f"{result.fastest * 1e3:.0f} ms",
+        *(f"{score.settling * 1e3:.1f} ms" for score in (known, worst)),
+        *(f"{score.overshoot:.1%}" for score in (known, worst)),
+        *(f"{abs(score.stiffness):.2%}" for score in (known, worst)),
+        f"{worst.slack * 1e3:.0f} ms",
+        f"{worst.cycle * 1e3:.2f} mrad",
+        f"{result.force:.1f} N",
+        f"{result.gains['K_p']:.3g} N m/rad",
+        "reached" if all(reached) else "missed",
+    )

@@ -8,7 +8,6 @@ packaged hands have theirs beside their gains.
 
 from __future__ import annotations
 
-import json
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -18,20 +17,22 @@ import numpy as np
 import awiwi_gen
 from awiwi_gen import parallel
 from awiwi_gen.cache import Cache, key
-from awiwi_gen.errors import Fault, InputError
+from awiwi_gen.certificates import VERSION, Row, certificate_text, digest_of, kept_certificate
+from awiwi_gen.errors import Fault, InputError, OutputError
 from awiwi_gen.hand import Hand
-from awiwi_gen.hand.gains import OPTIONAL, REQUIRED, TendonGains
+from awiwi_gen.hand.file import HandFile
+from awiwi_gen.hand.gains import OPTIONAL, REQUIRED, GainsFile, TendonGains
 from awiwi_gen.loops.clock import Clocked, clocked
-from awiwi_gen.loops.hand_joint import Joint, joint_of, period_of
+from awiwi_gen.loops.hand_joint import Joint, joint_of
 from awiwi_gen.loops.scenarios import FAMILY, FORCES, JUDGED
 from awiwi_gen.loops.search import BANDWIDTHS
+from awiwi_gen.parallel import Progress, silent
 from awiwi_gen.tune.family import LAW, NEEDED, Pulled, pulled_joints
 
-VERSION = 1  # of the certificate: raise it where laws, plants or the family change
-Row = dict[str, Any]
 
-
-def require_running_gains(hand: Hand, store: Cache, beside: Path | None = None) -> list[Row]:
+def require_running_gains(
+    hand: Hand, store: Cache, beside: Path | None = None, progress: Progress = silent
+) -> list[Row]:
     """The certificate of a hand's gains. Raises InputError with every tendon whose gains do not run, and gains that do.
 
     A certificate for these numbers is taken from the cache or the folder ``beside``, else it is made.
@@ -41,7 +42,7 @@ def require_running_gains(hand: Hand, store: Cache, beside: Path | None = None) 
     rows = kept_certificate(hand, store, beside)
     if rows is None:
         library = awiwi_gen.build(hand, only=NEEDED)
-        faults = failing(library, hand, store)
+        faults = failing(library, hand, store, progress)
         if faults:
             raise InputError(faults)
         rows = certificate(library, hand, store)
@@ -49,32 +50,11 @@ def require_running_gains(hand: Hand, store: Cache, beside: Path | None = None) 
     return rows
 
 
-def digest_of(hand: Hand) -> str:
-    """The digest of all numbers that decide the certificate."""
-    parts = [hand.motor, hand.spring, *hand.fingers.values(), *hand.gains]
-    return key(VERSION, period_of(hand), *(part.digest() for part in parts if part is not None))
-
-
-def kept_certificate(hand: Hand, store: Cache, beside: Path | None = None) -> list[Row] | None:
-    """The certificate that is kept for a hand's gains, or None; compiles nothing."""
-    digest = digest_of(hand)
-    texts = [store.read("certificates", digest)]
-    if beside is not None and (beside / "gains.certificate.json").is_file():
-        texts.append((beside / "gains.certificate.json").read_bytes())
-    for text in texts:
-        try:
-            found = json.loads(text) if text else {}
-        except ValueError:
-            continue
-        if isinstance(found, dict) and found.get("digest") == digest:
-            rows: list[Row] = found["joints"]
-            return rows
-    return None
-
-
-def certificate_text(hand: Hand, rows: list[Row]) -> str:
-    """The certificate as a file: a row for each joint, under the digest of what it is about."""
-    return json.dumps({"digest": digest_of(hand), "joints": rows}, indent=1) + "\n"
+def certified(hand: Hand, text: str, store: Cache, progress: Progress = silent) -> str:
+    """The certificate of a hand with the gains of a file's text. Raises InputError for gains that do not run."""
+    gains = HandFile.parse(text, "gains.toml").validated(GainsFile).gains
+    own = hand.model_copy(update={"gains": gains})
+    return certificate_text(own, require_running_gains(own, store, progress=progress))
 
 
 def certificate(library: Any, hand: Hand, store: Cache) -> list[Row]:
@@ -82,31 +62,31 @@ def certificate(library: Any, hand: Hand, store: Cache) -> list[Row]:
     rows = []
     for each, number in gains_of_joints(library, hand).items():
         found = store.get("clocked", joint_digest(library, hand, each, hand.gains[number]))
-        assert isinstance(found, Clocked)  # `failing` has just put it there
+        if not isinstance(found, Clocked):  # `failing` has just put it there
+            raise OutputError(f"{store.directory} was changed during the run; run it again")
         row = {"joint": each.name, "tendons": list(each.tendons), "radius": found.radius, "margin": found.margin}
         rows.append(row | {"cycle": found.cycle, "noise": found.noise, "at": dict(found.at), "plants": found.plants})
     return rows
 
 
 def gains_of_joints(library: Any, hand: Hand) -> dict[Pulled, int]:
-    """Joints that have gains, and the index of the first set; a second, different set is a joint of its own."""
+    """Joints that have gains, with the tendons that share a set, and the index of the set."""
     joints, _ = pulled_joints(library, hand)
     owner = {tendon: each for each in joints for tendon in each.tendons}
-    found: dict[Pulled, int] = {}
-    seen: dict[tuple[Pulled, str], Pulled] = {}
+    seen: dict[tuple[Pulled, str], list[int]] = {}
     for number, gains in enumerate(hand.gains):
         each = owner.get(gains.tendon)
         if each is None:
             continue
-        numbers = str([getattr(gains, name) for name in (*REQUIRED, *OPTIONAL)])
-        if (each, numbers) not in seen:
-            own = Pulled(each.finger, each.joint, tuple(t for t in each.tendons if t == gains.tendon))
-            seen[each, numbers] = own
-            found[own] = number
-    return found
+        numbers = str([str(getattr(gains, name)) for name in (*REQUIRED, *OPTIONAL)])
+        seen.setdefault((each, numbers), []).append(number)
+    return {
+        Pulled(each.finger, each.joint, tuple(hand.gains[number].tendon for number in alike)): alike[0]
+        for (each, _), alike in seen.items()
+    }
 
 
-def failing(library: Any, hand: Hand, store: Cache | None = None) -> list[Fault]:
+def failing(library: Any, hand: Hand, store: Cache | None = None, progress: Progress = silent) -> list[Fault]:
     """A fault for each set of gains that does not run, and for each tendon whose joint has no pair."""
     store = store or Cache()
     faults = []
@@ -114,13 +94,13 @@ def failing(library: Any, hand: Hand, store: Cache | None = None) -> list[Fault]
     owned = {tendon for each in joints for tendon in each.tendons}
     for number, gains in enumerate(hand.gains):
         if gains.tendon not in owned:
-            message = f"= {gains.tendon}: the joint that it pulls has no pair of tendons that turn it, one for each direction"
+            message = f"= {gains.tendon}: its joint has no pair of tendons, one for each direction"
             faults.append(Fault(key=f"gains[{number}].tendon", message=message))
     chosen = gains_of_joints(library, hand)
     digests = {each: joint_digest(library, hand, each, hand.gains[number]) for each, number in chosen.items()}
     missing = set(store.missing("clocked", digests.values()))
     work = [(hand, each, number, digests[each], store) for each, number in chosen.items() if digests[each] in missing]
-    parallel.run("certify", examine, work, parallel.silent)
+    parallel.run("certify", examine, work, progress)
     for each, number in chosen.items():
         found = store.get("clocked", digests[each])
         joint, gains = joint_of(library, hand, each.finger, each.joint), hand.gains[number]
@@ -140,7 +120,7 @@ def joint_digest(library: Any, hand: Hand, each: Pulled, gains: TendonGains) -> 
 def examine(piece: tuple[Hand, Pulled, int, str, Cache]) -> None:
     """Run one joint on the family, and keep what is found, or why the law refuses its gains."""
     hand, each, number, digest, store = piece
-    library = awiwi_gen.build(hand, only=NEEDED, progress=parallel.silent)
+    library = awiwi_gen.build(hand, only=NEEDED, progress=silent)
     joint = joint_of(library, hand, each.finger, each.joint)
     try:
         found: Clocked | str = worst_clocked(library, joint, hand.gains[number])
@@ -151,15 +131,9 @@ def examine(piece: tuple[Hand, Pulled, int, str, Cache]) -> None:
 
 def worst_clocked(library: Any, joint: Joint, gains: TendonGains) -> Clocked:
     """The law with these gains on the family; at two pretensions where the gains name none."""
-    own = law_gains(joint, gains)
+    own = LAW.gains_from(joint, gains)
     found = [clocked(library, LAW, own, joint, force, FAMILY) for force in forces(library, gains)]
     return max(found, key=lambda each: (not each.runs, each.radius))
-
-
-def law_gains(joint: Joint, gains: TendonGains) -> dict[str, float]:
-    """The law's gains from those of a tendon; what is left out has the value for such a joint."""
-    given = {name: getattr(gains, name) for name in (*REQUIRED, *OPTIONAL) if name != "pretension"}
-    return LAW.gains_for(joint) | {name: float(value) for name, value in given.items() if value is not None}
 
 
 def forces(library: Any, gains: TendonGains) -> list[float]:

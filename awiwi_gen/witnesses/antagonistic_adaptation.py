@@ -9,12 +9,12 @@ from casadi import SX
 
 
 def antagonistic_identifier(
-    _: Any, adaptation: SX, driven: SX, torques: SX, load: SX, inertia: SX,
+    _: Any, adaptation: SX, driven: SX, excited: SX, load: SX, inertia: SX,
     learning: SX, ranges: SX, noise: SX, period: SX,
 ) -> tuple[SX, SX, SX, list[SX]]:  # fmt: skip
     """The memory (11), the link's inertia, the factors (2) of the springs; guards."""
     keep = ca.exp(-learning * period)
-    mixed = ca.vertcat(driven, ca.SX(ca.DM([[1, 0, 1, 0]])) @ torques)
+    mixed = ca.vertcat(driven, excited)
     filters = ca.reshape(adaptation[2:8], 3, 2)
     lower, powers = SX(3, 3), ca.vertcat(1 - keep[0], (1 - keep[0]) ** 2, (1 - keep[0]) ** 3)
     for row in range(3):  # the response of a chain of three equal filters
