@@ -6,12 +6,15 @@ A wrong inertia looks like a load: with the modelled inertia m = m_0 / n and the
 
 with the true load L and the low-pass F of its triple pole. Where the law follows a desired motion, w is nearly the torque
 that this motion needs, which no load and no noise disturbs: the correlation of it with the seen load leads n to its true
-value, and without a desired motion nothing is learnt. Springs of which one is stronger by the share a than the law has it,
-and the other weaker, add a F s to the load, with s = tau_1 + tau_2. At rest this is one equation for a, the common scale of
-both springs, and the load: it has the same solutions multiplied by any factor, so nothing can be learnt. A co-contraction
-that is known, s = s_0 + excited, changes with a alone; so the correlation of load and excitation leads a. The scale of both
-springs stays unknown: no torque but theirs is known. From all signals slow parts are removed. Steps are normalised by the squares of both signals, so that they do not depend on the
-size of a motion, and a load that explains nothing moves little.
+value, and without a desired motion nothing is learnt.
+
+Springs of which one is stronger by the share a than the law has it, and the other weaker, add a F s to the load, with
+s = tau_1 + tau_2. At rest this is one equation for a, the common scale of both springs, and the load: any multiple of a
+solution is one, so nothing can be learnt. A known co-contraction changes s, but not the load; so the correlation of both
+leads a. The common scale stays unknown: no torque but that of the springs is known.
+
+From all signals slow parts are removed. Steps are normalised by the squares of both signals, so that they do not depend on
+the size of a motion, and a load that explains nothing moves little.
 """
 
 from __future__ import annotations

@@ -169,11 +169,12 @@ def antagonistic_identifier(
 ) -> Any:  # fmt: skip
     """Learns the link's inertia and how much stronger one spring is than the other, from the observer's outputs.
 
-    driven is the torque that the desired motion needs, excited the sum of torques that is added to both springs. Pass link_inertia to the observer and the law in the next sample,
-    and multiply torques that are known through the springs' calibration by factors. learning are the bandwidth of the
-    observer's link, the rate below which signals are ignored, and the rates of learning inertia and springs; a rate of
-    zero learns nothing. ranges limit inertia over link_inertia (low, high) and the springs' difference. noise is the
-    torque below which nothing is learnt. Start the memory with 1 and zeros.
+    driven is the torque that the desired motion needs, excited the sum of torques that is added to both springs. Pass
+    link_inertia to the observer and the law in the next sample, and multiply torques that are known through the springs'
+    calibration by factors. learning are the bandwidth of the observer's link, the rate below which signals are ignored,
+    and the rates of learning inertia and springs; a rate of zero learns nothing. ranges limit inertia over link_inertia
+    (low, high) and the springs' difference. noise is the torque below which nothing is learnt. Start the memory with 1
+    and zeros.
     """
 
 

@@ -100,7 +100,10 @@ def failing(library: Any, hand: Hand, store: Cache | None = None, progress: Prog
     digests = {each: joint_digest(library, hand, each, hand.gains[number]) for each, number in chosen.items()}
     missing = set(store.missing("clocked", digests.values()))
     work = [(hand, each, number, digests[each], store) for each, number in chosen.items() if digests[each] in missing]
-    parallel.run("certify", examine, work, progress)
+    if len(work) == 1:
+        keep(library, work[0])
+    else:
+        parallel.run("certify", examine, work, progress)
     for each, number in chosen.items():
         found = store.get("clocked", digests[each])
         joint, gains = joint_of(library, hand, each.finger, each.joint), hand.gains[number]
@@ -117,16 +120,20 @@ def joint_digest(library: Any, hand: Hand, each: Pulled, gains: TendonGains) -> 
     return key(VERSION, repr(joint_of(library, hand, each.finger, each.joint)), gains.digest())
 
 
-def examine(piece: tuple[Hand, Pulled, int, str, Cache]) -> None:
+def keep(library: Any, piece: tuple[Hand, Pulled, int, str, Cache]) -> None:
     """Run one joint on the family, and keep what is found, or why the law refuses its gains."""
     hand, each, number, digest, store = piece
-    library = awiwi_gen.build(hand, only=NEEDED, progress=silent)
     joint = joint_of(library, hand, each.finger, each.joint)
     try:
         found: Clocked | str = worst_clocked(library, joint, hand.gains[number])
     except InputError as error:
         found = f"refused by the law: {error}"
     store.put("clocked", digest, found)
+
+
+def examine(piece: tuple[Hand, Pulled, int, str, Cache]) -> None:
+    """The same in a process of its own."""
+    keep(awiwi_gen.build(piece[0], only=NEEDED, progress=silent), piece)
 
 
 def worst_clocked(library: Any, joint: Joint, gains: TendonGains) -> Clocked:
