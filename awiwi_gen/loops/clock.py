@@ -65,11 +65,12 @@ class Clocked:
         clock = f"{1 / self.period:.0f} Hz and one sample of delay"
         where = f" on the plant '{self.at['radius']}'" if self.plants > 1 else ""
         radius = f"spectral radius {self.radius:.4g}{where}"
-        if not self.runs and not self.stable:
+        if not self.stable and self.cycle > CYCLE:
             grows = "runs away" if not np.isfinite(self.cycle) else f"cycles by {self.cycle:.2g} rad"
             return f"unstable at {clock}: {radius}; it {grows} on the plant '{self.at['cycle']}'"
         if self.noise >= 1:
-            return f"stable at {clock}, but the sensors' noise alone drives the motors to their limit"
+            steady = "stable" if self.stable else f"hunting ({radius})"
+            return f"{steady} at {clock}, but the sensors' noise alone drives the motors to their limit"
         if not self.stable:
             return f"hunting by {self.cycle:.2g} rad at {clock}: {radius}"
         return f"stable at {clock}: {radius}, delay margin {self.margin * 1e6:.0f} us"

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from awiwi_gen.arguments import HandFile, Json
-from awiwi_gen.certificates import SUFFIX
+from awiwi_gen.certificates import SUFFIX, certificate_text
 from awiwi_gen.errors import InputError
 from awiwi_gen.patterns import ALL, matches
 
@@ -37,10 +37,13 @@ def tune(
 
     store, progress = Cache(), Progress()
     found, without = family.tune_family(read, store, seed, tries, lambda name: matches(name, only), progress)
-    text = family.gains_text(found, seed, tries)
-    certified = hand_gains.certified(read, text, store, progress)
-    family.write(output, text)
-    family.write(output.with_suffix(SUFFIX), certified)
+    own, refused = hand_gains.holding(read, found, store, progress)
+    without += refused
+    if not found:
+        raise InputError("; ".join(without))
+    family.write(output, family.gains_text(found, seed, tries))
+    certificate = certificate_text(own, hand_gains.require_running_gains(own, store))
+    family.write(output.with_suffix(SUFFIX), certificate)
     if as_json:
         print_json({"joints": family.as_data(found), "without": without})
     else:

@@ -30,6 +30,7 @@ NEEDED = (
     "backstepping_ant*,backstepping_adaptive,reference_filter,antagonistic_*,plant_antagonistic,motor_energy,"
     "spring_elongation,spring_stiffness,*_coupling,*_mass_matrix"
 )
+Tuned = tuple["Pulled", Found]
 SEARCHED = ("awiwi_gen/loops", "awiwi_gen/definitions", "awiwi_gen/simulate.py", "csrc")
 
 

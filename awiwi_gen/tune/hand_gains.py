@@ -8,6 +8,7 @@ packaged hands have theirs beside their gains.
 
 from __future__ import annotations
 
+import re
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -27,7 +28,7 @@ from awiwi_gen.loops.hand_joint import Joint, joint_of
 from awiwi_gen.loops.scenarios import FAMILY, FORCES, JUDGED
 from awiwi_gen.loops.search import BANDWIDTHS
 from awiwi_gen.parallel import Progress, silent
-from awiwi_gen.tune.family import LAW, NEEDED, Pulled, pulled_joints
+from awiwi_gen.tune.family import LAW, NEEDED, Pulled, Tuned, gains_text, pulled_joints
 
 
 def require_running_gains(
@@ -50,11 +51,19 @@ def require_running_gains(
     return rows
 
 
-def certified(hand: Hand, text: str, store: Cache, progress: Progress = silent) -> str:
-    """The certificate of a hand with the gains of a file's text. Raises InputError for gains that do not run."""
-    gains = HandFile.parse(text, "gains.toml").validated(GainsFile).gains
-    own = hand.model_copy(update={"gains": gains})
-    return certificate_text(own, require_running_gains(own, store, progress=progress))
+def holding(hand: Hand, found: list[Tuned], store: Cache, progress: Progress = silent) -> tuple[Hand, list[str]]:
+    """The hand with the gains that were found, but for those that do not run on the whole family, and why not."""
+    own = _with(hand, found)
+    faults = failing(awiwi_gen.build(own, only=NEEDED), own, store, progress)
+    bad = {own.gains[int(re.findall(r"\d+", fault.key or "")[0])].tendon: fault for fault in faults}
+    refused = [f"tendon {str(fault.message).removeprefix('= ')}" for fault in bad.values()]
+    found[:] = [(each, result) for each, result in found if not bad.keys() & {*each.tendons}]
+    return _with(hand, found), refused
+
+
+def _with(hand: Hand, found: list[Tuned]) -> Hand:
+    gains = HandFile.parse(gains_text(found, 0, 0), "gains.toml").validated(GainsFile).gains if found else ()
+    return hand.model_copy(update={"gains": gains})
 
 
 def certificate(library: Any, hand: Hand, store: Cache) -> list[Row]:
