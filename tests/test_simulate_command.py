@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,9 +17,10 @@ from awiwi_gen.cache import Cache
 from awiwi_gen.certificates import certificate_lines, kept_certificate
 from awiwi_gen.hand import Hand
 from awiwi_gen.hand.gains import OPTIONAL, REQUIRED
-from awiwi_gen.loops.hand_joint import Drive, pair_of
+from awiwi_gen.loops.hand_joint import Drive, gains_of, joint_of, pair_of
 from awiwi_gen.loops.laws import LAWS
 from awiwi_gen.loops.scenarios import FAMILY, PLANTS
+from awiwi_gen.loops.search import judged, worst_of
 from awiwi_gen.resources import DEFAULT_HAND
 from awiwi_gen.tune.hand_gains import certificate, failing
 
@@ -60,7 +62,10 @@ def test_one_run_is_shown_sample_by_sample(lib):
         (["motor_pd", "--gains", "kp=-1"], "motor_pd: the gain kp = -1 is not positive and finite"),
         (["motor_pd", "--gains", "kp=nan"], "motor_pd: the gain kp = nan is not positive and finite"),
         (["motor_pd", "--gains", "K_p=1"], "motor_pd has no gain 'K_p'; it has kp, kd"),
-        (["motor_pd", "--gains", "kp=20000"], "these gains are unstable at 3000 Hz and one sample of delay"),
+        (
+            ["motor_pd", "--gains", "kp=20000"],
+            "motor_pd: these gains are hunting (spectral radius 1.096) at 3000 Hz and one sample of delay, but the sensors' noise",
+        ),
         (["motor_pd", "--scenario", "jump"], "no scenario 'jump'; there are step, load, sine"),
         (["motor_pd", "--scenario", "step", "--plant", "as knwn"], "no plant 'as knwn'; did you mean as known"),
         (["motor_pd", "--scenario", "step", "--force", "-1"], "--force -1: a pretension is more than 0"),
@@ -125,6 +130,23 @@ def test_gains_that_no_clock_of_3_khz_can_have_are_refused_with_the_plant_and_ga
     mended = fault.message.split("that run on such a joint are ")[1].replace(", ", "\n")
     text = f'{AWIWI}\n[[gains]]\ntendon = {TENDON}\n{mended}\nsource = "test"\n'
     assert failing(lib, Hand.parse(text), Cache(tmp_path)) == []
+
+
+def test_a_row_of_the_table_of_joints_is_what_the_packaged_gains_give(lib, hand):
+    laws = (Path(__file__).parents[1] / "docs" / "laws.md").read_text(encoding="utf-8")
+    (row,) = re.findall(r"^\| index pip \|(.*)\|$", laws, re.MULTILINE)
+    joint, gains = joint_of(lib, hand), gains_of(lib, hand)
+    law = LAWS["backstepping_adaptive"]
+    scores = judged(lib, law, joint, law.gains_from(joint, gains), float(gains.pretension), FAMILY)
+    known, worst = scores["as known"], worst_of(scores)
+    numbers = [
+        known.settling * 1e3, known.overshoot * 100, worst.settling * 1e3, worst.overshoot * 100,
+        abs(worst.stiffness) * 100, worst.slack * 1e3, worst.cycle * 1e3, float(gains.pretension), float(gains.K_p),
+    ]  # fmt: skip
+    steps = [1, 0.3, 2, 0.5, 0.05, 0.01, 0.2, 0.06, 1e-3]
+
+    for printed, found, step in zip(row.split("|"), numbers, steps, strict=True):
+        assert float(printed) == pytest.approx(found, abs=step)
 
 
 def test_a_joint_without_a_tendon_for_each_direction_has_no_pair():
