@@ -64,7 +64,7 @@ def test_one_run_is_shown_sample_by_sample(lib):
         (["motor_pd", "--gains", "K_p=1"], "motor_pd has no gain 'K_p'; it has kp, kd"),
         (
             ["motor_pd", "--gains", "kp=20000"],
-            "motor_pd: these gains are hunting (spectral radius 1.096) at 3000 Hz and one sample of delay, but the sensors' noise",
+            "gains are hunting (spectral radius 1.096) at 3000 Hz and one sample of delay, but the sensors' noise",
         ),
         (["motor_pd", "--scenario", "jump"], "no scenario 'jump'; there are step, load, sine"),
         (["motor_pd", "--scenario", "step", "--plant", "as knwn"], "no plant 'as knwn'; did you mean as known"),
