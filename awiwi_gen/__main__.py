@@ -6,6 +6,7 @@ Exit codes: 0 done, 1 verification failed or out of date, 2 bad input.
 from __future__ import annotations
 
 import json
+import os
 import sys
 from collections.abc import Callable
 from dataclasses import replace
@@ -17,6 +18,7 @@ from awiwi_gen import exits, extras, terminal
 from awiwi_gen.errors import AwiwiError, InputError, printable
 from awiwi_gen.extras import GENERATE, HAND
 from awiwi_gen.patterns import matches
+from awiwi_gen.resources import DEFAULT_HAND
 
 if absent := extras.missing("awiwi-gen", *extras.COMMAND_LINE):
     exits.leave(exits.SYSTEM, f'{absent}; Python alone has awiwi_gen.load("generated")')
@@ -44,6 +46,7 @@ from awiwi_gen.drawing import show
 from awiwi_gen.editing import init, set_
 from awiwi_gen.interchange.command import export, import_
 from awiwi_gen.tick.command import replay, tick
+from awiwi_gen.tune.command import tune
 
 app = typer.Typer(
     help="From the CAD numbers of a tendon-driven hand to verified real-time C.",
@@ -124,9 +127,9 @@ def generate(
         compiler()  # without one nothing can be verified: an error before anything is replaced
     if job.hand.gains:
         extras.require("the check of the hand's gains", "scipy")
-        from awiwi_gen.tune import require_running_gains
+        from awiwi_gen.tune.hand_gains import require_running_gains
 
-        require_running_gains(job.hand, job.store)
+        require_running_gains(job.hand, job.store, (hand or DEFAULT_HAND).parent)
     changed = generate(job, output)
     if verify:
         return terminal.prove(job, hand, output, as_json)
@@ -143,6 +146,7 @@ def check(
     params: ParamsOption = Params.baked, math: MathOption = Math.own, only: Only = "*", as_json: Json = False,
 ) -> int:  # fmt: skip
     """Check the hand file, and whether the generated C is fresh and unedited."""
+    from awiwi_gen.certificates import certificate_lines
     from awiwi_gen.hand import Hand
     from awiwi_gen.hand.capability import left_out_names
     from awiwi_gen.hand.tick import tick_lines, tick_values
@@ -162,7 +166,8 @@ def check(
         print(printable(f"{hand or 'hand.toml'}: {counted(len(job.hand.fingers), 'finger')}, no faults{more}"))
         print("".join(f"warning: {each}\n" for each in warnings), end="")
         print_left_out(absent)
-        print("".join(f"{line}\n" for line in tick_lines(read)), end="")
+        gained = certificate_lines(read, job.store, (hand or DEFAULT_HAND).parent)
+        print(printable("".join(f"{line}\n" for line in (*tick_lines(read), *gained))), end="")
         print("\n".join(state_lines(found, str(output), terminal.fix(job, hand, output))))
     return 0 if found.fresh or (found.missing and not found.foreign) else 1
 
@@ -318,45 +323,29 @@ def report(
 
 
 @command("scipy", *GENERATE)
-def tune(
-    costs: Annotated[Path, typer.Option("--costs", help="TOML file of what motion and torque cost.")],
-    hand: HandFile = None, as_json: Json = False,
-    output: Annotated[Path, typer.Option("--output", "-o", help="File of gains to write.")] = Path("gains.toml"),
-) -> int:  # fmt: skip
-    """Find gains of the backstepping law for every tendon, and write a file that the hand file can name."""
-    from awiwi_gen.report import print_json
-    from awiwi_gen.tune import tune_hand, write_gains
-
-    tuned = tune_hand(make_job(hand).hand, costs)
-    write_gains(output, tuned)
-    if as_json:
-        print_json([each.as_dict() for each in tuned])
-    else:
-        radius, margin = max(e.sampled_radius for e in tuned), min(e.delay_margin for e in tuned)
-        print(f"{output}: gains of {len(tuned)} tendons; spectral radius {radius:.4f} at most at 3 kHz and one sample")
-        print(f"of delay, delay margin {margin * 1e6:.0f} us at least")
-    return 0
-
-
-@command("scipy", *GENERATE)
 def simulate(
     law: Annotated[str, typer.Argument(help="A law; all of them if left out.")] = "",
     gains: Annotated[str, typer.Option("--gains", help="Gains such as K_p=0.5,K_d=0.003.")] = "",
     scenario: Annotated[str, typer.Option("--scenario", help="Show one run: step, load or sine.")] = "",
     force: Annotated[float, typer.Option("--force", help="Pretension of that run [N].")] = 10.0,
     plant: Annotated[str, typer.Option("--plant", help="Plant of that run.")] = "as known",
+    joint: Annotated[str, typer.Option("--joint", help="A joint such as index_pip, or all.")] = "index_pip",
+    sensing: Annotated[str, typer.Option("--sensing", help="Of that run: force sensor, or lever.")] = "force sensor",
     hand: HandFile = None, as_json: Json = False,
 ) -> int:  # fmt: skip
     """Simulate control laws on a joint between two tendons, at the hand's clock rate, and compare the results."""
     from awiwi_gen.compare import benchmark, one_run
 
     one = scenario != ""
-    shown = one_run(hand, law, gains, scenario, force, plant) if one else benchmark(hand, law, gains)
+    shown = (
+        one_run(hand, law, gains, scenario, force, plant, joint, sensing) if one else benchmark(hand, law, gains, joint)
+    )
     shown.show(as_json)
     return 0
 
 
 command(*HAND)(show)
+command("scipy", *GENERATE)(tune)
 command(*GENERATE)(diff)
 command()(init)
 command(*HAND, ignore_unknown_options=True)(set_)  # "-5 deg" is a value
@@ -368,6 +357,7 @@ command()(replay)
 
 def main() -> None:
     """Entry point of ``awiwi-gen``."""
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # matrices are small: its threads would wait for each other
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="backslashreplace")  # a terminal that cannot show a letter shows its number

@@ -106,7 +106,7 @@ class Scenario:
 class Trace:
     """Watched signals (rows, size) of one run at the times (rows) [s].
 
-    ``done`` ticks were simulated, and in ``refused`` of them the law failed. ``status`` is that of the last, 0 for success.
+    ``done`` of the ``asked`` ticks were simulated, the law failed in ``refused``. ``status`` is the last, 0 for success.
     """
 
     time: Array
@@ -114,6 +114,7 @@ class Trace:
     done: int
     refused: int
     status: int
+    asked: int
 
     def __getitem__(self, name: str) -> Array:
         return self.signals[name]
@@ -319,10 +320,10 @@ class Machine:
         plan = ffi.new("awiwi_run *", (*counts, *tables, self._pointer(record)))
         refused, status = ffi.new("int *"), ffi.new("int *")
         done = self.library.c.awiwi_simulate(self.c, plan, self._pointer(self.signals), refused, status)
-        record = record[: ceil(done / every)]
-        ends = np.cumsum([len(part) for part in parts.values()])[:-1]
-        split = dict(zip(parts, np.split(record, ends, axis=1), strict=True))
-        return Trace(np.arange(len(record)) * every * self.loop.period, split, done, refused[0], status[0])
+        pieces = np.split(record[: ceil(done / every)], np.cumsum([len(part) for part in parts.values()])[:-1], axis=1)
+        split = dict(zip(parts, pieces, strict=True))
+        times = np.arange(ceil(done / every)) * every * self.loop.period
+        return Trace(times, split, done, refused[0], status[0], scenario.ticks)
 
     @staticmethod
     def _rows(value: Any, scenario: Scenario) -> Array:

@@ -2540,6 +2540,56 @@ void awiwi_antagonistic_sharing(const double torque_in[1], const double pretensi
 AWIWI_MUST_CHECK int awiwi_backstepping_adaptive(const double joint_in[2], const double torques_in[4], const double desired_in[5], const double pretension_in[3], const double external_in[2], const double inertias_in[3], const double springs_in[4], const double damping_in[1], const double impedance_in[2], const double tunings_in[8], const double resistance_in[2], double tau_m_out[2]);
 
 /*
+ * Learns the link's inertia and how much stronger one spring is than the other, from the observer's
+ * outputs. driven is the torque that the desired motion needs, excited the sum of torques that is
+ * added to both springs. Pass link_inertia to the observer and the law in the next sample, and
+ * multiply torques that are known through the springs' calibration by factors. learning are the
+ * bandwidth of the observer's link, the rate below which signals are ignored, and the rates of
+ * learning inertia and springs; a rate of zero learns nothing. ranges limit inertia over link_inertia
+ * (low, high) and the springs' difference. noise is the torque below which nothing is learnt. Start
+ * the memory with 1 and zeros.
+ * Source: the observer's load, correlated with torques.
+ *   in   adaptation[11] in 1, N m, from [0.2, -0.5, -1, -1, -1, -1, -1, -1, -1, -1, -1] to [2, 0.5, 1, 1, 1, 1, 1, 1, 1, 1, 1]
+ *   in   driven[1] in N m, -1 to 1
+ *   in   excited[1] in N m, -1 to 1
+ *   in   load[1] in N m, -1 to 1
+ *   in   inertia[1] in kg m^2, 5e-07 to 0.001
+ *   in   learning[4] in 1/s, 1 to 2000
+ *   in   ranges[3] in 1, from [0.1, 1.5, 0.1] to [0.6, 3, 0.9]
+ *   in   noise[1] in N m, 0.0001 to 0.01
+ *   in   period[1] in s, 0.0001 to 0.01
+ *   out  adaptation_next[11] in 1, N m
+ *   out  link_inertia[1] in kg m^2
+ *   out  factors[2] in 1
+ * Returns 0 where all inputs and outputs are finite and the period is positive and the inertia is
+ * positive and the noise is positive and the least share is positive; else 1, and outputs without a
+ * value are NaN.
+ * Cost: 43 add, 30 mul, 3 div, 4 neg, 8 calls.
+ */
+AWIWI_MUST_CHECK int awiwi_antagonistic_identifier(const double adaptation_in[11], const double driven_in[1], const double excited_in[1], const double load_in[1], const double inertia_in[1], const double learning_in[4], const double ranges_in[3], const double noise_in[1], const double period_in[1], double adaptation_next_out[11], double link_inertia_out[1], double factors_out[2]);
+
+/*
+ * Pretension with two derivatives, moving smoothly to the least that keeps both tendons taut and stiff
+ * enough. torque is that on the link, stiffness that which both springs shall have together. bounds
+ * are the least common torque, the torque that the slacker spring shall keep, and the most. plan is
+ * the memory: start with the pretension at rest.
+ * Source: eq. 15.88, with a pretension for the load and the stiffness.
+ *   in   plan[3] in N m, N m/s, N m/s^2, from [0, -10, -1000] to [1, 10, 1000]
+ *   in   torque[1] in N m, -2 to 2
+ *   in   stiffness[1] in N m/rad, 0 to 10
+ *   in   curves[2][3] in N m/rad, N m/rad^2, N m/rad^3, from [0.05, -1, 0.01, 0.05, -1, 0.01] to [2, 2, 10, 2, 2, 10]
+ *   in   bounds[3] in N m, 0.01 to 1
+ *   in   rate[1] in 1/s, 1 to 1000
+ *   in   period[1] in s, 0.0001 to 0.01
+ *   out  plan_next[3] in N m, N m/s, N m/s^2
+ * Returns 0 where all inputs and outputs are finite and the period is positive and the rate is
+ * positive and the mean cubic coefficient is positive and the most is positive; else 1, and outputs
+ * without a value are NaN.
+ * Cost: 32 add, 35 mul, 2 div, 1 neg, 1 sqrt, 7 calls.
+ */
+AWIWI_MUST_CHECK int awiwi_antagonistic_pretension(const double plan_in[3], const double torque_in[1], const double stiffness_in[1], const double curves_in[6], const double bounds_in[3], const double rate_in[1], const double period_in[1], double plan_next_out[3]);
+
+/*
  * A motor that winds up a tendon with a spring, at a fixed joint: rates of x = (theta, theta'), and
  * the force f. path is the tendon's path length at the joint. motor is (inertia, pulley's radius),
  * friction is (steepness, level, viscosity). line is (k1, k2, k3) of the spring's force f = k1 p + k2

@@ -4,5 +4,5 @@
 #include "awiwi_version.h"
 #include "kernels.h"
 
-const char awiwi_model_digest[65] = "cab9e9ac18c100c4771232934208eee0be37958627967688a8b4f02e20c22d23";
+const char awiwi_model_digest[65] = "a0ece17f9d9b2b706df3f72f08ae72bab4a0532e78176ed528e12d32efd9549f";
 const int awiwi_api_version = AWIWI_API_VERSION;

@@ -9,6 +9,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 os.environ.setdefault("AWIWI_GEN_CACHE", str(ROOT / ".cache"))
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # matrices here are small: threads would only wait for each other
 
 from trees import version  # noqa: E402 the cache is chosen first
 

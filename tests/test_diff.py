@@ -9,6 +9,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from actuators import AWIWI
 from commands import ONE_FINGER, answer, complaint, run, small, told  # noqa: F401 a fixture
 from edited_hands import RADIUS, TEXT, edited
 
@@ -22,7 +23,6 @@ from awiwi_gen.hand import Hand
 from awiwi_gen.ir.builder import Builder
 from awiwi_gen.ir.graph import Output
 from awiwi_gen.pipeline import Job, derive
-from awiwi_gen.resources import DEFAULT_HAND
 
 
 def compared(old: str, new: str, wanted: list[str] | None = None) -> Difference:
@@ -146,7 +146,7 @@ def test_derivatives_are_those_of_edited_files(path, unit):
     ],
 )
 def test_derivatives_of_spans_and_followers_are_those_of_edited_files(hand, finger, key, size, names):
-    path, text = f"fingers.{finger}.{key}", DEFAULT_HAND.read_text(encoding="utf-8")
+    path, text = f"fingers.{finger}.{key}", AWIWI
     low, high = (
         {each.name: each.value for each in figures(Job(Hand.parse(edited(text, path, f"{size + step} mm"))), finger)}
         for step in (-1e-4, 1e-4)
@@ -248,7 +248,7 @@ def test_kernels_that_vanish_and_appear_have_their_reason():
 
 
 def test_a_motor_that_is_new_brings_its_kernels():
-    motor = re.search(r"^\[motor\]\n.*?\n(?=\[\[|# -)", DEFAULT_HAND.read_text(), re.MULTILINE | re.DOTALL)[0]
+    motor = re.search(r"^\[motor\]\n.*?\n(?=\[\[|# -)", AWIWI, re.MULTILINE | re.DOTALL)[0]
     found = compared(TEXT, f"{TEXT}\n{motor}")
 
     assert {found.appear[name] for name in found.appear if name.startswith("motor_")} == {"the hand has no [motor]"}

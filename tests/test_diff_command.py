@@ -9,11 +9,11 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+from actuators import AWIWI
 from commands import answer, complaint, run, told
 from edited_hands import RADIUS, TEXT, edited
 
 from awiwi_gen.diff import hands
-from awiwi_gen.resources import DEFAULT_HAND
 
 
 @pytest.fixture
@@ -116,8 +116,9 @@ def test_bad_input_is_one_sentence(repository, tmp_path, monkeypatch):
 
 
 def test_tables_fit_a_terminal_and_markdown_is_regular(tmp_path):
-    old, new = DEFAULT_HAND, tmp_path / "new.toml"
-    text = edited(DEFAULT_HAND.read_text(encoding="utf-8"), "fingers.fifth.links[0].four_bar.crank", "10.1 mm")
+    old, new = tmp_path / "old.toml", tmp_path / "new.toml"
+    old.write_text(AWIWI, encoding="utf-8")
+    text = edited(AWIWI, "fingers.fifth.links[0].four_bar.crank", "10.1 mm")
     new.write_text(edited(text, "fingers.thumb.pulleys[0].radius", "8.1 mm"), encoding="utf-8")
     lines = told("diff", old, new, "--finger", "fifth").splitlines()
     tables = [line for line in told("diff", old, new, "--markdown").splitlines() if line.startswith("|")]

@@ -7,6 +7,7 @@ import shlex
 from pathlib import Path
 
 import pytest
+from actuators import AWIWI
 from pydantic import BaseModel
 from typer.testing import CliRunner
 
@@ -14,7 +15,6 @@ from awiwi_gen.__main__ import app
 from awiwi_gen.errors import InputError
 from awiwi_gen.hand import Hand
 from awiwi_gen.ir import passes
-from awiwi_gen.resources import DEFAULT_HAND
 from awiwi_gen.verify import physics
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -125,7 +125,7 @@ def test_the_messages_of_the_hand_file_are_printed_like_this(old, new):
 def test_the_tables_of_diff_are_printed_like_this(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for name in ("hand.toml", "wider.toml"):
-        (tmp_path / name).write_bytes(DEFAULT_HAND.read_bytes())
+        (tmp_path / name).write_text(AWIWI, encoding="utf-8")
     edit, compare = re.findall(r"^\$ awiwi-gen ((?:set|diff) .*wider.toml)$", text("docs/diff.md"), re.MULTILINE)
     assert CliRunner().invoke(app, shlex.split(edit)).exit_code == 0
     said = CliRunner().invoke(app, shlex.split(compare)).stdout.splitlines()

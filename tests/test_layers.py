@@ -49,6 +49,7 @@ TOP = [
         "editing",
         "drawing",
         "diff",
+        "certificates",
     ],
     ["loops", "identify", "tick"],
     [*ROOMS],

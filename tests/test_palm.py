@@ -6,6 +6,7 @@ import json
 
 import numpy as np
 import pytest
+from actuators import AWIWI
 from samples import ONE_FINGER
 from textbook import roll_pitch_yaw
 
@@ -140,7 +141,6 @@ def test_a_slip_in_the_palm_is_named(old, new, message):
 
 
 def test_a_palm_has_joints_in_series_or_the_parallelogram():
-    from awiwi_gen.resources import DEFAULT_HAND
 
     with pytest.raises(InputError, match=r"palm has joints, but the hand has a wrist that moves its palm"):
-        awiwi_gen.Hand.parse(DEFAULT_HAND.read_text(encoding="utf-8").replace('gains = "gains.toml"', "") + PALM)
+        awiwi_gen.Hand.parse(AWIWI + PALM)

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from actuators import AWIWI
 from commands import ONE_FINGER
 from samples import ONE_FINGER as TEXT
 from samples import points
@@ -25,7 +26,6 @@ from awiwi_gen.ir.exact import exact_values
 from awiwi_gen.parameters import numbers_file
 from awiwi_gen.pipeline import Job, cached_tree, derive, verify
 from awiwi_gen.records import load_graphs, prepare, values_of
-from awiwi_gen.resources import DEFAULT_HAND
 
 RUNTIME = Options(params="runtime")
 STATUS = (
@@ -214,7 +214,7 @@ def test_runtime_kernels_cost_what_baked_ones_cost_where_no_numbers_are_equal():
     def moved(length: re.Match) -> str:  # zero is structure
         return f'"{float(length[1]) + chance.uniform(-0.3, 0.3):.3f} mm"' if float(length[1]) else length[0]
 
-    lines = DEFAULT_HAND.read_text(encoding="utf-8").splitlines()
+    lines = AWIWI.splitlines()
     lines = [re.sub(r'"(-?[\d.]+) mm"', moved, x) if "forearm =" in x or "span =" in x else x for x in lines]
     hand = awiwi_gen.Hand.parse("\n".join(lines))
     for name in ("wrist_tendon_lengths", "thumb_joint_torque"):

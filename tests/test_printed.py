@@ -151,10 +151,12 @@ def test_the_rate_of_the_load_cannot_be_neglected_with_the_printed_gains(lib):
 
 def test_the_printed_damping_does_not_run_on_the_clock(lib):
     printed = impedance_loop(lib, TABLE_15_1, FIGURE_15_16)
+    other = impedance_loop(lib, TABLE_16_1, FIGURE_15_16)
     softer = impedance_loop(lib, TABLE_16_1, (0.5, 0.0012, 100.0, 100.0))
 
     assert printed.poles().real.max() < 0
-    assert printed.sampled_radius() > 3
+    assert [printed.sampled_radius(delay) for delay in (0, 1)] == pytest.approx([13.7, 3.8], abs=0.05)
+    assert [other.sampled_radius(delay) for delay in (0, 1)] == pytest.approx([22.7, 4.9], abs=0.05)
     assert printed.delay_margin() < 25e-6
     assert softer.sampled_radius() < 1
 

@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from actuators import AWIWI
 from test_cli import answer, complaint, told
 
 pytest.importorskip("scipy")
 
-from awiwi_gen.compare.laws import LAWS
+from awiwi_gen.cache import Cache
+from awiwi_gen.certificates import certificate_lines, kept_certificate
 from awiwi_gen.hand import Hand
-from awiwi_gen.tune import hand_gains
-from awiwi_gen.tune.hand_gains import failing
-from awiwi_gen.tune.tendons import GAINS, plants, tune_tendon
+from awiwi_gen.hand.gains import OPTIONAL, REQUIRED
+from awiwi_gen.loops.hand_joint import Drive, gains_of, joint_of, pair_of
+from awiwi_gen.loops.laws import LAWS
+from awiwi_gen.loops.scenarios import FAMILY, PLANTS
+from awiwi_gen.loops.search import judged, worst_of
+from awiwi_gen.resources import DEFAULT_HAND
+from awiwi_gen.tune.hand_gains import certificate, failing
 
 TENDON = 12  # the index's pip
 
@@ -23,15 +31,15 @@ def test_one_law_is_shown_on_every_plant(lib):
     shown = told("simulate", "backstepping_adaptive")
 
     assert "at 3 kHz with one sample of delay" in shown
-    assert shown.count("reached") == 10
-    assert shown.count("link 30 % heavier") == 2
+    assert shown.count("reached") == 2 * len(PLANTS) - 4  # two of them for the springs' scale, which no sensor shows
+    assert shown.count("link three times heavier") == 2
 
 
 def test_programs_get_the_same_as_numbers(lib):
     found = answer("simulate", "motor_pd")
 
     assert {row["plant"] for row in found["benchmark"]} >= {"as known", "springs 30 % soft"}
-    assert all(row["runs"] and row["radius"] < 1 for row in found["clock"])
+    assert all(row["runs"] and row["radius"] < 1 for row in found["clock"] if row["plants"] == 1)
     assert all(not row["goal"] and row["overshoot"] >= 0 for row in found["benchmark"])
 
 
@@ -54,10 +62,15 @@ def test_one_run_is_shown_sample_by_sample(lib):
         (["motor_pd", "--gains", "kp=-1"], "motor_pd: the gain kp = -1 is not positive and finite"),
         (["motor_pd", "--gains", "kp=nan"], "motor_pd: the gain kp = nan is not positive and finite"),
         (["motor_pd", "--gains", "K_p=1"], "motor_pd has no gain 'K_p'; it has kp, kd"),
-        (["motor_pd", "--gains", "kp=6000"], "these gains are unstable at 3000 Hz and one sample of delay"),
+        (
+            ["motor_pd", "--gains", "kp=20000"],
+            "gains are hunting (spectral radius 1.096) at 3000 Hz and one sample of delay, but the sensors' noise",
+        ),
         (["motor_pd", "--scenario", "jump"], "no scenario 'jump'; there are step, load, sine"),
         (["motor_pd", "--scenario", "step", "--plant", "as knwn"], "no plant 'as knwn'; did you mean as known"),
         (["motor_pd", "--scenario", "step", "--force", "-1"], "--force -1: a pretension is more than 0"),
+        (["motor_pd", "--joint", "index_pap"], "no joint 'index_pap'; did you mean index_pip"),
+        (["motor_pd", "--scenario", "step", "--sensing", "force sensr"], "did you mean force sensor"),
     ],
 )
 def test_errors_name_the_unknown_word_and_the_known_ones(lib, arguments, message):
@@ -77,41 +90,83 @@ def test_every_law_names_its_equation_and_itself():
 # -- gains of a hand file -----------------------------------------------------------------------------------
 
 
+UNITS = {**REQUIRED, **OPTIONAL}
+
+
 def tables(values: dict[str, Any], tendon: int = TENDON) -> str:
     """One tendon's table as a hand file has it."""
-    lines = [f'{name} = "{value!r} {GAINS[name]}"' for name, value in values.items()]
+    lines = [f'{name} = "{value!r} {UNITS[name]}"' for name, value in values.items()]
     return "\n".join(["", "[[gains]]", f"tendon = {tendon}", *lines, 'source = "test"', ""])
 
 
 @pytest.fixture(scope="module")
-def tuned(lib, hand):
-    """Gains as `awiwi-gen tune` finds them."""
-    import numpy as np
-
-    index = TENDON - hand.blocks["index"][0].start
-    joint, plant = plants(lib, hand, "index", hand.fingers["index"], 10.0)[index]
-    return tune_tendon(lib, TENDON, joint, plant, np.diag([100.0, 0.01, 0.01, 0.01]), 0.1).values()
+def packaged(hand):
+    """The packaged gains of this tendon."""
+    gains = next(each for each in hand.gains if each.tendon == TENDON)
+    return {name: float(getattr(gains, name)) for name in UNITS}
 
 
-def test_gains_that_tuning_finds_are_accepted(lib, tuned):
-    assert failing(lib, Hand.parse(AWIWI + tables(tuned))) == []
+def test_the_packaged_gains_are_accepted_and_their_certificate_says_what_the_check_finds(lib, hand, packaged, tmp_path):
+    store = Cache(tmp_path)
+    own = Hand.parse(AWIWI + tables(packaged))
+    rows = {tendon: row for row in kept_certificate(hand, store, DEFAULT_HAND.parent) for tendon in row["tendons"]}
+
+    assert failing(lib, own, store) == []
+    ((found,), kept) = certificate(lib, own, store), rows[TENDON]
+    assert found["at"] == kept["at"]
+    assert found["plants"] == kept["plants"] == len(FAMILY)
+    for name in ("radius", "margin", "cycle", "noise"):
+        assert found[name] == pytest.approx(kept[name], rel=0.05), name
+    assert sorted(rows) == list(range(hand.tendons))
+    assert all(row["radius"] < 1 and row["cycle"] < 1e-3 for row in rows.values())
 
 
-def test_gains_that_no_clock_of_3_khz_can_have_are_refused_with_the_nearest_that_run(lib, tuned):
-    (fault,) = failing(lib, Hand.parse(AWIWI + tables(tuned | {"K_d": 0.5})))
+def test_gains_that_no_clock_of_3_khz_can_have_are_refused_with_the_plant_and_gains_that_run(lib, packaged, tmp_path):
+    (fault,) = failing(lib, Hand.parse(AWIWI + tables(packaged | {"K_d": 0.5})), Cache(tmp_path))
 
     assert fault.key == "gains[0].tendon"
-    assert f"= {TENDON} (index, pip): these gains are unstable at 3000 Hz" in fault.message
-    mended = fault.message.split("that run are ")[1].replace(", ", "\n")
+    assert f"= {TENDON} (index, pip): these gains are unstable at 3000 Hz and one sample of delay: " in fault.message
+    assert re.search(r"spectral radius [\d.]+ on the plant '[^']+'; it .* on the plant '[^']+'", fault.message)
+    mended = fault.message.split("that run on such a joint are ")[1].replace(", ", "\n")
     text = f'{AWIWI}\n[[gains]]\ntendon = {TENDON}\n{mended}\nsource = "test"\n'
-    assert failing(lib, Hand.parse(text)) == []
+    assert failing(lib, Hand.parse(text), Cache(tmp_path)) == []
 
 
-def test_gains_that_give_no_feedback_are_said_to(lib, tuned, monkeypatch):
-    monkeypatch.setattr(hand_gains, "radius", lambda *_: float("inf"))
-    (fault,) = failing(lib, Hand.parse(AWIWI + tables(tuned)))
+def test_a_row_of_the_table_of_joints_is_what_the_packaged_gains_give(lib, hand):
+    laws = (Path(__file__).parents[1] / "docs" / "laws.md").read_text(encoding="utf-8")
+    (row,) = re.findall(r"^\| index pip \|(.*)\|$", laws, re.MULTILINE)
+    joint, gains = joint_of(lib, hand), gains_of(lib, hand)
+    law = LAWS["backstepping_adaptive"]
+    scores = judged(lib, law, joint, law.gains_from(joint, gains), float(gains.pretension), FAMILY)
+    known, worst = scores["as known"], worst_of(scores)
+    numbers = [
+        known.settling * 1e3, known.overshoot * 100, worst.settling * 1e3, worst.overshoot * 100,
+        abs(worst.stiffness) * 100, worst.slack * 1e3, worst.cycle * 1e3, float(gains.pretension), float(gains.K_p),
+    ]  # fmt: skip
+    steps = [1, 0.3, 2, 0.5, 0.05, 0.01, 0.2, 0.06, 1e-3]
 
-    assert "(the law has no finite feedback with them); no other bandwidth" in fault.message
+    for printed, found, step in zip(row.split("|"), numbers, steps, strict=True):
+        assert float(printed) == pytest.approx(found, abs=step)
+
+
+def test_a_joint_without_a_tendon_for_each_direction_has_no_pair():
+    forward, back, other = (
+        Drive(joint, 0.01, 1e-5, 1e-3, tendon, np.array(pulls))
+        for tendon, (joint, pulls) in enumerate([(0, [-0.01, 0.002]), (0, [0.008, 0.0]), (1, [0.0, -0.01])])
+    )
+
+    assert [each.tendon for each in pair_of([forward, back, other], 0)] == [0, 1]
+    assert [each.arm for each in pair_of([forward, back, other], 0)] == [0.01, 0.01]
+    assert [each.tendon for each in pair_of([forward, back, other], 1)] == [2, 0]
+    assert pair_of([forward, other], 0) is None
+
+
+def test_check_says_what_the_certificate_says_and_when_there_is_none(hand, tmp_path):
+    said = " ".join(certificate_lines(hand, Cache(tmp_path), DEFAULT_HAND.parent))
+
+    assert f"certified on {len(FAMILY)} plants of each of 19 joints: spectral radius at most 0." in said
+    assert "gains: no certificate is kept" in " ".join(certificate_lines(hand, Cache(tmp_path), tmp_path))
+    assert list(certificate_lines(Hand.parse(AWIWI), Cache(tmp_path), None)) == []
 
 
 def test_a_hand_with_such_gains_is_not_generated(tmp_path):
@@ -121,5 +176,5 @@ def test_a_hand_with_such_gains_is_not_generated(tmp_path):
     message = complaint("generate", "--hand", tmp_path / "hand.toml", "-o", tmp_path / "out", "--only", "motor_*")
 
     assert "gains[0].tendon = 0" in message
-    assert "unstable at 3000 Hz" in message
+    assert "at 3000 Hz" in message
     assert not (tmp_path / "out").exists()

@@ -7,10 +7,10 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from actuators import AWIWI
 from commands import answer, told
 from exported_mjcf import read_mjcf
 
-from awiwi_gen.compare.scenarios import motions
 from awiwi_gen.errors import InputError
 from awiwi_gen.hand import Hand
 from awiwi_gen.hand.tick import tick_values
@@ -21,8 +21,8 @@ from awiwi_gen.loops.hand_joint import joint_of, loop_around, period_of, values_
 from awiwi_gen.loops.joint import Plant
 from awiwi_gen.loops.regulator import loop_of
 from awiwi_gen.loops.sampled import sampled
+from awiwi_gen.loops.scenarios import motions
 from awiwi_gen.pipeline import Job
-from awiwi_gen.resources import DEFAULT_HAND
 
 PLAIN = Path(__file__).with_name("motor_fingers.toml").read_text(encoding="utf-8")
 SENSOR = 'sensor = { resolution = "0.1 deg", low = "-45 deg", high = "95 deg" }'
@@ -161,11 +161,11 @@ def test_gains_are_judged_on_the_hands_own_clock():
 
 
 def test_a_joint_is_simulated_on_the_hands_own_clock(lib):
-    text = DEFAULT_HAND.read_text(encoding="utf-8")
+    text = AWIWI
     text = text.replace("\n[motor]\n", '\n[clock]\nperiod = "1 ms"\nsource = "assumed"\n\n[motor]\n')
     joint = joint_of(lib, Hand.parse(text))
 
     assert joint.period == 1e-3
     assert loop_around(joint, []).period == 1e-3
     assert values_of(joint, joint, 10.0)["period"] == 1e-3
-    assert motions(1e-3)["sine"].goal[-1, 0] != motions()["sine"].goal[-1, 0]
+    assert motions(0.0, 1e-3)["sine"].goal[-1, 0] != motions(0.0)["sine"].goal[-1, 0]

@@ -4,16 +4,24 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from actuators import AWIWI
 from typer.testing import CliRunner
 
 import awiwi_gen
 from awiwi_gen.__main__ import app
+from awiwi_gen.errors import InputError
+from awiwi_gen.hand.gains import OPTIONAL
+from awiwi_gen.loops import search as searching
+from awiwi_gen.loops.hand_joint import joint_of
 from awiwi_gen.loops.joint import Plant
+from awiwi_gen.loops.laws import LAWS
 from awiwi_gen.loops.regulator import cancelling, regulator
-from awiwi_gen.resources import DEFAULT_HAND
+from awiwi_gen.loops.scenarios import FAMILY, Score
+from awiwi_gen.loops.search import search
 from awiwi_gen.tune.tendons import GAINS, plants
 
 TENDONS = 38
@@ -51,7 +59,7 @@ def own(tuned):
     """The hand that takes these gains in."""
     directory, _ = tuned
     file = directory / "hand.toml"
-    file.write_text('gains = "gains.toml"\n' + DEFAULT_HAND.read_text(encoding="utf-8"), encoding="utf-8")
+    file.write_text('gains = "gains.toml"\n' + AWIWI, encoding="utf-8")
     return file
 
 
@@ -104,19 +112,18 @@ def test_the_hand_file_takes_in_the_gains_to_the_last_bit(tuned, own):
         assert all(float(getattr(gains, name)) == each[name] for name in GAINS)
 
 
-def test_the_generated_parameters_carry_the_gains_to_the_last_bit(tuned, own):
-    directory, found = tuned
-    made = directory / "generated"
-    arguments = ["generate", "--hand", own, "-o", made, "--only", "tendon_stretch", "--params", "runtime"]
+def test_the_generated_parameters_carry_the_packaged_gains_to_the_last_bit(tmp_path, hand):
+    made = tmp_path / "generated"
+    arguments = ["generate", "-o", made, "--only", "tendon_stretch", "--params", "runtime"]
     done = CliRunner().invoke(app, [str(argument) for argument in arguments])
 
     assert done.exit_code == 0, done.output
     text = (made / "params.c").read_text()
-    for number, each in enumerate(found):
-        for name in GAINS:
+    for number, each in enumerate(hand.gains):
+        for name in (*GAINS, *OPTIONAL):
             value = re.search(rf"\.gains_{number}_{name} = ([^,]+),", text)
             assert value
-            assert float(value[1]) == each[name]
+            assert float(value[1]) == float(getattr(each, name))
 
 
 def test_the_same_costs_give_the_same_bytes(tuned, tmp_path):
@@ -205,3 +212,34 @@ def test_a_file_that_cannot_be_written_is_an_error_and_no_trace(tmp_path, lib):
 
     assert done.exit_code == 2
     assert "cannot be written" in done.stderr
+
+
+# -- gains that hold on a family of plants ---------------------------------------------------------------------
+
+
+def test_the_search_gives_the_same_gains_for_the_same_seed_and_improves_on_its_starts(lib, hand):
+    joint, law = joint_of(lib, hand), LAWS["motor_pd"]
+    seen = []
+    found, again = (search(lib, law, joint, 3, 40, lambda *step: seen.append(step)) for _ in range(2))
+
+    assert found == again
+    assert all(value > 0 for value in found.gains.values())
+    assert [cost for _, cost in seen[: len(seen) // 2]] == [cost for _, cost in seen[len(seen) // 2 :]]
+    assert set(found.scores) == set(FAMILY)
+
+
+def test_a_family_that_no_gain_can_hold_is_refused_with_the_plant(lib, hand, monkeypatch):
+    good = Score(*(0.0,) * 9, failed=False)
+    scores = {"as known": good, "link x3": replace(good, failed=True)}
+    monkeypatch.setattr(searching, "judged", lambda *_, **__: scores)
+
+    with pytest.raises(InputError, match=r"motor_pd: none of 20 tries runs on the plant 'link x3': .* with motors of"):
+        search(lib, LAWS["motor_pd"], joint_of(lib, hand), 1, 20)
+
+
+@pytest.mark.parametrize(("option", "value"), [("--tries", "3"), ("--seed", "-1")])
+def test_a_search_needs_tries_and_a_seed(option, value):
+    done = CliRunner().invoke(app, ["tune", option, value])
+
+    assert done.exit_code == 2
+    assert "a search has 20 to 100000 tries, and a seed of 0 or more" in done.stderr

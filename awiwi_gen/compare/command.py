@@ -9,15 +9,18 @@ from typing import Any
 
 import awiwi_gen
 from awiwi_gen.compare import comparison
-from awiwi_gen.compare.clock import require_clocked
-from awiwi_gen.compare.laws import LAWS, law_of
-from awiwi_gen.compare.scenarios import BEFORE, FORCES, PLANTS, run
 from awiwi_gen.errors import InputError, unknown
 from awiwi_gen.hand import Hand
-from awiwi_gen.loops.hand_joint import joint_of
+from awiwi_gen.loops import clock
+from awiwi_gen.loops.clock import require_clocked
+from awiwi_gen.loops.hand_joint import FINGER, JOINT, SENSING, joint_of
+from awiwi_gen.loops.laws import LAWS, law_of
+from awiwi_gen.loops.scenarios import BEFORE, FAMILY, FORCES, PLANTS, run
 from awiwi_gen.report import print_json, print_table
 from awiwi_gen.results import Table
 
+DEFAULT = f"{FINGER}_{JOINT}"
+MOST_FORCE = 60.0  # N
 SHOWN = 30  # ticks between two printed rows of a run
 
 
@@ -49,7 +52,7 @@ def read_gains(text: str) -> dict[str, float]:
     return found
 
 
-def benchmark(hand_file: Path | None, name: str, gains: str) -> Shown:
+def benchmark(hand_file: Path | None, name: str, gains: str, where: str) -> Shown:
     """Compare one law, or all of them, on all plants. Raises InputError for gains that are unstable on the clock."""
     chosen = read_gains(gains)
     if chosen and not name:
@@ -58,13 +61,18 @@ def benchmark(hand_file: Path | None, name: str, gains: str) -> Shown:
     for law in laws:
         law.gains_with(chosen)  # refuses bad gains before anything is compiled
     hand = Hand.load(hand_file)
+    place = named_joint(hand, where)
     library = awiwi_gen.build(hand)
+    joint = joint_of(library, hand, *place)
     if chosen:
-        joint, own = joint_of(library, hand), laws[0].gains_with(chosen)
+        own = laws[0].gains_with(chosen, joint)
         clocked = [(force, require_clocked(library, laws[0], own, joint, force)) for force in FORCES]
     else:
-        clocked = comparison.clocks(library, hand, laws)
-    rows = comparison.compare(library, hand, laws, chosen)
+        clocked = comparison.clocks(library, hand, laws, place)
+    if name:
+        own, forces = comparison.own_gains(library, hand, laws[0], place, chosen, FORCES)
+        clocked += [(force, clock.clocked(library, laws[0], own, joint, force, FAMILY)) for force in forces]
+    rows = comparison.compare(library, hand, laws, chosen, where=place)
     return Shown(
         {
             "clock": [{"force": force, **found.as_dict()} for force, found in clocked],
@@ -74,19 +82,37 @@ def benchmark(hand_file: Path | None, name: str, gains: str) -> Shown:
     )
 
 
-def one_run(hand_file: Path | None, name: str, gains: str, scenario: str, force: float, plant: str) -> Shown:
+def named_joint(hand: Hand, where: str) -> tuple[str, str]:
+    """Finger and joint of a name such as index_pip. Raises InputError with the names that there are."""
+    known = {f"{finger}_{joint}": (finger, joint) for finger, each in hand.fingers.items() for joint in each.joints}
+    if where == DEFAULT and where not in known:
+        return comparison.INDEX_PIP  # of another hand, its first joint
+    if where not in known:
+        raise unknown("joint", where, known, f"there are {', '.join(known)}")
+    return known[where]
+
+
+def one_run(
+    hand_file: Path | None, name: str, gains: str, scenario: str, force: float, plant: str, where: str, sensing: str
+) -> Shown:
     """One run of one law. Raises InputError for an unknown law, scenario or plant, and for gains that cannot run."""
     law = law_of(name)
-    own = law.gains_with(read_gains(gains))
+    chosen = read_gains(gains)
+    law.gains_with(chosen)
     if plant not in PLANTS:
         raise unknown("plant", plant, PLANTS, f"there are {'; '.join(PLANTS)}")
-    if not 0 < force <= FORCES[-1] * 2:
-        raise InputError(f"--force {force:g}: a pretension is more than 0 and at most {FORCES[-1] * 2:g} N")
+    if sensing not in SENSING:
+        raise unknown("sensing", sensing, SENSING, f"there are {'; '.join(SENSING)}")
+    if not 0 < force <= MOST_FORCE:
+        raise InputError(f"--force {force:g}: a pretension is more than 0 and at most {MOST_FORCE:g} N")
     hand = Hand.load(hand_file)
+    place = named_joint(hand, where)
     library = awiwi_gen.build(hand)
-    joint = joint_of(library, hand)
+    joint = joint_of(library, hand, *place)
+    own, _ = comparison.own_gains(library, hand, law, place, chosen, FORCES)
     require_clocked(library, law, own, joint, force)
-    trace = run(library, law, own, joint.perturbed(**PLANTS[plant]), joint.believed(), force, [scenario])[scenario]
+    true = joint.perturbed(**PLANTS[plant])
+    trace = run(library, law, own, true, joint.believed(), force, [scenario], sensing=sensing)[scenario]
     time = trace.time - BEFORE * joint.period
     columns = {"q": trace["x"][:, 0], "tau_1": trace["tau"][:, 0], "tau_2": trace["tau"][:, 1]}
     columns |= {"u_1": trace["u"][:, 0], "u_2": trace["u"][:, 1]}
@@ -94,8 +120,9 @@ def one_run(hand_file: Path | None, name: str, gains: str, scenario: str, force:
     head = ("t [s]", "q [rad]", *(f"{name} [N m]" for name in list(columns)[1:]))
     return Shown(
         {
-            "law": name, "scenario": scenario, "plant": plant, "force": force, "gains": own, "refused": trace.refused,
+            "law": name, "scenario": scenario, "plant": plant, "sensing": sensing, "force": force, "gains": own,
+            "refused": trace.refused,
             "status": trace.status, "time": time.tolist(), **{name: c.tolist() for name, c in columns.items()},
         },
-        [Table(f"{name}: {scenario}, {plant}", head, rows)],
+        [Table(f"{name}: {scenario}, {plant}, {sensing}", head, rows)],
     )  # fmt: skip

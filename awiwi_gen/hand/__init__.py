@@ -78,12 +78,12 @@ class Hand(Part):
 
         Raises `InputError` with every fault of the first stage that fails: reading, schema, physics.
         """
-        return _checked(with_gains(_read(path)))
+        return _checked(_read(path))
 
     @classmethod
     def review(cls, path: str | os.PathLike[str] | None = None) -> tuple[Hand, list[Fault]]:
         """Like `load`, with the warnings about the file: possible, but unusual numbers."""
-        file = with_gains(_read(path))
+        file = _read(path)
         hand = _checked(file)
         unusual = (*remarks(hand.fingers), *effort_remarks(hand.limits, hand.fingers))
         warnings = [file.fault(*remark) for remark in unusual]
@@ -122,4 +122,6 @@ def _palm(hand: Hand) -> Iterator[Complaint]:
 
 
 def _read(path: str | os.PathLike[str] | None) -> HandFile:
-    return HandFile.read(path) if path is not None else HandFile.read(DEFAULT_HAND, DEFAULT_HAND.name)
+    if path is not None:
+        return with_gains(HandFile.read(path))
+    return with_gains(HandFile.read(DEFAULT_HAND, DEFAULT_HAND.name), DEFAULT_HAND.parent)

@@ -19,12 +19,17 @@ from pydantic import Field
 from awiwi_gen.errors import InputError
 from awiwi_gen.hand.file import HandFile
 from awiwi_gen.hand.names import Source
+from awiwi_gen.hand.part import absent
 from awiwi_gen.hand.parts import Keys, Measure, Part
 from awiwi_gen.units import Quantity
 
-__all__ = ["GainsFile", "TendonGains", "gains_complaints", "with_gains"]
+__all__ = ["OPTIONAL", "REQUIRED", "GainsFile", "TendonGains", "gains_complaints", "with_gains"]
 
 Rate = Annotated[Quantity, Measure("100 1/s", "1e-6 1/s", "1000000 1/s")]
+
+Pretension = Annotated[Quantity, Measure("10 N", "1e-3 N", "10000 N")]
+Delay = Annotated[Quantity, Measure("22 ms", "1 ms", "10 s")]
+LeastTorque = Annotated[Quantity, Measure("2 mN m", "1e-12 N m", "1000 N m")]
 
 
 class TendonGains(Part):
@@ -32,6 +37,10 @@ class TendonGains(Part):
 
     Both tendons of a joint share the joint's impedance K_p and K_d. The rates K_3 and K_4 are those of the errors of
     the tendon's torque and of its rate, C_t and C_s what these weigh in the Lyapunov function.
+
+    The other keys may be left out: the tendon's pretension at rest, the delay of the reference filter, the rates of the
+    observer, and of what it learns: inertia, springs, below which rate and torque nothing is learnt, and the plan of the
+    pretension.
     """
 
     tendon: Annotated[int, Field(ge=0, examples=["11"])]
@@ -41,7 +50,28 @@ class TendonGains(Part):
     K_4: Rate
     C_t: Annotated[Quantity, Measure("1 rad/(N m)", "1e-12 rad/(N m)", "1000000000 rad/(N m)")]
     C_s: Annotated[Quantity, Measure("0.001 rad s^2/(N m)", "1e-12 rad s^2/(N m)", "1000000000 rad s^2/(N m)")]
+    pretension: Annotated[Pretension | None, Field(exclude_if=absent)] = None
+    smoothing: Annotated[Delay | None, Field(exclude_if=absent)] = None
+    link_rate: Annotated[Rate | None, Field(exclude_if=absent)] = None
+    motor_rate: Annotated[Rate | None, Field(exclude_if=absent)] = None
+    torque_rate: Annotated[Rate | None, Field(exclude_if=absent)] = None
+    spring_rate: Annotated[Rate | None, Field(exclude_if=absent)] = None
+    inertia_rate: Annotated[Rate | None, Field(exclude_if=absent)] = None
+    balance_rate: Annotated[Rate | None, Field(exclude_if=absent)] = None
+    memory_rate: Annotated[Rate | None, Field(exclude_if=absent)] = None
+    pretension_rate: Annotated[Rate | None, Field(exclude_if=absent)] = None
+    least_torque: Annotated[LeastTorque | None, Field(exclude_if=absent)] = None
     source: Source
+
+
+REQUIRED = {
+    "K_p": "N m/rad", "K_d": "N m s/rad", "K_3": "1/s", "K_4": "1/s", "C_t": "rad/(N m)", "C_s": "rad s^2/(N m)",
+}  # fmt: skip
+OPTIONAL = {
+    "pretension": "N", "smoothing": "s", "link_rate": "1/s", "motor_rate": "1/s", "torque_rate": "1/s",
+    "spring_rate": "1/s", "inertia_rate": "1/s", "balance_rate": "1/s", "memory_rate": "1/s", "pretension_rate": "1/s",
+    "least_torque": "N m",
+}  # fmt: skip
 
 
 Gains = Annotated[tuple[TendonGains, ...], Field(strict=False, max_length=256, examples=["[[gains]]"])]
@@ -53,16 +83,17 @@ class GainsFile(Part):
     gains: Gains
 
 
-def with_gains(file: HandFile) -> HandFile:
+def with_gains(file: HandFile, folder: Path | None = None) -> HandFile:
     """A hand file with the gains of the file it names in place of that name.
 
-    Only a regular file in or below the folder of the hand file is read. Raises `InputError` with the faults of that
+    Only a regular file in or below the folder of the hand file is read; ``folder`` is that folder, where the file has
+    another name in messages. Raises `InputError` with the faults of that
     file, or with the line that names it if it cannot be read.
     """
     name = file.data.get("gains")
     if not isinstance(name, str):
         return file
-    folder = Path(file.name).parent
+    folder = folder or Path(file.name).parent
     try:
         inside = (folder / name).resolve().is_relative_to(folder.resolve())
     except (OSError, ValueError, RuntimeError):  # a null character, a loop of links
@@ -72,7 +103,7 @@ def with_gains(file: HandFile) -> HandFile:
         message = f'{shown} is no file in or below the folder of the hand file; expected a path such as "gains.toml"'
         raise InputError(file.fault(("gains",), message))
     try:
-        included = HandFile.read(folder / name)
+        included = HandFile.read(folder / name, None if folder == Path(file.name).parent else name)
     except InputError as error:
         if any(fault.line for fault in error.faults):
             raise

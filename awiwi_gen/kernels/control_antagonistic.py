@@ -9,7 +9,7 @@ from typing import Any
 
 from awiwi_gen.kernel import Kernel, Port
 from awiwi_gen.kernels import plants
-from awiwi_gen.kernels.control_backstepping import MOTION, PAIR, PORTS, TORQUES, Nm, box, positive, symmetric
+from awiwi_gen.kernels.control_backstepping import INERTIA, MOTION, PAIR, PORTS, TORQUES, Nm, box, positive, symmetric
 from awiwi_gen.kernels.declare import Family, Parameterless
 from awiwi_gen.units import one, rad, s
 
@@ -50,7 +50,22 @@ INPUTS = {
     "torque": Port((), Nm, -2.0, 2.0),
     "resistance": Port((2,), Nm, -4.0, 4.0),
     "friction": plants.FRICTION["friction"],
-}
+    "adaptation": box(
+        (one, one, *(Nm,) * 9), (0.2, -0.5, *(-1.0,) * 9), (2.0, 0.5, *(1.0,) * 9),
+    ),
+    "load": Port((), Nm, -1.0, 1.0),
+    "driven": Port((), Nm, -1.0, 1.0),
+    "excited": Port((), Nm, -1.0, 1.0),
+    "inertia": Port((), INERTIA, 5e-7, 1e-3),
+    "learning": Port((4,), one / s, 1.0, 2e3),
+    "ranges": box((one, one, one), (0.1, 1.5, 0.1), (0.6, 3.0, 0.9)),
+    "noise": Port((), Nm, 1e-4, 1e-2),
+    "curves": box(plants.SPRING, (0.05, -1.0, 0.01), (2.0, 2.0, 10.0), rows=2),
+    "plan": box(TORQUES, (0.0, -10.0, -1e3), (1.0, 10.0, 1e3)),
+    "stiffness": Port((), plants.STIFFNESS, 0.0, 10.0),
+    "bounds": Port((3,), Nm, 0.01, 1.0),
+    "rate": Port((), one / s, 1.0, 1e3),
+}  # fmt: skip
 
 
 @of_pair(
@@ -136,3 +151,44 @@ def backstepping_adaptive(
     damping: Any, impedance: Any, tunings: Any, resistance: Any,
 ) -> Any:  # fmt: skip
     """The antagonistic law for a link with damping; springs, external torque and resistance come from the observer."""
+
+
+@of_pair(
+    lambda _: {
+        "adaptation_next": Port((11,), (one, one, *(Nm,) * 9)),
+        "link_inertia": Port((), INERTIA),
+        "factors": Port((2,), one),
+    },
+    "the observer's load, correlated with torques",
+    subject="antagonistic_adaptation",
+    guards=positive("the period", "the inertia", "the noise", "the least share"),
+)
+def antagonistic_identifier(
+    _: Any, adaptation: Any, driven: Any, excited: Any, load: Any, inertia: Any,
+    learning: Any, ranges: Any, noise: Any, period: Any,
+) -> Any:  # fmt: skip
+    """Learns the link's inertia and how much stronger one spring is than the other, from the observer's outputs.
+
+    driven is the torque that the desired motion needs, excited the sum of torques that is added to both springs. Pass
+    link_inertia to the observer and the law in the next sample, and multiply torques that are known through the springs'
+    calibration by factors. learning are the bandwidth of the observer's link, the rate below which signals are ignored,
+    and the rates of learning inertia and springs; a rate of zero learns nothing. ranges limit inertia over link_inertia
+    (low, high) and the springs' difference. noise is the torque below which nothing is learnt. Start the memory with 1
+    and zeros.
+    """
+
+
+@of_pair(
+    lambda _: {"plan_next": Port((3,), TORQUES)},
+    "eq. 15.88, with a pretension for the load and the stiffness",
+    subject="antagonistic_adaptation",
+    guards=positive("the period", "the rate", "the mean cubic coefficient", "the most"),
+)
+def antagonistic_pretension(
+    _: Any, plan: Any, torque: Any, stiffness: Any, curves: Any, bounds: Any, rate: Any, period: Any
+) -> Any:
+    """Pretension with two derivatives, moving smoothly to the least that keeps both tendons taut and stiff enough.
+
+    torque is that on the link, stiffness that which both springs shall have together. bounds are the least common torque,
+    the torque that the slacker spring shall keep, and the most. plan is the memory: start with the pretension at rest.
+    """

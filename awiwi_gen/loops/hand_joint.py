@@ -17,7 +17,8 @@ from scipy.optimize import linear_sum_assignment
 
 from awiwi_gen.errors import InputError
 from awiwi_gen.hand import Hand
-from awiwi_gen.simulate import PERIOD, Actuator, Array, Block, Element, Loop, Sensor
+from awiwi_gen.hand.gains import TendonGains
+from awiwi_gen.simulate import PERIOD, Actuator, Array, Block, Element, Loop, Sensor, Sum
 
 FINGER, JOINT = "index", "pip"
 DAMPING = 2e-4  # N m s/rad, of the link
@@ -51,14 +52,17 @@ class Joint:
         """The same with the friction that a law knows."""
         return replace(self, friction=self.friction * [1, self.known, self.known])
 
-    def perturbed(self, springs: tuple[float, float] = (1, 1), friction: float = 1, link: float = 1) -> Joint:
-        """The same with springs, friction and the link's inertia multiplied by factors."""
+    def perturbed(
+        self, springs: tuple[float, float] = (1, 1), friction: float = 1, link: float = 1, damping: float = 1
+    ) -> Joint:
+        """The same with springs, friction, the link's inertia and its damping multiplied by factors."""
         tendons = self.tendons * np.array(springs)[:, None]
         return replace(
             self,
             tendons=tendons,
             friction=self.friction * [1, friction, friction],
             inertias=self.inertias * [link, 1, 1],
+            damping=self.damping * damping,
         )
 
     def elongations(self, torque: float) -> Array:
@@ -72,24 +76,27 @@ class Joint:
         slopes: Array = self.tendons[:, 0] + 2 * self.tendons[:, 1] * p + 3 * self.tendons[:, 2] * p**2
         return slopes
 
+    def stronger(self, believed: Joint, force: float) -> Array:
+        """How many times as strong (2,) the springs are as a law believes, at rest under a pretension [N]."""
+        p = self.elongations(force * self.arm)
+        weaker: Array = (believed.tendons * p[:, None] ** [1, 2, 3]).sum(axis=1)
+        return force * self.arm / weaker
+
 
 def joint_of(library: Any, hand: Hand, finger: str = FINGER, joint: str = JOINT) -> Joint:
     """A joint of a hand, with the finger straight and its other joints held. Raises InputError where there is none."""
     if hand.motor is None or hand.spring is None or hand.motor.friction is None:
         raise InputError("a joint between tendons needs a hand with the sections [motor], with friction, and [spring]")
-    pulled = [name for name, each in hand.fingers.items() if each.pulled and not each.sliding]
-    if not pulled:
-        raise InputError(
-            "a joint between tendons needs a finger with tendons that motors pull, none of whose joints slide"
-        )
-    finger = finger if finger in pulled else pulled[0]
+    finger, index = place_of(hand, finger, joint)
     names = hand.fingers[finger].joints
-    index = names.index(joint) if joint in names else 0
     pulley, friction = float(hand.motor.pulley), hand.motor.friction
-    driven = [each for each in drives(library, finger, pulley) if each.joint == index]
-    if not driven:
-        raise InputError(f"no tendon of fingers.{finger} is left for its joint {names[index]}")
-    arm, link, b = max((each.arm, each.link, each.motor) for each in driven)
+    both = pair_of(drives(library, finger, pulley), index)
+    if both is None:
+        raise InputError(
+            f"fingers.{finger}: the joint {names[index]} has no pair of tendons, one for each direction, when the finger "
+            "is straight; a law for pairs has nothing to pull back with"
+        )
+    arm, link, b = max((each.arm, each.link, each.motor) for each in both)
     ratio = arm / pulley
     known = np.array([friction.steepness, friction.level, friction.viscosity], float)
     return Joint(
@@ -105,6 +112,26 @@ def joint_of(library: Any, hand: Hand, finger: str = FINGER, joint: str = JOINT)
     )
 
 
+def place_of(hand: Hand, finger: str, joint: str) -> tuple[str, int]:
+    """The finger and the index of a joint; of a hand that has no such joint, its first that motors turn."""
+    pulled = [name for name, each in hand.fingers.items() if each.pulled and not each.sliding]
+    if not pulled:
+        raise InputError(
+            "a joint between tendons needs a finger with tendons that motors pull, none of whose joints slide"
+        )
+    finger = finger if finger in pulled else pulled[0]
+    names = hand.fingers[finger].joints
+    return finger, names.index(joint) if joint in names else 0
+
+
+def gains_of(library: Any, hand: Hand, finger: str = FINGER, joint: str = JOINT) -> TendonGains | None:
+    """The gains in the hand file of a joint's own tendons, if there are any."""
+    finger, index = place_of(hand, finger, joint)
+    driven, first = drives(library, finger, float(hand.motor.pulley)), hand.blocks[finger][0].start  # type: ignore[union-attr]
+    own = {first + each.tendon for each in driven if each.joint == index}
+    return next((gains for gains in hand.gains if gains.tendon in own), None)
+
+
 def period_of(hand: Hand) -> float:
     """The period of the hand's clock [s]; that of 3 kHz for a hand without one."""
     return float(hand.clock.period) if hand.clock else PERIOD
@@ -112,12 +139,36 @@ def period_of(hand: Hand) -> float:
 
 @dataclass(frozen=True)
 class Drive:
-    """A tendon's joint and lever arm [m]; inertias [kg m^2] of the link and of the motor in joint coordinates."""
+    """A tendon's joint and lever arm [m]; inertias [kg m^2] of the link and of the motor in joint coordinates.
+
+    ``tendon`` counts within the finger; ``pulls`` are its lever arms [m] at all joints, with their signs.
+    """
 
     joint: int
     arm: float
     link: float
     motor: float
+    tendon: int
+    pulls: Array
+
+
+def pair_of(driven: Sequence[Drive], joint: int) -> tuple[Drive, Drive] | None:
+    """The tendons that pull a joint forward and back: its own where it has them, else those with the longest arms."""
+
+    def longest(sign: int) -> Drive | None:
+        found = [each for each in driven if sign * each.pulls[joint] > 0]
+        return max(found, key=lambda each: (each.joint == joint, abs(each.pulls[joint])), default=None)
+
+    forward, back = longest(-1), longest(1)  # a tendon that gets shorter pulls forward
+    link = next((each.link for each in driven if each.joint == joint), None)
+    if forward is None or back is None or link is None:
+        return None
+    arm = float(max(abs(each.pulls[joint]) for each in (forward, back)))
+
+    def on_joint(each: Drive) -> Drive:
+        return replace(each, arm=arm, link=link, motor=each.motor * (arm / each.arm) ** 2, joint=joint)
+
+    return on_joint(forward), on_joint(back)
 
 
 def drives(library: Any, finger: str, pulley: float) -> list[Drive]:
@@ -127,14 +178,18 @@ def drives(library: Any, finger: str, pulley: float) -> list[Drive]:
     """
     coupling = library[f"{finger}_coupling"]
     straight = np.zeros(coupling.inputs[0]["shape"])
-    arms = np.abs(coupling(straight))
+    signed = coupling(straight)
+    arms = np.abs(signed)
     found = library[f"{finger}_mass_matrix"](straight)
     masses = np.diagonal(found if isinstance(found, np.ndarray) else found.M)  # of a four-bar, a status comes with M
     inertia, share = 2 * float(library.motor_energy(1.0)), -(-len(arms) // len(straight))
     _, places = linear_sum_assignment(np.repeat(arms, share, axis=1), maximize=True)
     joints = [int(place) // share for place in places]
     pulls = [(joint, float(arm[joint])) for joint, arm in zip(joints, arms, strict=True)]
-    return [Drive(joint, arm, float(masses[joint]), inertia * (arm / pulley) ** 2) for joint, arm in pulls]
+    return [
+        Drive(joint, arm, float(masses[joint]), inertia * (arm / pulley) ** 2, index, signed[index])
+        for index, (joint, arm) in enumerate(pulls)
+    ]
 
 
 def _cubic(library: Any) -> Array:
@@ -149,17 +204,34 @@ def _cubic(library: Any) -> Array:
     return fitted
 
 
-def loop_around(joint: Joint, law: Sequence[Element]) -> Loop:
-    """The joint on the hand's clock, with its sensors and motors; the law reads the sensors and writes ``wanted``."""
+SENSING = ("force sensor", "lever")
+CALIBRATED = (  # tendon torques as the springs' calibration has them, corrected by what the law has learnt
+    Block(
+        "antagonistic_springs",
+        {
+            "stretches": "stretches_seen", "speeds": "unmoved", "tendons": "known_tendons", "torques": "calibrated",
+            "springs": "calibrated_springs",
+        },
+    ),
+    Sum("measured", (("calibrated[0]", "calibrated[2]"), "factors")),
+)  # fmt: skip
+
+
+def loop_around(joint: Joint, law: Sequence[Element], sensing: str = SENSING[0]) -> Loop:
+    """The joint on the hand's clock, with its sensors and motors; the law reads the sensors and writes ``wanted``.
+
+    Tendon torques are measured, or with the lever alone are those that its calibration gives for the elongations.
+    """
     noise = sqrt(2.0) * ANGLE_NOISE  # of the two sensors of a lever
+    lever = sensing != SENSING[0]
     return Loop(
         plant=[Block("plant_antagonistic")],
-        law=law,
+        law=[*CALIBRATED, *law] if lever else law,
         states={"x": "xd"},
         sensors=[
             Sensor(("x[2]", "x[4]"), "thetas", step=joint.encoder),
             Sensor("stretches", "stretches_seen", noise=noise, step=ANGLE_NOISE),
-            Sensor("tau", "measured", noise=TORQUE_NOISE, step=TORQUE_NOISE),
+            *([] if lever else [Sensor("tau", "measured", noise=TORQUE_NOISE, step=TORQUE_NOISE)]),
             Sensor("u", "acted"),
         ],
         actuators=[Actuator("wanted", "u", limit=joint.limit)],
@@ -178,4 +250,5 @@ def values_of(joint: Joint, believed: Joint, force: float) -> dict[str, Any]:
         "motion": np.zeros(5), "goal": np.zeros(5), "period": joint.period,
         "known_inertias": believed.inertias, "known_tendons": believed.tendons, "known_damping": believed.damping,
         "known_friction": believed.friction, "pretension": [torque, 0, 0], "nothing": 0.0, "acted": [torque, torque],
+        "link_inertia": believed.inertias[0], "factors": np.ones(2), "unmoved": np.zeros(2),
     }  # fmt: skip

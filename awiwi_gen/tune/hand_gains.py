@@ -1,91 +1,175 @@
-"""The check of gains in a hand file, before C is generated from them.
+"""The check of gains in a hand file, before C is generated from them, and its result: the certificate.
 
-As in `awiwi-gen tune` each tendon counts as one half of its joint; the law is the antagonistic one, on the
-hand's clock and with a delay of one sample, linearised about rest at two pretensions. Unstable gains are refused.
+Gains of a tendon are those of its joint. The adaptive law with them runs on the joint and on all plants of the family, on
+the hand's clock with a delay of one sample; it believes the joint as known. Gains are refused where the law is unstable
+on some plant and does more than hunt. The certificate is kept in the cache by the digest of what it is about, and the
+packaged hands have theirs beside their gains.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from itertools import product
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import awiwi_gen
-from awiwi_gen.cache import Cache, code_digest, key
-from awiwi_gen.errors import Fault, InputError
+from awiwi_gen import parallel
+from awiwi_gen.cache import Cache, key
+from awiwi_gen.certificates import VERSION, Row, certificate_text, digest_of, kept_certificate
+from awiwi_gen.errors import Fault, InputError, OutputError
 from awiwi_gen.hand import Hand
-from awiwi_gen.loops.hand_joint import period_of
-from awiwi_gen.loops.joint import Plant
-from awiwi_gen.loops.nearest import nearest
-from awiwi_gen.loops.pair import Pair, pair_loop
-from awiwi_gen.tune.tendons import GAINS, plants
+from awiwi_gen.hand.file import HandFile
+from awiwi_gen.hand.gains import OPTIONAL, REQUIRED, GainsFile, TendonGains
+from awiwi_gen.loops.clock import Clocked, clocked
+from awiwi_gen.loops.hand_joint import Joint, joint_of
+from awiwi_gen.loops.scenarios import FAMILY, FORCES, JUDGED
+from awiwi_gen.loops.search import BANDWIDTHS
+from awiwi_gen.parallel import Progress, silent
+from awiwi_gen.tune.family import LAW, NEEDED, Pulled, Tuned, gains_text, pulled_joints
 
-PRETENSIONS = (10.0, 20.0)  # N
-NEEDED = "backstepping_antagonistic,motor_energy,spring_elongation,spring_stiffness,*_coupling,*_mass_matrix"
-POWERS = {"K_p": 2, "K_d": 1, "K_3": 1, "K_4": 1, "C_t": 0, "C_s": -2}  # of the bandwidth, that gains grow with
 
+def require_running_gains(
+    hand: Hand, store: Cache, beside: Path | None = None, progress: Progress = silent
+) -> list[Row]:
+    """The certificate of a hand's gains. Raises InputError with every tendon whose gains do not run, and gains that do.
 
-def require_running_gains(hand: Hand, store: Cache) -> None:
-    """Raise InputError with every tendon whose gains are unstable, and the nearest stable gains."""
+    A certificate for these numbers is taken from the cache or the folder ``beside``, else it is made.
+    """
     if not hand.gains:
-        return
-    digest = key(hand.digest(), period_of(hand), code_digest())
-    faults = store.memo("gains", digest, lambda: failing(awiwi_gen.build(hand, only=NEEDED), hand))
-    if faults:
-        raise InputError(faults)
+        return []
+    rows = kept_certificate(hand, store, beside)
+    if rows is None:
+        library = awiwi_gen.build(hand, only=NEEDED)
+        faults = failing(library, hand, store, progress)
+        if faults:
+            raise InputError(faults)
+        rows = certificate(library, hand, store)
+        store.write("certificates", digest_of(hand), certificate_text(hand, rows).encode())
+    return rows
 
 
-def failing(library: Any, hand: Hand) -> list[Fault]:
-    """A fault for each tendon whose gains are unstable."""
-    found: dict[int, tuple[str, list[Plant]]] = {}
-    for force in pretensions(library):
-        for name, finger in hand.fingers.items():
-            first = hand.blocks[name][0].start
-            for index, (joint, plant) in enumerate(plants(library, hand, name, finger, force)):
-                found.setdefault(first + index, (f"{name}, {joint}", []))[1].append(plant)
-    faults, period = [], period_of(hand)
-    for index, gains in enumerate(hand.gains):
-        joint, both = found[gains.tendon]
-        wanted = {name: float(getattr(gains, name)) for name in GAINS}
-        worst = max(radius(library, plant, wanted, period) for plant in both)
-        if not worst < 1:
-            why = f"spectral radius {worst:.3g}" if np.isfinite(worst) else "the law has no finite feedback with them"
-            message = (
-                f"= {gains.tendon} ({joint}): these gains are unstable at {1 / period:.0f} Hz and a delay of one sample "
-                f"({why}); {way_out(library, both, wanted, period)}"
-            )
-            faults.append(Fault(key=f"gains[{index}].tendon", message=message))
+def holding(hand: Hand, found: list[Tuned], store: Cache, progress: Progress = silent) -> tuple[Hand, list[str]]:
+    """The hand with the gains that were found, but for those that do not run on the whole family, and why not."""
+    own = _with(hand, found)
+    faults = failing(awiwi_gen.build(own, only=NEEDED), own, store, progress)
+    bad = {own.gains[int(re.findall(r"\d+", fault.key or "")[0])].tendon: fault for fault in faults}
+    refused = [f"tendon {str(fault.message).removeprefix('= ')}" for fault in bad.values()]
+    found[:] = [(each, result) for each, result in found if not bad.keys() & {*each.tendons}]
+    return _with(hand, found), refused
+
+
+def _with(hand: Hand, found: list[Tuned]) -> Hand:
+    gains = HandFile.parse(gains_text(found, 0, 0), "gains.toml").validated(GainsFile).gains if found else ()
+    return hand.model_copy(update={"gains": gains})
+
+
+def certificate(library: Any, hand: Hand, store: Cache) -> list[Row]:
+    """A row for each set of gains of a joint: worst radius, margin and cycle over the family, and their plants."""
+    rows = []
+    for each, number in gains_of_joints(library, hand).items():
+        found = store.get("clocked", joint_digest(library, hand, each, hand.gains[number]))
+        if not isinstance(found, Clocked):  # `failing` has just put it there
+            raise OutputError(f"{store.directory} was changed during the run; run it again")
+        row = {"joint": each.name, "tendons": list(each.tendons), "radius": found.radius, "margin": found.margin}
+        rows.append(row | {"cycle": found.cycle, "noise": found.noise, "at": dict(found.at), "plants": found.plants})
+    return rows
+
+
+def gains_of_joints(library: Any, hand: Hand) -> dict[Pulled, int]:
+    """Joints that have gains, with the tendons that share a set, and the index of the set."""
+    joints, _ = pulled_joints(library, hand)
+    owner = {tendon: each for each in joints for tendon in each.tendons}
+    seen: dict[tuple[Pulled, str], list[int]] = {}
+    for number, gains in enumerate(hand.gains):
+        each = owner.get(gains.tendon)
+        if each is None:
+            continue
+        numbers = str([str(getattr(gains, name)) for name in (*REQUIRED, *OPTIONAL)])
+        seen.setdefault((each, numbers), []).append(number)
+    return {
+        Pulled(each.finger, each.joint, tuple(hand.gains[number].tendon for number in alike)): alike[0]
+        for (each, _), alike in seen.items()
+    }
+
+
+def failing(library: Any, hand: Hand, store: Cache | None = None, progress: Progress = silent) -> list[Fault]:
+    """A fault for each set of gains that does not run, and for each tendon whose joint has no pair."""
+    store = store or Cache()
+    faults = []
+    joints, _ = pulled_joints(library, hand)
+    owned = {tendon for each in joints for tendon in each.tendons}
+    for number, gains in enumerate(hand.gains):
+        if gains.tendon not in owned:
+            message = f"= {gains.tendon}: its joint has no pair of tendons, one for each direction"
+            faults.append(Fault(key=f"gains[{number}].tendon", message=message))
+    chosen = gains_of_joints(library, hand)
+    digests = {each: joint_digest(library, hand, each, hand.gains[number]) for each, number in chosen.items()}
+    missing = set(store.missing("clocked", digests.values()))
+    work = [(hand, each, number, digests[each], store) for each, number in chosen.items() if digests[each] in missing]
+    if len(work) == 1:
+        keep(library, work[0])
+    else:
+        parallel.run("certify", examine, work, progress)
+    for each, number in chosen.items():
+        found = store.get("clocked", digests[each])
+        joint, gains = joint_of(library, hand, each.finger, each.joint), hand.gains[number]
+        if isinstance(found, Clocked) and found.runs:
+            continue
+        why = found.reason if isinstance(found, Clocked) else str(found)
+        message = f"= {gains.tendon} ({each.name}): these gains are {why}; {way_out(library, joint, each.name)}"
+        faults.append(Fault(key=f"gains[{number}].tendon", message=message))
     return faults
 
 
+def joint_digest(library: Any, hand: Hand, each: Pulled, gains: TendonGains) -> str:
+    """The digest of a joint's numbers and gains."""
+    return key(VERSION, repr(joint_of(library, hand, each.finger, each.joint)), gains.digest())
+
+
+def keep(library: Any, piece: tuple[Hand, Pulled, int, str, Cache]) -> None:
+    """Run one joint on the family, and keep what is found, or why the law refuses its gains."""
+    hand, each, number, digest, store = piece
+    joint = joint_of(library, hand, each.finger, each.joint)
+    try:
+        found: Clocked | str = worst_clocked(library, joint, hand.gains[number])
+    except InputError as error:
+        found = f"refused by the law: {error}"
+    store.put("clocked", digest, found)
+
+
+def examine(piece: tuple[Hand, Pulled, int, str, Cache]) -> None:
+    """The same in a process of its own."""
+    keep(awiwi_gen.build(piece[0], only=NEEDED, progress=silent), piece)
+
+
+def worst_clocked(library: Any, joint: Joint, gains: TendonGains) -> Clocked:
+    """The law with these gains on the family; at two pretensions where the gains name none."""
+    own = LAW.gains_from(joint, gains)
+    found = [clocked(library, LAW, own, joint, force, FAMILY) for force in forces(library, gains)]
+    return max(found, key=lambda each: (not each.runs, each.radius))
+
+
+def forces(library: Any, gains: TendonGains) -> list[float]:
+    """Pretensions [N] at which gains are examined."""
+    return pretensions(library) if gains.pretension is None else [float(gains.pretension)]
+
+
 def pretensions(library: Any) -> list[float]:
-    """Forces [N] at which the springs' stiffness is taken: the nearest that the springs of the hand can have."""
+    """Usual pretensions [N], or the nearest that the springs of the hand can have."""
     (port,) = library.spring_elongation.inputs
-    return [float(np.clip(force, port["low"][0], port["high"][0])) for force in PRETENSIONS]
+    return [float(np.clip(force, port["low"][0], port["high"][0])) for force in FORCES]
 
 
-def radius(library: Any, plant: Plant, gains: Mapping[str, float], period: float, delay: int = 1) -> float:
-    """Spectral radius of a joint whose two tendons have these gains; infinite where the law refuses them."""
-    pair = Pair(plant.m, (plant.b / 2,) * 2, (plant.k / 2,) * 2)
-    impedance, tuning = list(gains.values())[:2], list(gains.values())[2:]
-    loop, constant = pair_loop(library.backstepping_antagonistic, pair, impedance, tuning)
-    if not (np.isfinite(loop.K).all() and np.isfinite(constant).all()):
-        return float("inf")
-    return loop.sampled_radius(delay, period)
-
-
-def way_out(library: Any, both: list[Plant], gains: dict[str, float], period: float) -> str:
-    """The nearest stable gains, in words; they are stable with another sample of delay, too."""
-
-    def works(chosen: Mapping[str, float]) -> bool:
-        return all(radius(library, plant, chosen, period, delay) < 1 for plant in both for delay in (1, 2))
-
-    def widest(chosen: Mapping[str, float]) -> float:
-        return max(radius(library, plant, chosen, period, 2) for plant in both)
-
-    found = nearest(gains, POWERS, works, widest)
-    if found is None:
-        return "no other bandwidth and no change of gains was found that helps"
-    listed = ", ".join(f'{name} = "{value:.6g} {GAINS[name]}"' for name, value in found.gains.items())
-    return f"the nearest that run are {listed}"
+def way_out(library: Any, joint: Joint, name: str) -> str:
+    """Gains for such a joint that run on the whole family, in words; else the command that searches for some."""
+    for force, bandwidth in product(FORCES, BANDWIDTHS):
+        gains = LAW.gains_for(joint, bandwidth)
+        if clocked(library, LAW, gains, joint, force, JUDGED).runs:
+            found = gains | {"pretension": force}
+            units = {**REQUIRED, **OPTIONAL}
+            listed = ", ".join(f'{key} = "{found[key]:.6g} {unit}"' for key, unit in units.items())
+            return f"gains that run on such a joint are {listed}"
+    return f"awiwi-gen tune --only {name.replace(', ', '_')} searches for gains that run"
