@@ -1,9 +1,9 @@
 """What a hand's tendons can do, and which kernels cannot exist because of what they cannot do.
 
 Tendons only pull: the torques -P' f of forces f >= 0 form a cone. Lengths tell the joint angles where P = dh/dq has as
-many independent columns as there are joints; a torque of any direction needs the cone to be the whole space. Only
-tendons with motors count, and those of one motor count as one. Return strings pull with a force of their own that no
-controller changes.
+many independent columns as there are joints, or where springs of joints tell the rest. A torque of any direction needs
+the cone to be the whole space. Only tendons with motors count, and those of one motor count as one. Return strings pull
+with a force of their own that no controller changes.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from awiwi_gen.hand.parts import Finger
 from awiwi_gen.hand.pose import Chain
+from awiwi_gen.structure import estimated_parts, is_curved, resting_parts
 
 if TYPE_CHECKING:
     from awiwi_gen.hand import Hand
@@ -109,7 +110,59 @@ def _unknown_angles(finger: Finger, couplings: Sequence[Any]) -> list[str]:
     columns = [[[row[column] for column in free] for row in coupling] for coupling in couplings]
     reason = _indistinct(columns, [finger.joints[column] for column in free])
     without = " without sensors" if finger.measured else ""
-    return [f"{reason}: tendon lengths do not determine the joint angles{without}"] if reason else []
+    if not reason or not (springs := _no_rest(finger, couplings)):
+        return []
+    return [f"{reason}: tendon lengths do not determine the joint angles{without}{springs if springs != ' ' else ''}"]
+
+
+def estimate_sources(finger: Finger) -> dict[str, tuple[str, ...]]:
+    """Where the equations of a joint estimate come from, besides tendon lengths: sensors and springs, of these joints."""
+    joints, resting = finger.joints, [joint for part, _ in resting_parts(finger) for joint in part]
+    springs = [joints[j] for j in resting if sprung(finger, joints[j])]
+    found = {"sensors": tuple(joints[j] for j in finger.measured), "springs": tuple(springs)}
+    return {source: names for source, names in found.items() if names}
+
+
+def sprung(finger: Finger, joint: str) -> bool:
+    """Whether a joint, or one that follows it, has a spring."""
+    return any(link.spring is not None and finger.leaders.get(link.joint, link.joint) == joint for link in finger.links)
+
+
+def _no_rest(finger: Finger, couplings: Sequence[Any]) -> str:
+    """Why springs do not tell the angles that lengths leave open; empty if they do, blank if there are none."""
+    import numpy as np
+
+    stiffness = _spring_stiffness(finger)
+    if not stiffness and not finger.strings:
+        return " "
+    if stiffness is None or finger.strings or is_curved(finger):
+        return "; springs would, but only by torques that are linear in the angles, with constant arms and no return strings"
+    for joints, tendons in estimated_parts(finger):
+        names = [finger.joints[j] for j in joints]
+        arms = (
+            _scaled([[couplings[0][i][j] for j in joints] for i in tendons]) if tendons else np.zeros((0, len(joints)))
+        )
+        size = np.array([stiffness.get(name, 0.0) for name in names])
+        size = size / max(size.max(initial=0.0), 1e-300)
+        rank = int(np.linalg.matrix_rank(arms, _RANK)) if tendons else 0
+        if rank < min(arms.shape):
+            return f", and springs of joints do not where tendons that move {', '.join(names)} depend on one another"
+        kept = np.linalg.svd(arms)[2][rank:] if tendons else np.eye(len(joints))
+        if np.linalg.matrix_rank(kept * np.sqrt(size), _RANK) < len(joints) - rank:
+            return f", nor do the springs of joints: {', '.join(names)} can turn without stretching one"
+    return ""
+
+
+def _spring_stiffness(finger: Finger) -> dict[str, float] | None:
+    """Stiffness by independent joint of the springs of that joint and its followers; None if it depends on the pose."""
+    found: dict[str, float] = {}
+    for link in finger.links:
+        if link.spring is not None:
+            motion, leader = finger.motion(link.joint), finger.leaders.get(link.joint, link.joint)
+            if len(motion) > 2:
+                return None
+            found[leader] = found.get(leader, 0.0) + float(link.spring.stiffness) * motion[1] ** 2
+    return found
 
 
 def _none(finger: Finger) -> str:
