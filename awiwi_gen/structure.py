@@ -177,6 +177,13 @@ def determined(finger: Finger) -> tuple[list[int], list[int]]:
     return joints, [i for i in range(len(finger.transmissions)) if not any(i in part for _, part in resting)]
 
 
+def rests_in_a_bend(finger: Finger) -> bool:
+    """Whether joints rest by springs, and springs or tendons do not act linearly on them: strings, or what bends with q."""
+    curves = {coupling.follower for coupling in finger.couplings if coupling.powers}
+    springs = any(link.spring is not None and link.joint in curves for link in finger.links)
+    return bool(resting_parts(finger)) and (bool(finger.strings) or springs or is_curved(finger))
+
+
 def is_curved(finger: Finger) -> bool:
     """Whether the coupling depends on the pose, as that of lines from link to link does."""
     return any(is_bent(finger, transmission) for transmission in finger.transmissions)

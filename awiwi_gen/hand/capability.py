@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from awiwi_gen.hand.parts import Finger
 from awiwi_gen.hand.pose import Chain
-from awiwi_gen.structure import estimated_parts, is_curved, resting_parts
+from awiwi_gen.structure import resting_parts, rests_in_a_bend
 
 if TYPE_CHECKING:
     from awiwi_gen.hand import Hand
@@ -29,6 +29,9 @@ _NEED_LENGTHS = ("joint_estimate", "joint_estimate_error")
 _NEED_TORQUES = ("tendon_distribution",)
 _NEED_SPANS = ("base_estimate_by_gradient",)
 _TWO_WAY = "a motor of the finger pulls both ways, and the stiffness of its tendons follows from their pretension"
+_BENT = (
+    "where springs give the missing equations, and these are not linear in the angles, errors depend on tendon forces"
+)
 _RANK = 1e-7  # a singular value below this share of the largest is zero; central differences are good to 1e-10
 _RESIDUAL = 1e-7  # likewise for the part of a torque that no forces give
 
@@ -91,7 +94,10 @@ def _reasons(finger: Finger, couplings: Sequence[Any]) -> tuple[tuple[str, str],
     if torques and finger.strings and not both_ways:
         torques += "; return strings do not count, for no motor pulls them"
     torques = _mixed(finger) or torques
-    found += [(family, reason) for family in _NEED_LENGTHS for reason in _unknown_angles(finger, couplings)]
+    unknown = _unknown_angles(finger, couplings)
+    found += [(family, reason) for family in _NEED_LENGTHS for reason in unknown]
+    if rests_in_a_bend(finger):
+        found += [("resting_balance", reason) for reason in unknown] or [("joint_estimate_error", _BENT)]
     found += [(family, torques) for family in _NEED_TORQUES if torques]
     if not any(transmission.ratios for transmission in finger.transmissions):
         found += [(family, reason) for family in _NEED_SPANS for reason in _indistinct_base(finger, couplings)]
@@ -117,51 +123,48 @@ def _unknown_angles(finger: Finger, couplings: Sequence[Any]) -> list[str]:
 
 def estimate_sources(finger: Finger) -> dict[str, tuple[str, ...]]:
     """Where the equations of a joint estimate come from, besides tendon lengths: sensors and springs, of these joints."""
-    joints, resting = finger.joints, [joint for part, _ in resting_parts(finger) for joint in part]
-    springs = [joints[j] for j in resting if sprung(finger, joints[j])]
-    found = {"sensors": tuple(joints[j] for j in finger.measured), "springs": tuple(springs)}
-    return {source: names for source, names in found.items() if names}
-
-
-def sprung(finger: Finger, joint: str) -> bool:
-    """Whether a joint, or one that follows it, has a spring."""
-    return any(link.spring is not None and finger.leaders.get(link.joint, link.joint) == joint for link in finger.links)
+    resting = [joint for part, _ in resting_parts(finger) for joint in part]
+    found = {"sensors": finger.measured, "springs": resting}
+    return {source: tuple(finger.joints[j] for j in joints) for source, joints in found.items() if joints}
 
 
 def _no_rest(finger: Finger, couplings: Sequence[Any]) -> str:
     """Why springs do not tell the angles that lengths leave open; empty if they do, blank if there are none."""
     import numpy as np
 
-    stiffness = _spring_stiffness(finger)
-    if not stiffness and not finger.strings:
+    stiffnesses = [_spring_stiffness(finger, coupling) for coupling in Chain(finger).couplings()]
+    if not stiffnesses[0].any():
         return " "
-    if stiffness is None or finger.strings or is_curved(finger):
-        return "; springs would, but only by torques that are linear in the angles, with constant arms and no return strings"
-    for joints, tendons in estimated_parts(finger):
-        names = [finger.joints[j] for j in joints]
-        arms = (
-            _scaled([[couplings[0][i][j] for j in joints] for i in tendons]) if tendons else np.zeros((0, len(joints)))
-        )
-        size = np.array([stiffness.get(name, 0.0) for name in names])
-        size = size / max(size.max(initial=0.0), 1e-300)
-        rank = int(np.linalg.matrix_rank(arms, _RANK)) if tendons else 0
-        if rank < min(arms.shape):
-            return f", and springs of joints do not where tendons that move {', '.join(names)} depend on one another"
-        kept = np.linalg.svd(arms)[2][rank:] if tendons else np.eye(len(joints))
-        if np.linalg.matrix_rank(kept * np.sqrt(size), _RANK) < len(joints) - rank:
-            return f", nor do the springs of joints: {', '.join(names)} can turn without stretching one"
-    return ""
+    reasons = []
+    for joints, tendons in resting_parts(finger):
+        names, found = ", ".join(finger.joints[j] for j in joints), set()
+        for coupling, stiffness in zip(couplings, stiffnesses, strict=False):
+            arms = _scaled(np.array(coupling)[np.ix_(tendons, joints)])
+            rank = int(np.linalg.matrix_rank(arms, _RANK)) if tendons else 0
+            kept = np.linalg.svd(arms)[2][rank:] if tendons else np.eye(len(joints))
+            held = kept @ stiffness[np.ix_(joints, joints)] @ kept.T
+            if rank < len(tendons):
+                found.add(f", and springs do not either where tendons that move {names} depend on one another")
+            elif np.linalg.matrix_rank(held, _RANK, hermitian=True) < len(held):
+                found.add(f", nor do springs: some motion of {names} stretches none")
+            else:
+                found.add("")
+        reasons += [] if "" in found else sorted(found)
+    return reasons[0] if reasons else "" if resting_parts(finger) else " "
 
 
-def _spring_stiffness(finger: Finger) -> dict[str, float] | None:
-    """Stiffness by independent joint of the springs of that joint and its followers; None if it depends on the pose."""
-    found: dict[str, float] = {}
+def _spring_stiffness(finger: Finger, coupling: Sequence[Sequence[float]]) -> Any:
+    """Stiffness (n x n) of the springs of a finger's joints, and of its return strings where they are taut."""
+    import numpy as np
+
+    found = np.zeros((len(finger.joints), len(finger.joints)))
     for link in finger.links:
         if link.spring is not None:
-            motion, leader = finger.motion(link.joint), finger.leaders.get(link.joint, link.joint)
-            if len(motion) > 2:
-                return None
-            found[leader] = found.get(leader, 0.0) + float(link.spring.stiffness) * motion[1] ** 2
+            leader = finger.joints.index(finger.leaders.get(link.joint, link.joint))
+            found[leader, leader] += float(link.spring.stiffness) * (finger.motion(link.joint)[1] or 1.0) ** 2
+    for number, tendon in enumerate(finger.tendons):
+        if tendon.spring is not None:
+            found += float(tendon.spring.stiffness) * np.outer(coupling[number], coupling[number])
     return found
 
 
