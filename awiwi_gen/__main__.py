@@ -143,7 +143,7 @@ def check(
 ) -> int:  # fmt: skip
     """Check the hand file, and whether the generated C is fresh and unedited."""
     from awiwi_gen.hand import Hand
-    from awiwi_gen.hand.capability import left_out_names
+    from awiwi_gen.hand.capability import estimate_lines, estimate_sources, left_out_names
     from awiwi_gen.hand.tick import tick_lines, tick_values
     from awiwi_gen.pipeline import state
     from awiwi_gen.report import counted, print_json, print_left_out, state_lines
@@ -154,6 +154,7 @@ def check(
     found = state(job, output)
     if as_json:
         extra = {"warnings": [each.as_dict() for each in warnings], "tick": tick_values(read),
+                 "estimates": estimate_sources(read),
                  "left_out": [{"name": name, "reason": reason} for name, reason in absent.items()]}  # fmt: skip
         print_json({"hand": job.hand.name, "fresh": found.fresh, **vars(found), **extra})
     else:
@@ -161,7 +162,7 @@ def check(
         print(printable(f"{hand or 'hand.toml'}: {counted(len(job.hand.fingers), 'finger')}, no faults{more}"))
         print("".join(f"warning: {each}\n" for each in warnings), end="")
         print_left_out(absent)
-        print("".join(f"{line}\n" for line in tick_lines(read)), end="")
+        print("".join(f"{line}\n" for line in (*estimate_lines(read), *tick_lines(read))), end="")
         print("\n".join(state_lines(found, str(output), terminal.fix(job, hand, output))))
     return 0 if found.fresh or (found.missing and not found.foreign) else 1
 

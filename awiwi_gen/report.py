@@ -196,7 +196,8 @@ def wrapped(text: str, indent: str) -> str:
 
 
 def list_kernels(hand: Hand, directory: Path, as_json: bool) -> None:
-    """Print the kernels of a hand, and in text what a tick needs."""
+    """Print the kernels of a hand, and in text what estimates use and a tick needs."""
+    from awiwi_gen.hand.capability import estimate_lines
     from awiwi_gen.hand.tick import tick_lines
 
     entries = kernel_entries(hand, directory)
@@ -204,7 +205,7 @@ def list_kernels(hand: Hand, directory: Path, as_json: bool) -> None:
         print_json(entries)
         return
     print_kernels(entries)
-    print("".join(f"{line}\n" for line in tick_lines(hand)), end="")
+    print("".join(f"{line}\n" for line in (*estimate_lines(hand), *tick_lines(hand))), end="")
 
 
 def counted(number: int, noun: str) -> str:

@@ -19,7 +19,7 @@ from awiwi_gen.structure import resting_parts, rests_in_a_bend
 if TYPE_CHECKING:
     from awiwi_gen.hand import Hand
 
-__all__ = ["left_out", "left_out_names"]
+__all__ = ["estimate_lines", "estimate_sources", "left_out", "left_out_names"]
 
 # Kernel families of a finger that need tendons at all.
 _NEED_TENDONS = ("tendon_lengths", "coupling", "coupling_derivative", "joint_torque", "joint_stiffness",
@@ -33,6 +33,7 @@ _BENT = (
     "where springs give the missing equations, and these are not linear in the angles, errors depend on tendon forces"
 )
 _RANK = 1e-7  # a singular value below this share of the largest is zero; central differences are good to 1e-10
+_FIRM = 1e-3  # least stiffness of what springs hold, as a share of the largest
 _RESIDUAL = 1e-7  # likewise for the part of a torque that no forces give
 
 
@@ -116,54 +117,74 @@ def _unknown_angles(finger: Finger, couplings: Sequence[Any]) -> list[str]:
     columns = [[[row[column] for column in free] for row in coupling] for coupling in couplings]
     reason = _indistinct(columns, [finger.joints[column] for column in free])
     without = " without sensors" if finger.measured else ""
-    if not reason or not (springs := _no_rest(finger, couplings)):
+    if not reason or not (springs := _no_rest(finger)):
         return []
     return [f"{reason}: tendon lengths do not determine the joint angles{without}{springs if springs != ' ' else ''}"]
 
 
-def estimate_sources(finger: Finger) -> dict[str, tuple[str, ...]]:
-    """Where the equations of a joint estimate come from, besides tendon lengths: sensors and springs, of these joints."""
+def estimate_sources(hand: Hand) -> dict[str, dict[str, tuple[str, ...]]]:
+    """Kernel -> what gives its equations besides tendon lengths, for which joints; those by lengths alone are not in it."""
+    absent = left_out(hand)
+    found = {
+        f"{name}_joint_estimate": _sources(finger)
+        for name, finger in hand.fingers.items()
+        if (f"fingers.{name}", "joint_estimate") not in absent
+    }
+    return {kernel: sources for kernel, sources in found.items() if sources}
+
+
+def estimate_lines(hand: Hand) -> list[str]:
+    """The same as lines of text."""
+    return [
+        f"estimate: {kernel}: by tendon lengths"
+        + "".join(f" and {source} of {', '.join(joints)}" for source, joints in sources.items())
+        for kernel, sources in estimate_sources(hand).items()
+    ]
+
+
+def _sources(finger: Finger) -> dict[str, tuple[str, ...]]:
     resting = [joint for part, _ in resting_parts(finger) for joint in part]
     found = {"sensors": finger.measured, "springs": resting}
     return {source: tuple(finger.joints[j] for j in joints) for source, joints in found.items() if joints}
 
 
-def _no_rest(finger: Finger, couplings: Sequence[Any]) -> str:
+def _no_rest(finger: Finger) -> str:
     """Why springs do not tell the angles that lengths leave open; empty if they do, blank if there are none."""
     import numpy as np
 
-    stiffnesses = [_spring_stiffness(finger, coupling) for coupling in Chain(finger).couplings()]
-    if not stiffnesses[0].any():
+    if not finger.strings and not any(link.spring for link in finger.links):
         return " "
-    reasons = []
+    chain = Chain(finger)
+    couplings = [chain.coupling(q) for q in chain.poses()]
+    pulled = list(of_motors(finger, couplings))
+    stiffnesses = [_spring_stiffness(chain, q, coupling) for q, coupling in zip(chain.poses(), couplings, strict=True)]
     for joints, tendons in resting_parts(finger):
-        names, found = ", ".join(finger.joints[j] for j in joints), set()
-        for coupling, stiffness in zip(couplings, stiffnesses, strict=False):
-            arms = _scaled(np.array(coupling)[np.ix_(tendons, joints)])
-            rank = int(np.linalg.matrix_rank(arms, _RANK)) if tendons else 0
-            kept = np.linalg.svd(arms)[2][rank:] if tendons else np.eye(len(joints))
-            held = kept @ stiffness[np.ix_(joints, joints)] @ kept.T
-            if rank < len(tendons):
-                found.add(f", and springs do not either where tendons that move {names} depend on one another")
-            elif np.linalg.matrix_rank(held, _RANK, hermitian=True) < len(held):
-                found.add(f", nor do springs: some motion of {names} stretches none")
-            else:
-                found.add("")
-        reasons += [] if "" in found else sorted(found)
-    return reasons[0] if reasons else "" if resting_parts(finger) else " "
+        names, firm = ", ".join(finger.joints[j] for j in joints), []
+        for coupling, stiffness in zip(pulled, stiffnesses, strict=True):
+            arms = _scaled(np.array(coupling).reshape(-1, len(finger.joints))[np.ix_(tendons, joints)])
+            if np.linalg.matrix_rank(arms, _RANK) == len(tendons) or not tendons:
+                kept = np.linalg.svd(arms)[2][len(tendons) :] if tendons else np.eye(len(joints))
+                held = np.linalg.eigvalsh(kept @ stiffness[np.ix_(joints, joints)] @ kept.T)
+                firm.append(held.min() > _FIRM * stiffness.max(initial=1e-300))
+        if not firm:
+            return f", and springs do not either where tendons that move {names} depend on one another"
+        if not all(firm):
+            return f", nor do springs: in some pose a motion of {names} stretches none"
+    return "" if resting_parts(finger) else " "
 
 
-def _spring_stiffness(finger: Finger, coupling: Sequence[Sequence[float]]) -> Any:
-    """Stiffness (n x n) of the springs of a finger's joints, and of its return strings where they are taut."""
+def _spring_stiffness(chain: Chain, q: Sequence[float], coupling: Sequence[Sequence[float]]) -> Any:
+    """Stiffness (n x n) at q of the springs of a finger's joints, and of its return strings that are taut there."""
     import numpy as np
 
+    finger = chain.finger
     found = np.zeros((len(finger.joints), len(finger.joints)))
     for link in finger.links:
         if link.spring is not None:
-            leader = finger.joints.index(finger.leaders.get(link.joint, link.joint))
-            found[leader, leader] += float(link.spring.stiffness) * (finger.motion(link.joint)[1] or 1.0) ** 2
+            column, slope = chain.slope(link.joint, q)
+            found[column, column] += float(link.spring.stiffness) * slope**2
     for number, tendon in enumerate(finger.tendons):
-        if tendon.spring is not None:
+        if tendon.spring is not None and chain.length(number, q) > float(tendon.spring.rest):
             found += float(tendon.spring.stiffness) * np.outer(coupling[number], coupling[number])
     return found
 

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from flint import arb, arb_mat
 
+from awiwi_gen.errors import InputError
 from awiwi_gen.ir.algebras import NUMPY_NAMES, Balls, Floats, ball
 from awiwi_gen.ir.graph import Node
 from awiwi_gen.ir.interpret import evaluate
@@ -92,7 +93,8 @@ class Resting(Problem):
         pose = self._descend(pose, f, low, high)
         good = np.flatnonzero(self._well_posed(pose, f, low, high))
         if not len(good):
-            raise ValueError("no resting pose of the finger is well-posed")
+            raise InputError("found no pose of the finger in which lengths and springs tell its angles, rather than stops; "
+                             "leave its joint_estimate out with --only")  # fmt: skip
         chosen = [s if s in good else good[s % len(good)] for s in range(len(start))]
         pose = pose[chosen]
         pose[:, held] = pose[:, held].astype(start.dtype)
@@ -204,7 +206,7 @@ class Resting(Problem):
         at_low, at_high = q <= low + width, q >= high - width
         q = np.where(at_low, low, np.where(at_high, high, q))
         balance = self._state(q, f).balance
-        pulls = ((at_low & (balance < 0)) | (at_high & (balance > 0)))[:, joints].any(axis=1)
+        pulls: Any = ((at_low & (balance < 0)) | (at_high & (balance > 0)))[:, joints].any(axis=1)
         free = [[j for j in joints if not (at_low[s, j] or at_high[s, j])] for s in range(samples)]
         angles = [[arb(x) for x in column] for column in q.T.tolist()]
         forces = [[arb(x) for x in column] for column in f.T.tolist()]
@@ -242,7 +244,7 @@ class Resting(Problem):
         """Whether angles follow from lengths with a derivative: no joint between free and held, and enough free ones."""
         state, joints, tendons = self._state(q, f), self.joints, self.tendons
         margin, good = MARGIN * (high - low), list[bool]()
-        inside = np.minimum(q - low, high - q) > margin
+        inside: Any = np.minimum(q - low, high - q) > margin
         for s in range(len(q)):
             free, size = [j for j in joints if inside[s, j]], np.abs(state.slope[s]).max()
             held = [j for j in joints if not inside[s, j]]
