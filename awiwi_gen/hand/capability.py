@@ -49,6 +49,13 @@ def left_out(hand: Hand) -> dict[tuple[str, str], str]:
     found |= {("", f"{name}_{family}"): _none(hand.fingers[name]) for name in without for family in driven}
     two_way = [name for name, finger in hand.fingers.items() if any(each.two_way for each in finger.transmissions)]
     found |= {("", f"{name}_tendon_stiffness"): _TWO_WAY for name in two_way}
+    for name, motor in hand.across.items():
+        why = f"the motor {motor} pulls tendons of several fingers, whose forces"
+        found[f"fingers.{name}", "tendon_distribution"] = f"{why} no finger can choose alone"
+        if hand.motor:
+            found["", f"{name}_measured_lengths"] = (
+                f"the motor {motor} tells the sum of lengths in several fingers only"
+            )
     if not hand.tendons:
         found |= dict.fromkeys(_of_all_tendons(hand), "no motor pulls a tendon of this hand")
     return found
