@@ -176,16 +176,6 @@ def test_a_coupling_in_a_loop_or_to_another_finger_is_a_loss():
 # -- what a hand file cannot hold ------------------------------------------------------------------------------------
 
 
-def test_a_tendon_over_two_fingers_is_refused_by_its_name():
-    with pytest.raises(InputError) as caught:
-        draft(two_fingers(tendons=(Tendon("long", arms={"index_bend": 0.01, "thumb_bend": 0.01}),)))
-
-    assert str(caught.value) == (
-        "pair.xml tendon long runs over the fingers index and thumb; a tendon of the hand file is of one finger; "
-        "leave it out with --without long"
-    )
-
-
 def test_tendons_of_the_wrist_are_reported():
     losses = draft(two_fingers(tendons=(Tendon("flexor", arms={"wrist": 0.01}),))).losses
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
 
 import numpy as np
@@ -51,7 +52,7 @@ def energy(finger: str, q: np.ndarray) -> float:
     if finger == "ring":
         turn = [np.exp(1j * angle) for angle in np.cumsum(q)]
         points = [-10 - 8j, turn[0] * (12 - 9j), turn[0] * 40 + turn[1] * (9 - 7j)]
-        length = sum(abs(b - a) for a, b in zip(points, points[1:], strict=False)) / 1000
+        length = sum(abs(b - a) for a, b in itertools.pairwise(points)) / 1000
         total += 300 / 2 * max(0.0, length - 0.058) ** 2
     return total
 

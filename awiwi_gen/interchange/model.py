@@ -96,7 +96,8 @@ class Tendon:
     """A tendon: either `arms`, length per angle by joint, or a `path` from place to place.
 
     Its length also has a `constant` part [m]. An elastic string has a `stiffness` [N/m] and no force where it is as long
-    as `rest`. A tendon of arms that its motor also pushes is `two_way`.
+    as `rest`. A tendon of arms that its motor also pushes is `two_way`; one that is a part of a tendon over several fingers,
+    which one motor pulls, is `across`.
     """
 
     name: str
@@ -106,6 +107,7 @@ class Tendon:
     rest: float = 0.0
     constant: float = 0.0
     two_way: bool = False
+    across: bool = False
 
 
 @dataclass(frozen=True)
