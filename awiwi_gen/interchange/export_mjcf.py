@@ -29,7 +29,7 @@ from awiwi_gen.interchange.export import (
     vector,
 )
 from awiwi_gen.interchange.export_motors import FORCE, MOTORS, TIMESTEP, Drives, Lost, Sections, one_sided
-from awiwi_gen.interchange.export_wrist import wrist_of_bars
+from awiwi_gen.interchange.export_wrist import pull_runs, wrist_of_bars
 from awiwi_gen.interchange.fits import coupler_fit
 from awiwi_gen.interchange.frames import turn_matrix
 from awiwi_gen.interchange.mjcf_elements import inertial, joint_of, least_inertia, place
@@ -55,21 +55,24 @@ def text_and_losses(hand: Hand, motors: str = FORCE) -> tuple[str, list[Loss]]:
     lost: Lost = {}
     world = SubElement(root, "worldbody")
     drives = Drives(hand, motors, world, sections, lost)
-    palm = _palm(world, hand, sections, lost)
+    pulls = float(hand.limits.tendon_force) if motors == FORCE else None
+    palm = _palm(world, hand, sections, lost, pulls)
     writers = [_Writer(drives, name, finger) for name, finger in hand.fingers.items()]
     for writer in writers:
         writer.write(palm)
     _pull_across(writers)
+    if hand.wrist is not None and pulls is not None:
+        pull_runs(hand.wrist, sections, pulls)  # behind the fingers' motors
     root.extend(section for section in sections.values() if len(section))
     losses = [*common_losses(hand), coupler_losses(hand, DEGREE)]
     losses += [Loss(what, tuple(places)) for what, places in lost.items()]
     return document(root, hand), [loss for loss in losses if loss.places]
 
 
-def _palm(world: Element, hand: Hand, sections: Sections, lost: Lost) -> Element:
+def _palm(world: Element, hand: Hand, sections: Sections, lost: Lost, force: float | None) -> Element:
     """The body that the fingers stand on, with the joints of its wrist."""
     if hand.wrist is not None:
-        return wrist_of_bars(SubElement(world, "body", name="forearm"), hand.wrist, sections, lost)
+        return wrist_of_bars(SubElement(world, "body", name="forearm"), hand.wrist, sections, lost, force)
     if hand.palm is None:
         return SubElement(world, "body", name="palm")
     drawn = Drawn.of(palm_parts(hand.palm))

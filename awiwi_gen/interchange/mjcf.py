@@ -40,7 +40,7 @@ def read(path: Path, exact: bool = False, without: Iterable[str] = (), fit: bool
     losses = prepare(spec, set(without))
     massless = {body.name for body in spec.bodies[1:] if _has_no_mass(body)}
     compiled = compile_spec(spec, path)
-    tensors = _unbalanced(spec, compiled)
+    tensors = unbalanced(spec, compiled)
     tendons, lost = tendons_of(compiled, driven, _mimics(compiled) if fit else None)
     return Model(
         name=spec.modelname or path.stem,
@@ -309,7 +309,7 @@ def _has_no_mass(body: Any) -> bool:
     )
 
 
-def _unbalanced(spec: Any, compiled: Any) -> dict[str, Array]:
+def unbalanced(spec: Any, compiled: Any) -> dict[str, Array]:
     """Body -> its published tensor (3 x 3) in its own axes, where MuJoCo has put the mean of its moments in its place."""
     found = {}
     for body in spec.bodies[1:] if spec.compiler.balanceinertia else []:

@@ -125,6 +125,7 @@ def wrist(hand: Hand) -> Iterator[str]:
     normal = np.array([-np.sin(q71), 0, np.cos(q71)])
     bars = [model.tendon(f"wrist.{name}").id for name in ("cc0", "aa0")]
     palm, drawn = model.body("palm").id, model.tendon_length0[bars]
+    runs = [model.tendon(f"wrist.run{number}").id for number in range(len(hand.wrist.tendons))]
     for angles in np.random.default_rng(6).uniform(low, high, (STATES, 2)):
         pose = lib.wrist_palm_pose(*angles).T
         moved = np.array(angles) - hand.wrist.neutral
@@ -139,6 +140,7 @@ def wrist(hand: Hand) -> Iterator[str]:
         theirs = np.eye(4)
         theirs[:3, :3], theirs[:3, 3] = data.xmat[palm].reshape(3, 3), data.xpos[palm]
         worst.compare("palm_pose", pose, theirs)
+        worst.compare("tendon_lengths", lib.wrist_tendon_lengths(*angles).h, data.ten_length[runs])
         off = max(off, float(np.abs(data.ten_length[bars] - drawn).max()))
     yield from (f"wrist {kernel} differs by {x:.1e}" for kernel, x in worst.found.items() if x > LIMIT)
     if off > LIMIT:
