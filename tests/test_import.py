@@ -377,3 +377,15 @@ def test_links_that_are_no_tree_are_named(text, message):
         require_tree(text, "r.urdf")
 
     assert str(caught.value) == message
+
+
+def test_a_single_finger_stands_on_the_last_body_that_is_called_a_palm():
+    bodies = (
+        body("world", 0, mass=0.0), body("forearm", 0), body("hand_Palm", 1), body("base", 2), body("link", 3, (0.03, 0, 0)),
+    )  # fmt: skip
+    joints = (joint("wrist", 2), joint("bend", 4, (0, 1, 0)))
+    drafted = draft(Model("One", "one.xml", bodies, joints))
+
+    assert drafted.palm == "hand_Palm"
+    assert [each.joint for each in drafted.wrist.joints] == ["wrist"]
+    assert [[each.joint for each in finger.links] for finger in drafted.fingers] == [["bend"]]

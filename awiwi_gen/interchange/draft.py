@@ -13,12 +13,10 @@ from awiwi_gen.interchange.across import split
 from awiwi_gen.interchange.fingers import Chain, Segment, composite, find, palm_of, wrist_joints
 from awiwi_gen.interchange.frames import Axis, Frame, base_frame, link_frames
 from awiwi_gen.interchange.mimics import Followed, followed
-from awiwi_gen.interchange.model import Array, Joint, Loss, Model, Place, Tendon
+from awiwi_gen.interchange.model import TRAVEL, Array, Joint, Loss, Model, Place, Tendon
 from awiwi_gen.interchange.names import check_finger, finger_names, joint_names, prefix_of
 
 __all__ = ["DraftFinger", "DraftHand", "DraftLink", "DraftPalm", "DraftTendon", "draft"]
-
-_TRAVEL = 0.1  # m, to both sides, of slides without limits
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,7 +175,7 @@ def _approximated(chains: list[Chain], fingers: tuple[DraftFinger, ...]) -> list
             tuple(j.name for j in joints if j.low is None and j.kind != "slide"),
         ),
         Loss(
-            f"slides without limits: -{_TRAVEL * 1e3:g} to {_TRAVEL * 1e3:g} mm assumed",
+            f"slides without limits: -{TRAVEL * 1e3:g} to {TRAVEL * 1e3:g} mm assumed",
             tuple(j.name for j in joints if j.low is None and j.kind == "slide"),
         ),
         Loss(
@@ -269,7 +267,7 @@ def _link(
     mimic: Followed | None, assumed: tuple[str, ...],
 ) -> DraftLink:  # fmt: skip
     mass, com, inertia = composite(model, segment) if holds else (0.0, np.zeros(3), np.zeros((3, 3)))
-    most = _TRAVEL if joint.kind == "slide" else np.pi
+    most = TRAVEL if joint.kind == "slide" else np.pi
     limits = (joint.low, joint.high) if joint.low is not None and joint.high is not None else (-most, most)
     return DraftLink(
         joint=name,

@@ -16,12 +16,14 @@ import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
-__all__ = ["LEAST_MASS", "Array", "Body", "Joint", "Loss", "Mimic", "Model", "Place", "Site", "Tendon"]
+__all__ = ["LEAST_MASS", "TRAVEL", "Array", "Body", "Joint", "Loss", "Mimic", "Model", "Place", "Site", "Tendon"]
 
 Array = NDArray[np.float64]
 
 LEAST_MASS = 1e-9
 """Mass [kg] of moving bodies that have none, with a radius of gyration of 1 mm: MuJoCo refuses bodies without."""
+TRAVEL = 0.1
+"""How far [m] slides are taken to go to both sides where nothing says it."""
 
 
 @dataclass(frozen=True, eq=False)
