@@ -219,7 +219,7 @@ def brief(rows: list[tuple[str, ...]]) -> str:
     cells = [head, ("---",) * len(head)]
     for name, _, *middle, mujoco, pinocchio, lost in rows:
         count = len(lost.split("; "))
-        kinds = f"{count} kind{'s' if count > 1 else ''} of elements"
+        kinds = lost if lost == "nothing" else f"{count} kind{'s' if count > 1 else ''} of elements"
         cells.append((name, *middle, mujoco.split(":")[0], pinocchio, kinds if mujoco[0].isdigit() else "-"))
     return "".join(f"| {' | '.join(each)} |\n" for each in cells)
 
