@@ -33,6 +33,7 @@ _BENT = (
     "where springs give the missing equations, and these are not linear in the angles, errors depend on tendon forces"
 )
 _RANK = 1e-7  # a singular value below this share of the largest is zero; central differences are good to 1e-10
+_TURN = 1e-4  # rad or m, of differences of arms
 _FIRM = 1e-3  # least stiffness of what springs hold, as a share of the largest
 _RESIDUAL = 1e-7  # likewise for the part of a torque that no forces give
 
@@ -191,9 +192,18 @@ def _spring_stiffness(chain: Chain, q: Sequence[float], coupling: Sequence[Seque
             column, slope = chain.slope(link.joint, q)
             found[column, column] += float(link.spring.stiffness) * slope**2
     for number, tendon in enumerate(finger.tendons):
-        if tendon.spring is not None and chain.length(number, q) > float(tendon.spring.rest):
-            found += float(tendon.spring.stiffness) * np.outer(coupling[number], coupling[number])
+        if tendon.spring is not None and (stretch := chain.length(number, q) - float(tendon.spring.rest)) > 0:
+            bends = np.array([_turned(chain, number, q, column) for column in range(len(q))])
+            arms = np.outer(coupling[number], coupling[number])
+            found += float(tendon.spring.stiffness) * (arms + stretch * (bends + bends.T) / 2)
     return found
+
+
+def _turned(chain: Chain, number: int, q: Sequence[float], column: int) -> list[float]:
+    """How a tendon's arms change with one joint, by central differences."""
+    ends = [[x + way * _TURN * (j == column) for j, x in enumerate(q)] for way in (-1, 1)]
+    before, after = (chain.coupling(end)[number] for end in ends)
+    return [(b - a) / (2 * _TURN) for a, b in zip(before, after, strict=True)]
 
 
 def _none(finger: Finger) -> str:

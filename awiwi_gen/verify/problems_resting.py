@@ -225,6 +225,8 @@ class Resting(Problem):
                     arms = arb_mat([[P[i * n + j][s].mid() for j in known] for i in others])
                     right = arms.transpose() * arb_mat([[away[i]] for i in others])
                     _move(angles, known, s, (arms.transpose() * arms).solve(right).entries())
+                if not free[s]:
+                    continue
                 rows = [[slope[j * n + k][s].mid() for k in free[s]] + [P[i * n + j][s].mid() for i in tendons]
                         for j in free[s]]  # fmt: skip
                 rows += [[P[i * n + j][s].mid() for j in free[s]] + [arb(0)] * len(tendons) for i in tendons]
@@ -249,12 +251,12 @@ class Resting(Problem):
             free, size = [j for j in joints if inside[s, j]], np.abs(state.slope[s]).max()
             held = [j for j in joints if not inside[s, j]]
             arms, scale = state.P[s][np.ix_(tendons, free)], np.abs(state.P[s, tendons]).max(initial=0.0)
-            well = bool(free) and len(free) >= len(tendons)
+            well = len(free) >= len(tendons)
             well &= all(q[s, j] in (low[j], high[j]) and abs(state.balance[s, j]) > MARGIN * size for j in held)
             well &= bool(np.abs(state.balance[s, free]).max(initial=0.0) < 1e-9 * size)
             if well and tendons:
                 well = bool(np.linalg.matrix_rank(arms, LEAST_CURVATURE * scale) == len(tendons))
-            if well:
+            if well and free:
                 kept = np.linalg.svd(arms)[2][len(tendons) :] if tendons else np.eye(len(free))
                 curvature = np.linalg.eigvalsh(kept @ state.slope[s][np.ix_(free, free)] @ kept.T)
                 well = bool(curvature.min(initial=size) > LEAST_CURVATURE * size)

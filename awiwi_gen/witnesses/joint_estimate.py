@@ -45,6 +45,9 @@ def joint_estimate(finger: Finger, h: SX, start: SX, measured: SX | None = None)
         about[joints] = _solve_upper(R, Q.T @ missing[tendons])
     torques = ca.substitute(passive_springs(finger, at), at, SX.zeros(at.numel()))
     for joints, tendons in resting_parts(finger):
+        if not tendons:
+            about[joints] = -torques[joints] / _springs(finger, P)[joints]
+            continue
         stiff = _stiffness(finger, P, joints, tendons)
         pulls = stiff * P[tendons, joints].T @ missing[tendons]
         found = _eliminate(*_energy(finger, P, joints, tendons), ca.vertcat(pulls - torques[joints], missing[tendons]))
@@ -76,7 +79,7 @@ def _stiffness(finger: Finger, P: SX, joints: list[int], tendons: list[int]) -> 
     K, free = _springs(finger, P)[joints], [link for link in finger.links if link.joint not in leaders(finger)]
     first = next((j for place, j in enumerate(joints) if not K[place].is_zero()), joints[0])
     alike = [place for place, j in enumerate(joints) if free[j].slides == free[first].slides]
-    return ca.sum1(K[alike]) / ca.sumsqr(P[tendons, joints][:, alike]) if tendons else SX(0)
+    return ca.sum1(K[alike]) / ca.sumsqr(P[tendons, joints][:, alike])
 
 
 def _springs(finger: Finger, P: SX) -> SX:
