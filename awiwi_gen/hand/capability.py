@@ -177,7 +177,7 @@ def _no_rest(finger: Finger) -> str:
         if not firm:
             return f", and springs do not either where tendons that move {names} depend on one another"
         if not all(firm):
-            return f", nor do springs: in some pose a motion of {names} stretches none"
+            return f", nor do springs: in some pose they do not hold {names}"
     return "" if resting_parts(finger) else " "
 
 
