@@ -148,7 +148,7 @@ def check(
     """Check the hand file, and whether the generated C is fresh and unedited."""
     from awiwi_gen.certificates import certificate_lines
     from awiwi_gen.hand import Hand
-    from awiwi_gen.hand.capability import left_out_names
+    from awiwi_gen.hand.capability import estimate_lines, estimate_sources, left_out_names
     from awiwi_gen.hand.tick import tick_lines, tick_values
     from awiwi_gen.pipeline import state
     from awiwi_gen.report import counted, print_json, print_left_out, state_lines
@@ -159,6 +159,7 @@ def check(
     found = state(job, output)
     if as_json:
         extra = {"warnings": [each.as_dict() for each in warnings], "tick": tick_values(read),
+                 "estimates": estimate_sources(read),
                  "left_out": [{"name": name, "reason": reason} for name, reason in absent.items()]}  # fmt: skip
         print_json({"hand": job.hand.name, "fresh": found.fresh, **vars(found), **extra})
     else:
@@ -167,7 +168,8 @@ def check(
         print("".join(f"warning: {each}\n" for each in warnings), end="")
         print_left_out(absent)
         gained = certificate_lines(read, job.store, (hand or DEFAULT_HAND).parent)
-        print(printable("".join(f"{line}\n" for line in (*tick_lines(read), *gained))), end="")
+        lines = (*estimate_lines(read), *tick_lines(read), *gained)
+        print(printable("".join(f"{line}\n" for line in lines)), end="")
         print("\n".join(state_lines(found, str(output), terminal.fix(job, hand, output))))
     return 0 if found.fresh or (found.missing and not found.foreign) else 1
 

@@ -61,6 +61,7 @@ def header_files(hand: Hand, options: Options, made_from: Any, has_tick: bool) -
         "tendons": enumerators(
             [(name, str(i)) for name, f in hand.fingers.items() for i in range(len(f.transmissions))]
         ),
+        "motors": motors_of_tendons(hand),
         "constants": [(constant, constant.lines(options)) for constant in constants(hand)],
         "numbers": [(name, options.literal(Fraction(value)), doc) for name, value, doc in numbers(hand)],
     }
@@ -73,6 +74,12 @@ def fingers(hand: Hand) -> list[tuple[str, int, int, int, int]]:
         (name.upper(), columns.start, columns.stop - columns.start, rows.start, rows.stop - rows.start)
         for name, (rows, columns) in hand.blocks.items()
     ]
+
+
+def motors_of_tendons(hand: Hand) -> list[int]:
+    """The motor of every tendon, where one pulls tendons of several fingers; else none."""
+    motor = {place: number for number, places in enumerate(hand.motors) for place in places}
+    return [motor[place] for place in range(hand.tendons)] if hand.across else []
 
 
 def enumerators(pairs: Sequence[tuple[str, str]]) -> list[str]:

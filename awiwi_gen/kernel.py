@@ -96,6 +96,7 @@ class Solver:
     ``iterations`` is the number of calls of the used kernels in the worst case; ``calls`` has other numbers, by
     family.
     A last step shorter than ``stop``, per scalar type, ends an iteration. Unknowns in ``held`` are inputs, not found.
+    ``resting`` are the joints whose angles springs tell beside lengths, and the tendons over them.
     ``limits`` are the paths of the numbers in ``arrays`` that are read at run time where others are. The solver is
     expected to converge from starts up to ``near`` away in each unknown. ``pairs`` are antagonistic tendons (first,
     second, number of the pair that shares joints with it).
@@ -114,6 +115,7 @@ class Solver:
     stop: Mapping[str, str] = field(default_factory=lambda: STOP)
     near: tuple[float, ...] = ()
     held: tuple[int, ...] = ()
+    resting: tuple[tuple[int, ...], tuple[int, ...]] = ((), ())
     calls: Mapping[str, int] = field(default_factory=dict)
     pairs: tuple[tuple[int, int, int], ...] = ()
 

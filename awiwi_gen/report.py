@@ -196,8 +196,9 @@ def wrapped(text: str, indent: str) -> str:
 
 
 def list_kernels(hand: Hand, directory: Path, as_json: bool) -> None:
-    """Print the kernels of a hand, and in text what a tick needs."""
+    """Print the kernels of a hand, and in text what estimates use and a tick needs."""
     from awiwi_gen.emit.options import Options
+    from awiwi_gen.hand.capability import estimate_lines
     from awiwi_gen.hand.tick import tick_lines
     from awiwi_gen.hand_model import no_tick
     from awiwi_gen.kernels import catalog
@@ -207,9 +208,9 @@ def list_kernels(hand: Hand, directory: Path, as_json: bool) -> None:
         print_json(entries)
         return
     print_kernels(entries)
-    print("".join(f"{line}\n" for line in tick_lines(hand)), end="")
+    print("".join(f"{line}\n" for line in (*estimate_lines(hand), *tick_lines(hand))), end="")
     reason = no_tick(hand, catalog(hand), Options())
-    print(f"tick: none, for {reason}" if reason else "tick: awiwi_hand_step, docs/tick.md")
+    print(f"tick: none, for {reason}" if reason else "tick: awiwi_hand_step, docs/hand_step.md")
 
 
 def counted(number: int, noun: str) -> str:

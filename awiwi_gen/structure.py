@@ -25,6 +25,7 @@ An angle of a joint that slides is its position [m], along z.
 The numbers may be symbols of either library. Independent joints are counted along the chain, base to tip.
 """
 
+from collections import Counter
 from typing import Any
 
 Finger = Any
@@ -104,6 +105,97 @@ def motion(finger: Finger, follower: str) -> tuple[Any, ...]:
 def rolls(finger: Finger, joint: str) -> bool:
     """Whether the arc on a joint's pulley is that on its leader's, so that the leader's stands for it."""
     return any(c.follower == joint and c.ratio is None and c.offset is None for c in finger.couplings)
+
+
+def senses(finger: Finger, tendon: Any) -> Counter[str]:
+    """Signed number of pulleys of each independent joint that a tendon runs over."""
+    found: Counter[str] = Counter()
+    for over in tendon.over:
+        sign, joint = sense(over)
+        found[leaders(finger).get(joint, joint)] += sign
+    return Counter({joint: count for joint, count in found.items() if count})
+
+
+def geared(finger: Finger, tendon: Any) -> list[str]:
+    """The joints under a tendon that follow others by a ratio or with an offset, not by rolling on pulleys."""
+    return [over[1:] for over in tendon.over if over[1:] in leaders(finger) and not rolls(finger, over[1:])]
+
+
+def moved(finger: Finger, transmission: Any) -> set[str]:
+    """The independent joints that the tendons of a motor pull."""
+    return set().union(*(moved_by(finger, tendon) for tendon in transmission.tendons))
+
+
+def moved_by(finger: Finger, tendon: Any) -> set[str]:
+    """The independent joints that move a tendon."""
+    order, follows = [link.joint for link in finger.links], leaders(finger)
+    between = order[: order.index(tendon.span.joint)] if tendon.span else []
+    for run in tendon.runs:
+        touched = [link_number(finger, each.link) for each in (run.start, run.body, run.end) if each is not None]
+        between += order[min(touched) + 1 : max(touched) + 1]
+    paths = {follows.get(joint, joint) for joint in (*between, *tendon.arms, *geared(finger, tendon))}
+    return paths | set(senses(finger, tendon))
+
+
+def groups(finger: Finger) -> list[list[int]]:
+    """The tendons in groups, those of one motor as one; tendons that share a joint are in one group."""
+    found: list[tuple[set[str], list[int]]] = []
+    for i, transmission in enumerate(finger.transmissions):
+        joints, members = moved(finger, transmission), [i]
+        for other in [group for group in found if group[0] & joints]:
+            found.remove(other)
+            joints, members = joints | other[0], other[1] + members
+        found.append((joints, members))
+    return [sorted(members) for _, members in found]
+
+
+def estimated_parts(finger: Finger) -> list[tuple[list[int], list[int]]]:
+    """Joints whose angles are to be found and tendons, by index, that depend on no others.
+
+    Where a part has fewer tendons than joints, springs of joints have to give the missing equations. Joints without
+    tendons are the last part.
+    """
+    follows = leaders(finger)
+    joints = [link.joint for link in finger.links if link.joint not in follows]
+    found, left = [], unmeasured(finger)
+    for tendons in groups(finger):
+        pulled = set().union(*(moved(finger, finger.transmissions[i]) for i in tendons))
+        found.append(([i for i in left if joints[i] in pulled], tendons))
+    loose = [i for i in left if not any(i in part for part, _ in found)]
+    return [part for part in [*found, (loose, [])] if part[0]]
+
+
+def resting_parts(finger: Finger) -> list[tuple[list[int], list[int]]]:
+    """Those of the estimated parts where lengths are too few, so that springs of joints have to tell the rest."""
+    return [(joints, tendons) for joints, tendons in estimated_parts(finger) if len(tendons) < len(joints)]
+
+
+def determined(finger: Finger) -> tuple[list[int], list[int]]:
+    """The joints whose angles tendon lengths tell by themselves, and the tendons for them, by index."""
+    resting = resting_parts(finger)
+    joints = [j for j in unmeasured(finger) if not any(j in part for part, _ in resting)]
+    return joints, [i for i in range(len(finger.transmissions)) if not any(i in part for _, part in resting)]
+
+
+def rests_in_a_bend(finger: Finger) -> bool:
+    """Whether joints rest by springs, and springs or tendons do not act linearly on them: strings, or what bends with q."""
+    curves = {coupling.follower for coupling in finger.couplings if coupling.powers}
+    springs = any(link.spring is not None and link.joint in curves for link in finger.links)
+    return bool(resting_parts(finger)) and (bool(finger.strings) or springs or is_curved(finger))
+
+
+def is_curved(finger: Finger) -> bool:
+    """Whether the coupling depends on the pose, as that of lines from link to link does."""
+    return any(is_bent(finger, transmission) for transmission in finger.transmissions)
+
+
+def is_bent(finger: Finger, transmission: Any) -> bool:
+    """Whether a motor's tendons have lines from point to point, straight or round bodies, or joints that follow a curve."""
+    curves = {coupling.follower for coupling in finger.couplings if coupling.powers}
+    return any(
+        tendon.span or tendon.path or curves & {*tendon.arms, *(over[1:] for over in tendon.over)}
+        for tendon in transmission.tendons
+    )
 
 
 def quarter_turns(turn: str) -> tuple[int, int]:

@@ -305,7 +305,11 @@ void awiwi_thumb_joint_torque_and_stiffness(const double q_in[4], const double f
 /*
  * Joint angles whose tendon lengths are nearest to the measured h (least squares); start is the last
  * estimate. Where the coupling is constant the estimate is linear, and not limited: lengths that no
- * pose has give angles beyond the joint limits. Otherwise it is within them.
+ * pose has give angles beyond the joint limits. Otherwise it is within them. Where tendons are too
+ * few, the springs of the finger tell the rest: of all angles with these lengths, those are found
+ * where the springs hold the least energy. So the finger must rest without contact, its tendons must
+ * be taut, and weight and friction small beside the springs. Linear estimates do not know the stops of
+ * joints, others do.
  * Source: eq. 5.14, 5.15, 5.24.
  *   in   h[8] in m, from [0, 0, 0, 0, -0.01117, -0.01117, -0.01955, -0.01955] to [0.1515, 0.1515, 0.1515, 0.1515, 0.01117, 0.01117, 0.01955, 0.01955]
  *   in   start[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
@@ -589,7 +593,11 @@ void awiwi_index_joint_torque_and_stiffness(const double q_in[4], const double f
 /*
  * Joint angles whose tendon lengths are nearest to the measured h (least squares); start is the last
  * estimate. Where the coupling is constant the estimate is linear, and not limited: lengths that no
- * pose has give angles beyond the joint limits. Otherwise it is within them.
+ * pose has give angles beyond the joint limits. Otherwise it is within them. Where tendons are too
+ * few, the springs of the finger tell the rest: of all angles with these lengths, those are found
+ * where the springs hold the least energy. So the finger must rest without contact, its tendons must
+ * be taut, and weight and friction small beside the springs. Linear estimates do not know the stops of
+ * joints, others do.
  * Source: eq. 5.14, 5.15, 5.24.
  *   in   h[8] in m, from [-0.01278, -0.01278, -0.01278, -0.01278, -0.009425, -0.009425, -0.01571, -0.01571] to [0.01278, 0.01278, 0.01278, 0.01278, 0.009425, 0.009425, 0.01571, 0.01571]
  *   in   start[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
@@ -859,7 +867,11 @@ void awiwi_middle_joint_torque_and_stiffness(const double q_in[4], const double 
 /*
  * Joint angles whose tendon lengths are nearest to the measured h (least squares); start is the last
  * estimate. Where the coupling is constant the estimate is linear, and not limited: lengths that no
- * pose has give angles beyond the joint limits. Otherwise it is within them.
+ * pose has give angles beyond the joint limits. Otherwise it is within them. Where tendons are too
+ * few, the springs of the finger tell the rest: of all angles with these lengths, those are found
+ * where the springs hold the least energy. So the finger must rest without contact, its tendons must
+ * be taut, and weight and friction small beside the springs. Linear estimates do not know the stops of
+ * joints, others do.
  * Source: eq. 5.14, 5.15, 5.24.
  *   in   h[8] in m, from [-0.01278, -0.01278, -0.01278, -0.01278, -0.009425, -0.009425, -0.01571, -0.01571] to [0.01278, 0.01278, 0.01278, 0.01278, 0.009425, 0.009425, 0.01571, 0.01571]
  *   in   start[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
@@ -1129,7 +1141,11 @@ void awiwi_ring_joint_torque_and_stiffness(const double q_in[3], const double f_
 /*
  * Joint angles whose tendon lengths are nearest to the measured h (least squares); start is the last
  * estimate. Where the coupling is constant the estimate is linear, and not limited: lengths that no
- * pose has give angles beyond the joint limits. Otherwise it is within them.
+ * pose has give angles beyond the joint limits. Otherwise it is within them. Where tendons are too
+ * few, the springs of the finger tell the rest: of all angles with these lengths, those are found
+ * where the springs hold the least energy. So the finger must rest without contact, its tendons must
+ * be taut, and weight and friction small beside the springs. Linear estimates do not know the stops of
+ * joints, others do.
  * Source: eq. 5.14, 5.15, 5.24.
  *   in   h[6] in m, from [-0.01278, -0.01278, -0.01278, -0.01278, -0.008639, -0.008639] to [0.01278, 0.01278, 0.01278, 0.01278, 0.008639, 0.008639]
  *   in   start[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
@@ -1427,7 +1443,11 @@ void awiwi_fifth_joint_torque_and_stiffness(const double q_in[4], const double f
 /*
  * Joint angles whose tendon lengths are nearest to the measured h (least squares); start is the last
  * estimate. Where the coupling is constant the estimate is linear, and not limited: lengths that no
- * pose has give angles beyond the joint limits. Otherwise it is within them.
+ * pose has give angles beyond the joint limits. Otherwise it is within them. Where tendons are too
+ * few, the springs of the finger tell the rest: of all angles with these lengths, those are found
+ * where the springs hold the least energy. So the finger must rest without contact, its tendons must
+ * be taut, and weight and friction small beside the springs. Linear estimates do not know the stops of
+ * joints, others do.
  * Source: eq. 5.14, 5.15, 5.24.
  *   in   h[8] in m, from [-0.005585, -0.005585, -0.01169, -0.01169, -0.01169, -0.01169, -0.007854, -0.007854] to [0.005585, 0.005585, 0.01169, 0.01169, 0.01169, 0.01169, 0.007854, 0.007854]
  *   in   start[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]

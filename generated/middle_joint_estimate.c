@@ -2,7 +2,11 @@
  *
  * Joint angles whose tendon lengths are nearest to the measured h (least squares); start is the last
  * estimate. Where the coupling is constant the estimate is linear, and not limited: lengths that no
- * pose has give angles beyond the joint limits. Otherwise it is within them.
+ * pose has give angles beyond the joint limits. Otherwise it is within them. Where tendons are too
+ * few, the springs of the finger tell the rest: of all angles with these lengths, those are found
+ * where the springs hold the least energy. So the finger must rest without contact, its tendons must
+ * be taut, and weight and friction small beside the springs. Linear estimates do not know the stops of
+ * joints, others do.
  * Source: eq. 5.14, 5.15, 5.24.
  *   in   h[8] in m, from [-0.01278, -0.01278, -0.01278, -0.01278, -0.009425, -0.009425, -0.01571, -0.01571] to [0.01278, 0.01278, 0.01278, 0.01278, 0.009425, 0.009425, 0.01571, 0.01571]
  *   in   start[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]

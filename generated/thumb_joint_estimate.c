@@ -2,7 +2,11 @@
  *
  * Joint angles whose tendon lengths are nearest to the measured h (least squares); start is the last
  * estimate. Where the coupling is constant the estimate is linear, and not limited: lengths that no
- * pose has give angles beyond the joint limits. Otherwise it is within them.
+ * pose has give angles beyond the joint limits. Otherwise it is within them. Where tendons are too
+ * few, the springs of the finger tell the rest: of all angles with these lengths, those are found
+ * where the springs hold the least energy. So the finger must rest without contact, its tendons must
+ * be taut, and weight and friction small beside the springs. Linear estimates do not know the stops of
+ * joints, others do.
  * Source: eq. 5.14, 5.15, 5.24.
  *   in   h[8] in m, from [0, 0, 0, 0, -0.01117, -0.01117, -0.01955, -0.01955] to [0.1515, 0.1515, 0.1515, 0.1515, 0.01117, 0.01117, 0.01955, 0.01955]
  *   in   start[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]

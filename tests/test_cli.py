@@ -109,7 +109,7 @@ def test_a_fresh_directory_is_called_fresh(small):
     assert told("check", *SMALL, "-o", small) == f"{ONE_FINGER}: 1 finger, no faults\n{small}: fresh\n"
     assert answer("check", *SMALL, "-o", small) == {
         "hand": "One finger", "fresh": True, "missing": False, "edited": [], "lost": [], "foreign": [], "stale": [],
-        "warnings": [], "left_out": [], "tick": {},
+        "warnings": [], "left_out": [], "tick": {}, "estimates": {},
     }  # fmt: skip
 
 

@@ -168,6 +168,26 @@ def test_the_bars_of_the_wrist_are_drawn_in_the_neutral_pose(hand):
     assert losses(found)["bars of the wrist"] == ("cc0", "aa0")
 
 
+def test_runs_through_the_wrist_are_tendons_with_motors_behind_those_of_the_fingers(hand):
+    text, found = export_mjcf.text_and_losses(hand)
+    model, root = read_mjcf(text), parsed(text)
+    (start, end) = next(each.path for each in model.tendons if each.name == "wrist.run7")
+    names = [each.get("tendon") for each in root.findall("actuator/motor")]
+
+    for place, origin, point in (
+        (start, (0, 0, 0), hand.wrist.tendons[7].forearm),
+        (end, hand.wrist.palm, hand.wrist.tendons[7].palm),
+    ):
+        axes, position = model.poses[place.body]
+        wanted = [float(a) + float(b) for a, b in zip(origin, point, strict=True)]
+        assert position + axes @ place.at == pytest.approx(wanted, abs=1e-16)
+    assert names[-38:] == [f"wrist.run{number}" for number in range(38)]
+    assert losses(found)["runs of tendons through the wrist"] == tuple(f"wrist.run{number}" for number in range(38))
+    wound = parsed(export_mjcf.text_and_losses(hand, export_mjcf.MOTORS[1])[0])
+    assert not [each for each in wound.findall("actuator/*") if "run" in each.get("name")]
+    assert len([each for each in wound.findall("tendon/spatial") if "run" in each.get("name")]) == 38
+
+
 def test_the_fingers_on_a_wrist_of_bars_come_back(hand):
     again = draft(read_mjcf(export_mjcf.text_and_losses(hand)[0]))
 

@@ -176,16 +176,6 @@ def test_a_coupling_in_a_loop_or_to_another_finger_is_a_loss():
 # -- what a hand file cannot hold ------------------------------------------------------------------------------------
 
 
-def test_a_tendon_over_two_fingers_is_refused_by_its_name():
-    with pytest.raises(InputError) as caught:
-        draft(two_fingers(tendons=(Tendon("long", arms={"index_bend": 0.01, "thumb_bend": 0.01}),)))
-
-    assert str(caught.value) == (
-        "pair.xml tendon long runs over the fingers index and thumb; a tendon of the hand file is of one finger; "
-        "leave it out with --without long"
-    )
-
-
 def test_tendons_of_the_wrist_are_reported():
     losses = draft(two_fingers(tendons=(Tendon("flexor", arms={"wrist": 0.01}),))).losses
 
@@ -387,3 +377,15 @@ def test_links_that_are_no_tree_are_named(text, message):
         require_tree(text, "r.urdf")
 
     assert str(caught.value) == message
+
+
+def test_a_single_finger_stands_on_the_last_body_that_is_called_a_palm():
+    bodies = (
+        body("world", 0, mass=0.0), body("forearm", 0), body("hand_Palm", 1), body("base", 2), body("link", 3, (0.03, 0, 0)),
+    )  # fmt: skip
+    joints = (joint("wrist", 2), joint("bend", 4, (0, 1, 0)))
+    drafted = draft(Model("One", "one.xml", bodies, joints))
+
+    assert drafted.palm == "hand_Palm"
+    assert [each.joint for each in drafted.wrist.joints] == ["wrist"]
+    assert [[each.joint for each in finger.links] for finger in drafted.fingers] == [["bend"]]

@@ -11,9 +11,9 @@ from thumbs import SHIPPED, literal, replaced, thumb, wider
 
 from awiwi_gen.build import load
 from awiwi_gen.hand import Hand
-from awiwi_gen.kernels.estimates import estimated_parts
 from awiwi_gen.pipeline import Job, cached_tree
 from awiwi_gen.reproduce.base_search import BaseSearch
+from awiwi_gen.structure import estimated_parts
 from awiwi_gen.tasks import ordered
 
 OK, NOT_CONVERGED, NOT_FINITE = 0, 2, 3  # of awiwi_status
@@ -84,7 +84,7 @@ def test_few_steps_find_the_base_joints(readings, reading, reach, noise, steps):
 
 
 def test_the_parts_that_are_solved_apart_are_read_off_the_routing(hand):
-    assert estimated_parts(hand.fingers["thumb"]) == [([0, 1], [0, 1, 2, 3], False), ([2, 3], [4, 5, 6, 7], True)]
+    assert estimated_parts(hand.fingers["thumb"]) == [([0, 1], [0, 1, 2, 3]), ([2, 3], [4, 5, 6, 7])]
 
 
 def test_joints_at_their_limits_leave_the_estimates_of_other_parts_alone(lib):

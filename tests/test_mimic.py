@@ -12,8 +12,8 @@ from awiwi_gen.errors import InputError
 from awiwi_gen.hand import Hand
 from awiwi_gen.hand.pose import Chain
 from awiwi_gen.kernels.fingers_control import antagonists
-from awiwi_gen.kernels.routing import groups
 from awiwi_gen.pipeline import Job, cached_tree, verify
+from awiwi_gen.structure import groups
 
 ONE_FINGER = Path(__file__).with_name("one_finger.toml").read_text(encoding="utf-8")
 COUPLING = '{ follower = "end", leader = "mid" }'

@@ -211,11 +211,6 @@ def test_kernels_of_shared_motors_are_proved_in_all_forms(hand, options):
             "go, but the sum of |ratio| times length changes by -0.8 mm per radian of base; expected none",
         ),
         (
-            '"grip", ratio = "0.4"',
-            '"flexor", ratio = "0.4"',
-            'thumb.tendons[2].motor.name = "flexor" is a motor of fingers.index already; a motor pulls',
-        ),
-        (
             'over = ["+pip"]',
             'over = ["+pip"], motor = { name = "m", ratio = "-1" }',
             "index.tendons[3].motor has no tendon with a ratio above zero",

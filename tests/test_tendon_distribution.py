@@ -9,7 +9,7 @@ from tendon_demands import HIGH, LOW, Demands
 from tendon_solvers import INFEASIBLE, NOT_FINITE, OK, OUT_OF_DOMAIN
 
 from awiwi_gen.kernels.fingers_control import antagonists
-from awiwi_gen.kernels.routing import groups
+from awiwi_gen.structure import groups
 from awiwi_gen.verify import nearest_forces
 
 FINGERS = ["thumb", "index", "middle", "ring", "fifth"]

@@ -23,9 +23,9 @@ from tendon_solvers import (
 import awiwi_gen
 from awiwi_gen.emit.files import room_of
 from awiwi_gen.kernels.fingers_control import INVERSIONS, SEARCHES, antagonists, distribution
-from awiwi_gen.kernels.routing import groups
 from awiwi_gen.pipeline import Job
 from awiwi_gen.resources import CSRC
+from awiwi_gen.structure import groups
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 

@@ -41,6 +41,35 @@ def joint_stiffness(hand: Hand, q: Matrix, f: Matrix, k: Matrix) -> Any:
     return _guarded(hand, q, sympy.diag(*_blocks(hand, tendons.joint_stiffness, q, f, k)))
 
 
+def motor_lengths(hand: Hand, q: Matrix) -> Any:
+    """Lengths (motors) [m] of all that each motor pulls: a constant matrix times those of the tendons."""
+    return _guarded(hand, q, _shares(hand) * Matrix.vstack(*_blocks(hand, tendons.tendon_lengths, q)))
+
+
+def motor_coupling(hand: Hand, q: Matrix) -> Any:
+    """The same matrix times P (motors x n) [m/rad]."""
+    return _guarded(hand, q, _shares(hand) * sympy.diag(*_blocks(hand, tendons.coupling, q)))
+
+
+def motor_joint_torque(hand: Hand, q: Matrix, f: Matrix) -> Any:
+    """Joint torques (n) [N m]: every tendon has the force of its motor, f (motors) [N]."""
+    return _guarded(hand, q, Matrix.vstack(*_blocks(hand, tendons.joint_torque, q, _shares(hand).T * f)))
+
+
+def motor_joint_stiffness(hand: Hand, q: Matrix, f: Matrix, k: Matrix) -> Any:
+    """-d tau/dq (n x n) [N m/rad] through motors of stiffness k (motors) [N/m]: blocks by forces, and P' diag(k) P."""
+    still = _shares(hand).T * f
+    blocks = _blocks(hand, tendons.joint_stiffness, q, still, sympy.zeros(len(still), 1))
+    P = _shares(hand) * sympy.diag(*_blocks(hand, tendons.coupling, q))
+    return _guarded(hand, q, sympy.diag(*blocks) + P.T * sympy.diag(*k) * P)
+
+
+def _shares(hand: Hand) -> Matrix:
+    """The tendons (motors x m) of each motor: 1 where it pulls one."""
+    count = sum(map(len, hand.motors))
+    return Matrix(len(hand.motors), count, lambda motor, place: int(place in hand.motors[motor]))
+
+
 def _guarded(hand: Hand, q: Matrix, result: Matrix, guards: Iterable[Expr] = ()) -> Any:
     """A result with its guards, and those of tendons that wrap round bodies; the result alone if there are none."""
     wraps = (wraps_hold(hand.fingers[name], _column(q[joints])) for name, (_, joints) in hand.blocks.items())

@@ -13,6 +13,7 @@ import sympy
 from sympy import Expr, Matrix
 
 from awiwi_gen.definitions.inside_wraps import bent_length
+from awiwi_gen.definitions.joints import spring_energy
 from awiwi_gen.definitions.kinematics import frames, joint_angles, joint_frames
 from awiwi_gen.definitions.naming import Derivation
 from awiwi_gen.definitions.wraps import seen_from_body, wrapped_length
@@ -70,6 +71,26 @@ def return_torque(finger: Finger, q: Matrix) -> tuple[Matrix, Expr]:
         tau -= string.spring.stiffness * stretch * Matrix([derivation.partial(length, angle) for angle in q])
         energy += string.spring.stiffness * stretch**2 / 2
     return tau, energy
+
+
+def resting_balance(finger: Finger, q: Matrix, f: Matrix) -> tuple[Matrix, Matrix]:
+    """Gradient (n) [N m] by the angles of the energy of springs and strings plus f'h, and its Hessian (n x n) [N m/rad].
+
+    Strings are as in `return_torque`; where one becomes taut, the Hessian jumps.
+    """
+    derivation, n = Derivation(), len(q)
+    smooth = spring_energy(finger, q) + _of_motors(finger, q, derivation).dot(f)
+    balance = Matrix([derivation.partial(smooth, angle) for angle in q])
+    slope = Matrix(n, n, lambda j, k: derivation.partial(balance[min(j, k)], q[max(j, k)]))
+    for length, string in zip(_lengths(finger, finger.strings, q, derivation), finger.strings, strict=True):
+        beyond = derivation.name(length - string.spring.rest)
+        pull = derivation.name(string.spring.stiffness * (beyond + abs(beyond)) / 2)
+        rate = derivation.name(string.spring.stiffness * (1 + sympy.sign(beyond)) / 2)
+        arms = Matrix([derivation.partial(length, angle) for angle in q])
+        (bends,) = _second_derivatives(arms.T, q, derivation)
+        balance += pull * arms
+        slope += rate * arms * arms.T + pull * bends
+    return balance, slope
 
 
 def _lengths(finger: Finger, tendons: Iterable[Tendon], q: Matrix, derivation: Derivation) -> Matrix:

@@ -22,6 +22,7 @@ from awiwi_gen.hand.file import HandFile
 from awiwi_gen.hand.gains import Gains, gains_complaints, with_gains
 from awiwi_gen.hand.lint import Complaint, below, complaints, sources
 from awiwi_gen.hand.lint_actuation import actuator_complaints
+from awiwi_gen.hand.lint_motors import across_complaints
 from awiwi_gen.hand.lint_tick import effort_remarks
 from awiwi_gen.hand.names import FingerName, Prefix, Title
 from awiwi_gen.hand.palm import Palm, palm_complaints
@@ -67,10 +68,33 @@ class Hand(Part):
             row, column = row + tendons, column + joints
         return found
 
+    @property
+    def motors(self) -> tuple[tuple[int, ...], ...]:
+        """What each motor pulls, as places in arrays over the hand's tendons, in the order of their first tendons.
+
+        A motor that pulls tendons of several fingers has a place for each of these.
+        """
+        places: dict[int | str, list[int]] = {}
+        pulled = [each for finger in self.fingers.values() for each in finger.transmissions]
+        for place, transmission in enumerate(pulled):
+            shared = transmission.tendons[0].motor
+            places.setdefault(shared.name if shared else place, []).append(place)
+        return tuple(map(tuple, places.values()))
+
+    @property
+    def across(self) -> dict[str, str]:
+        """Finger -> a motor that pulls tendons of it and of others; empty for most hands."""
+        owners: dict[str, list[str]] = {}
+        for name, finger in self.fingers.items():
+            for motor in {tendon.motor.name for tendon in finger.pulled if tendon.motor}:
+                owners.setdefault(motor, []).append(name)
+        return {name: motor for motor, names in owners.items() if len(names) > 1 for name in names}
+
     def structure(self) -> dict[str, Any]:
         """Everything but the numbers that the kernels of the whole hand depend on, ready for JSON."""
         fingers = {name: finger.structure() for name, finger in self.fingers.items()}
-        return {"fingers": [*fingers.items()], "wrist": self.wrist and self.wrist.structure()}
+        shared = {"motors": self.motors} if self.across else {}
+        return {"fingers": [*fingers.items()], "wrist": self.wrist and self.wrist.structure(), **shared}
 
     @classmethod
     def load(cls, path: str | os.PathLike[str] | None = None) -> Hand:
@@ -104,6 +128,7 @@ def _checked(file: HandFile) -> Hand:
     found += actuator_complaints(hand.motor, hand.spring, hand.tendon, hand.tendons)
     lacks = [section for section in ("motor", "spring") if getattr(hand, section) is None]
     found += gains_complaints(hand.gains, hand.tendons, lacks)
+    found += across_complaints(hand.across, bool(hand.gains), bool(hand.spring and hand.spring.units))
     if found:
         raise file.error(found)
     return hand

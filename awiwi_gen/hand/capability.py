@@ -1,9 +1,9 @@
 """What a hand's tendons can do, and which kernels cannot exist because of what they cannot do.
 
 Tendons only pull: the torques -P' f of forces f >= 0 form a cone. Lengths tell the joint angles where P = dh/dq has as
-many independent columns as there are joints; a torque of any direction needs the cone to be the whole space. Only
-tendons with motors count, and those of one motor count as one. Return strings pull with a force of their own that no
-controller changes.
+many independent columns as there are joints, or where springs of joints tell the rest. A torque of any direction needs
+the cone to be the whole space. Only tendons with motors count, and those of one motor count as one. Return strings pull
+with a force of their own that no controller changes.
 """
 
 from __future__ import annotations
@@ -14,11 +14,12 @@ from typing import TYPE_CHECKING, Any
 
 from awiwi_gen.hand.parts import Finger
 from awiwi_gen.hand.pose import Chain
+from awiwi_gen.structure import resting_parts, rests_in_a_bend
 
 if TYPE_CHECKING:
     from awiwi_gen.hand import Hand
 
-__all__ = ["left_out", "left_out_names"]
+__all__ = ["estimate_lines", "estimate_sources", "left_out", "left_out_names"]
 
 # Kernel families of a finger that need tendons at all.
 _NEED_TENDONS = ("tendon_lengths", "coupling", "coupling_derivative", "joint_torque", "joint_stiffness",
@@ -28,7 +29,12 @@ _NEED_LENGTHS = ("joint_estimate", "joint_estimate_error")
 _NEED_TORQUES = ("tendon_distribution",)
 _NEED_SPANS = ("base_estimate_by_gradient",)
 _TWO_WAY = "a motor of the finger pulls both ways, and the stiffness of its tendons follows from their pretension"
+_BENT = (
+    "where springs give the missing equations, and these are not linear in the angles, errors depend on tendon forces"
+)
 _RANK = 1e-7  # a singular value below this share of the largest is zero; central differences are good to 1e-10
+_TURN = 1e-4  # rad or m, of differences of arms
+_FIRM = 1e-3  # least stiffness of what springs hold, as a share of the largest
 _RESIDUAL = 1e-7  # likewise for the part of a torque that no forces give
 
 
@@ -44,6 +50,13 @@ def left_out(hand: Hand) -> dict[tuple[str, str], str]:
     found |= {("", f"{name}_{family}"): _none(hand.fingers[name]) for name in without for family in driven}
     two_way = [name for name, finger in hand.fingers.items() if any(each.two_way for each in finger.transmissions)]
     found |= {("", f"{name}_tendon_stiffness"): _TWO_WAY for name in two_way}
+    for name, motor in hand.across.items():
+        why = f"the motor {motor} pulls tendons of several fingers, whose forces"
+        found[f"fingers.{name}", "tendon_distribution"] = f"{why} no finger can choose alone"
+        if hand.motor:
+            found["", f"{name}_measured_lengths"] = (
+                f"the motor {motor} tells the sum of lengths in several fingers only"
+            )
     if not hand.tendons:
         found |= dict.fromkeys(_of_all_tendons(hand), "no motor pulls a tendon of this hand")
     return found
@@ -90,7 +103,10 @@ def _reasons(finger: Finger, couplings: Sequence[Any]) -> tuple[tuple[str, str],
     if torques and finger.strings and not both_ways:
         torques += "; return strings do not count, for no motor pulls them"
     torques = _mixed(finger) or torques
-    found += [(family, reason) for family in _NEED_LENGTHS for reason in _unknown_angles(finger, couplings)]
+    unknown = _unknown_angles(finger, couplings)
+    found += [(family, reason) for family in _NEED_LENGTHS for reason in unknown]
+    if rests_in_a_bend(finger):
+        found += [("resting_balance", reason) for reason in unknown] or [("joint_estimate_error", _BENT)]
     found += [(family, torques) for family in _NEED_TORQUES if torques]
     if not any(transmission.ratios for transmission in finger.transmissions):
         found += [(family, reason) for family in _NEED_SPANS for reason in _indistinct_base(finger, couplings)]
@@ -109,7 +125,85 @@ def _unknown_angles(finger: Finger, couplings: Sequence[Any]) -> list[str]:
     columns = [[[row[column] for column in free] for row in coupling] for coupling in couplings]
     reason = _indistinct(columns, [finger.joints[column] for column in free])
     without = " without sensors" if finger.measured else ""
-    return [f"{reason}: tendon lengths do not determine the joint angles{without}"] if reason else []
+    if not reason or not (springs := _no_rest(finger)):
+        return []
+    return [f"{reason}: tendon lengths do not determine the joint angles{without}{springs if springs != ' ' else ''}"]
+
+
+def estimate_sources(hand: Hand) -> dict[str, dict[str, tuple[str, ...]]]:
+    """Kernel -> what gives its equations besides tendon lengths, for which joints; those by lengths alone are not in it."""
+    absent = left_out(hand)
+    found = {
+        f"{name}_joint_estimate": _sources(finger)
+        for name, finger in hand.fingers.items()
+        if (f"fingers.{name}", "joint_estimate") not in absent
+    }
+    return {kernel: sources for kernel, sources in found.items() if sources}
+
+
+def estimate_lines(hand: Hand) -> list[str]:
+    """The same as lines of text."""
+    return [
+        f"estimate: {kernel}: by tendon lengths"
+        + "".join(f" and {source} of {', '.join(joints)}" for source, joints in sources.items())
+        for kernel, sources in estimate_sources(hand).items()
+    ]
+
+
+def _sources(finger: Finger) -> dict[str, tuple[str, ...]]:
+    resting = [joint for part, _ in resting_parts(finger) for joint in part]
+    found = {"sensors": finger.measured, "springs": resting}
+    return {source: tuple(finger.joints[j] for j in joints) for source, joints in found.items() if joints}
+
+
+def _no_rest(finger: Finger) -> str:
+    """Why springs do not tell the angles that lengths leave open; empty if they do, blank if there are none."""
+    import numpy as np
+
+    if not finger.strings and not any(link.spring for link in finger.links):
+        return " "
+    chain = Chain(finger)
+    couplings = [chain.coupling(q) for q in chain.poses()]
+    pulled = list(of_motors(finger, couplings))
+    stiffnesses = [_spring_stiffness(chain, q, coupling) for q, coupling in zip(chain.poses(), couplings, strict=True)]
+    for joints, tendons in resting_parts(finger):
+        names, firm = ", ".join(finger.joints[j] for j in joints), []
+        for coupling, stiffness in zip(pulled, stiffnesses, strict=True):
+            arms = _scaled(np.array(coupling).reshape(-1, len(finger.joints))[np.ix_(tendons, joints)])
+            if np.linalg.matrix_rank(arms, _RANK) == len(tendons) or not tendons:
+                kept = np.linalg.svd(arms)[2][len(tendons) :] if tendons else np.eye(len(joints))
+                held = np.linalg.eigvalsh(kept @ stiffness[np.ix_(joints, joints)] @ kept.T)
+                firm.append(held.min() > _FIRM * stiffness.max(initial=1e-300))
+        if not firm:
+            return f", and springs do not either where tendons that move {names} depend on one another"
+        if not all(firm):
+            return f", nor do springs: in some pose they do not hold {names}"
+    return "" if resting_parts(finger) else " "
+
+
+def _spring_stiffness(chain: Chain, q: Sequence[float], coupling: Sequence[Sequence[float]]) -> Any:
+    """Stiffness (n x n) at q of the springs of a finger's joints, and of its return strings that are taut there."""
+    import numpy as np
+
+    finger = chain.finger
+    found = np.zeros((len(finger.joints), len(finger.joints)))
+    for link in finger.links:
+        if link.spring is not None:
+            column, slope = chain.slope(link.joint, q)
+            found[column, column] += float(link.spring.stiffness) * slope**2
+    for number, tendon in enumerate(finger.tendons):
+        if tendon.spring is not None and (stretch := chain.length(number, q) - float(tendon.spring.rest)) > 0:
+            bends = np.array([_turned(chain, number, q, column) for column in range(len(q))])
+            arms = np.outer(coupling[number], coupling[number])
+            found += float(tendon.spring.stiffness) * (arms + stretch * (bends + bends.T) / 2)
+    return found
+
+
+def _turned(chain: Chain, number: int, q: Sequence[float], column: int) -> list[float]:
+    """How a tendon's arms change with one joint, by central differences."""
+    ends = [[x + way * _TURN * (j == column) for j, x in enumerate(q)] for way in (-1, 1)]
+    before, after = (chain.coupling(end)[number] for end in ends)
+    return [(b - a) / (2 * _TURN) for a, b in zip(before, after, strict=True)]
 
 
 def _none(finger: Finger) -> str:

@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Protocol
 
-from awiwi_gen.hand.lint_motors import motor_complaints, names_in_two_fingers
+from awiwi_gen.hand.lint_motors import motor_complaints
 from awiwi_gen.hand.lint_paths import misplaced, told, without_length
 from awiwi_gen.hand.lint_slides import limit_complaints, link_complaints, misfits
 from awiwi_gen.hand.lint_tick import joint_complaints
@@ -42,7 +42,6 @@ def complaints(limits: Limits, fingers: Mapping[str, Finger], wrist: Wrist | Non
     yield from below(("limits",), limit_complaints(limits, fingers))
     for name, finger in fingers.items():
         yield from below(("fingers", name), _finger(finger))
-    yield from names_in_two_fingers(fingers)
     yield from tensor_complaints(fingers)
     if wrist:
         yield from below(("wrist",), _wrist(wrist, sum(len(finger.transmissions) for finger in fingers.values())))

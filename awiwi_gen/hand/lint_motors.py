@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from awiwi_gen.hand.parts import Finger, Keys, Transmission
 
-__all__ = ["motor_complaints", "names_in_two_fingers"]
+__all__ = ["across_complaints", "motor_complaints"]
 
 Complaint = tuple[Keys, str]
 
@@ -14,15 +14,13 @@ _LEAST_ARM = 1e-7  # m; a motor with less than this about every joint pulls noth
 _STRETCH = 0.01  # of the largest arm: what strings on one drum, both ways, give way by
 
 
-def names_in_two_fingers(fingers: Mapping[str, Finger]) -> Iterator[Complaint]:
-    """A motor pulls tendons of one finger only."""
-    owners: dict[str, str] = {}
-    for name, finger in fingers.items():
-        for number, tendon in enumerate(finger.tendons):
-            if tendon.motor and (owner := owners.setdefault(tendon.motor.name, name)) != name:
-                keys: Keys = ("fingers", name, "tendons", number, "motor", "name")
-                fix = "a motor pulls tendons of one finger; expected another name"
-                yield keys, f'= "{tendon.motor.name}" is a motor of fingers.{owner} already; {fix}'
+def across_complaints(across: Mapping[str, str], gains: bool, units: bool) -> Iterator[Complaint]:
+    """What counts motors by tendons, beside motors that pull tendons of several fingers (finger -> motor)."""
+    for key, given in ((("gains",), gains), (("spring", "units"), units)):
+        if given and across:
+            motor = next(iter(across.values()))
+            why = f"the motor {motor} pulls tendons of several fingers; expected none, or a motor for each finger"
+            yield key, f"count one motor for each tendon, but {why}"
 
 
 def motor_complaints(finger: Finger, couplings: Sequence[Sequence[Sequence[float]]]) -> Iterator[Complaint]:

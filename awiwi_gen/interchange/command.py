@@ -16,6 +16,8 @@ from awiwi_gen.errors import InputError, printable
 if TYPE_CHECKING:
     from awiwi_gen.interchange.draft import DraftHand
 
+_SHOWN = 6  # roundings that are printed; the file has all
+
 Replace = Annotated[bool, typer.Option("--replace", help="Replace a file that exists.")]
 
 
@@ -60,7 +62,9 @@ def import_(
         lines = [f"{target}: {len(hand.fingers)} fingers ({', '.join(each.name for each in hand.fingers)}), "
                  f"{joints} independent joints, {tendons} tendons"]  # fmt: skip
         lines += [f"named: {old} -> {new}" for old, new in hand.names.items()]
-        lines += [f"taken: {note}" for note in hand.notes]
+        lines += [f"taken: {note}" for note in hand.notes[:_SHOWN]]
+        if (more := len(hand.notes) - _SHOWN) > 0:
+            lines.append(f"taken: {more} more such roundings, which the file lists")
         lines += loss_lines(hand.losses)
         print(printable("\n".join(lines)))
         if faults:

@@ -9,15 +9,14 @@ import numpy as np
 
 from awiwi_gen.errors import Fault, InputError
 from awiwi_gen.hand.parts import PALM
+from awiwi_gen.interchange.across import split
 from awiwi_gen.interchange.fingers import Chain, Segment, composite, find, palm_of, wrist_joints
 from awiwi_gen.interchange.frames import Axis, Frame, base_frame, link_frames
 from awiwi_gen.interchange.mimics import Followed, followed
-from awiwi_gen.interchange.model import Array, Joint, Loss, Model, Place, Tendon
+from awiwi_gen.interchange.model import TRAVEL, Array, Joint, Loss, Model, Place, Tendon
 from awiwi_gen.interchange.names import check_finger, finger_names, joint_names, prefix_of
 
 __all__ = ["DraftFinger", "DraftHand", "DraftLink", "DraftPalm", "DraftTendon", "draft"]
-
-_TRAVEL = 0.1  # m, to both sides, of slides without limits
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,7 +133,8 @@ def draft(model: Model, palm: str = "", named: Mapping[str, str] | None = None) 
     owner = {joint.name: chain.name for chain in chains for joint in chain.joints}
     mimics, lost = followed(model.mimics, owner, names)
     routed, left = _routed(model, chains, owner)
-    motors = joint_names({"": [tendon.name for tendon in model.tendons if tendon.two_way]})
+    shared = [each.name for own in routed.values() for each in own if each.two_way or each.across]
+    motors = joint_names({"": list(dict.fromkeys(shared))})
     fingers = tuple(
         _finger(model, root, chain, names, {f.published: f for f in mimics}, routed[chain.name], motors)
         for chain in chains
@@ -175,7 +175,7 @@ def _approximated(chains: list[Chain], fingers: tuple[DraftFinger, ...]) -> list
             tuple(j.name for j in joints if j.low is None and j.kind != "slide"),
         ),
         Loss(
-            f"slides without limits: -{_TRAVEL * 1e3:g} to {_TRAVEL * 1e3:g} mm assumed",
+            f"slides without limits: -{TRAVEL * 1e3:g} to {TRAVEL * 1e3:g} mm assumed",
             tuple(j.name for j in joints if j.low is None and j.kind == "slide"),
         ),
         Loss(
@@ -209,7 +209,10 @@ def _finger(
     strings: list[DraftTendon] = []
     for tendon in tendons:
         string = _tendon(model, tendon, names, mimics, places, (base, axes[0].anchor))
-        strings += string.wound_by(motors[tendon.name]) if tendon.two_way else [string]
+        if tendon.two_way:
+            strings += string.wound_by(motors[tendon.name])
+        else:
+            strings.append(replace(string, motor=(motors[tendon.name], 1.0)) if tendon.across else string)
     followers = tuple(mimics[joint.name] for joint in chain.joints if joint.name in mimics)
     pulleys = _pulleys(strings, {each.follower for each in followers} | {each.joint for each in links if each.slides})
     return DraftFinger(
@@ -264,7 +267,7 @@ def _link(
     mimic: Followed | None, assumed: tuple[str, ...],
 ) -> DraftLink:  # fmt: skip
     mass, com, inertia = composite(model, segment) if holds else (0.0, np.zeros(3), np.zeros((3, 3)))
-    most = _TRAVEL if joint.kind == "slide" else np.pi
+    most = TRAVEL if joint.kind == "slide" else np.pi
     limits = (joint.low, joint.high) if joint.low is not None and joint.high is not None else (-most, most)
     return DraftLink(
         joint=name,
@@ -299,7 +302,10 @@ def _tip(model: Model, segment: Segment, frame: Frame) -> tuple[Array, bool]:
 
 
 def _routed(model: Model, chains: list[Chain], owner: Mapping[str, str]) -> tuple[dict[str, list[Tendon]], list[Loss]]:
-    """The tendons of every finger, and those of none. Raises `InputError` for a tendon over two fingers."""
+    """The tendons of every finger, and those of none; one that a motor pulls in several fingers is one in each.
+
+    Raises `InputError` for a tendon that leads from finger to finger.
+    """
     bodies = {body: chain.name for chain in chains for segment in chain.segments for body in segment.members}
     moving = {joint.body for joint in model.joints if joint.name not in owner}
     routed: dict[str, list[Tendon]] = {chain.name: [] for chain in chains}
@@ -308,14 +314,18 @@ def _routed(model: Model, chains: list[Chain], owner: Mapping[str, str]) -> tupl
         passed = [body for place in tendon.path for body in (place.body, place.carrier) if body is not None]
         ends = [owner.get(joint) for joint in tendon.arms] + [bodies.get(body) for body in passed]
         fingers = sorted({name for name in ends if name})
-        if len(fingers) > 1:
-            message = f"runs over the fingers {' and '.join(fingers)}; a tendon of the hand file is of one finger"
+        if len(fingers) > 1 and (parts := split(tendon, owner, bodies)):
+            for name, part in parts.items():
+                routed[name].append(replace(part, across=True))
+        elif len(fingers) > 1:
+            message = f"leads from finger to finger ({' and '.join(fingers)}), which a tendon of the hand file cannot"
             fix = f"leave it out with --without {tendon.name}"
             raise InputError(Fault(file=model.file, key=f"tendon {tendon.name}", message=f"{message}; {fix}"))
         if not fingers:
             elsewhere.append(tendon.name)
             continue
-        routed[fingers[0]].append(tendon)
+        if len(fingers) == 1:
+            routed[fingers[0]].append(tendon)
         far = [body for body in passed if body not in bodies and moving & set(model.above(body))]
         if any(joint not in owner for joint in tendon.arms) or (far and moving & set(model.above(far[0]))):
             held.append(tendon.name)

@@ -6,6 +6,7 @@ implicitfast, with which the damping of tendons does not diverge.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
@@ -28,7 +29,7 @@ from awiwi_gen.interchange.export import (
     vector,
 )
 from awiwi_gen.interchange.export_motors import FORCE, MOTORS, TIMESTEP, Drives, Lost, Sections, one_sided
-from awiwi_gen.interchange.export_wrist import wrist_of_bars
+from awiwi_gen.interchange.export_wrist import pull_runs, wrist_of_bars
 from awiwi_gen.interchange.fits import coupler_fit
 from awiwi_gen.interchange.frames import turn_matrix
 from awiwi_gen.interchange.mjcf_elements import inertial, joint_of, least_inertia, place
@@ -54,19 +55,24 @@ def text_and_losses(hand: Hand, motors: str = FORCE) -> tuple[str, list[Loss]]:
     lost: Lost = {}
     world = SubElement(root, "worldbody")
     drives = Drives(hand, motors, world, sections, lost)
-    palm = _palm(world, hand, sections, lost)
-    for name, finger in hand.fingers.items():
-        _Writer(drives, name, finger).write(palm)
+    pulls = float(hand.limits.tendon_force) if motors == FORCE else None
+    palm = _palm(world, hand, sections, lost, pulls)
+    writers = [_Writer(drives, name, finger) for name, finger in hand.fingers.items()]
+    for writer in writers:
+        writer.write(palm)
+    _pull_across(writers)
+    if hand.wrist is not None and pulls is not None:
+        pull_runs(hand.wrist, sections, pulls)  # behind the fingers' motors
     root.extend(section for section in sections.values() if len(section))
     losses = [*common_losses(hand), coupler_losses(hand, DEGREE)]
     losses += [Loss(what, tuple(places)) for what, places in lost.items()]
     return document(root, hand), [loss for loss in losses if loss.places]
 
 
-def _palm(world: Element, hand: Hand, sections: Sections, lost: Lost) -> Element:
+def _palm(world: Element, hand: Hand, sections: Sections, lost: Lost, force: float | None) -> Element:
     """The body that the fingers stand on, with the joints of its wrist."""
     if hand.wrist is not None:
-        return wrist_of_bars(SubElement(world, "body", name="forearm"), hand.wrist, sections, lost)
+        return wrist_of_bars(SubElement(world, "body", name="forearm"), hand.wrist, sections, lost, force)
     if hand.palm is None:
         return SubElement(world, "body", name="palm")
     drawn = Drawn.of(palm_parts(hand.palm))
@@ -104,18 +110,18 @@ class _Writer:
             if link.sensor is not None:
                 joint = f"{self.name}_{link.joint}"
                 SubElement(self.sections["sensor"], "jointpos", name=f"{joint}.sensor", joint=joint)
-        motors = {self.finger.pulled_numbers[t.members[0]]: (i, t) for i, t in enumerate(self.finger.transmissions)}
+        motors = {self.finger.pulled_numbers[each.transmission.members[0]]: each for each in self.pulls}
         for number, tendon in enumerate(self.finger.tendons):
             if tendon.spring is not None:
                 self._string(number, tendon)
-            elif number in motors:
-                self._transmission(*motors[number])
+            elif number in motors and not motors[number].across:
+                _pull([motors[number]])
         if not self.finger.tendons:
             for link in self.finger.links:
                 if link.joint in self.finger.joints:
                     self.drives.move(f"{self.name}_{link.joint}", link.effort, link.slides)
 
-    def _lose(self, what: str, place: str) -> None:
+    def lose(self, what: str, place: str) -> None:
         self.lost.setdefault(what, []).append(place)
 
     # -- bodies ------------------------------------------------------------------------------------------------------
@@ -164,7 +170,7 @@ class _Writer:
         curve = Polynomial(self.finger.motion(follower))(Polynomial([references[leader], 1.0])) - references[follower]
         SubElement(self.sections["equality"], "joint", joint1=f"{self.name}_{follower}", joint2=f"{self.name}_{leader}",
                    polycoef=text([*curve.coef, 0.0, 0.0, 0.0][:5]))  # fmt: skip
-        self._lose("couplings of joints: soft constraints in MuJoCo", f"{self.name} {follower}")
+        self.lose("couplings of joints: soft constraints in MuJoCo", f"{self.name} {follower}")
 
     def _coupler(self, link: Link) -> None:
         """The coupler of a four-bar follows the crank by a polynomial."""
@@ -174,24 +180,14 @@ class _Writer:
 
     # -- tendons -----------------------------------------------------------------------------------------------------
 
-    def _transmission(self, index: int, transmission: Transmission) -> None:
-        """What a motor of the finger pulls, number `index`, and the motor."""
-        numbers = [self.finger.pulled_numbers[member] for member in transmission.members]
-        shares = [*zip(transmission.weights, numbers, strict=True)]
-        if transmission.two_way:  # the tendons that it lets go mirror those that it winds up
-            shares = [(2 * weight, number) for weight, number in shares if weight > 0]
-        shared, chain = transmission.tendons[0].motor, Chain(self.finger)
-        name = (
-            f"{self.name}.{shared.name.removeprefix(f'{self.name}_')}" if shared else f"{self.name}.tendon{numbers[0]}"
-        )
-        tendons = [(weight, self.finger.tendons[number]) for weight, number in shares]
-        slack = sum(weight * chain.length(number, [0.0] * len(self.finger.joints)) for weight, number in shares)
-        slack -= sum(weight * float(tendon.rest) for weight, tendon in tendons)
-        index += self.drives.hand.blocks[self.name][0].start
-        self.drives.pull(self._tendon(name, tendons), index, slack, transmission.two_way)
+    @property
+    def pulls(self) -> list[_Pull]:
+        """What the finger's motors pull of it."""
+        first = self.drives.hand.blocks[self.name][0].start
+        return [_Pull(self, first + index, each) for index, each in enumerate(self.finger.transmissions)]
 
-    def _tendon(self, name: str, tendons: list[tuple[float, Tendon]]) -> list[Element]:
-        """A tendon of MuJoCo, or one for arcs and one for lines, as long as the sum of weight times length."""
+    def arms_of(self, tendons: list[tuple[float, Tendon]]) -> dict[str, float]:
+        """Joint of the model -> length per angle of the sum of weight times length."""
         arms: dict[str, float] = {}
         for weight, tendon in tendons:
             for over in tendon.over:
@@ -199,45 +195,18 @@ class _Writer:
                 arms[over[1:]] = arms.get(over[1:], 0.0) + weight * radius
             for joint, arm in tendon.arms.items():
                 arms[joint] = arms.get(joint, 0.0) + weight * float(arm)
-        written = []
-        if arms:
-            written.append(SubElement(self.sections["tendon"], "fixed", name=name))
-            for joint, coefficient in arms.items():
-                SubElement(written[-1], "joint", joint=f"{self.name}_{joint}", coef=text(coefficient))
-        lines = [(weight, points) for weight, tendon in tendons for points in self._lines(tendon)]
-        if lines:
-            full = f"{name}.line0" if written else name
-            written.append(SubElement(self.sections["tendon"], "spatial", name=full))
-            self._branches(written[-1], full, lines)
-        if len(written) > 1:
-            self._lose("tendons of arcs and lines: one tendon of MuJoCo for each, and their forces are equal", name)
-        if any(tendon.rest.value for _, tendon in tendons):
-            self._lose("lengths of tendons that no joint changes (rest): not in MuJoCo's length", name)
-        return written
-
-    def _branches(self, element: Element, name: str, lines: list[tuple[float, list[Passed]]]) -> None:
-        """The places of some paths; lengths of each count so many times."""
-        steps = [(weight, first, *each) for weight, points in lines for first, each in enumerate(points)]
-        for step, (weight, first, link, at, passed) in enumerate(steps):
-            if passed is not None and passed.radius is not None:
-                self._wrap(element, f"{name}.geom{step}", passed)
-                continue
-            divisor = None if passed is None else passed.divisor
-            if divisor is not None or (first == 0 and (step or weight != 1)):
-                SubElement(element, "pulley", divisor=text(float(divisor or 1) / weight))
-            SubElement(self.bodies[link], "site", name=f"{name}.site{step}", pos=text(at))
-            SubElement(element, "site", site=f"{name}.site{step}")
+        return {f"{self.name}_{joint}": arm for joint, arm in arms.items()}
 
     def _string(self, number: int, tendon: Tendon) -> None:
         """An elastic return string: it never pushes."""
-        written = self._tendon(f"{self.name}.tendon{number}", [(1.0, tendon)])
+        written = _tendon(f"{self.name}.tendon{number}", [(self, [(1.0, tendon)])])
         if tendon.spring is None or len(written) > 1:
-            self._lose("return springs of arcs and lines: MuJoCo has no spring over both", written[0].get("name", ""))
+            self.lose("return springs of arcs and lines: MuJoCo has no spring over both", written[0].get("name", ""))
             return
         written[0].set("stiffness", text(float(tendon.spring.stiffness)))
         written[0].set("springlength", one_sided(float(tendon.spring.rest.value - tendon.rest.value)))
 
-    def _wrap(self, tendon: Element, name: str, body: PathPoint) -> None:
+    def wrap(self, tendon: Element, name: str, body: PathPoint) -> None:
         """A geom that the tendon wraps round, and the site on its side."""
         geom = SubElement(self.bodies[body.link], "geom", name=name, type=body.kind, pos=text(vector(body.at)),
                           contype="0", conaffinity="0", mass="0")  # fmt: skip
@@ -253,7 +222,7 @@ class _Writer:
             SubElement(carrier, "site", name=f"{name}.side", pos=text(vector(side)))
             step.set("sidesite", f"{name}.side")
 
-    def _lines(self, tendon: Tendon) -> list[list[Passed]]:
+    def lines_of(self, tendon: Tendon) -> list[list[Passed]]:
         """What the span and the path pass, each as (link, position in its frame, entry of the path or None)."""
         found: list[list[Passed]] = []
         if tendon.span is not None:
@@ -267,3 +236,98 @@ class _Writer:
         if tendon.path:
             found.append([(each.link, vector(each.at), each) for each in tendon.path])
         return found
+
+
+@dataclass(frozen=True)
+class _Pull:
+    """What a motor pulls of one finger: a transmission, with its index among all of the hand."""
+
+    writer: _Writer
+    index: int
+    transmission: Transmission
+
+    @property
+    def across(self) -> str:
+        """The motor's name, if it pulls tendons of other fingers too."""
+        shared, across = self.transmission.tendons[0].motor, self.writer.drives.hand.across
+        return shared.name if shared and any(shared.name == each for each in across.values()) else ""
+
+    @property
+    def name(self) -> str:
+        """The name of the tendon in the model."""
+        shared, finger = self.transmission.tendons[0].motor, self.writer.name
+        number = self.writer.finger.pulled_numbers[self.transmission.members[0]]
+        own = f"{finger}.{shared.name.removeprefix(f'{finger}_')}" if shared else f"{finger}.tendon{number}"
+        return self.across or own
+
+    @property
+    def shares(self) -> list[tuple[float, int]]:
+        """Weights and numbers of its tendons; those that a motor lets go mirror those that it winds up."""
+        numbers = [self.writer.finger.pulled_numbers[member] for member in self.transmission.members]
+        shares = [*zip(self.transmission.weights, numbers, strict=True)]
+        return [(2 * each, number) for each, number in shares if each > 0] if self.transmission.two_way else shares
+
+    @property
+    def tendons(self) -> list[tuple[float, Tendon]]:
+        """Weights and tendons."""
+        return [(weight, self.writer.finger.tendons[number]) for weight, number in self.shares]
+
+    @property
+    def slack(self) -> float:
+        """The length [m] with all joints at zero, without the rest."""
+        chain, zero = Chain(self.writer.finger), [0.0] * len(self.writer.finger.joints)
+        lengths = sum(weight * chain.length(number, zero) for weight, number in self.shares)
+        return lengths - sum(weight * float(tendon.rest) for weight, tendon in self.tendons)
+
+
+def _pull_across(writers: list[_Writer]) -> None:
+    """One tendon for each motor that pulls tendons of several fingers."""
+    found: dict[str, list[_Pull]] = {}
+    for pull in (each for writer in writers for each in writer.pulls):
+        if pull.across:
+            found.setdefault(pull.across, []).append(pull)
+    for pulls in found.values():
+        _pull(pulls)
+
+
+def _pull(pulls: list[_Pull]) -> None:
+    """A tendon for all that a motor pulls, and the motor."""
+    written = _tendon(pulls[0].name, [(pull.writer, pull.tendons) for pull in pulls])
+    both_ways = any(pull.transmission.two_way for pull in pulls)
+    pulls[0].writer.drives.pull(written, pulls[0].index, sum(pull.slack for pull in pulls), both_ways)
+
+
+def _tendon(name: str, parts: list[tuple[_Writer, list[tuple[float, Tendon]]]]) -> list[Element]:
+    """A tendon of MuJoCo, or one for arcs and one for lines, as long as the sum of weight times length in all fingers."""
+    first = parts[0][0]
+    arms = {joint: arm for writer, tendons in parts for joint, arm in writer.arms_of(tendons).items()}
+    written = []
+    if arms:
+        written.append(SubElement(first.sections["tendon"], "fixed", name=name))
+        for joint, coefficient in arms.items():
+            SubElement(written[-1], "joint", joint=joint, coef=text(coefficient))
+    lines = [(writer, weight, points) for writer, tendons in parts for weight, tendon in tendons
+             for points in writer.lines_of(tendon)]  # fmt: skip
+    if lines:
+        full = f"{name}.line0" if written else name
+        written.append(SubElement(first.sections["tendon"], "spatial", name=full))
+        _branches(written[-1], full, lines)
+    if len(written) > 1:
+        first.lose("tendons of arcs and lines: one tendon of MuJoCo for each, and their forces are equal", name)
+    if any(tendon.rest.value for _, tendons in parts for _, tendon in tendons):
+        first.lose("lengths of tendons that no joint changes (rest): not in MuJoCo's length", name)
+    return written
+
+
+def _branches(element: Element, name: str, lines: list[tuple[_Writer, float, list[Passed]]]) -> None:
+    """The places of some paths; lengths of each count so many times."""
+    steps = [(writer, weight, first, *each) for writer, weight, points in lines for first, each in enumerate(points)]
+    for step, (writer, weight, first, link, at, passed) in enumerate(steps):
+        if passed is not None and passed.radius is not None:
+            writer.wrap(element, f"{name}.geom{step}", passed)
+            continue
+        divisor = None if passed is None else passed.divisor
+        if divisor is not None or (first == 0 and (step or weight != 1)):
+            SubElement(element, "pulley", divisor=text(float(divisor or 1) / weight))
+        SubElement(writer.bodies[link], "site", name=f"{name}.site{step}", pos=text(at))
+        SubElement(element, "site", site=f"{name}.site{step}")

@@ -18,7 +18,7 @@ from awiwi_gen.hand.lever import Lever
 from awiwi_gen.interchange.export import text
 from awiwi_gen.interchange.fits import Fit, elongation_curve, spring_fit
 from awiwi_gen.interchange.mjcf_elements import least_inertia
-from awiwi_gen.interchange.model import LEAST_MASS
+from awiwi_gen.interchange.model import LEAST_MASS, TRAVEL
 from awiwi_gen.units import Quantity
 
 __all__ = ["FORCE", "MOTORS", "POSITION", "TIMESTEP", "TORQUE", "Drives", "Lost", "Sections", "one_sided"]
@@ -31,7 +31,6 @@ Sections = dict[str, Element]
 _MOST = 10.0  # [m] below its rest length, a spring of MuJoCo would push
 _LEG = 1.0  # [m] of a tendon through points between its shaft and the world, longer than any travel
 _SHARE = 0.01  # of a motor's travel, or of 10 rad of a joint: the error at which a servo gives its full torque
-_TRAVEL = 0.1  # [m] of a slide instead of 10 rad
 
 
 def one_sided(rest: float) -> str:
@@ -78,7 +77,7 @@ class Drives:
     def move(self, joint: str, effort: Quantity | None, slides: bool) -> None:
         """A motor in a joint of a finger without tendons; without an effort of its own, up to the hand's limit."""
         limits = self.hand.limits
-        torque, range_ = (float(limits.slide_force or 0), _TRAVEL) if slides else (float(limits.joint_torque), 10.0)
+        torque, range_ = (float(limits.slide_force or 0), TRAVEL) if slides else (float(limits.joint_torque), 10.0)
         torque = float(effort or torque)
         if self.motors == POSITION:
             SubElement(self.sections["actuator"], "position", name=f"{joint}.motor", joint=joint,

@@ -17,11 +17,16 @@ from awiwi_gen.interchange.mjcf_elements import least_inertia, place
 
 SOLREF, SOLIMP = "0.004 1", "0.999 0.9999 0.0001"  # under the weight of the hand, bars of 5 cm give way by 2 um
 SOFT = "bars of the wrist: soft constraints in MuJoCo"
-RUNS = "runs of tendons through the wrist: not in MuJoCo's lengths, so that no tendon pulls the wrist"
+RUNS = "runs of tendons through the wrist: tendons of their own, for MuJoCo has none of arcs and lines"
+PULLED = f"{RUNS}; their motors need the fingers' forces"
+LOOSE = f"{RUNS}; no motor pulls them"
 
 
-def wrist_of_bars(forearm: Element, wrist: Wrist, sections: Sections, lost: Lost) -> Element:
-    """The palm in its neutral pose, in the forearm's frame {0}."""
+def wrist_of_bars(forearm: Element, wrist: Wrist, sections: Sections, lost: Lost, force: float | None) -> Element:
+    """The palm in its neutral pose, in the forearm's frame {0}.
+
+    Motors of the largest `force` [N] pull the tendons' runs through the wrist, if given.
+    """
     b, origin = vector(wrist.b), vector(wrist.palm)
     palm = SubElement(forearm, "body", name="palm")
     place(palm, origin, np.eye(3))
@@ -45,5 +50,18 @@ def wrist_of_bars(forearm: Element, wrist: Wrist, sections: Sections, lost: Lost
             SubElement(bar, "site", site=f"wrist.{name}.{end_of}")
         SubElement(sections["equality"], "tendon", tendon1=f"wrist.{name}", solref=SOLREF, solimp=SOLIMP)
         lost.setdefault(SOFT, []).append(name)
-    lost[RUNS] = [str(number) for number in range(len(wrist.tendons))]
+    for number, tendon in enumerate(wrist.tendons):
+        run = SubElement(sections["tendon"], "spatial", name=f"wrist.run{number}")
+        for body, end in ((forearm, vector(tendon.forearm)), (palm, vector(tendon.palm))):
+            site = f"wrist.run{number}.{body.get('name')}"
+            SubElement(body, "site", name=site, pos=text(end))
+            SubElement(run, "site", site=site)
+        lost.setdefault(LOOSE if force is None else PULLED, []).append(f"wrist.run{number}")
     return palm
+
+
+def pull_runs(wrist: Wrist, sections: Sections, force: float) -> None:
+    """Motors for the tendons' runs through the wrist."""
+    for number in range(len(wrist.tendons)):
+        SubElement(sections["actuator"], "motor", name=f"wrist.run{number}.motor", tendon=f"wrist.run{number}", gear="-1",
+                   ctrlrange=text((0.0, force)))  # fmt: skip

@@ -63,12 +63,18 @@ def palm_of(model: Model, name: str = "") -> int:
 
 
 def _branching(model: Model, top: int) -> int:
-    """The first body below `top` that carries several moving parts; in a single chain `top`, or what carries it."""
-    at = top
+    """The first body below `top` that carries several moving parts.
+
+    In a single chain, the last body with "palm" in its name that carries others, else `top`, or what carries it.
+    """
+    at, palm = top, None
     while len(moving := [child for child in model.children[at] if _hinges(model, child)]) == 1:
+        palm = at if "palm" in model.bodies[at].name.lower() else palm
         at = moving[0]
     if moving:
         return at
+    if palm is not None:
+        return palm
     return model.bodies[top].parent if model.joints_of[top] else top
 
 

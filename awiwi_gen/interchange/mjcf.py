@@ -16,10 +16,10 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from awiwi_gen.errors import Fault, InputError
-from awiwi_gen.interchange.model import LEAST_MASS, Array, Body, Joint, Loss, Mimic, Model, Site, Tendon
+from awiwi_gen.interchange.model import LEAST_MASS, Array, Body, Joint, Loss, Mimic, Model, Site
 from awiwi_gen.interchange.quarter import quarter_angle, quarter_axis, quarter_rotation
 from awiwi_gen.interchange.urdf import require_tree
-from awiwi_gen.interchange.wraps import fitted, path_of
+from awiwi_gen.interchange.wraps import tendons_of
 
 KINDS = ("free", "ball", "slide", "hinge")
 _INCLUDE = re.compile(r'<include\s[^>]*?file\s*=\s*"([^"]+)"')
@@ -38,13 +38,14 @@ def read(path: Path, exact: bool = False, without: Iterable[str] = (), fit: bool
     driven = {name: bool(min(ends) < 0 < max(ends)) for name, ends in forces.items()}
     measured = {each.objname for each in spec.sensors if each.type == mujoco.mjtSensor.mjSENS_JOINTPOS}
     losses = prepare(spec, set(without))
-    massless = {body.name for body in spec.bodies[1:] if body.explicitinertial and body.mass <= LEAST_MASS}
+    massless = {body.name for body in spec.bodies[1:] if _has_no_mass(body)}
     compiled = compile_spec(spec, path)
-    tendons, lost = _tendons(compiled, driven, fit)
+    tensors = unbalanced(spec, compiled)
+    tendons, lost = tendons_of(compiled, driven, _mimics(compiled) if fit else None)
     return Model(
         name=spec.modelname or path.stem,
         file=path.name,
-        bodies=tuple(_body(compiled, index, massless) for index in range(compiled.nbody)),
+        bodies=tuple(_body(compiled, index, massless, tensors) for index in range(compiled.nbody)),
         joints=tuple(_joint(compiled, index, measured) for index in range(compiled.njnt)),
         tendons=tendons,
         mimics=_mimics(compiled),
@@ -52,7 +53,7 @@ def read(path: Path, exact: bool = False, without: Iterable[str] = (), fit: bool
             Site(compiled.site(i).name, int(compiled.site_bodyid[i]), compiled.site_pos[i].copy())
             for i in range(compiled.nsite)
         ),
-        losses=(*losses, *lost),
+        losses=(*losses, *(each for each in (*lost, *_of_joints(compiled)) if each.places)),
         notes=tuple(notes),
         tendon_force=max(most) if most and min(most) > 0 else 0.0,
     )
@@ -262,10 +263,16 @@ def _loss(what: str, elements: Iterable[Any], counts: Any = lambda each: True) -
 
 
 def compile_spec(spec: Any, path: Path) -> Any:
-    """The MjModel of a spec. Raises `InputError` with MuJoCo's reason."""
+    """The MjModel of a spec. Raises `InputError` with MuJoCo's reason.
+
+    Where it refuses tensors that no body has, the hand file's checks say more of them: MuJoCo balances them.
+    """
     try:
         return spec.compile()
     except (ValueError, mujoco.FatalError) as error:
+        if "balanceinertia" in str(error) and not spec.compiler.balanceinertia:
+            spec.compiler.balanceinertia = True
+            return compile_spec(spec, path)
         raise _refused(path, error) from None
 
 
@@ -274,6 +281,11 @@ def _refused(path: Path, error: Exception) -> InputError:
     needed = "Error opening file" in reason and "include" not in reason
     missing = "; the mass of a body is computed from it: get the file, or give the body an inertial" if needed else ""
     return InputError(Fault(file=str(path), message=f"is refused by MuJoCo {mujoco.__version__}: {reason}{missing}"))
+
+
+def _of_joints(compiled: Any) -> list[Loss]:
+    places = tuple(compiled.joint(i).name for i in range(compiled.njnt) if _is_polynomial(compiled, i))
+    return [Loss("polynomial stiffness or damping of joints: only the linear term is kept", places)]
 
 
 def _is_polynomial(compiled: Any, joint: int) -> bool:
@@ -289,7 +301,32 @@ def rotation(quat: Any) -> Array:
     return np.where(np.abs(matrix - exact) < 1e-15, exact, matrix).reshape(3, 3)
 
 
-def _body(compiled: Any, index: int, massless: set[str]) -> Body:
+def _has_no_mass(body: Any) -> bool:
+    """Whether a body has only what `_weigh`, or our export, gives to those without mass."""
+    full = not np.isnan(body.fullinertia[0]) and np.any(body.fullinertia)
+    return bool(
+        body.explicitinertial and body.mass <= LEAST_MASS and not full and max(body.inertia) <= LEAST_MASS * 1e-6
+    )
+
+
+def unbalanced(spec: Any, compiled: Any) -> dict[str, Array]:
+    """Body -> its published tensor (3 x 3) in its own axes, where MuJoCo has put the mean of its moments in its place."""
+    found = {}
+    for body in spec.bodies[1:] if spec.compiler.balanceinertia else []:
+        index = compiled.body(body.name).id
+        full = np.array(body.fullinertia)
+        axes = rotation(compiled.body_iquat[index])
+        xx, yy, zz, xy, xz, yz = full if not np.isnan(full[0]) else np.zeros(6)
+        tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        if not np.any(tensor):
+            tensor = axes @ np.diag(body.inertia) @ axes.T
+        moments = np.linalg.eigvalsh(tensor)
+        if body.explicitinertial and moments[0] + moments[1] < moments[2]:
+            found[body.name] = tensor
+    return found
+
+
+def _body(compiled: Any, index: int, massless: set[str], tensors: dict[str, Array]) -> Body:
     axes = rotation(compiled.body_iquat[index])
     name = compiled.body(index).name or f"body{index}"
     return Body(
@@ -299,7 +336,7 @@ def _body(compiled: Any, index: int, massless: set[str]) -> Body:
         axes=rotation(compiled.body_quat[index]),
         mass=0.0 if name in massless else float(compiled.body_mass[index]),
         com=compiled.body_ipos[index].copy(),
-        inertia=axes @ np.diag(compiled.body_inertia[index]) @ axes.T,
+        inertia=tensors.get(name, axes @ np.diag(compiled.body_inertia[index]) @ axes.T),
     )
 
 
@@ -336,59 +373,3 @@ def _mimics(compiled: Any) -> tuple[Mimic, ...]:
         curve = Polynomial(compiled.eq_data[index, :5])(Polynomial([-zeros[1], 1.0])) + zeros[0]
         found.append(Mimic.of(compiled.joint(follower).name, compiled.joint(leader).name, curve))
     return tuple(found)
-
-
-def _tendons(compiled: Any, driven: dict[str, bool], fit: bool) -> tuple[tuple[Tendon, ...], list[Loss]]:
-    found, fits, pushed, poly, both, two_way = [], [], [], [], [], []
-    losses: dict[str, list[str]] = {}
-    joint_wrap = mujoco.mjtWrap.mjWRAP_JOINT
-    for index in range(compiled.ntendon):
-        name = compiled.tendon(index).name or f"tendon{index}"
-        first = int(compiled.tendon_adr[index])
-        places = range(first, first + int(compiled.tendon_num[index]))
-        kinds = {int(compiled.wrap_type[k]) for k in places}
-        stiffness = float(compiled.tendon_stiffness[index])
-        low, rest = map(float, compiled.tendon_lengthspring[index])
-        if stiffness and name in driven:
-            both.append(name)
-            stiffness = 0.0
-        spring: dict[str, Any] = {"stiffness": stiffness, "rest": rest if stiffness else 0.0}
-        if stiffness and low > 0:
-            pushed.append(name)
-        if np.any(compiled.tendon_stiffnesspoly[index]):
-            poly.append(name)
-        if kinds == {int(joint_wrap)}:
-            arms = {compiled.joint(int(compiled.wrap_objid[k])).name: float(compiled.wrap_prm[k]) for k in places}
-            found.append(Tendon(name, arms=arms, two_way=driven.get(name, False), **spring))
-        elif fit and kinds != {int(mujoco.mjtWrap.mjWRAP_SITE)}:
-            tendon, error = fitted(compiled, Tendon(name, two_way=driven.get(name, False), **spring), _mimics(compiled))
-            found.append(tendon)
-            fits.append(f"{name} by {error * 1e3:.2g} mm")
-        else:
-            path, lost = path_of(compiled, places)
-            two_way += [name] * driven.get(name, False)
-            if path:
-                found.append(Tendon(name, path=path, **spring))
-            for what in lost:
-                losses.setdefault(what, []).append(name)
-    all_losses = [
-        *(Loss(what, tuple(names)) for what, names in losses.items()),
-        Loss("wraps of tendons: constant arms fitted, lengths differ at most", tuple(fits)),
-        Loss("springs of tendons that also push: the hand's springs only pull", tuple(pushed)),
-        Loss("motors that also push tendons through sites: the hand's motors only pull these", tuple(two_way)),
-        Loss("springs of tendons that a motor pulls: the hand's tendons have one or the other", tuple(both)),
-        Loss(
-            "polynomial stiffness or damping of joints: only the linear term is kept",
-            tuple(compiled.joint(i).name for i in range(compiled.njnt) if _is_polynomial(compiled, i)),
-        ),
-        Loss("polynomial stiffness of tendons: only its linear term is kept", tuple(poly)),
-        Loss(
-            "damping, armature or friction of tendons",
-            tuple(
-                compiled.tendon(i).name
-                for i in range(compiled.ntendon)
-                if compiled.tendon_damping[i] or compiled.tendon_armature[i] or compiled.tendon_frictionloss[i]
-            ),
-        ),
-    ]
-    return tuple(found), [loss for loss in all_losses if loss.places]

@@ -16,12 +16,14 @@ import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
-__all__ = ["LEAST_MASS", "Array", "Body", "Joint", "Loss", "Mimic", "Model", "Place", "Site", "Tendon"]
+__all__ = ["LEAST_MASS", "TRAVEL", "Array", "Body", "Joint", "Loss", "Mimic", "Model", "Place", "Site", "Tendon"]
 
 Array = NDArray[np.float64]
 
 LEAST_MASS = 1e-9
 """Mass [kg] of moving bodies that have none, with a radius of gyration of 1 mm: MuJoCo refuses bodies without."""
+TRAVEL = 0.1
+"""How far [m] slides are taken to go to both sides where nothing says it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +98,8 @@ class Tendon:
     """A tendon: either `arms`, length per angle by joint, or a `path` from place to place.
 
     Its length also has a `constant` part [m]. An elastic string has a `stiffness` [N/m] and no force where it is as long
-    as `rest`. A tendon of arms that its motor also pushes is `two_way`.
+    as `rest`. A tendon of arms that its motor also pushes is `two_way`; one that is a part of a tendon over several fingers,
+    which one motor pulls, is `across`.
     """
 
     name: str
@@ -106,6 +109,7 @@ class Tendon:
     rest: float = 0.0
     constant: float = 0.0
     two_way: bool = False
+    across: bool = False
 
 
 @dataclass(frozen=True)

@@ -12,10 +12,68 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from awiwi_gen.interchange.model import Array, Mimic, Place, Tendon
+from awiwi_gen.interchange.model import Array, Loss, Mimic, Place, Tendon
 
 _STATES = 400
 _LEAST_ARM = 1e-6  # m; what MuJoCo's solver of wraps leaves of a joint that the tendon does not cross
+
+
+def tendons_of(
+    compiled: Any, driven: dict[str, bool], mimics: tuple[Mimic, ...] | None
+) -> tuple[tuple[Tendon, ...], list[Loss]]:
+    """All tendons, and what of them is lost; `driven` has those of actuators, and whether these pull both ways.
+
+    Given `mimics`, the couplings of joints, wraps get constant arms that are fitted.
+    """
+    found, fits, pushed, poly, both, two_way = [], [], [], [], [], []
+    losses: dict[str, list[str]] = {}
+    joint_wrap = mujoco.mjtWrap.mjWRAP_JOINT
+    for index in range(compiled.ntendon):
+        name = compiled.tendon(index).name or f"tendon{index}"
+        first = int(compiled.tendon_adr[index])
+        places = range(first, first + int(compiled.tendon_num[index]))
+        kinds = {int(compiled.wrap_type[k]) for k in places}
+        stiffness = float(compiled.tendon_stiffness[index])
+        low, rest = map(float, compiled.tendon_lengthspring[index])
+        if stiffness and name in driven:
+            both.append(name)
+            stiffness = 0.0
+        spring: dict[str, Any] = {"stiffness": stiffness, "rest": rest if stiffness else 0.0}
+        if stiffness and low > 0:
+            pushed.append(name)
+        if np.any(compiled.tendon_stiffnesspoly[index]):
+            poly.append(name)
+        if kinds == {int(joint_wrap)}:
+            arms = {compiled.joint(int(compiled.wrap_objid[k])).name: float(compiled.wrap_prm[k]) for k in places}
+            found.append(Tendon(name, arms=arms, two_way=driven.get(name, False), **spring))
+        elif mimics is not None and kinds != {int(mujoco.mjtWrap.mjWRAP_SITE)}:
+            tendon, error = fitted(compiled, Tendon(name, two_way=driven.get(name, False), **spring), mimics)
+            found.append(tendon)
+            fits.append(f"{name} by {error * 1e3:.2g} mm")
+        else:
+            path, lost = path_of(compiled, places)
+            two_way += [name] * driven.get(name, False)
+            if path:
+                found.append(Tendon(name, path=path, **spring))
+            for what in lost:
+                losses.setdefault(what, []).append(name)
+    all_losses = [
+        *(Loss(what, tuple(names)) for what, names in losses.items()),
+        Loss("wraps of tendons: constant arms fitted, lengths differ at most", tuple(fits)),
+        Loss("springs of tendons that also push: the hand's springs only pull", tuple(pushed)),
+        Loss("motors that also push tendons through sites: the hand's motors only pull these", tuple(two_way)),
+        Loss("springs of tendons that a motor pulls: the hand's tendons have one or the other", tuple(both)),
+        Loss("polynomial stiffness of tendons: only its linear term is kept", tuple(poly)),
+        Loss(
+            "damping, armature or friction of tendons",
+            tuple(
+                compiled.tendon(i).name
+                for i in range(compiled.ntendon)
+                if compiled.tendon_damping[i] or compiled.tendon_armature[i] or compiled.tendon_frictionloss[i]
+            ),
+        ),
+    ]
+    return tuple(found), [loss for loss in all_losses if loss.places]
 
 
 def path_of(compiled: Any, places: Iterable[int]) -> tuple[tuple[Place, ...], list[str]]:

@@ -15,8 +15,8 @@ from awiwi_gen.kernel import Kernel, Port, Solver
 from awiwi_gen.kernels.declare import Family
 from awiwi_gen.kernels.estimates import NEAR, joint_limits, limit_paths
 from awiwi_gen.kernels.fingers import input_ports
-from awiwi_gen.kernels.routing import moved
 from awiwi_gen.kernels.sizes import Size
+from awiwi_gen.structure import moved
 from awiwi_gen.units import rad
 
 TRIALS = 50  # as in algorithm 1; figure 5.17 shows that 15 are enough for noisy lengths

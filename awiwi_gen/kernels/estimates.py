@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from awiwi_gen.hand.parts import Finger
 from awiwi_gen.kernel import STOP, Solver
-from awiwi_gen.kernels.routing import groups, is_bent, is_curved, moved
-from awiwi_gen.structure import wraps
+from awiwi_gen.structure import estimated_parts, is_bent, is_curved, wraps
 
 
 def joint_limits(finger: Finger) -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -20,17 +19,6 @@ def limit_paths(finger: Finger) -> dict[str, tuple[str, ...]]:
     return {end: tuple(f"links[{i}].{end}" if getattr(k, end) else "" for i, k in free) for end in ("low", "high")}
 
 
-def estimated_parts(finger: Finger) -> list[tuple[list[int], list[int], bool]]:
-    """Joints to be found and tendons, by index, that depend on no others, and whether their coupling is constant."""
-    found = []
-    for tendons in groups(finger):
-        members = [finger.transmissions[i] for i in tendons]
-        pulled = set().union(*(moved(finger, each) for each in members))
-        joints = [i for i, joint in enumerate(finger.joints) if joint in pulled and i not in finger.measured]
-        found.append((joints, tendons, not any(is_bent(finger, each) for each in members)))
-    return [part for part in found if part[0]]
-
-
 # Steps get shorter more slowly where lengths bend more, and rounding in single precision leaves them longer than 1e-6.
 ROUND_BODIES = {"f64": "1e-13", "f32": "5e-6"}
 
@@ -43,7 +31,10 @@ def nonlinear_estimate(finger: Finger, iterations: int = 24) -> Solver | None:
     if not is_curved(finger):
         return None
     low, high = joint_limits(finger)
-    parts = estimated_parts(finger)
+    parts = [
+        (joints, tendons, not any(is_bent(finger, finger.transmissions[i]) for i in tendons))
+        for joints, tendons in estimated_parts(finger)
+    ]
     scales = [SLIDE_UNIT if joint in finger.sliding else "1" for joint in finger.joints]
     curved = sum(not linear for _, _, linear in parts)
     return Solver(

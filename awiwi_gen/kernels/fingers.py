@@ -10,9 +10,10 @@ from awiwi_gen.hand import Hand
 from awiwi_gen.hand.lever import Lever
 from awiwi_gen.hand.parts import Finger, PathPoint, Tendon, Transmission
 from awiwi_gen.hand.pose import polynomial
-from awiwi_gen.kernel import Kernel, Port
+from awiwi_gen.kernel import Kernel, Port, Solver
 from awiwi_gen.kernels.declare import Family, within
 from awiwi_gen.kernels.estimates import joint_limits, nonlinear_estimate
+from awiwi_gen.kernels.resting import resting_estimate
 from awiwi_gen.kernels.routing import least_forces, wraps_hold
 from awiwi_gen.kernels.sizes import (
     POSE,
@@ -27,7 +28,7 @@ from awiwi_gen.kernels.sizes import (
     stiffness,
     torque,
 )
-from awiwi_gen.structure import link_number, rolls
+from awiwi_gen.structure import link_number, rests_in_a_bend, rolls
 from awiwi_gen.units import J, N, Unit, m, one, s
 
 per_finger: Family[Size] = Family()
@@ -46,7 +47,9 @@ def guarded(finger: Finger, kernels: list[Kernel]) -> list[Kernel]:
     """The kernels of a finger; they return a status if they depend on four-bars, or on tendons round bodies."""
     loops = tuple(f"the four-bar of {link.joint} closes" for link in finger.links if link.four_bar)
     held = wraps_hold(finger)
-    kernels = [kernel for kernel in kernels if kernel.family != "return_torque" or finger.strings]
+    needless = {"return_torque"} if not finger.strings else set()
+    needless |= {"resting_balance"} if not rests_in_a_bend(finger) else set()
+    kernels = [kernel for kernel in kernels if kernel.family not in needless]
     kernels = [within(k, "domain", "loops_close", loops) if loops and moves_the_chain(k) else k for k in kernels]
     return [within(k, "domain", "wraps_hold", held) if held and moves_tendons(k) else k for k in kernels]
 
@@ -304,16 +307,38 @@ def return_torque(finger: Any, q: Any) -> Any:
 
 
 @per_finger(
+    lambda z: {"balance": torque(z), "slope": stiffness(z)},
+    "eq. 5.8, 5.14, with springs of joints and strings",
+    subject="tendons",
+)
+def resting_balance(finger: Any, q: Any, f: Any) -> Any:
+    """Joint torques that a finger misses to rest under tendon forces f, and their derivatives by the joint angles.
+
+    Those of springs of joints and of return strings, plus P' f; without gravity, friction and contact. Zero where the
+    finger rests.
+    """
+
+
+def estimate_solver(finger: Finger) -> Solver | None:
+    """What finds the joint angles of a finger; None where they have a closed form."""
+    return resting_estimate(finger) if rests_in_a_bend(finger) else nonlinear_estimate(finger)
+
+
+@per_finger(
     lambda z: {"q": motion(z)},
     "eq. 5.14, 5.15, 5.24",
     subject="joint_estimate",
-    solver=nonlinear_estimate,
+    solver=estimate_solver,
 )
 def joint_estimate(finger: Any, h: Any, start: Any, measured: Any = None) -> Any:
     """Joint angles whose tendon lengths are nearest to the measured h (least squares); start is the last estimate.
 
     Where the coupling is constant the estimate is linear, and not limited: lengths that no pose has give angles beyond the
     joint limits. Otherwise it is within them.
+
+    Where tendons are too few, the springs of the finger tell the rest: of all angles with these lengths, those are found
+    where the springs hold the least energy. So the finger must rest without contact, its tendons must be taut, and
+    weight and friction small beside the springs. Linear estimates do not know the stops of joints, others do.
     """
 
 

@@ -14,7 +14,7 @@ from awiwi_gen.hand.parts import Tendon
 from awiwi_gen.kernel import Kernel, Port, Solver
 from awiwi_gen.kernels.declare import Family
 from awiwi_gen.kernels.fingers import force_range, per_finger
-from awiwi_gen.kernels.routing import geared, groups, is_curved, senses
+from awiwi_gen.structure import geared, groups, is_curved, senses
 from awiwi_gen.units import N, m, one
 
 SEARCHES, INVERSIONS = 2 + 4 * 97, 66  # evaluations of the curve in the worst case, see csrc/awiwi_distribution.h

@@ -3,6 +3,9 @@
 `Hand.blocks` has the rows (tendons) and columns (joints) of each finger. Outside these blocks the coupling and the
 stiffness are constant zeros, since a finger's tendons do not depend on the joints of other fingers. The wrist changes
 tendon lengths only; its coupling has two columns of its own, in `wrist_coupling`.
+
+Where a motor pulls tendons of several fingers, `motor_*` have one element for each motor instead of each tendon;
+`Hand.motors` tells which tendons each pulls.
 """
 
 from __future__ import annotations
@@ -21,6 +24,7 @@ from awiwi_gen.kernels.wrist import bars_close, wrist_ports
 from awiwi_gen.units import m
 
 of_hand: Family[Size] = Family("hand_tendons")
+of_motors: Family[Size] = Family("hand_tendons")  # of hands whose motors pull tendons of several fingers
 
 
 def hand_kernels(hand: Hand) -> list[Kernel]:
@@ -34,7 +38,13 @@ def hand_kernels(hand: Hand) -> list[Kernel]:
     whole = Size(sliding, ports["f"].size, sum(size.links for size in sizes.values()))
     joints = [(joint, finger) for finger in hand.fingers.values() for joint in finger.joints]
     slides = [f"{index} ({joint})" for index, (joint, finger) in enumerate(joints) if joint in finger.sliding]
-    kernels = with_slides(of_hand.kernels("hand", hand, "", hand.structure(), ports, whole), slides)
+    made = of_hand.kernels("hand", hand, "", hand.structure(), ports, whole)
+    if hand.across:
+        motors = Size(sliding, len(hand.motors), whole.links)
+        first = [tendons[0] for tendons in hand.motors]
+        ports |= {f"{name}_motor": ports[name].subset(first) for name in ("f", "k")}
+        made += of_motors.kernels("hand", hand, "", hand.structure(), ports, motors)
+    kernels = with_slides(made, slides)
     wraps = tuple(each for name, finger in hand.fingers.items() for each in wraps_hold(finger, f"{name}."))
     return [
         replace(kernel, guards=(bars_close(hand.wrist) if hand.wrist and "wrist" in kernel.inputs else ()) + wraps)
@@ -73,3 +83,26 @@ def joint_torque(hand: Any, q: Any, f: Any) -> Any:
 )
 def joint_stiffness(hand: Any, q: Any, f: Any, k: Any) -> Any:
     """Joint stiffness -d tau/dq of tendons with the stiffnesses k and the forces f; zero outside the blocks."""
+
+
+@of_motors(lambda z: {"h": Port((z.tendons,), m)}, "eq. 5.1, 5.5, 6.9, summed over a motor's tendons")
+def motor_lengths(hand: Any, q: Any) -> Any:
+    """Path length in the fingers of all that each motor pulls."""
+
+
+@of_motors(lambda z: {"P": arms(z)}, "eq. 5.6, 5.9, 5.21, summed over a motor's tendons")
+def motor_coupling(hand: Any, q: Any) -> Any:
+    """Coupling matrix P = dh/dq of all motors and joints."""
+
+
+@of_motors(lambda z: {"tau": torque(z)}, "eq. 5.8, by the motors' forces")
+def motor_joint_torque(hand: Any, q: Any, f_motor: Any) -> Any:
+    """Joint torques -P' f of the motors' forces f_motor."""
+
+
+@of_motors(lambda z: {"K": stiffness(z)}, "eq. 5.12, 5.23, by the motors' forces")
+def motor_joint_stiffness(hand: Any, q: Any, f_motor: Any, k_motor: Any) -> Any:
+    """Joint stiffness -d tau/dq of motors with the stiffnesses k_motor and the forces f_motor.
+
+    Fingers of one motor are coupled: it pulls less at one as another gives way.
+    """

@@ -17,6 +17,7 @@ from awiwi_gen.kernel import Solver
 from awiwi_gen.verify.problem import Problem
 from awiwi_gen.verify.problems_distribution import Distribution
 from awiwi_gen.verify.problems_gains import GainMatching
+from awiwi_gen.verify.problems_resting import Resting
 from awiwi_gen.verify.problems_riccati import JointRegulator, Riccati
 from awiwi_gen.verify.reference import Reference, reference
 
@@ -227,6 +228,7 @@ def _clamped(x: Array, low: Array, high: Array) -> Array:
 PROBLEMS: Mapping[str, Callable[[Solver, Mapping[str, Graph], Mapping[str, Fraction]], Problem]] = {
     "least squares": LeastSquares,
     "gradient search": GradientSearch,
+    "resting": Resting,
     "distribution": Distribution,
     "riccati": Riccati,
     "joint regulator": JointRegulator,

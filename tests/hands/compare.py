@@ -27,6 +27,10 @@ def compiled_model(path: Path, exact: bool, without: frozenset[str] = frozenset(
     spec, _ = mjcf.parse(path, exact)
     mjcf.prepare(spec, set(without))
     compiled = mjcf.compile_spec(spec, path)
+    for name, tensor in mjcf.unbalanced(spec, compiled).items():  # the published ones, that MuJoCo would not have taken
+        index = compiled.body(name).id
+        compiled.body_inertia[index], axes = np.linalg.eigh(tensor)
+        mujoco.mju_mat2Quat(compiled.body_iquat[index], (axes * np.linalg.det(axes)).ravel())
     for each in ("tendon_damping", "tendon_armature", "tendon_frictionloss", "tendon_stiffness"):
         getattr(compiled, each)[:] = 0
     for each in ("jnt_stiffnesspoly", "dof_dampingpoly"):

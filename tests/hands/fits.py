@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import mujoco
@@ -18,12 +20,13 @@ from awiwi_gen.interchange.export_motors import MOTORS, POSITION, TORQUE
 from .compare import GRAVITY, LIMIT, STATES, Worst, within_domain
 
 _GRID = 301
+RESTING = Path(__file__).resolve().parent.parent / "resting_fingers.toml"
 
 
 def fitted() -> list[str]:
     """What is wrong with the export of the Awiwi hand, whose four-bar, springs and wrist MuJoCo does not have."""
     hand = Hand.load()
-    found = [*four_bar(hand), *lever_spring(hand), *wrist(hand)]
+    found = [*four_bar(hand), *lever_spring(hand), *wrist(hand), *at_rest()]
     return [f"fits: {each}" for each in (*found, *(fault for motors in MOTORS for fault in simulated(hand, motors)))]
 
 
@@ -125,6 +128,7 @@ def wrist(hand: Hand) -> Iterator[str]:
     normal = np.array([-np.sin(q71), 0, np.cos(q71)])
     bars = [model.tendon(f"wrist.{name}").id for name in ("cc0", "aa0")]
     palm, drawn = model.body("palm").id, model.tendon_length0[bars]
+    runs = [model.tendon(f"wrist.run{number}").id for number in range(len(hand.wrist.tendons))]
     for angles in np.random.default_rng(6).uniform(low, high, (STATES, 2)):
         pose = lib.wrist_palm_pose(*angles).T
         moved = np.array(angles) - hand.wrist.neutral
@@ -139,10 +143,29 @@ def wrist(hand: Hand) -> Iterator[str]:
         theirs = np.eye(4)
         theirs[:3, :3], theirs[:3, 3] = data.xmat[palm].reshape(3, 3), data.xpos[palm]
         worst.compare("palm_pose", pose, theirs)
+        worst.compare("tendon_lengths", lib.wrist_tendon_lengths(*angles).h, data.ten_length[runs])
         off = max(off, float(np.abs(data.ten_length[bars] - drawn).max()))
     yield from (f"wrist {kernel} differs by {x:.1e}" for kernel, x in worst.found.items() if x > LIMIT)
     if off > LIMIT:
         yield f"the bars of the wrist change their length by {off:.1e} m"
+
+
+def at_rest() -> Iterator[str]:
+    """Fingers with fewer tendons than joints: MuJoCo comes to rest where the estimate is, from the lengths there."""
+    hand = Hand.load(RESTING)
+    model, data, _ = exported(hand)
+    lib = awiwi_gen.build(hand, only="*joint_estimate,*tendon_lengths")
+    model.opt.gravity[:], model.dof_damping[:] = 0, 0.002
+    for name, force in itertools.product(("index", "ring"), (1.0, 3.0)):
+        mujoco.mj_resetData(model, data)
+        data.ctrl[[i for i in range(model.nu) if model.actuator(i).name.startswith(name)]] = force
+        while data.time < 10:
+            mujoco.mj_step(model, data)
+        q = data.qpos[[int(model.joint(f"{name}_{joint}").qposadr[0]) for joint in hand.fingers[name].joints]]
+        h = lib[f"{name}_tendon_lengths"](q)
+        found = lib[f"{name}_joint_estimate"](getattr(h, "h", h), np.zeros(len(q)))
+        if (off := np.abs(getattr(found, "q", found) - q).max()) > LIMIT:
+            yield f"at rest under {force} N {name} is {off:.1e} rad from its estimate"
 
 
 def turned(axis: np.ndarray, angle: float) -> np.ndarray:

@@ -14,13 +14,13 @@ import numpy as np
 
 from awiwi_gen.hand import Hand
 from awiwi_gen.kernels.fingers_control import antagonists
-from awiwi_gen.kernels.routing import groups, senses
 from awiwi_gen.loops.hand_joint import STRETCH, Joint, joint_of, loop_around, values_of
 from awiwi_gen.loops.step import overshoot, run, settling
 from awiwi_gen.reproduce.distribution_search import Demands, closed_form_of
 from awiwi_gen.reproduce.printed.joint import VISIBLE, paired
 from awiwi_gen.results import Figure, curves, listed
 from awiwi_gen.simulate import PERIOD, Array, Block, Element, Scenario, Sum, Trace, simulate
+from awiwi_gen.structure import groups, senses
 
 FELT = (1.0, 0.7)  # N m/rad, of figure 8.3
 EPSILON = 1.5

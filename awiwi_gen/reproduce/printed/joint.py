@@ -9,10 +9,10 @@ import numpy as np
 
 from awiwi_gen.hand import Hand
 from awiwi_gen.kernels.fingers_control import antagonists
-from awiwi_gen.kernels.routing import groups
 from awiwi_gen.reproduce.distribution_search import WEIGHTS, Demands, closed_form_of
 from awiwi_gen.results import Printed, compared, judged, misprint
 from awiwi_gen.simulate import PERIOD
+from awiwi_gen.structure import groups
 
 COUNT = 300
 VISIBLE = 1e-3  # N; violations below are rounding
