@@ -10,8 +10,8 @@
 #define AWIWI_PARAMS "baked"
 
 /* SHA-256 of the hand's numbers, the options and the generated C; and its first digits as a number. */
-#define AWIWI_BUILD_DIGEST "b0e01dc2d0bdf643aa9a7bc7ddfbebd886d6bc05ac48e0915fdaeacbfc8ef109"
-#define AWIWI_BUILD_ID 0xb0e01dc2u
+#define AWIWI_BUILD_DIGEST "7e89a08d2d1236478f9722c6e9f88c94e151ebf851fc65c659f195a6ce171139"
+#define AWIWI_BUILD_ID 0x7e89a08du
 
 /* -- counts and names ------------------------------------------------------------------------------------------------ */
 
@@ -121,6 +121,8 @@ enum {
 #define AWIWI_MOTOR_VELOCITY 20.0 /* largest velocity of the output shaft [rad/s] */
 #define AWIWI_MOTOR_TRAVEL 5.0 /* the output shaft turns by this much to either side [rad] */
 
+#include "awiwi_hand_plant.h"
+
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -128,6 +130,12 @@ extern "C" {
 /* AWIWI_BUILD_ID and the digest of the compiled library; others in your headers mean that they are not its own. */
 extern const unsigned long awiwi_build_id;
 extern const char awiwi_build_digest[65];
+
+/* The hand for awiwi_hand_step, and gains to begin with. */
+extern const awiwi_hand awiwi_hand_model;
+extern const awiwi_hand_gains awiwi_default_gains;
+/* The same hand, simulated. */
+extern const awiwi_hand_plant awiwi_simulated_hand;
 
 /* The largest torques that the joints bear in N m, of slides in N: their own, or the hand's limit. */
 extern const double awiwi_joint_effort[AWIWI_JOINTS];
