@@ -1,0 +1,471 @@
+/* Ticks of a small hand by a script: every law, mode, fault and limit, and its simulation. */
+#include "problems_stub.h"
+
+#include <math.h>
+#include <stddef.h>
+#include <string.h>
+
+enum { START = 40 };
+
+/* A hand in motion, all that belongs to it. */
+typedef struct scene {
+    const awiwi_hand_plant *plant;
+    awiwi_hand_world world;
+    awiwi_hand_input input;
+    awiwi_hand_gains gains;
+    awiwi_hand_state state;
+} scene;
+
+static scene now;
+
+static const awiwi_hand_gains ordinary = {
+    .period = 0.001, .delay = 0.01, .velocity_bandwidth = 300, .compliance_bandwidth = 20, .motor_kp = 0.6,
+    .motor_kd = 0.008, .friction_share = 0.8, .force_kp = 10000, .force_kd = 250, .force_low = 0.5, .force_high = 8,
+    .stop_margin = 0.05, .stop_stiffness = 0.3, .residual = 0.0015, .continuous_torque = 0.05, .heating_time = 0.05,
+    .hold_ticks = 3, .slack_ticks = 4, .ramp_ticks = 6,
+};
+
+/* -- one tick -------------------------------------------------------------------------------------------------------- */
+
+static void show_numbers(const char *name, unsigned status, const void *structure, size_t size)
+{
+    print(name, (int)status, copy_of(structure, (int)(size / sizeof(double))), (int)(size / sizeof(double)));
+    release();
+}
+
+static void show_counts(const awiwi_hand_state *state)
+{
+    const char *first = (const char *)state->plan_status, *last = (const char *)(&state->tick + 1);
+    double counts[256];
+    int n = 0;
+    for (; first < last; first += sizeof(int)) {
+        int count;
+        memcpy(&count, first, sizeof count);
+        counts[n++] = count;
+    }
+    print("counts", state->mode[0] * 10 + state->mode[1], counts, n);
+}
+
+static void show(const char *name, unsigned status)
+{
+    show_numbers(name, status, &now.state, offsetof(awiwi_hand_state, gains));
+    show_numbers("gains", 0, &now.state.gains, offsetof(awiwi_hand_gains, hold_ticks));
+    show_counts(&now.state);
+}
+
+static void sense(void)
+{
+    awiwi_hand_measure(now.plant, &now.world, &now.input);
+}
+
+static void step(const char *name)
+{
+    double torque[HAND_TENDONS];
+    show(name, awiwi_hand_step(now.plant->hand, &now.gains, &now.input, &now.state, torque));
+    print("torque", 0, torque, HAND_TENDONS);
+    const int moved = awiwi_hand_move(now.plant, torque, &now.world);
+    print("world", moved, now.world.q, (int)((sizeof now.world - offsetof(awiwi_hand_world, q)) / sizeof(double)));
+}
+
+static void run(const char *name, int ticks)
+{
+    for (int i = 0; i < ticks; i++) {
+        sense();
+        step(name);
+    }
+}
+
+/* -- the start ------------------------------------------------------------------------------------------------------- */
+
+static const double pose[HAND_JOINTS] = {0.1, -0.2, 0.3};
+
+static void place(const awiwi_hand_plant *plant, int law)
+{
+    static const double theta[HAND_TENDONS] = {0.1, -0.1, 0.2, 0.05, -0.3, 0.15};
+    memset(&now, 0, sizeof now);
+    now.plant = plant;
+    now.gains = ordinary;
+    now.world = (awiwi_hand_world){.period = 0.001, .substeps = 3, .friction = 1.5, .reading_noise = 0.4,
+                                   .theta_step = 1e-4, .seed = 5, .gravity = {1, -3, 9}, .wrist = {0.2, -0.1}};
+    for (int j = 0; j < HAND_JOINTS; j++)
+        now.world.damping[j] = 0.004;
+    for (int k = 0; k < HAND_TENDONS; k++)
+        now.world.spring[k] = 1 + 0.01 * k;
+    print("place", awiwi_hand_place(plant, pose, theta, 3, &now.world), now.world.q, HAND_JOINTS);
+    print("suggest", awiwi_hand_suggest(plant->hand, &now.gains, pose, &now.input), now.input.stiffness, HAND_JOINTS);
+    print("damping", 0, now.input.damping, HAND_JOINTS);
+    sense();
+    for (int j = 0; j < HAND_JOINTS; j++)
+        now.input.q_des[j] = pose[j];
+    now.input.law = law;
+    now.input.enable = 1;
+}
+
+static void init(const char *name)
+{
+    show(name, awiwi_hand_init(now.plant->hand, &now.gains, &now.input, pose, &now.state));
+}
+
+/* Where every scenario begins: a hand that runs and moves. */
+static scene moving(const awiwi_hand_plant *plant, int law)
+{
+    place(plant, law);
+    init("init");
+    run("start", START);
+    for (int j = 0; j < HAND_JOINTS; j++) {
+        now.input.q_des[j] += 0.1 * (j + 1) - 0.15;
+        now.input.qd_des[j] = 0.3;
+        now.input.qdd_des[j] = 2 - j;
+        now.input.torque[j] = 0.002 * (j + 1);
+    }
+    run("move", START / 2);
+    return now;
+}
+
+/* -- scenarios; each begins with a scene and may leave anything behind ----------------------------------------------- */
+
+static void demands(const scene *start)
+{
+    static const double odd[] = {NAN, INFINITY, -INFINITY, 5, -5};
+    for (int i = 0; i < 5; i++) {
+        now = *start;
+        now.input.q_des[i % HAND_JOINTS] = odd[i];
+        run("odd angle", 3);
+        now.input.qd_des[1] = now.input.damping[2] = now.input.tip_damping[0] = odd[i];
+        run("odd rate", 2);
+        now.input.qdd_des[2] = now.input.torque[0] = odd[i];
+        run("odd torque", 4);
+        now.input.stiffness[i % HAND_JOINTS] = odd[i];
+        run("odd stiffness", 4);
+        now.input.tip_stiffness[0] = i ? 3 : NAN;
+        now.input.tip[0][i % 3] = odd[i];
+        run("odd tip", 4);
+    }
+}
+
+static void tips(const scene *start)
+{
+    now = *start;
+    now.input.tip_stiffness[0] = 20;
+    now.input.tip_stiffness[1] = 30;
+    now.input.tip_damping[0] = 0.5;
+    now.input.tip[0][0] = now.input.tip[1][2] = 0.01;
+    run("tip", 6);
+    now.input.tip_stiffness[1] = -1;
+    run("no tip", 3);
+    refuse_call(TIP, 0, AWIWI_OUT_OF_DOMAIN);
+    run("refused tip", 3);
+    refuse_nothing();
+}
+
+/* Joints in their soft and hard ends, and joint torques beyond their limits. */
+static void ends(const scene *start)
+{
+    for (int side = -1; side <= 1; side += 2) {
+        now = *start;
+        for (int j = 0; j < HAND_JOINTS; j++)
+            now.world.load[j] = side * 0.3;
+        run("stop", 35);
+        now.gains.stop_margin = 2; /* low and high ends change places */
+        run("no stop", 8);
+        now.input.torque[1] = side;
+        run("torque", 12);
+    }
+}
+
+static void faults(const scene *start)
+{
+    static const double odd[] = {NAN, INFINITY, 80, 84.5, 95, 101, 103, 930, 1000};
+    for (int i = 0; i < 24; i++) {
+        const int k = i % HAND_TENDONS, ticks = 1 + i % 7;
+        now = *start;
+        for (int tick = 0; tick < ticks; tick++) {
+            sense();
+            if (i % 4 == 0)
+                now.input.reading_valid[k] = 0;
+            if (i % 4 == 1)
+                now.input.theta_valid[k] = 0;
+            if (i % 4 == 2)
+                now.input.reading[k] = odd[i / 4 + 3 * (i > 12)];
+            if (i % 4 == 3)
+                now.input.theta[k] = i < 8 ? NAN : i < 12 ? 2.6 : i < 16 ? -2.6 : now.input.theta[k] + 0.05 + 0.1 * (tick % 4);
+            step("fault");
+        }
+        run("after", 14);
+        now.input.enable = i % 3 != 0;
+        now.input.reset = i % 2;
+        run("reset", 4);
+        now.input.enable = 1;
+        run("again", 3);
+    }
+}
+
+/* Readings of one sensor near its ends, in fine steps. */
+static void sensors(const scene *start)
+{
+    static const double shares[] = {-0.021, -0.02, -0.019, -0.001, 0, 0.0019, 0.002, 0.0021, 0.01, 0.99, 1, 1.001, 1.019, 1.02, 1.021};
+    for (int i = 0; i < (int)(2 * sizeof shares / sizeof *shares); i++) {
+        const int k = i % 2 ? 0 : 1 + i % 5;
+        const double slack = now.plant->hand->sensor_slack[k], taut = now.plant->hand->sensor_taut[k];
+        now = *start;
+        sense();
+        now.input.reading[k] = slack + shares[i / 2] * (taut - slack);
+        step("share");
+        now.input.reset = 1;
+        step("share at reset");
+    }
+    now = *start;
+    now.input.reading[0] = 100 + 0.002 * 800; /* where each limit is, exactly */
+    step("at loose");
+    now.input.reading[0] = 100 - 0.02 * 800;
+    step("at low");
+    now.input.reading[0] = 900 + 0.02 * 800;
+    step("at high");
+}
+
+static void slack(const scene *start)
+{
+    for (int ticks = 3; ticks < 9; ticks++) {
+        now = *start;
+        for (int tick = 0; tick < ticks; tick++) {
+            sense();
+            now.input.reading[ticks % HAND_TENDONS] = now.plant->hand->sensor_slack[ticks % HAND_TENDONS];
+            now.input.reset = ticks == 8 && tick == 5;
+            step("slack");
+        }
+        run("taut", 12);
+        now.gains.slack_ticks = 0;
+        run("at once", 5);
+    }
+}
+
+/* Faults while a finger is off, ramps or is in a fault; fades to and fro. */
+static void modes(const scene *start)
+{
+    for (int i = 0; i < 40; i++) {
+        now = *start;
+        now.gains.hold_ticks = i % 3;
+        now.gains.ramp_ticks = 1 + i % 5;
+        for (int tick = 0; tick < 24; tick++) {
+            sense();
+            now.input.enable = !(i >> 1 & tick >> 2 & 1);
+            now.input.reset = i > 20 && tick % 5 == 4;
+            now.input.reading_valid[1] = !(i % 8 && tick % (4 + i % 8) < i % 8 - 1);
+            now.input.theta_valid[5] = !(i % 5 == 4 && tick % 11 < 6);
+            step("mode");
+        }
+    }
+}
+
+static void changes(const scene *start)
+{
+    now = *start;
+    for (int i = 0; i < 9; i++) {
+        now.input.law = i % 3 == 2 ? 7 * i - 15 : i % 3; /* -1 and more are no laws */
+        run("law", 2 + i);
+        now.gains.motor_kd *= 0.9;
+        now.gains.force_kd *= 0.9;
+        run("gain", 3);
+    }
+    for (int i = 0; i < 4; i++) {
+        now.gains.motor_kp = 0.6 + 0.1 * i;
+        run("gain in every tick", 1);
+    }
+    for (int i = 0; i < 16 * 5 + 6; i++) {
+        static const double odd[] = {0, -1, NAN, INFINITY, AWIWI_REAL_MAX};
+        now = *start;
+        double *number = &now.gains.period + i / 5;
+        int *count = &now.gains.hold_ticks + (i - 80) / 2;
+        if (i < 80)
+            *number = odd[i % 5];
+        else
+            *count = i % 2 - 1;
+        run("odd gain", 2);
+        now.gains = ordinary;
+        run("good gain", 2);
+    }
+    now = *start;
+    now.gains.force_high = now.gains.force_low;
+    run("no forces", 2);
+    now.gains.heating_time = now.gains.period;
+    now.gains.force_high = 3;
+    run("few forces", 10);
+    init("again");
+}
+
+static void heat(const scene *start)
+{
+    static const double lasting[] = {0.002, 0.008, 0.02, 0.2, 0.3, 1e-200};
+    for (int i = 0; i < 6; i++) {
+        now = *start;
+        now.gains.continuous_torque = lasting[i];
+        now.gains.heating_time = 0.02;
+        run("heat", 12);
+        now.input.torque[0] = 0.05;
+        now.input.enable = 0;
+        run("cool", 10);
+    }
+}
+
+static void travel(const scene *start)
+{
+    for (int i = 0; i < 4; i++) {
+        now = *start;
+        now.world.theta_step = 0;
+        for (int tick = 0; tick < 12; tick++) {
+            sense();
+            now.input.theta[i] = (i % 2 ? 1 : -1) * (2.4 + 0.01 * tick);
+            now.state.theta[i] = now.input.theta[i]; /* no jump */
+            step("travel");
+        }
+    }
+}
+
+/* Every kernel refuses, or has a result that is no number, at each of its calls. */
+static void refusals(const scene *start)
+{
+    static const int told[] = {AWIWI_OUT_OF_DOMAIN, AWIWI_NOT_CONVERGED, AWIWI_OK};
+    for (int kernel = 0; kernel < HAND_KERNELS; kernel++)
+        for (int i = 0; i < 21; i++) {
+            now = *start;
+            refuse_call(kernel, i / 3, told[i % 3]);
+            run("refusal", 2);
+            refuse_nothing();
+            run("then", 2);
+        }
+}
+
+static void singular(const scene *start)
+{
+    now = *start;
+    refuse_call(JOINT_ESTIMATE, 100, 0);
+    now.state.q[2] = 0.7;
+    now.state.motion[0][0] = 0.7;
+    run("singular", 5);
+    refuse_nothing();
+}
+
+static void reaches(const scene *start)
+{
+    now = *start;
+    for (int j = 0; j < HAND_JOINTS; j++)
+        now.input.stiffness[j] *= 5;
+    run("stiffer", 8);
+    now.gains.force_high = 2.9;
+    run("unreachable", 10);
+    now.world.wrist[0] = 0.4;
+    run("wrist", 3);
+    now.world.wrist[0] = 1.5;
+    run("no wrist", 3);
+    now.world.wrist[0] = 0.4;
+    run("wrist again", 5);
+}
+
+/* Lines that break, forces beyond both ends of levers, motors at both ends of their travel. */
+static void simulation(const scene *start)
+{
+    static const double pulls[] = {0.2, -0.2, 0.05, -0.02};
+    for (int i = 0; i < 8; i++) {
+        now = *start;
+        now.world.substeps = 1 + i % 3;
+        now.world.reading_noise = i % 2 ? 30 : 0;
+        now.world.theta_step = i % 3 ? 0 : 0.01;
+        now.world.spring[i % HAND_TENDONS] = i % 4 ? 1 : 0;
+        for (int tick = 0; tick < 30; tick++) {
+            double torque[HAND_TENDONS];
+            for (int k = 0; k < HAND_TENDONS; k++)
+                torque[k] = pulls[(i + (k == i % 6)) % 4];
+            print("pulled", awiwi_hand_move(now.plant, torque, &now.world), now.world.q,
+                  (int)((sizeof now.world - offsetof(awiwi_hand_world, q)) / sizeof(double)));
+            now.input.reading_valid[2] = now.input.theta_valid[3] = 0;
+            sense();
+            print("seen", now.input.reading_valid[2] * 2 + now.input.theta_valid[3], now.input.reading, HAND_TENDONS);
+            show_numbers("sensed", 0, now.input.theta, 5 * sizeof(double) + HAND_TENDONS * sizeof(double));
+            show_numbers("wrist", 0, now.input.wrist, 5 * sizeof(double));
+        }
+        run("found", 3);
+    }
+}
+
+static void refusing_simulation(const scene *start)
+{
+    for (int kernel = 0; kernel < HAND_KERNELS; kernel++)
+        for (int i = 0; i < 4; i++) {
+            now = *start;
+            double torque[HAND_TENDONS] = {0};
+            refuse_call(kernel, i, AWIWI_OUT_OF_DOMAIN);
+            print("refused", awiwi_hand_move(now.plant, torque, &now.world), now.world.q, HAND_JOINTS);
+            refuse_call(kernel, i, AWIWI_OUT_OF_DOMAIN);
+            print("refused", awiwi_hand_place(now.plant, pose, now.world.theta, 1, &now.world), now.world.q, HAND_JOINTS);
+            refuse_call(kernel, i, AWIWI_OUT_OF_DOMAIN);
+            print("refused", awiwi_hand_suggest(now.plant->hand, &now.gains, pose, &now.input), now.input.damping,
+                  HAND_JOINTS);
+            refuse_nothing();
+        }
+}
+
+/* Beginnings that fail, and ticks after them. */
+static void beginnings(const awiwi_hand_plant *plant)
+{
+    for (int i = 0; i < 8 + 3 * HAND_KERNELS; i++) {
+        place(plant, i % 2);
+        if (i == 0)
+            now.gains.ramp_ticks = 0;
+        if (i == 1)
+            now.input.reading_valid[5] = 0;
+        if (i == 2)
+            now.input.reading[1] = plant->hand->sensor_slack[1] - 4;
+        if (i == 3)
+            now.input.theta[4] = -2.6;
+        if (i == 4)
+            now.input.wrist[0] = 1;
+        if (i == 5)
+            now.input.law = 9;
+        if (i == 6)
+            now.gains.force_low = 4.5;
+        if (i >= 8)
+            refuse_call((i - 8) / 3, (i - 8) % 3, AWIWI_OUT_OF_DOMAIN);
+        init("beginning");
+        refuse_nothing();
+        run("and then", 2);
+    }
+    place(plant, 0);
+    double nowhere[HAND_JOINTS] = {0, 0, NAN};
+    show("nowhere", awiwi_hand_init(plant->hand, &now.gains, &now.input, nowhere, &now.state));
+}
+
+static void logs(const scene *start)
+{
+    static awiwi_hand_log head;
+    static awiwi_hand_record record;
+    now = *start;
+    memset(&head, 1, sizeof head);
+    memset(&record, 1, sizeof record);
+    awiwi_hand_log_begin(now.plant->hand, &now.gains, &now.input, pose, &head);
+    awiwi_hand_log_tick(now.plant->hand, &now.gains, &now.input, &now.state, &record);
+    const double numbers[] = {head.magic[0], head.magic[7], head.version, head.build_id, head.real_size,
+                              head.record_size == sizeof record, head.input.law, record.input.enable, head.gains.ramp_ticks,
+                              record.gains.hold_ticks};
+    print("log", (int)record.status, numbers, 10);
+    print("log pose", 0, head.q, AWIWI_ALL_JOINTS);
+    print("log torque", 0, record.torque, AWIWI_ALL_TENDONS);
+    show_numbers("log input", 0, head.input.reading, offsetof(awiwi_hand_input, reading_valid));
+    show_numbers("log input", 0, record.input.reading, offsetof(awiwi_hand_input, reading_valid));
+    show_numbers("log gains", 0, &head.gains.period, offsetof(awiwi_hand_gains, hold_ticks));
+    show_numbers("log gains", 0, &record.gains.period, offsetof(awiwi_hand_gains, hold_ticks));
+}
+
+void try_hand(void)
+{
+    static void (*const scenarios[])(const scene *) = {demands, tips, ends, faults, sensors, slack, modes, changes, heat,
+                                                       travel, refusals, singular, reaches, simulation,
+                                                       refusing_simulation, logs};
+    static const awiwi_hand_plant *const plants[] = {&stub_plant, &plain_plant};
+    static scene start;
+    for (int i = 0; i < 4; i++) {
+        start = moving(plants[i / 2], i % 2);
+        for (size_t s = 0; s < sizeof scenarios / sizeof *scenarios; s++)
+            scenarios[s](&start);
+        beginnings(plants[i / 2]);
+    }
+}

@@ -1,0 +1,44 @@
+/* A hand of two small fingers whose kernels are a few lines each, and which refuse when they are told to. */
+#ifndef PROBLEMS_STUB_H
+#define PROBLEMS_STUB_H
+
+#include "awiwi_hand_plant.h"
+#include "problems.h"
+
+enum { FINGERS = 2, HAND_JOINTS = 3, HAND_TENDONS = 6 };
+
+enum kernel_of_hand {
+    MEASURED_LENGTHS,
+    JOINT_ESTIMATE,
+    TENDON_LENGTHS,
+    COUPLING,
+    JOINT_TORQUE,
+    JOINT_STIFFNESS,
+    TENDON_STIFFNESS,
+    DYNAMICS,
+    TIP,
+    DISTRIBUTION,
+    SENSORS,
+    WRIST_LENGTHS,
+    SPRING_ELONGATION,
+    TENDON_STRETCH,
+    MOTOR_FRICTION,
+    STIFFNESS_CORRECTION,
+    REFERENCE_FILTER,
+    MOTOR_IMPEDANCE,
+    CASCADE,
+    FORWARD_DYNAMICS,
+    MOTOR_ACCELERATION,
+    HAND_KERNELS
+};
+
+/* From now on a kernel answers its calls from the one `after` so many with this status, or with numbers that are none if it is
+   AWIWI_OK. */
+void refuse_call(int kernel, int after, int status);
+void refuse_nothing(void);
+
+/* The hand with all kernels, and the one without those that it may lack. */
+extern const awiwi_hand stub_hand, plain_hand;
+extern const awiwi_hand_plant stub_plant, plain_plant;
+
+#endif
