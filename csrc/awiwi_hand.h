@@ -172,6 +172,7 @@ typedef struct awiwi_hand_state {
     awiwi_real thd[AWIWI_ALL_TENDONS];
     awiwi_real x[AWIWI_ALL_TENDONS]; /* elongations */
     awiwi_real xd[AWIWI_ALL_TENDONS];
+    awiwi_real lost[AWIWI_ALL_TENDONS];  /* ticks since a motor was last seen */
     awiwi_real f[AWIWI_ALL_TENDONS];     /* measured forces [N] */
     awiwi_real f_des[AWIWI_ALL_TENDONS]; /* wanted ones */
     awiwi_real q[AWIWI_ALL_JOINTS];      /* estimates */
@@ -199,10 +200,9 @@ typedef struct awiwi_hand_state {
     unsigned status;                           /* with those of all fingers */
     int mode[AWIWI_ALL_FINGERS];               /* an awiwi_mode each */
     int slack_for[AWIWI_ALL_TENDONS];          /* ticks for which a tendon has been slack */
-    int lost[AWIWI_ALL_TENDONS];               /* ticks since a motor was last seen */
     int waited[AWIWI_ALL_FINGERS];             /* ticks of the present fault */
     int alive[AWIWI_ALL_FINGERS];              /* whether the law had a result in the last tick */
-    int changed;                               /* whether law or gains are others than in the last tick */
+    int changed; /* ticks until all fingers have planned with the present law and gains */
     int law;
     int turn; /* the finger that plans anew */
     int ready;

@@ -165,7 +165,9 @@ static void ends(const scene *start)
         now = *start;
         for (int j = 0; j < HAND_JOINTS; j++)
             now.world.load[j] = side * 0.3;
-        run("stop", 35);
+        run("end", 20);
+        now.gains.stop_margin = 0.7;
+        run("stop", 10);
         now.gains.stop_margin = 2; /* low and high ends change places */
         run("no stop", 8);
         now.input.torque[1] = side;
@@ -244,8 +246,8 @@ static void modes(const scene *start)
 {
     for (int i = 0; i < 40; i++) {
         now = *start;
-        now.gains.hold_ticks = i % 3;
-        now.gains.ramp_ticks = 1 + i % 5;
+        now.gains.hold_ticks = i % 4 * 3;
+        now.gains.ramp_ticks = 1 + i * 2 % 9;
         for (int tick = 0; tick < 24; tick++) {
             sense();
             now.input.enable = !(i >> 1 & tick >> 2 & 1);
@@ -285,6 +287,12 @@ static void changes(const scene *start)
         run("good gain", 2);
     }
     now = *start;
+    now.gains.motor_kp = now.gains.force_kp = 1e308;
+    run("huge gain", 4);
+    now.gains.ramp_ticks = 1;
+    now.input.enable = 0;
+    run("and no share", 4);
+    now = *start;
     now.gains.force_high = now.gains.force_low;
     run("no forces", 2);
     now.gains.heating_time = now.gains.period;
@@ -304,6 +312,8 @@ static void heat(const scene *start)
         now.input.torque[0] = 0.05;
         now.input.enable = 0;
         run("cool", 10);
+        now.gains.continuous_torque = 0.3;
+        run("strong", 3);
     }
 }
 
@@ -324,12 +334,15 @@ static void travel(const scene *start)
 /* Every kernel refuses, or has a result that is no number, at each of its calls. */
 static void refusals(const scene *start)
 {
-    static const int told[] = {AWIWI_OUT_OF_DOMAIN, AWIWI_NOT_CONVERGED, AWIWI_OK};
     for (int kernel = 0; kernel < HAND_KERNELS; kernel++)
-        for (int i = 0; i < 21; i++) {
+        for (int i = 0; i < 9; i++) {
             now = *start;
-            refuse_call(kernel, i / 3, told[i % 3]);
-            run("refusal", 2);
+            sense();
+            if ((i + 1) & 2)
+                now.input.reading[3] = now.plant->hand->sensor_slack[3];
+            refuse_call(kernel, i < 7 ? i : 0, i == 7 ? AWIWI_NOT_CONVERGED : i == 8 ? AWIWI_OK : AWIWI_OUT_OF_DOMAIN);
+            step("refusal");
+            run("refusal", 1);
             refuse_nothing();
             run("then", 2);
         }
