@@ -64,16 +64,16 @@ static int pull(const awiwi_hand_plant *plant, awiwi_hand_world *world, const aw
 static int paths(const awiwi_hand_plant *plant, const awiwi_hand_world *world, awiwi_real *path)
 {
     const awiwi_hand *hand = plant->hand;
-    awiwi_real wrist[ALL] = {0};
+    awiwi_real in_finger[ALL] = {0}, in_wrist[ALL] = {0};
     int status = AWIWI_OK;
     for (int i = 0; i < hand->fingers; i++) {
         const awiwi_finger *finger = hand->finger + i;
-        status |= finger->tendon_lengths(world->q + finger->first_joint, path + finger->first_tendon);
+        status |= finger->tendon_lengths(world->q + finger->first_joint, in_finger + finger->first_tendon);
     }
     if (hand->wrist_lengths)
-        status |= hand->wrist_lengths(world->wrist, wrist);
+        status |= hand->wrist_lengths(world->wrist, in_wrist);
     for (int k = 0; k < hand->tendons; k++)
-        path[k] += hand->motor_pulley * world->theta[k] + wrist[k];
+        path[k] = in_finger[k] + (hand->motor_pulley * world->theta[k] + in_wrist[k]);
     return status ? AWIWI_OUT_OF_DOMAIN : AWIWI_OK;
 }
 

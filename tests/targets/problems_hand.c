@@ -60,10 +60,11 @@ static void sense(void)
 
 static void step(const char *name)
 {
-    double torque[HAND_TENDONS];
-    show(name, awiwi_hand_step(now.plant->hand, &now.gains, &now.input, &now.state, torque));
-    print("torque", 0, torque, HAND_TENDONS);
+    double *torque = output(HAND_TENDONS);
+    const unsigned status = awiwi_hand_step(now.plant->hand, &now.gains, &now.input, &now.state, torque);
     const int moved = awiwi_hand_move(now.plant, torque, &now.world);
+    print("torque", 0, torque, HAND_TENDONS);
+    show(name, status);
     print("world", moved, now.world.q, (int)((sizeof now.world - offsetof(awiwi_hand_world, q)) / sizeof(double)));
 }
 
@@ -263,7 +264,7 @@ static void changes(const scene *start)
 {
     now = *start;
     for (int i = 0; i < 9; i++) {
-        now.input.law = i % 3 == 2 ? 7 * i - 15 : i % 3; /* -1 and more are no laws */
+        now.input.law = i % 3 == 2 ? i - 3 : i % 3; /* -1 and 2 are no laws */
         run("law", 2 + i);
         now.gains.motor_kd *= 0.9;
         now.gains.force_kd *= 0.9;
@@ -273,19 +274,21 @@ static void changes(const scene *start)
         now.gains.motor_kp = 0.6 + 0.1 * i;
         run("gain in every tick", 1);
     }
-    for (int i = 0; i < 16 * 5 + 6; i++) {
-        static const double odd[] = {0, -1, NAN, INFINITY, AWIWI_REAL_MAX};
+    for (int i = 0; i < 16 * 6 + 6; i++) {
+        static const double odd[] = {0, -1, 0.5, NAN, INFINITY, AWIWI_REAL_MAX};
         now = *start;
-        double *number = &now.gains.period + i / 5;
-        int *count = &now.gains.hold_ticks + (i - 80) / 2;
-        if (i < 80)
-            *number = odd[i % 5];
+        double *number = &now.gains.period + i / 6;
+        int *count = &now.gains.hold_ticks + (i - 96) / 2;
+        if (i < 96)
+            *number = odd[i % 6];
         else
             *count = i % 2 - 1;
         run("odd gain", 2);
         now.gains = ordinary;
         run("good gain", 2);
     }
+    now.gains.period *= 1.01;
+    run("period", 3);
     now = *start;
     now.gains.motor_kp = now.gains.force_kp = 1e308;
     run("huge gain", 4);
@@ -335,10 +338,10 @@ static void travel(const scene *start)
 static void refusals(const scene *start)
 {
     for (int kernel = 0; kernel < HAND_KERNELS; kernel++)
-        for (int i = 0; i < 9; i++) {
+        for (int i = 0; i < 10; i++) {
             now = *start;
             sense();
-            if ((i + 1) & 2)
+            if ((i + 1) & 2 || i == 9)
                 now.input.reading[3] = now.plant->hand->sensor_slack[3];
             refuse_call(kernel, i < 7 ? i : 0, i == 7 ? AWIWI_NOT_CONVERGED : i == 8 ? AWIWI_OK : AWIWI_OUT_OF_DOMAIN);
             step("refusal");
@@ -436,6 +439,8 @@ static void beginnings(const awiwi_hand_plant *plant)
             now.input.law = 9;
         if (i == 6)
             now.gains.force_low = 4.5;
+        if (i == 7)
+            now.input.reading[3] = plant->hand->sensor_slack[3];
         if (i >= 8)
             refuse_call((i - 8) / 3, (i - 8) % 3, AWIWI_OUT_OF_DOMAIN);
         init("beginning");

@@ -283,7 +283,7 @@ static const awiwi_finger fingers[FINGERS] = {
     {2, 1, 4, 2, {0, 0, 1, 1, 0, 0, 0, 1, 0}, KERNELS(1)},
 };
 static const double joint_low[] = {-0.8, -0.9, -0.7}, joint_high[] = {0.9, 0.8, 1}, efforts[] = {0.06, 0.05, 0.07};
-static const double tendon_low[] = {0.1, 0.1, 0.2, 0.1, 0.1, 0.1}, tendon_high[] = {9, 9, 8, 9, 9, 9};
+static const double tendon_low[] = {0.1, 0.1, 0.2, 0, 0.1, 0.1}, tendon_high[] = {9, 9, 8, 9, 9, 9};
 
 #define HAND(wrist, stretches, resistance) \
     {77, FINGERS, HAND_JOINTS, HAND_TENDONS, fingers, joint_low, joint_high, efforts, tendon_low, tendon_high, \
