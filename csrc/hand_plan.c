@@ -41,10 +41,11 @@ static awiwi_real end_stop(const awiwi_tick_of *now, int j, unsigned *status)
 {
     const awiwi_real low = now->hand->joint_low[j] + now->gains->stop_margin, q = now->state->q[j];
     const awiwi_real high = now->hand->joint_high[j] - now->gains->stop_margin;
-    if (low >= high || (q >= low && q <= high))
+    const awiwi_real back = awiwi_clamp(q, low, high) - q;
+    if (low >= high || !(back < 0 || back > 0))
         return 0;
     *status |= AWIWI_END_STOP;
-    return now->gains->stop_stiffness * ((q < low ? low : high) - q);
+    return now->gains->stop_stiffness * back;
 }
 
 /* The fingertip as a point between springs and dampers; nothing where its stiffness is 0. */

@@ -60,10 +60,11 @@ static void sense(void)
 
 static void step(const char *name)
 {
-    double *torque = output(HAND_TENDONS);
+    const int tendons = now.plant->hand->tendons;
+    double *torque = output(tendons);
     const unsigned status = awiwi_hand_step(now.plant->hand, &now.gains, &now.input, &now.state, torque);
     const int moved = awiwi_hand_move(now.plant, torque, &now.world);
-    print("torque", 0, torque, HAND_TENDONS);
+    print("torque", 0, torque, tendons);
     show(name, status);
     print("world", moved, now.world.q, (int)((sizeof now.world - offsetof(awiwi_hand_world, q)) / sizeof(double)));
 }
@@ -78,25 +79,26 @@ static void run(const char *name, int ticks)
 
 /* -- the start ------------------------------------------------------------------------------------------------------- */
 
-static const double pose[HAND_JOINTS] = {0.1, -0.2, 0.3};
+static const double pose[AWIWI_ALL_JOINTS] = {0.1, -0.2, 0.3, 0.2, -0.1, 0.15, -0.25, 0.1};
 
 static void place(const awiwi_hand_plant *plant, int law)
 {
-    static const double theta[HAND_TENDONS] = {0.1, -0.1, 0.2, 0.05, -0.3, 0.15};
+    static const double theta[AWIWI_ALL_TENDONS] = {0.1, -0.1, 0.2, 0.05, -0.3, 0.15};
+    const int joints = plant->hand->joints;
     memset(&now, 0, sizeof now);
     now.plant = plant;
     now.gains = ordinary;
     now.world = (awiwi_hand_world){.period = 0.001, .substeps = 3, .friction = 1.5, .reading_noise = 0.4,
                                    .theta_step = 1e-4, .seed = 5, .gravity = {1, -3, 9}, .wrist = {0.2, -0.1}};
-    for (int j = 0; j < HAND_JOINTS; j++)
+    for (int j = 0; j < joints; j++)
         now.world.damping[j] = 0.004;
-    for (int k = 0; k < HAND_TENDONS; k++)
+    for (int k = 0; k < plant->hand->tendons; k++)
         now.world.spring[k] = 1 + 0.01 * k;
-    print("place", awiwi_hand_place(plant, pose, theta, 3, &now.world), now.world.q, HAND_JOINTS);
-    print("suggest", awiwi_hand_suggest(plant->hand, &now.gains, pose, &now.input), now.input.stiffness, HAND_JOINTS);
-    print("damping", 0, now.input.damping, HAND_JOINTS);
+    print("place", awiwi_hand_place(plant, pose, theta, 3, &now.world), now.world.q, joints);
+    print("suggest", awiwi_hand_suggest(plant->hand, &now.gains, pose, &now.input), now.input.stiffness, joints);
+    print("damping", 0, now.input.damping, joints);
     sense();
-    for (int j = 0; j < HAND_JOINTS; j++)
+    for (int j = 0; j < joints; j++)
         now.input.q_des[j] = pose[j];
     now.input.law = law;
     now.input.enable = 1;
@@ -113,11 +115,11 @@ static scene moving(const awiwi_hand_plant *plant, int law)
     place(plant, law);
     init("init");
     run("start", START);
-    for (int j = 0; j < HAND_JOINTS; j++) {
-        now.input.q_des[j] += 0.1 * (j + 1) - 0.15;
+    for (int j = 0; j < plant->hand->joints; j++) {
+        now.input.q_des[j] += 0.1 * (j % 3 + 1) - 0.15;
         now.input.qd_des[j] = 0.3;
-        now.input.qdd_des[j] = 2 - j;
-        now.input.torque[j] = 0.002 * (j + 1);
+        now.input.qdd_des[j] = 2 - j % 3;
+        now.input.torque[j] = 0.002 * (j % 3 + 1);
     }
     run("move", START / 2);
     return now;
@@ -150,8 +152,10 @@ static void tips(const scene *start)
     now.input.tip_stiffness[0] = 20;
     now.input.tip_stiffness[1] = 30;
     now.input.tip_damping[0] = 0.5;
+    now.input.tip_damping[1] = 0.7;
     now.input.tip[0][0] = now.input.tip[1][2] = 0.01;
     run("tip", 6);
+    now.input.tip_stiffness[0] = 0.5;
     now.input.tip_stiffness[1] = -1;
     run("no tip", 3);
     refuse_call(TIP, 0, AWIWI_OUT_OF_DOMAIN);
@@ -169,6 +173,8 @@ static void ends(const scene *start)
         run("end", 20);
         now.gains.stop_margin = 0.7;
         run("stop", 10);
+        now.gains.stop_margin = 0.75; /* the ends of the last joint are one */
+        run("one stop", 3);
         now.gains.stop_margin = 2; /* low and high ends change places */
         run("no stop", 8);
         now.input.torque[1] = side;
@@ -218,12 +224,17 @@ static void sensors(const scene *start)
         step("share at reset");
     }
     now = *start;
-    now.input.reading[0] = 100 + 0.002 * 800; /* where each limit is, exactly */
+    now.input.reading[0] = 2; /* where each limit is, exactly */
     step("at loose");
-    now.input.reading[0] = 100 - 0.02 * 800;
+    now.input.reset = 1;
+    step("at loose and reset");
+    now.input.reading[0] = -20;
     step("at low");
-    now.input.reading[0] = 900 + 0.02 * 800;
+    now.input.reading[0] = 1020;
     step("at high");
+    now.state.theta[1] = 0;
+    now.input.theta[1] = 0.08;
+    step("at fastest");
 }
 
 static void slack(const scene *start)
@@ -324,11 +335,12 @@ static void travel(const scene *start)
 {
     for (int i = 0; i < 4; i++) {
         now = *start;
-        now.world.theta_step = 0;
+        const double shift = (i % 2 ? 1 : -1) * 2.46 - now.state.theta[i]; /* of the motor's zero */
+        now.state.theta[i] += shift;
+        now.state.offset[i] -= shift;
         for (int tick = 0; tick < 12; tick++) {
             sense();
-            now.input.theta[i] = (i % 2 ? 1 : -1) * (2.4 + 0.01 * tick);
-            now.state.theta[i] = now.input.theta[i]; /* no jump */
+            now.input.theta[i] += shift;
             step("travel");
         }
     }
@@ -485,5 +497,11 @@ void try_hand(void)
         for (size_t s = 0; s < sizeof scenarios / sizeof *scenarios; s++)
             scenarios[s](&start);
         beginnings(plants[i / 2]);
+    }
+    for (int law = 0; law < AWIWI_LAWS; law++) {
+        start = moving(&whole_plant, law);
+        tips(&start);
+        ends(&start);
+        slack(&start);
     }
 }

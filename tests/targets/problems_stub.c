@@ -34,11 +34,18 @@ static int answer(int kernel, double *out)
 
 /* -- fingers: change of length of tendon i per angle of joint j, by number of joints --------------------------------- */
 
-static const double arms[2][8] = {{0.008, -0.007}, {0.009, 0.006, 0.008, -0.007, -0.0085, 0.006, -0.0095, -0.005}};
+static double straight_arm(int n, int i, int j)
+{
+    static const double few[2][8] = {{0.008, -0.007}, {0.009, 0.006, 0.008, -0.007, -0.0085, 0.006, -0.0095, -0.005}};
+    int sign = 1;
+    for (int both = i & (j + 1); both; both >>= 1)
+        sign = both & 1 ? -sign : sign;
+    return n > 2 ? sign * (0.008 - 0.0001 * j) : few[n - 1][i * n + j];
+}
 
 static double arm(int n, int i, int j, double q)
 {
-    return arms[n - 1][i * n + j] * (1 + 0.1 * q);
+    return straight_arm(n, i, j) * (1 + 0.1 * q);
 }
 
 static int lengths(int n, const double *q, double *h)
@@ -46,7 +53,7 @@ static int lengths(int n, const double *q, double *h)
     for (int i = 0; i < 2 * n; i++) {
         h[i] = 0.1 + 0.01 * i;
         for (int j = 0; j < n; j++)
-            h[i] += arms[n - 1][i * n + j] * (q[j] + 0.05 * q[j] * q[j]);
+            h[i] += straight_arm(n, i, j) * (q[j] + 0.05 * q[j] * q[j]);
     }
     return answer(TENDON_LENGTHS, h);
 }
@@ -64,24 +71,20 @@ static int estimate(int n, const double *h, const double *start, double *q)
     for (int j = 0; j < n; j++)
         q[j] = start[j];
     for (int step = 0; step < 2; step++) {
-        double A[4] = {0, 0, 0, 0}, b[2] = {0, 0};
+        double A[AWIWI_ALL_JOINTS * AWIWI_ALL_JOINTS] = {0}, b[AWIWI_ALL_JOINTS] = {0};
         for (int i = 0; i < 2 * n; i++) {
             double off = h[i] - 0.1 - 0.01 * i;
             for (int j = 0; j < n; j++)
-                off -= arms[n - 1][i * n + j] * (q[j] + 0.05 * q[j] * q[j]);
+                off -= straight_arm(n, i, j) * (q[j] + 0.05 * q[j] * q[j]);
             for (int j = 0; j < n; j++) {
                 b[j] += arm(n, i, j, q[j]) * off;
                 for (int k = 0; k < n; k++)
-                    A[j * 2 + k] += arm(n, i, j, q[j]) * arm(n, i, k, q[k]);
+                    A[j * n + k] += arm(n, i, j, q[j]) * arm(n, i, k, q[k]);
             }
         }
-        if (n == 1) {
-            q[0] += b[0] / A[0];
-            continue;
-        }
-        const double det = A[0] * A[3] - A[1] * A[2];
-        q[0] += (A[3] * b[0] - A[1] * b[1]) / det;
-        q[1] += (A[0] * b[1] - A[2] * b[0]) / det;
+        (void)awiwi_solve(n, 1, A, b);
+        for (int j = 0; j < n; j++)
+            q[j] += b[j];
     }
     return answer(JOINT_ESTIMATE, q);
 }
@@ -129,7 +132,7 @@ static int dynamics(int n, const double *q, const double *qd, const double *g, d
 {
     for (int a = 0; a < n; a++) {
         for (int b = 0; b < n; b++) {
-            M[a * n + b] = a == b ? INERTIA * (2 - a + 0.1 * q[0]) : INERTIA / 10 * (1 + q[n - 1]);
+            M[a * n + b] = a == b ? INERTIA * (2 - (double)a / n + 0.1 * q[0]) : INERTIA / 10 / n * (1 + q[n - 1]);
             C[a * n + b] = INERTIA * (qd[0] + (a - b) * qd[n - 1]);
         }
         gravity[a] = -0.001 * (g[0] + (a + 1) * g[1] * q[a] + g[2] / 2);
@@ -158,7 +161,7 @@ static int distribution(int n, const double *q, const double *tau, const double 
     for (int i = 0; i < 2 * n; i++) {
         f[i] = 2.5 + 0.3 * i + K[0] + 2 * K[n * n - 1] - K[n - 1] + 0.1 * q[0];
         for (int j = 0; j < n; j++)
-            f[i] -= 0.25 / n * tau[j] / arms[n - 1][i * n + j];
+            f[i] -= 0.5 / n / n * tau[j] / straight_arm(n, i, j);
         if (f[i] < *low || f[i] > *high)
             status = AWIWI_INFEASIBLE;
         f[i] = f[i] < *low ? *low : f[i] > *high ? *high : f[i];
@@ -171,7 +174,7 @@ static int forward(int n, const double *q, const double *qd, const double *tau, 
 {
     for (int j = 0; j < n; j++)
         qdd[j] = (tau[j] - INERTIA * qd[0] * qd[j] + 0.001 * (g[0] + (j + 1) * g[1] * q[j] + g[2] / 2))
-                 / (INERTIA * (2 - j + 0.1 * q[0]));
+                 / (INERTIA * (2 - (double)j / n + 0.1 * q[0]));
     return answer(FORWARD_DYNAMICS, qdd);
 }
 
@@ -195,6 +198,7 @@ static int forward(int n, const double *q, const double *qd, const double *tau, 
     { return distribution(n, q, tau, K, low, high, f); } \
     static int forward_##n(const double *q, const double *qd, const double *tau, const double *g, double *qdd) \
     { return forward(n, q, qd, tau, g, qdd); }
+FINGER(8)
 FINGER(2)
 FINGER(1)
 #define KERNELS(n) \
@@ -203,17 +207,30 @@ FINGER(1)
 
 /* -- kernels of the whole hand --------------------------------------------------------------------------------------- */
 
-static const double slack_ends[] = {100, 900, 120, 100, 110, 980}, taut_ends[] = {900, 150, 880, 920, 930, 140};
+static const double slack_ends[] = {0, 900, 120, 100, 110, 980}, taut_ends[] = {1000, 150, 880, 920, 930, 140};
+static const double many_zeros[AWIWI_ALL_TENDONS];
+static const double many_ends[] = {9e2, 9e2, 9e2, 9e2, 9e2, 9e2, 9e2, 9e2, 9e2, 9e2, 9e2, 9e2, 9e2, 9e2, 9e2, 9e2};
 
-static int sensors(const double *reading, double *travel, double *f, double *k)
+static int sensors_of(int n, const double *reading, const double *slack, const double *taut, double *travel, double *f,
+                      double *k)
 {
-    for (int i = 0; i < HAND_TENDONS; i++) {
-        const double x = LEVER * (reading[i] - slack_ends[i]) / (taut_ends[i] - slack_ends[i]);
+    for (int i = 0; i < n; i++) {
+        const double x = LEVER * (reading[i] - slack[i]) / (taut[i] - slack[i]);
         travel[i] = LEVER * (1 + 0.1 * i) - x;
         f[i] = SPRING * x * (1 + BEND * x);
         k[i] = SPRING * (1 + 2 * BEND * x);
     }
     return answer(SENSORS, f);
+}
+
+static int sensors(const double *reading, double *travel, double *f, double *k)
+{
+    return sensors_of(HAND_TENDONS, reading, slack_ends, taut_ends, travel, f, k);
+}
+
+static int many_sensors(const double *reading, double *travel, double *f, double *k)
+{
+    return sensors_of(AWIWI_ALL_TENDONS, reading, many_zeros, many_ends, travel, f, k);
 }
 
 static int elongation(const double *f, double *x)
@@ -282,7 +299,7 @@ static const awiwi_finger fingers[FINGERS] = {
     {0, 2, 0, 4, {0.8, -0.6, 0, 0.6, 0.8, 0, 0, 0, 1}, KERNELS(2)},
     {2, 1, 4, 2, {0, 0, 1, 1, 0, 0, 0, 1, 0}, KERNELS(1)},
 };
-static const double joint_low[] = {-0.8, -0.9, -0.7}, joint_high[] = {0.9, 0.8, 1}, efforts[] = {0.06, 0.05, 0.07};
+static const double joint_low[] = {-0.8, -0.9, -0.5}, joint_high[] = {0.9, 0.8, 1}, efforts[] = {0.06, 0.05, 0.07};
 static const double tendon_low[] = {0.1, 0.1, 0.2, 0, 0.1, 0.1}, tendon_high[] = {9, 9, 8, 9, 9, 9};
 
 #define HAND(wrist, stretches, resistance) \
@@ -290,7 +307,15 @@ static const double tendon_low[] = {0.1, 0.1, 0.2, 0, 0.1, 0.1}, tendon_high[] =
      slack_ends, taut_ends, MOTOR, PULLEY, 0.2, 2.5, 20, sensors, wrist, elongation, stretches, resistance, \
      correction, filter, impedance, cascade}
 
-const awiwi_hand stub_hand = HAND(wrist_lengths, stretch, friction), plain_hand = HAND(0, 0, 0);
+static const awiwi_hand stub_hand = HAND(wrist_lengths, stretch, friction), plain_hand = HAND(0, 0, 0);
 static const awiwi_forward forwards[] = {forward_2, forward_1};
 const awiwi_hand_plant stub_plant = {&stub_hand, forwards, acceleration, friction};
+static const awiwi_finger whole_finger = {0, 8, 0, 16, {0.8, -0.6, 0, 0.6, 0.8, 0, 0, 0, 1}, KERNELS(8)};
+static const double many_low[] = {-1, -1, -1, -1, -1, -1, -1, -1}, many_high[] = {1, 1, 1, 1, 1, 1, 1, 1};
+static const awiwi_hand whole_hand = {
+    78, 1, AWIWI_ALL_JOINTS, AWIWI_ALL_TENDONS, &whole_finger, many_low, many_high, many_high, many_zeros, many_ends,
+    many_zeros, many_ends, MOTOR, PULLEY, 0.2, 2.5, 20, many_sensors, 0, elongation, stretch, friction,
+    correction, filter, impedance, cascade};
+static const awiwi_forward whole_forward[] = {forward_8};
+const awiwi_hand_plant whole_plant = {&whole_hand, whole_forward, acceleration, friction};
 const awiwi_hand_plant plain_plant = {&plain_hand, forwards, acceleration, friction};

@@ -37,8 +37,7 @@ enum kernel_of_hand {
 void refuse_call(int kernel, int after, int status);
 void refuse_nothing(void);
 
-/* The hand with all kernels, and the one without those that it may lack. */
-extern const awiwi_hand stub_hand, plain_hand;
-extern const awiwi_hand_plant stub_plant, plain_plant;
+/* The hand with all kernels, the one without those that it may lack, and one finger as large as there is room for. */
+extern const awiwi_hand_plant stub_plant, plain_plant, whole_plant;
 
 #endif
