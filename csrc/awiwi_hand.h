@@ -1,5 +1,5 @@
-/* The tick of a whole hand: sensor readings in, motor torques out. Bounded work, no heap; reentrant: all memory is in the
-   caller's awiwi_hand_state. The hand itself is a constant of the generated hand_model.c, made of its kernels. */
+/* The tick of a whole hand: sensor readings in, motor torques out. Bounded work, no heap; reentrant: all memory is in
+   the caller's awiwi_hand_state. The hand itself is a constant of the generated hand_model.c, made of its kernels. */
 #ifndef AWIWI_HAND_STEP_H
 #define AWIWI_HAND_STEP_H
 
@@ -9,7 +9,7 @@
 extern "C" {
 #endif
 
-/* -- the hand, as the generator writes it ---------------------------------------------------------------------------- */
+/* -- the hand, as the generator writes it -------------------------------------------------------------------------- */
 
 /* Kernels of one input or several in a uniform shape; each returns an awiwi_status. */
 typedef int (*awiwi_of_one)(const awiwi_real *in, awiwi_real *out);
@@ -74,7 +74,7 @@ typedef struct awiwi_hand {
                    const awiwi_real *kd, awiwi_real *tau);
 } awiwi_hand;
 
-/* -- what the caller gives ------------------------------------------------------------------------------------------- */
+/* -- what the caller gives ----------------------------------------------------------------------------------------- */
 
 /* Laws by which motors give the tendon forces. */
 enum awiwi_law {
@@ -105,7 +105,8 @@ typedef struct awiwi_hand_input {
     int reset;  /* 1 ends a fault */
 } awiwi_hand_input;
 
-/* What may be tuned, at any time: a change is faded in. */
+/* What may be tuned, at any time: a change is faded in. Where they change in every tick, torques follow the law only as
+   fast as it fades. They are numbers from 0 on, those that divide or that a law needs above 0. */
 typedef struct awiwi_hand_gains {
     awiwi_real period;               /* of the clock [s] */
     awiwi_real delay;                /* of the reference filter [s] */
@@ -128,7 +129,7 @@ typedef struct awiwi_hand_gains {
     int ramp_ticks;               /* in which torques then fall to zero, and in which any change is faded in */
 } awiwi_hand_gains;
 
-/* -- what the tick keeps and tells ----------------------------------------------------------------------------------- */
+/* -- what the tick keeps and tells --------------------------------------------------------------------------------- */
 
 enum awiwi_mode {
     AWIWI_OFF,   /* not enabled, or not initialised: no torque */
@@ -181,7 +182,7 @@ typedef struct awiwi_hand_state {
     awiwi_real motion[AWIWI_ALL_JOINTS][5]; /* filtered references and their derivatives */
     awiwi_real yield[AWIWI_ALL_JOINTS];     /* angle by which a joint yields to its load */
     awiwi_real tau[AWIWI_ALL_JOINTS];       /* wanted joint torques [N m] */
-    awiwi_real feed[AWIWI_ALL_JOINTS];    /* what every finger planned at its last turn: torques that are fed forward, */
+    awiwi_real feed[AWIWI_ALL_JOINTS];      /* what every finger planned at its last turn: torques fed forward, */
     awiwi_real planned_tau[AWIWI_ALL_JOINTS];
     awiwi_real planned_f[AWIWI_ALL_TENDONS]; /* forces, elongations, stiffnesses and their slopes, */
     awiwi_real planned_x[AWIWI_ALL_TENDONS];
@@ -209,7 +210,7 @@ typedef struct awiwi_hand_state {
     unsigned tick;
 } awiwi_hand_state;
 
-/* -- what firmware may log ------------------------------------------------------------------------------------------- */
+/* -- what firmware may log ----------------------------------------------------------------------------------------- */
 
 enum { AWIWI_LOG_VERSION = 1 };
 
@@ -240,15 +241,15 @@ void awiwi_hand_log_begin(const awiwi_hand *hand, const awiwi_hand_gains *gains,
 void awiwi_hand_log_tick(const awiwi_hand *hand, const awiwi_hand_gains *gains, const awiwi_hand_input *input,
                          const awiwi_hand_state *state, awiwi_hand_record *record);
 
-/* -- the tick -------------------------------------------------------------------------------------------------------- */
+/* -- the tick ------------------------------------------------------------------------------------------------------ */
 
-/* Stiffness and damping of every joint that suit the hand in the pose q [joints]: a quarter of what its tendons have at the
-   lower limit of their forces, and critical damping. Returns an awiwi_status. */
+/* Stiffness and damping of every joint that suit the hand in the pose q [joints]: a quarter of what its tendons have at
+   the lower limit of their forces, and critical damping. Returns an awiwi_status. */
 int awiwi_hand_suggest(const awiwi_hand *hand, const awiwi_hand_gains *gains, const awiwi_real *q,
                        awiwi_hand_input *input);
 
-/* Begin with the hand at rest in a known pose q [joints], all tendons taut: finds the offsets of the motors. Returns the
-   status: where it has a fault, nothing runs, and `tendon_status` names the sensors. */
+/* Begin with the hand at rest in a known pose q [joints], all tendons taut: finds the offsets of the motors. Returns
+   the status: where it has a fault, nothing runs, and `tendon_status` names the sensors. */
 unsigned awiwi_hand_init(const awiwi_hand *hand, const awiwi_hand_gains *gains, const awiwi_hand_input *input,
                          const awiwi_real *q, awiwi_hand_state *state);
 

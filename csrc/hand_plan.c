@@ -1,5 +1,5 @@
-/* What a finger plans when it is its turn: forces for torque and stiffness, and how joints yield. Between its turns only
-   its law runs. */
+/* What a finger plans when it is its turn: forces for torque and stiffness, and how joints yield. Between its turns
+   only its law runs. */
 #include "numerics.h"
 #include "dense.h"
 #include "hand_parts.h"
@@ -71,7 +71,8 @@ static unsigned hold_tip(const awiwi_tick_of *now, int index, awiwi_real *tau)
     return status;
 }
 
-/* What the law of joint torques adds (eq. 11.4, 11.10): springs and dampers of the joints, soft end stops, the fingertip. */
+/* What the law of joint torques adds (eq. 11.4, 11.10): springs and dampers of the joints, soft end stops, the
+   fingertip. */
 static unsigned impedance(const awiwi_tick_of *now, int index, awiwi_real *tau)
 {
     const awiwi_finger *finger = now->hand->finger + index;
@@ -116,8 +117,8 @@ static unsigned solve(const awiwi_tick_of *now, int index, const awiwi_real *pos
         K[i] = 0;
     for (int i = 0; i < n; i++)
         K[i * n + i] = awiwi_given(now->input->stiffness[j + i], 0, &status);
-    const int found = finger->distribution(pose, state->planned_tau + j, K, &now->gains->force_low, &now->gains->force_high,
-                                           state->planned_f + finger->first_tendon);
+    const int found = finger->distribution(pose, state->planned_tau + j, K, &now->gains->force_low,
+                                           &now->gains->force_high, state->planned_f + finger->first_tendon);
     if (found == AWIWI_INFEASIBLE)
         return status | AWIWI_UNREACHABLE;
     return found == AWIWI_OK || found == AWIWI_NOT_CONVERGED ? status : status | AWIWI_NO_LAW;

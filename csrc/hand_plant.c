@@ -8,7 +8,7 @@ enum { ALL = AWIWI_ALL_TENDONS, JOINTS = AWIWI_MOST_JOINTS };
 enum { ROUNDS = 20 }; /* of Newton's method, from the middle of a lever */
 
 static const awiwi_real STIFF_JOINT = (awiwi_real)10;   /* of the joints' hard ends [N m/rad] */
-static const awiwi_real STIFF_LINE = (awiwi_real)60000; /* of a line that does not stretch, behind a spring's end [N/m] */
+static const awiwi_real STIFF_LINE = (awiwi_real)60000; /* of a line without stretch, behind a spring's end [N/m] */
 static const awiwi_real BESIDE = (awiwi_real)1 / 4096;  /* of a sensor's span: where slopes are taken */
 
 /* Force and elongation of every tendon at these readings; springs pull as the world says. */

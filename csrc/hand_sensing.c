@@ -3,7 +3,7 @@
 #include "dense.h"
 #include "hand_parts.h"
 
-static const awiwi_real WITHIN = (awiwi_real)0.02; /* of a sensor's span: so far beyond its ends a reading is believed */
+static const awiwi_real WITHIN = (awiwi_real)0.02; /* of a sensor's span: so far beyond its ends it is believed */
 static const awiwi_real LOOSE = (awiwi_real)0.002; /* of the span: up to here the lever is at its slack end */
 static const awiwi_real FASTEST = (awiwi_real)4;   /* of the motors' velocity: a faster change is a jump */
 

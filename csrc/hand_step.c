@@ -8,7 +8,7 @@
 
 static const awiwi_real HOT = (awiwi_real)0.9; /* heat from which on a motor's limit falls to what it bears for ever */
 
-/* -- motors ---------------------------------------------------------------------------------------------------------- */
+/* -- motors -------------------------------------------------------------------------------------------------------- */
 
 /* The largest torque of a motor as hot as this. */
 static awiwi_real limit_of(const awiwi_tick_of *now, int k)
@@ -31,7 +31,7 @@ static unsigned drive(const awiwi_tick_of *now, int k, awiwi_real wanted)
            | (limit < now->hand->motor_torque ? AWIWI_HOT : 0u);
 }
 
-/* -- modes ----------------------------------------------------------------------------------------------------------- */
+/* -- modes --------------------------------------------------------------------------------------------------------- */
 
 /* A finger's next mode. A fault that lasted longer than hold_ticks ends in AWIWI_FAULT, whether or not it goes away. */
 static int mode_after(const awiwi_tick_of *now, int index, int faulty)
@@ -144,7 +144,7 @@ static unsigned step_finger(const awiwi_tick_of *now, int index, unsigned status
     return status;
 }
 
-/* -- interface ------------------------------------------------------------------------------------------------------- */
+/* -- interface ----------------------------------------------------------------------------------------------------- */
 
 enum { REALS_OF_GAINS = offsetof(awiwi_hand_gains, hold_ticks) / sizeof(awiwi_real) };
 

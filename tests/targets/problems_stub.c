@@ -32,7 +32,7 @@ static int answer(int kernel, double *out)
     return refusal;
 }
 
-/* -- fingers: change of length of tendon i per angle of joint j, by number of joints --------------------------------- */
+/* -- fingers: change of length of tendon i per angle of joint j, by number of joints ------------------------------- */
 
 static double straight_arm(int n, int i, int j)
 {
@@ -154,8 +154,8 @@ static int tip(int n, const double *q, double *T, double *J)
     return answer(TIP, T);
 }
 
-static int distribution(int n, const double *q, const double *tau, const double *K, const double *low, const double *high,
-                        double *f)
+static int distribution(int n, const double *q, const double *tau, const double *K, const double *low,
+                        const double *high, double *f)
 {
     int status = AWIWI_OK;
     for (int i = 0; i < 2 * n; i++) {
@@ -205,7 +205,7 @@ FINGER(1)
     measured_##n, estimate_##n, lengths_##n, coupling_##n, torque_##n, stiffness_##n, of_tendons_##n, dynamics_##n, \
         tip_##n, distribution_##n
 
-/* -- kernels of the whole hand --------------------------------------------------------------------------------------- */
+/* -- kernels of the whole hand ------------------------------------------------------------------------------------- */
 
 static const double slack_ends[] = {0, 900, 120, 100, 110, 980}, taut_ends[] = {1000, 150, 880, 920, 930, 140};
 static const double many_zeros[AWIWI_ALL_TENDONS];
