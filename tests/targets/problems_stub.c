@@ -248,7 +248,7 @@ static int wrist_lengths(const double *wrist, double *w)
 
 static int stretch(const double *f, double *x)
 {
-    *x = STRETCH * *f;
+    *x = STRETCH * *f * (1 + 0.01 * *f);
     return answer(TENDON_STRETCH, x);
 }
 
