@@ -1,5 +1,5 @@
-/* The tick of a whole hand: sensor readings in, motor torques out. Bounded work, no heap; reentrant: all memory is in the
-   caller's awiwi_hand_state. The hand itself is a constant of the generated hand_model.c, made of its kernels. */
+/* The tick of a whole hand: sensor readings in, motor torques out. Bounded work, no heap; reentrant: all memory is in
+   the caller's awiwi_hand_state. The hand itself is a constant of the generated hand_model.c, made of its kernels. */
 #ifndef AWIWI_HAND_STEP_H
 #define AWIWI_HAND_STEP_H
 
@@ -9,7 +9,7 @@
 extern "C" {
 #endif
 
-/* -- the hand, as the generator writes it ---------------------------------------------------------------------------- */
+/* -- the hand, as the generator writes it -------------------------------------------------------------------------- */
 
 /* Kernels of one input or several in a uniform shape; each returns an awiwi_status. */
 typedef int (*awiwi_of_one)(const awiwi_real *in, awiwi_real *out);
@@ -74,12 +74,12 @@ typedef struct awiwi_hand {
                    const awiwi_real *kd, awiwi_real *tau);
 } awiwi_hand;
 
-/* -- what the caller gives ------------------------------------------------------------------------------------------- */
+/* -- what the caller gives ----------------------------------------------------------------------------------------- */
 
 /* Laws by which motors give the tendon forces. */
 enum awiwi_law {
-    AWIWI_MOTOR_IMPEDANCE, /* motors stand where the tendons' own stiffness holds the joint (eq. 11.3) */
-    AWIWI_CASCADE,         /* joint impedance by torque, over force control of every tendon (eq. 11.16) */
+    AWIWI_LAW_MOTOR_IMPEDANCE, /* motors stand where the tendons' own stiffness holds the joint (eq. 11.3) */
+    AWIWI_LAW_CASCADE,         /* joint impedance by torque, over force control of every tendon (eq. 11.16) */
     AWIWI_LAWS
 };
 
@@ -94,7 +94,7 @@ typedef struct awiwi_hand_input {
     awiwi_real qdd_des[AWIWI_ALL_JOINTS];
     awiwi_real torque[AWIWI_ALL_JOINTS];    /* to add [N m] */
     awiwi_real stiffness[AWIWI_ALL_JOINTS]; /* K of every joint [N m/rad] */
-    awiwi_real damping[AWIWI_ALL_JOINTS];   /* D of every joint [N m s/rad]; this and all below only by AWIWI_CASCADE */
+    awiwi_real damping[AWIWI_ALL_JOINTS];   /* D of every joint [N m s/rad]; this and all below only by AWIWI_LAW_CASCADE */
     awiwi_real tip[AWIWI_ALL_FINGERS][3];   /* desired place of every fingertip in its finger's base frame [m] */
     awiwi_real tip_stiffness[AWIWI_ALL_FINGERS]; /* [N/m]; 0 for none */
     awiwi_real tip_damping[AWIWI_ALL_FINGERS];   /* [N s/m] */
@@ -105,7 +105,8 @@ typedef struct awiwi_hand_input {
     int reset;  /* 1 ends a fault */
 } awiwi_hand_input;
 
-/* What may be tuned, at any time: a change is faded in. */
+/* What may be tuned, at any time: a change is faded in. Where they change in every tick, torques follow the law only as
+   fast as it fades. They are numbers from 0 on, those that divide or that a law needs above 0. */
 typedef struct awiwi_hand_gains {
     awiwi_real period;               /* of the clock [s] */
     awiwi_real delay;                /* of the reference filter [s] */
@@ -128,7 +129,7 @@ typedef struct awiwi_hand_gains {
     int ramp_ticks;               /* in which torques then fall to zero, and in which any change is faded in */
 } awiwi_hand_gains;
 
-/* -- what the tick keeps and tells ----------------------------------------------------------------------------------- */
+/* -- what the tick keeps and tells --------------------------------------------------------------------------------- */
 
 enum awiwi_mode {
     AWIWI_OFF,   /* not enabled, or not initialised: no torque */
@@ -142,7 +143,7 @@ enum awiwi_mode {
 enum {
     AWIWI_READING_LOST = 1 << 0,  /* invalid or not a number */
     AWIWI_READING_RANGE = 1 << 1, /* beyond the ends of the sensor */
-    AWIWI_MOTOR_LOST = 1 << 2,    /* the motor's angle is invalid, not a number, beyond its travel, or jumped */
+    AWIWI_ANGLE_LOST = 1 << 2,    /* the motor's angle is invalid, not a number, beyond its travel, or jumped */
     AWIWI_INCONSISTENT = 1 << 3,  /* the length disagrees with the others': a sensor is stuck, or a tendon broke */
     AWIWI_WRIST_LOST = 1 << 4,    /* wrist angles that the wrist cannot have */
     AWIWI_NO_ESTIMATE = 1 << 5,   /* the joint estimate failed */
@@ -172,6 +173,7 @@ typedef struct awiwi_hand_state {
     awiwi_real thd[AWIWI_ALL_TENDONS];
     awiwi_real x[AWIWI_ALL_TENDONS]; /* elongations */
     awiwi_real xd[AWIWI_ALL_TENDONS];
+    awiwi_real lost[AWIWI_ALL_TENDONS];  /* ticks since a motor was last seen */
     awiwi_real f[AWIWI_ALL_TENDONS];     /* measured forces [N] */
     awiwi_real f_des[AWIWI_ALL_TENDONS]; /* wanted ones */
     awiwi_real q[AWIWI_ALL_JOINTS];      /* estimates */
@@ -180,7 +182,7 @@ typedef struct awiwi_hand_state {
     awiwi_real motion[AWIWI_ALL_JOINTS][5]; /* filtered references and their derivatives */
     awiwi_real yield[AWIWI_ALL_JOINTS];     /* angle by which a joint yields to its load */
     awiwi_real tau[AWIWI_ALL_JOINTS];       /* wanted joint torques [N m] */
-    awiwi_real feed[AWIWI_ALL_JOINTS];    /* what every finger planned at its last turn: torques that are fed forward, */
+    awiwi_real feed[AWIWI_ALL_JOINTS];      /* what every finger planned at its last turn: torques fed forward, */
     awiwi_real planned_tau[AWIWI_ALL_JOINTS];
     awiwi_real planned_f[AWIWI_ALL_TENDONS]; /* forces, elongations, stiffnesses and their slopes, */
     awiwi_real planned_x[AWIWI_ALL_TENDONS];
@@ -199,17 +201,16 @@ typedef struct awiwi_hand_state {
     unsigned status;                           /* with those of all fingers */
     int mode[AWIWI_ALL_FINGERS];               /* an awiwi_mode each */
     int slack_for[AWIWI_ALL_TENDONS];          /* ticks for which a tendon has been slack */
-    int lost[AWIWI_ALL_TENDONS];               /* ticks since a motor was last seen */
     int waited[AWIWI_ALL_FINGERS];             /* ticks of the present fault */
     int alive[AWIWI_ALL_FINGERS];              /* whether the law had a result in the last tick */
-    int changed;                               /* whether law or gains are others than in the last tick */
+    int changed; /* ticks until all fingers have planned with the present law and gains */
     int law;
     int turn; /* the finger that plans anew */
     int ready;
     unsigned tick;
 } awiwi_hand_state;
 
-/* -- what firmware may log ------------------------------------------------------------------------------------------- */
+/* -- what firmware may log ----------------------------------------------------------------------------------------- */
 
 enum { AWIWI_LOG_VERSION = 1 };
 
@@ -240,15 +241,15 @@ void awiwi_hand_log_begin(const awiwi_hand *hand, const awiwi_hand_gains *gains,
 void awiwi_hand_log_tick(const awiwi_hand *hand, const awiwi_hand_gains *gains, const awiwi_hand_input *input,
                          const awiwi_hand_state *state, awiwi_hand_record *record);
 
-/* -- the tick -------------------------------------------------------------------------------------------------------- */
+/* -- the tick ------------------------------------------------------------------------------------------------------ */
 
-/* Stiffness and damping of every joint that suit the hand in the pose q [joints]: a quarter of what its tendons have at the
-   lower limit of their forces, and critical damping. Returns an awiwi_status. */
+/* Stiffness and damping of every joint that suit the hand in the pose q [joints]: a quarter of what its tendons have at
+   the lower limit of their forces, and critical damping. Returns an awiwi_status. */
 int awiwi_hand_suggest(const awiwi_hand *hand, const awiwi_hand_gains *gains, const awiwi_real *q,
                        awiwi_hand_input *input);
 
-/* Begin with the hand at rest in a known pose q [joints], all tendons taut: finds the offsets of the motors. Returns the
-   status: where it has a fault, nothing runs, and `tendon_status` names the sensors. */
+/* Begin with the hand at rest in a known pose q [joints], all tendons taut: finds the offsets of the motors. Returns
+   the status: where it has a fault, nothing runs, and `tendon_status` names the sensors. */
 unsigned awiwi_hand_init(const awiwi_hand *hand, const awiwi_hand_gains *gains, const awiwi_hand_input *input,
                          const awiwi_real *q, awiwi_hand_state *state);
 

@@ -44,8 +44,8 @@ typedef struct awiwi_hand_world {
     awiwi_real slack[AWIWI_ALL_TENDONS];   /* travel of the levers at their slack ends [m] */
 } awiwi_hand_world;
 
-/* Rest in the pose q [joints] with motors at theta [tendons] and every tendon under about `force`, after the caller has set the
-   first part. Returns an awiwi_status. */
+/* Rest in the pose q [joints] with motors at theta [tendons] and every tendon under about `force`, after the caller has
+   set the first part. Returns an awiwi_status. */
 int awiwi_hand_place(const awiwi_hand_plant *plant, const awiwi_real *q, const awiwi_real *theta, awiwi_real force,
                      awiwi_hand_world *world);
 

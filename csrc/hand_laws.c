@@ -15,7 +15,7 @@ typedef struct finger_now {
     awiwi_real h[TENDONS];        /* and with those of the last estimate where they are unknown */
 } finger_now;
 
-/* -- where the finger is --------------------------------------------------------------------------------------------- */
+/* -- where the finger is ------------------------------------------------------------------------------------------- */
 
 /* Tendons of unknown length have that of the last estimate. */
 static int fill_in(const awiwi_tick_of *now, finger_now *own)
@@ -72,7 +72,7 @@ static unsigned estimate(const awiwi_tick_of *now, finger_now *own)
     return compare(now, own);
 }
 
-/* -- what is wanted -------------------------------------------------------------------------------------------------- */
+/* -- what is wanted ------------------------------------------------------------------------------------------------ */
 
 static unsigned refer(const awiwi_tick_of *now, const awiwi_finger *finger)
 {
@@ -90,7 +90,8 @@ static unsigned refer(const awiwi_tick_of *now, const awiwi_finger *finger)
             desired[1] = desired[2] = 0;
         }
         state->demand[j] = within;
-        if (now->hand->reference_filter(state->motion[j], desired, &now->gains->delay, &now->gains->period, next) != AWIWI_OK)
+        if (now->hand->reference_filter(state->motion[j], desired, &now->gains->delay, &now->gains->period, next)
+            != AWIWI_OK)
             return status | AWIWI_NO_LAW;
         for (int k = 0; k < 5; k++)
             state->motion[j][k] = next[k];
@@ -114,7 +115,7 @@ static unsigned follow(const awiwi_tick_of *now, const finger_now *own)
     return status;
 }
 
-/* -- the laws -------------------------------------------------------------------------------------------------------- */
+/* -- the laws ------------------------------------------------------------------------------------------------------ */
 
 /* The friction of a motor, as far as it is compensated. */
 static awiwi_real friction(const awiwi_tick_of *now, int k)
@@ -165,9 +166,9 @@ static unsigned cascade(const awiwi_tick_of *now, const finger_now *own, awiwi_r
     for (int i = 0; i < finger->tendons && !(status & AWIWI_FAULTS); i++) {
         const int k = finger->first_tendon + i;
         const awiwi_real resistance = friction(now, k);
-        if (hand->cascade(state->f + k, state->xd + k, state->stiffness + k, state->slope + k, &nothing, state->f_des + k,
-                          &nothing, &nothing, &resistance, &hand->motor_pulley, &hand->motor_inertia, &gains->force_kp,
-                          &gains->force_kd, torque + i) != AWIWI_OK)
+        if (hand->cascade(state->f + k, state->xd + k, state->stiffness + k, state->slope + k, &nothing,
+                          state->f_des + k, &nothing, &nothing, &resistance, &hand->motor_pulley, &hand->motor_inertia,
+                          &gains->force_kp, &gains->force_kd, torque + i) != AWIWI_OK)
             return status | AWIWI_NO_LAW;
     }
     return status;
@@ -201,6 +202,6 @@ unsigned awiwi_finger_law(const awiwi_tick_of *now, int index, awiwi_real *torqu
     status |= now->state->plan_status[index];
     if (status & AWIWI_FAULTS)
         return status;
-    status |= now->state->law == AWIWI_CASCADE ? cascade(now, &own, torque) : motor_impedance(now, &own, torque);
+    status |= now->state->law == AWIWI_LAW_CASCADE ? cascade(now, &own, torque) : motor_impedance(now, &own, torque);
     return status | hold_back(now, own.finger, torque);
 }

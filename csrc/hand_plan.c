@@ -1,5 +1,5 @@
-/* What a finger plans when it is its turn: forces for torque and stiffness, and how joints yield. Between its turns only
-   its law runs. */
+/* What a finger plans when it is its turn: forces for torque and stiffness, and how joints yield. Between its turns
+   only its law runs. */
 #include "numerics.h"
 #include "dense.h"
 #include "hand_parts.h"
@@ -41,10 +41,11 @@ static awiwi_real end_stop(const awiwi_tick_of *now, int j, unsigned *status)
 {
     const awiwi_real low = now->hand->joint_low[j] + now->gains->stop_margin, q = now->state->q[j];
     const awiwi_real high = now->hand->joint_high[j] - now->gains->stop_margin;
-    if (low >= high || (q >= low && q <= high))
+    const awiwi_real back = awiwi_clamp(q, low, high) - q;
+    if (low >= high || !(back < 0 || back > 0))
         return 0;
     *status |= AWIWI_END_STOP;
-    return now->gains->stop_stiffness * ((q < low ? low : high) - q);
+    return now->gains->stop_stiffness * back;
 }
 
 /* The fingertip as a point between springs and dampers; nothing where its stiffness is 0. */
@@ -61,16 +62,17 @@ static unsigned hold_tip(const awiwi_tick_of *now, int index, awiwi_real *tau)
     if (finger->tip(now->state->q + finger->first_joint, T, J) != AWIWI_OK)
         return status | AWIWI_NO_LAW;
     for (int axis = 0; axis < 3; axis++) {
-        const awiwi_real place = T[4 * axis + 3], to = awiwi_given(now->input->tip[index][axis], place, &status);
+        const awiwi_real at = T[4 * axis + 3], to = awiwi_given(now->input->tip[index][axis], at, &status);
         const awiwi_real rate = awiwi_dot(J + axis * n, now->state->qd + finger->first_joint, n);
-        const awiwi_real force = k * (to - place) - d * rate;
+        const awiwi_real force = k * (to - at) - d * rate;
         for (int i = 0; i < n; i++)
             tau[i] += J[axis * n + i] * force;
     }
     return status;
 }
 
-/* What the law of joint torques adds (eq. 11.4, 11.10): springs and dampers of the joints, soft end stops, the fingertip. */
+/* What the law of joint torques adds (eq. 11.4, 11.10): springs and dampers of the joints, soft end stops, the
+   fingertip. */
 static unsigned impedance(const awiwi_tick_of *now, int index, awiwi_real *tau)
 {
     const awiwi_finger *finger = now->hand->finger + index;
@@ -92,7 +94,7 @@ unsigned awiwi_torques(const awiwi_tick_of *now, int index, awiwi_real *tau)
     unsigned status = 0;
     for (int i = 0; i < finger->joints; i++)
         tau[i] = now->state->feed[finger->first_joint + i];
-    if (now->state->law == AWIWI_CASCADE)
+    if (now->state->law == AWIWI_LAW_CASCADE)
         status |= impedance(now, index, tau);
     for (int i = 0, j = finger->first_joint; i < finger->joints; i++, j++) {
         const awiwi_real within = awiwi_clamp(tau[i], -now->hand->joint_effort[j], now->hand->joint_effort[j]);
@@ -115,8 +117,8 @@ static unsigned solve(const awiwi_tick_of *now, int index, const awiwi_real *pos
         K[i] = 0;
     for (int i = 0; i < n; i++)
         K[i * n + i] = awiwi_given(now->input->stiffness[j + i], 0, &status);
-    const int found = finger->distribution(pose, state->planned_tau + j, K, &now->gains->force_low, &now->gains->force_high,
-                                           state->planned_f + finger->first_tendon);
+    const int found = finger->distribution(pose, state->planned_tau + j, K, &now->gains->force_low,
+                                           &now->gains->force_high, state->planned_f + finger->first_tendon);
     if (found == AWIWI_INFEASIBLE)
         return status | AWIWI_UNREACHABLE;
     return found == AWIWI_OK || found == AWIWI_NOT_CONVERGED ? status : status | AWIWI_NO_LAW;
@@ -200,11 +202,11 @@ unsigned awiwi_plan(const awiwi_tick_of *now, int index)
     const awiwi_finger *finger = now->hand->finger + index;
     awiwi_real pose[JOINTS];
     for (int i = 0, j = finger->first_joint; i < finger->joints; i++, j++)
-        pose[i] = now->state->law == AWIWI_CASCADE ? now->state->q[j] : now->state->motion[j][0];
+        pose[i] = now->state->law == AWIWI_LAW_CASCADE ? now->state->q[j] : now->state->motion[j][0];
     unsigned status = feed(now, finger);
     if (!(status & AWIWI_FAULTS))
         status |= solve(now, index, pose);
-    if (!(status & AWIWI_FAULTS) && now->state->law == AWIWI_CASCADE)
+    if (!(status & AWIWI_FAULTS) && now->state->law == AWIWI_LAW_CASCADE)
         status |= spread(now, finger, pose);
     if (!(status & AWIWI_FAULTS))
         status |= elongate(now, finger);

@@ -4,11 +4,12 @@
 #include "noise.h"
 #include "awiwi_hand_plant.h"
 
-enum { ALL = AWIWI_ALL_TENDONS, JOINTS = AWIWI_MOST_JOINTS, ROUNDS = 20 }; /* of Newton's method, from the middle of a lever */
+enum { ALL = AWIWI_ALL_TENDONS, JOINTS = AWIWI_MOST_JOINTS };
+enum { ROUNDS = 20 }; /* of Newton's method, from the middle of a lever */
 
-static const awiwi_real STIFF_JOINT = (awiwi_real)10;    /* of the joints' hard ends [N m/rad] */
-static const awiwi_real STIFF_LINE = (awiwi_real)60000;  /* of a tendon that does not stretch, behind a spring's end [N/m] */
-static const awiwi_real BESIDE = (awiwi_real)1 / 4096;   /* of a sensor's span: where slopes are taken */
+static const awiwi_real STIFF_JOINT = (awiwi_real)10;   /* of the joints' hard ends [N m/rad] */
+static const awiwi_real STIFF_LINE = (awiwi_real)60000; /* of a line without stretch, behind a spring's end [N/m] */
+static const awiwi_real BESIDE = (awiwi_real)1 / 4096;  /* of a sensor's span: where slopes are taken */
 
 /* Force and elongation of every tendon at these readings; springs pull as the world says. */
 static int at_levers(const awiwi_hand_plant *plant, const awiwi_hand_world *world, const awiwi_real *lever,
@@ -26,8 +27,8 @@ static int at_levers(const awiwi_hand_plant *plant, const awiwi_hand_world *worl
     return status;
 }
 
-/* Forces of tendons with these elongations, by a step of Newton's from the levers' last readings. Behind the ends of its
-   lever a tendon is a fibre. */
+/* Forces of tendons with these elongations, by a step of Newton's from the levers' last readings. Behind the ends of
+   its lever a tendon is a fibre. */
 static int pull(const awiwi_hand_plant *plant, awiwi_hand_world *world, const awiwi_real *elongation)
 {
     const awiwi_hand *hand = plant->hand;
@@ -63,16 +64,16 @@ static int pull(const awiwi_hand_plant *plant, awiwi_hand_world *world, const aw
 static int paths(const awiwi_hand_plant *plant, const awiwi_hand_world *world, awiwi_real *path)
 {
     const awiwi_hand *hand = plant->hand;
-    awiwi_real wrist[ALL];
+    awiwi_real in_finger[ALL] = {0}, in_wrist[ALL] = {0};
     int status = AWIWI_OK;
     for (int i = 0; i < hand->fingers; i++) {
         const awiwi_finger *finger = hand->finger + i;
-        status |= finger->tendon_lengths(world->q + finger->first_joint, path + finger->first_tendon);
+        status |= finger->tendon_lengths(world->q + finger->first_joint, in_finger + finger->first_tendon);
     }
     if (hand->wrist_lengths)
-        status |= hand->wrist_lengths(world->wrist, wrist);
+        status |= hand->wrist_lengths(world->wrist, in_wrist);
     for (int k = 0; k < hand->tendons; k++)
-        path[k] += hand->motor_pulley * world->theta[k] + (hand->wrist_lengths ? wrist[k] : 0);
+        path[k] = in_finger[k] + (hand->motor_pulley * world->theta[k] + in_wrist[k]);
     return status ? AWIWI_OUT_OF_DOMAIN : AWIWI_OK;
 }
 

@@ -3,10 +3,10 @@
 #include "dense.h"
 #include "hand_parts.h"
 
-static const awiwi_real WITHIN = (awiwi_real)0.02;  /* of a sensor's span: so far beyond its ends a reading is believed */
+static const awiwi_real WITHIN = (awiwi_real)0.02; /* of a sensor's span: so far beyond its ends it is believed */
 static const awiwi_real BEYOND = (awiwi_real)1.004; /* of the motors' travel: so far kernels compute */
-static const awiwi_real LOOSE = (awiwi_real)0.002;  /* of the span: up to here the lever is at its slack end */
-static const awiwi_real FASTEST = (awiwi_real)4;    /* of the motors' velocity: a faster change is a jump */
+static const awiwi_real LOOSE = (awiwi_real)0.002; /* of the span: up to here the lever is at its slack end */
+static const awiwi_real FASTEST = (awiwi_real)4;   /* of the motors' velocity: a faster change is a jump */
 
 /* A lever at its end stop reads as the end, up to noise. */
 static unsigned take_reading(const awiwi_tick_of *now, int i)
@@ -31,9 +31,9 @@ static unsigned take_theta(const awiwi_tick_of *now, int i)
     const awiwi_real theta = now->input->theta[i], change = awiwi_size(theta - now->state->theta[i]);
     const awiwi_real fastest = FASTEST * now->hand->motor_velocity * now->gains->period;
     if (!now->input->theta_valid[i] || !awiwi_is_number(theta) || awiwi_size(theta) > BEYOND * now->hand->motor_travel)
-        return AWIWI_MOTOR_LOST;
-    if (now->state->ready && change > fastest * (awiwi_real)(1 + now->state->lost[i]))
-        return AWIWI_MOTOR_LOST;
+        return AWIWI_ANGLE_LOST;
+    if (now->state->ready && change > fastest * (1 + now->state->lost[i]))
+        return AWIWI_ANGLE_LOST;
     now->state->theta[i] = theta;
     return 0;
 }
@@ -76,11 +76,11 @@ awiwi_tick_of awiwi_tick_with(const awiwi_hand *hand, const awiwi_hand_gains *ga
 unsigned awiwi_sense(const awiwi_tick_of *now)
 {
     for (int i = 0; i < now->hand->tendons; i++) {
-        const awiwi_real last = now->state->theta[i];
+        const awiwi_real last = now->state->theta[i], ticks = 1 + now->state->lost[i];
         const unsigned motor = take_theta(now, i);
-        now->state->lost[i] = motor ? now->state->lost[i] + 1 : 0;
+        now->state->lost[i] = motor ? ticks : 0;
         now->state->tendon_status[i] = take_reading(now, i) | motor;
-        now->state->thd[i] = awiwi_rate(now, now->state->thd[i], now->state->theta[i] - last);
+        now->state->thd[i] = awiwi_rate(now, now->state->thd[i], (now->state->theta[i] - last) / ticks);
     }
     elongate(now);
     return wrist(now);

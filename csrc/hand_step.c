@@ -8,14 +8,16 @@
 
 static const awiwi_real HOT = (awiwi_real)0.9; /* heat from which on a motor's limit falls to what it bears for ever */
 
-/* -- motors ---------------------------------------------------------------------------------------------------------- */
+/* -- motors -------------------------------------------------------------------------------------------------------- */
 
 /* The largest torque of a motor as hot as this. */
 static awiwi_real limit_of(const awiwi_tick_of *now, int k)
 {
     const awiwi_real most = now->hand->motor_torque, lasting = now->gains->continuous_torque;
     const awiwi_real share = (now->state->heat[k] - HOT) / (1 - HOT);
-    return share <= 0 || lasting >= most ? most : share >= 1 ? lasting : most + share * (lasting - most);
+    if (share <= 0 || lasting >= most)
+        return most;
+    return share < 1 ? most + share * (lasting - most) : lasting;
 }
 
 /* A motor's torque within its limit; its heat follows the square of the torque. */
@@ -25,10 +27,11 @@ static unsigned drive(const awiwi_tick_of *now, int k, awiwi_real wanted)
     const awiwi_real load = torque / now->gains->continuous_torque;
     now->state->heat[k] += now->gains->period / now->gains->heating_time * (load * load - now->state->heat[k]);
     now->state->torque[k] = torque;
-    return (torque < wanted || torque > wanted ? AWIWI_SATURATED : 0u) | (limit < now->hand->motor_torque ? AWIWI_HOT : 0u);
+    return (torque < wanted || torque > wanted ? AWIWI_SATURATED : 0u)
+           | (limit < now->hand->motor_torque ? AWIWI_HOT : 0u);
 }
 
-/* -- modes ----------------------------------------------------------------------------------------------------------- */
+/* -- modes --------------------------------------------------------------------------------------------------------- */
 
 /* A finger's next mode. A fault that lasted longer than hold_ticks ends in AWIWI_FAULT, whether or not it goes away. */
 static int mode_after(const awiwi_tick_of *now, int index, int faulty)
@@ -99,15 +102,20 @@ static unsigned give(const awiwi_tick_of *now, int index, const awiwi_real *torq
 {
     const awiwi_finger *finger = now->hand->finger + index;
     awiwi_hand_state *state = now->state;
-    const int begins = torque && (!state->alive[index] || state->changed);
+    const int begins = torque && (!state->alive[index] || state->changed > 0);
+    const awiwi_real share = state->share[index];
     unsigned status = 0;
     for (int i = 0, k = finger->first_tendon; i < finger->tendons; i++, k++) {
-        if (begins)
-            state->jump[k] = state->share[index] > 0 ? state->wanted[k] - torque[i] : 0;
+        if (begins && share > 0) {
+            const awiwi_real most = now->hand->motor_torque / share; /* what was wanted beyond it did not act */
+            state->jump[k] = awiwi_clamp(state->wanted[k], -most, most) - torque[i];
+        } else if (begins) {
+            state->jump[k] = 0;
+        }
+        state->jump[k] -= state->jump[k] / (awiwi_real)now->gains->ramp_ticks;
         if (torque)
             state->wanted[k] = torque[i] + state->jump[k];
-        state->jump[k] -= state->jump[k] / (awiwi_real)now->gains->ramp_ticks;
-        const unsigned found = drive(now, k, state->share[index] * state->wanted[k]);
+        const unsigned found = drive(now, k, share > 0 ? share * state->wanted[k] : 0);
         state->tendon_status[k] |= found;
         status |= found;
     }
@@ -136,25 +144,42 @@ static unsigned step_finger(const awiwi_tick_of *now, int index, unsigned status
     return status;
 }
 
-/* -- interface ------------------------------------------------------------------------------------------------------- */
+/* -- interface ----------------------------------------------------------------------------------------------------- */
 
-enum { REALS_OF_GAINS = offsetof(awiwi_hand_gains, hold_ticks) / sizeof(awiwi_real) };
+static const int REALS_OF_GAINS = (int)(offsetof(awiwi_hand_gains, hold_ticks) / sizeof(awiwi_real));
 
 /* Whether all gains are numbers that a law can take. */
 static int usable(const awiwi_hand_gains *gains)
 {
     const awiwi_real *number = &gains->period;
     for (int i = 0; i < REALS_OF_GAINS; i++)
-        if (!(number[i] > 0 && number[i] <= AWIWI_REAL_MAX))
+        if (!(number[i] >= 0 && number[i] <= AWIWI_REAL_MAX))
             return 0;
-    return gains->force_low < gains->force_high && gains->hold_ticks >= 0 && gains->slack_ticks >= 0 && gains->ramp_ticks > 0;
+    return gains->period > 0 && gains->delay > 0 && gains->motor_kp > 0 && gains->motor_kd > 0 && gains->force_kp > 0
+           && gains->force_kd > 0 && gains->force_low < gains->force_high && gains->continuous_torque > 0
+           && gains->heating_time >= gains->period && gains->hold_ticks >= 0 && gains->slack_ticks >= 0
+           && gains->ramp_ticks > 0;
 }
 
-/* Take over new gains and another law; says whether something changed. Gains that no law can take change nothing. */
-static unsigned adopt(const awiwi_hand_gains *gains, const awiwi_hand_input *input, awiwi_hand_state *state)
+static int differ(const awiwi_hand_gains *a, const awiwi_hand_gains *b)
+{
+    const awiwi_real *first = &a->period, *second = &b->period;
+    for (int i = 0; i < REALS_OF_GAINS; i++)
+        if (first[i] < second[i] || first[i] > second[i])
+            return 1;
+    return a->hold_ticks != b->hold_ticks || a->slack_ticks != b->slack_ticks || a->ramp_ticks != b->ramp_ticks;
+}
+
+/* Take over new gains and another law; what changes is faded in until all fingers have planned with it, and from then
+   on. Gains that no law can take change nothing. */
+static unsigned adopt(const awiwi_hand *hand, const awiwi_hand_gains *gains, const awiwi_hand_input *input,
+                      awiwi_hand_state *state)
 {
     const int law = input->law, known = law >= 0 && law < AWIWI_LAWS, good = usable(gains);
-    state->changed = (known && law != state->law) || (good && memcmp(&state->gains, gains, sizeof state->gains) != 0);
+    if ((known && law != state->law) || (good && differ(&state->gains, gains)))
+        state->changed = hand->fingers;
+    else if (state->changed > 0)
+        state->changed--;
     if (known)
         state->law = law;
     if (good)
@@ -169,8 +194,9 @@ unsigned awiwi_hand_init(const awiwi_hand *hand, const awiwi_hand_gains *gains, 
     const awiwi_tick_of now = awiwi_tick_with(hand, gains, input, state);
     memset(state, 0, sizeof *state);
     if (!usable(gains) || hand->sensors(hand->sensor_slack, state->slack, ignored_force, ignored_stiffness) != AWIWI_OK)
-        return AWIWI_NO_LAW;
-    (void)adopt(gains, input, state);
+        return state->status = AWIWI_NO_LAW;
+    (void)adopt(hand, gains, input, state);
+    state->changed = 0;
     memcpy(state->reading, hand->sensor_slack, (size_t)hand->tendons * sizeof *state->reading);
     unsigned status = awiwi_sense(&now);
     for (int k = 0; k < hand->tendons; k++) {
@@ -196,8 +222,8 @@ unsigned awiwi_hand_step(const awiwi_hand *hand, const awiwi_hand_gains *gains, 
     for (int k = 0; k < hand->tendons; k++)
         torque[k] = 0;
     if (!state->ready)
-        return AWIWI_NO_LAW;
-    unsigned status = adopt(gains, input, state);
+        return state->status |= AWIWI_NO_LAW;
+    unsigned status = adopt(hand, gains, input, state);
     const awiwi_tick_of now = awiwi_tick_with(hand, &state->gains, input, state);
     const unsigned of_all = awiwi_sense(&now);
     for (int i = 0; i < hand->fingers; i++)

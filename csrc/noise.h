@@ -17,7 +17,8 @@ static inline uint32_t awiwi_mixed(uint32_t x)
 /* Nearly normal, of variance 1: four uniform numbers of 16 bits each. */
 static inline awiwi_real awiwi_normal(uint32_t seed, uint32_t tick, uint32_t sensor)
 {
-    const uint32_t a = awiwi_mixed(awiwi_mixed(awiwi_mixed(seed + 1) ^ tick) ^ sensor), b = awiwi_mixed(a + UINT32_C(0x9e3779b9));
+    const uint32_t a = awiwi_mixed(awiwi_mixed(awiwi_mixed(seed + 1) ^ tick) ^ sensor);
+    const uint32_t b = awiwi_mixed(a + UINT32_C(0x9e3779b9));
     const uint32_t total = (a >> 16) + (a & 0xffff) + (b >> 16) + (b & 0xffff);
     const awiwi_real root_of_three = (awiwi_real)1.7320508075688772935;
     return root_of_three * ((awiwi_real)total / 65535 - 2);

@@ -56,7 +56,7 @@ static void demand(int tick, const awiwi_real *start)
 {
     for (int j = 0; j < AWIWI_JOINTS; j++)
         input.q_des[j] = start[j] + (tick % 400 < 200 ? (awiwi_real)0.1 : (awiwi_real)-0.1);
-    input.law = tick < TICKS / 2 ? AWIWI_MOTOR_IMPEDANCE : AWIWI_CASCADE;
+    input.law = tick < TICKS / 2 ? AWIWI_LAW_MOTOR_IMPEDANCE : AWIWI_LAW_CASCADE;
     input.enable = 1;
     if (tick >= FAULT_BEGINS && tick < FAULT_ENDS)
         input.reading_valid[FAULTY] = 0; /* sense() sets it again */

@@ -113,5 +113,6 @@ int main(void)
         }
     }
     try_files();
+    try_hand();
     return 0;
 }

@@ -43,5 +43,6 @@ void try_joint(int number);
 void try_law(int number);
 void try_parts(int number);
 void try_files(void);
+void try_hand(void);
 
 #endif
