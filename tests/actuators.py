@@ -11,8 +11,7 @@ from awiwi_gen.library import Library
 from awiwi_gen.pipeline import Job, cached_tree
 
 ONE_FINGER = (Path(__file__).parent / "one_finger.toml").read_text(encoding="utf-8")
-PACKAGED = (Path(__file__).parents[1] / "awiwi_gen" / "hand.toml").read_text(encoding="utf-8")
-AWIWI = re.sub(r"^gains = .*\n", "", PACKAGED, flags=re.M)  # without the file of gains beside it
+AWIWI = (Path(__file__).parents[1] / "awiwi_gen" / "hand.toml").read_text(encoding="utf-8")
 ACTUATORS = "".join(re.findall(r"^\[+(?:motor|spring|tendon)\b.*?(?=^\[|^# -{20}|\Z)", AWIWI, flags=re.M | re.S))
 
 

@@ -11,6 +11,7 @@ from tempfile import TemporaryDirectory
 
 from awiwi_gen.errors import InputError
 from awiwi_gen.hand import Hand
+from awiwi_gen.hand.gains import gains_beside
 
 _SECONDS = 60  # for git to answer
 
@@ -51,7 +52,8 @@ def _at_revision(revision: str, file: Path) -> tuple[str, Hand]:
     with TemporaryDirectory() as scratch:
         copy = Path(scratch) / file.name
         copy.write_bytes(text)
-        if (name := _included(text)) and (gains := _git(folder, "show", f"{commit.decode().strip()}:./{name}")):
+        name = _included(text) or gains_beside(copy).name
+        if gains := _git(folder, "show", f"{commit.decode().strip()}:./{name}"):
             beside = copy.parent / name
             beside.parent.mkdir(parents=True, exist_ok=True)
             beside.write_bytes(gains)

@@ -19,7 +19,7 @@ from pydantic import Field
 from awiwi_gen.errors import Fault
 from awiwi_gen.hand.actuation import Fibre, Motor, Spring
 from awiwi_gen.hand.file import HandFile
-from awiwi_gen.hand.gains import Gains, gains_complaints, with_gains
+from awiwi_gen.hand.gains import Gains, gains_beside, gains_complaints, with_gains
 from awiwi_gen.hand.lint import Complaint, below, complaints, sources
 from awiwi_gen.hand.lint_actuation import actuator_complaints
 from awiwi_gen.hand.lint_motors import across_complaints
@@ -148,5 +148,6 @@ def _palm(hand: Hand) -> Iterator[Complaint]:
 
 def _read(path: str | os.PathLike[str] | None) -> HandFile:
     if path is not None:
-        return with_gains(HandFile.read(path))
-    return with_gains(HandFile.read(DEFAULT_HAND, DEFAULT_HAND.name), DEFAULT_HAND.parent)
+        return with_gains(HandFile.read(path), beside=gains_beside(Path(path)))
+    file = HandFile.read(DEFAULT_HAND, DEFAULT_HAND.name)
+    return with_gains(file, DEFAULT_HAND.parent, gains_beside(DEFAULT_HAND))

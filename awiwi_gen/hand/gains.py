@@ -3,6 +3,8 @@
     gains = "gains.toml"         # in the hand file: a file of its own, in or below the folder of the hand file
     [[gains]]                    # or the tables themselves
 
+    Without either, hand.gains.toml beside hand.toml is read, if it is there.
+
 They are numbers of the hand like any other, so the generated parameters carry them to the firmware.
 """
 
@@ -83,14 +85,21 @@ class GainsFile(Part):
     gains: Gains
 
 
-def with_gains(file: HandFile, folder: Path | None = None) -> HandFile:
-    """A hand file with the gains of the file it names in place of that name.
+def gains_beside(path: Path) -> Path:
+    """The file of gains that belongs to a hand file without naming it: hand.gains.toml to hand.toml."""
+    return path.with_suffix(".gains.toml")
+
+
+def with_gains(file: HandFile, folder: Path | None = None, beside: Path | None = None) -> HandFile:
+    """A hand file with the gains of the file it names in place of that name, or of the file `beside` it.
 
     Only a regular file in or below the folder of the hand file is read; ``folder`` is that folder, where the file has
     another name in messages. Raises `InputError` with the faults of that
     file, or with the line that names it if it cannot be read.
     """
     name = file.data.get("gains")
+    if name is None and beside is not None and beside.is_file():
+        return _including(file, HandFile.read(beside))
     if not isinstance(name, str):
         return file
     folder = folder or Path(file.name).parent
@@ -109,6 +118,10 @@ def with_gains(file: HandFile, folder: Path | None = None) -> HandFile:
             raise
         found = [file.fault(("gains",), f"{shown}: {fault.file} {fault.message}") for fault in error.faults]
         raise InputError(found) from None
+    return _including(file, included)
+
+
+def _including(file: HandFile, included: HandFile) -> HandFile:
     included.validated(GainsFile)
     return replace(file, data=file.data | included.data, included={"gains": included})
 
