@@ -202,7 +202,7 @@ def test_gains_that_cannot_run_are_refused_with_the_reason_and_the_nearest_that_
     found = running_gains(lib, law, gains, joint, 10.0)
     assert found.runs
     assert found.margin > 0.9 / 3000  # with something to spare
-    assert "unstable at 3000 Hz and one sample of delay" in str(refused.value)
+    assert "hunting (spectral radius 1.096) at 3000 Hz and one sample of delay" in str(refused.value)
     changed = [f"{name} = {value:.4g}" for name, value in found.gains.items() if value != gains[name]]
     assert f"the nearest that run have {', '.join(changed)} (" in str(refused.value)
 

@@ -53,7 +53,6 @@ def test_forces_that_are_measured_are_those_of_the_simulated_hand(loop):
 def test_motors_take_the_torques_of_the_motor_impedance(lib, hand, loop):
     """Each torque again from the state: set points by the hand's kernels, then the law's own kernel."""
     loop.hand.measure(loop.step.input)
-    jump = loop.step.state.jump.copy()
     torque, state, r = loop.step.step(), loop.step.state, float(loop.step.model.motor_pulley)
     low, high = loop.step.limits()
     for name, rows, joints in fingers(hand):
@@ -66,7 +65,7 @@ def test_motors_take_the_torques_of_the_motor_impedance(lib, hand, loop):
         friction = float(loop.step.gains.friction_share[0]) * lib.motor_friction(state.thd[rows])
         law = (float(loop.step.gains.motor_kp[0]), float(loop.step.gains.motor_kd[0]))
         expected = lib.motor_impedance(state.theta[rows], state.thd[rows], theta_des, f, friction, r, *law).tau
-        assert np.allclose(torque[rows], expected + jump[rows], atol=1e-9), name
+        assert np.allclose(torque[rows], expected + state.jump[rows], atol=1e-9), name
 
 
 def test_the_cascade_controls_the_forces_of_the_impedance(lib, hand, loop):
@@ -79,7 +78,6 @@ def test_the_cascade_controls_the_forces_of_the_impedance(lib, hand, loop):
         while int(loop.step.state.turn[0]) != turn:
             loop.run(1)
         loop.hand.measure(loop.step.input)
-        jump = loop.step.state.jump.copy()
         torque, state, given = loop.step.step(), loop.step.state, loop.step.input
         if len(range(*joints.indices(19))) == 4:
             dynamics = lib[f"{name}_dynamics"](state.q[joints], state.qd[joints], gravity)
@@ -98,7 +96,7 @@ def test_the_cascade_controls_the_forces_of_the_impedance(lib, hand, loop):
             state.f[rows], state.xd[rows], tension.k, tension.slope, 0, state.f_des[rows], 0, 0, friction, *motor, *law
         )
         limit = loop.step.model.motor_torque
-        assert np.allclose(torque[rows], np.clip(expected.tau + jump[rows], -limit, limit), atol=1e-9), name
+        assert np.allclose(torque[rows], np.clip(expected.tau + state.jump[rows], -limit, limit), atol=1e-9), name
         loop.hand.move(torque)
 
 
