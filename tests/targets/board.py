@@ -12,7 +12,7 @@ from .programs import PATIENCE
 from .toolchains import BOARD, ROOT
 
 CASES = (("cortex-m7", "f64"), ("cortex-m4", "f32"))
-OVERLOAD = 50  # how often the overloaded tick does its work; once takes a seventh of the period at most
+OVERLOAD = 100  # how often the overloaded tick does its work; once takes 2 to 3 % of the period
 
 
 def run_board(hand: Hand) -> list[str]:
