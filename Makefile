@@ -5,7 +5,7 @@
 # make torture  hours: 10 000 mutated hand files, 200 random hands, 10 000 damaged caches, 200 kills
 # make firmware  every kernel on every target: equal bits, committed figures (ACCEPT=1 writes them, ALL=1: more, QUICK=1: what CI runs)
 # make analysis  gcc -fanalyzer, clang-tidy and cppcheck: no finding without a reason
-# make mutants  change one operator or constant of csrc/ at a time (COUNT=60: some of them); 20 minutes for all
+# make mutants  change one operator or constant of csrc/ at a time (COUNT=60: some of them); half an hour for all
 # make test-hands  published hands: imported, one finger of each proved, compared with MuJoCo and Pinocchio (ACCEPT=1: new table)
 # make clean  remove what make made (generated/ stays: it is checked in)
 

@@ -18,7 +18,7 @@ typedef struct finger_now {
 /* -- where the finger is ------------------------------------------------------------------------------------------- */
 
 /* Tendons of unknown length have that of the last estimate. */
-static int fill_in(const awiwi_tick_of *now, finger_now *own)
+static int fill_in(const awiwi_context *now, finger_now *own)
 {
     const awiwi_finger *finger = own->finger;
     const unsigned *status = now->state->tendon_status + finger->first_tendon;
@@ -38,7 +38,7 @@ static int fill_in(const awiwi_tick_of *now, finger_now *own)
 }
 
 /* Tendons whose lengths disagree with those of the estimated joints. */
-static unsigned compare(const awiwi_tick_of *now, const finger_now *own)
+static unsigned compare(const awiwi_context *now, const finger_now *own)
 {
     const awiwi_finger *finger = own->finger;
     awiwi_real expected[TENDONS];
@@ -55,7 +55,7 @@ static unsigned compare(const awiwi_tick_of *now, const finger_now *own)
     return status;
 }
 
-static unsigned estimate(const awiwi_tick_of *now, finger_now *own)
+static unsigned estimate(const awiwi_context *now, finger_now *own)
 {
     const awiwi_finger *finger = own->finger;
     awiwi_real *q = now->state->q + finger->first_joint, *qd = now->state->qd + finger->first_joint, found[JOINTS];
@@ -74,7 +74,7 @@ static unsigned estimate(const awiwi_tick_of *now, finger_now *own)
 
 /* -- what is wanted ------------------------------------------------------------------------------------------------ */
 
-static unsigned refer(const awiwi_tick_of *now, const awiwi_finger *finger)
+static unsigned refer(const awiwi_context *now, const awiwi_finger *finger)
 {
     awiwi_hand_state *state = now->state;
     unsigned status = 0;
@@ -100,7 +100,7 @@ static unsigned refer(const awiwi_tick_of *now, const awiwi_finger *finger)
 }
 
 /* Torques of the joints and, by the least change of the planned ones, forces of the tendons. */
-static unsigned follow(const awiwi_tick_of *now, const finger_now *own)
+static unsigned follow(const awiwi_context *now, const finger_now *own)
 {
     const awiwi_finger *finger = own->finger;
     awiwi_hand_state *state = now->state;
@@ -118,7 +118,7 @@ static unsigned follow(const awiwi_tick_of *now, const finger_now *own)
 /* -- the laws ------------------------------------------------------------------------------------------------------ */
 
 /* The friction of a motor, as far as it is compensated. */
-static awiwi_real friction(const awiwi_tick_of *now, int k)
+static awiwi_real friction(const awiwi_context *now, int k)
 {
     awiwi_real tau = 0;
     if (now->hand->motor_friction && now->hand->motor_friction(now->state->thd + k, &tau) != AWIWI_OK)
@@ -127,7 +127,7 @@ static awiwi_real friction(const awiwi_tick_of *now, int k)
 }
 
 /* Motors stand where the tendons have the planned forces at the wanted angles. */
-static unsigned motor_impedance(const awiwi_tick_of *now, const finger_now *own, awiwi_real *torque)
+static unsigned motor_impedance(const awiwi_context *now, const finger_now *own, awiwi_real *torque)
 {
     const awiwi_hand *hand = now->hand;
     const awiwi_hand_gains *gains = now->gains;
@@ -155,7 +155,7 @@ static unsigned motor_impedance(const awiwi_tick_of *now, const finger_now *own,
 }
 
 /* Every tendon's force is controlled. */
-static unsigned cascade(const awiwi_tick_of *now, const finger_now *own, awiwi_real *torque)
+static unsigned cascade(const awiwi_context *now, const finger_now *own, awiwi_real *torque)
 {
     static const awiwi_real nothing = 0;
     const awiwi_hand *hand = now->hand;
@@ -175,7 +175,7 @@ static unsigned cascade(const awiwi_tick_of *now, const finger_now *own, awiwi_r
 }
 
 /* Motors are held back before the ends of their travel. */
-static unsigned hold_back(const awiwi_tick_of *now, const awiwi_finger *finger, awiwi_real *torque)
+static unsigned hold_back(const awiwi_context *now, const awiwi_finger *finger, awiwi_real *torque)
 {
     const awiwi_real end = MOST_TRAVEL * now->hand->motor_travel;
     unsigned status = 0;
@@ -190,7 +190,7 @@ static unsigned hold_back(const awiwi_tick_of *now, const awiwi_finger *finger, 
     return status;
 }
 
-unsigned awiwi_finger_law(const awiwi_tick_of *now, int index, awiwi_real *torque)
+unsigned awiwi_finger_law(const awiwi_context *now, int index, awiwi_real *torque)
 {
     finger_now own;
     own.finger = now->hand->finger + index;

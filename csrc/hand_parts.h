@@ -5,24 +5,25 @@
 #include "awiwi_hand.h"
 
 /* What a tick works on. */
-typedef struct awiwi_tick_of {
+typedef struct awiwi_context {
     const awiwi_hand *hand;
     const awiwi_hand_gains *gains;
     const awiwi_hand_input *input;
     awiwi_hand_state *state;
     awiwi_real per_period; /* 1/period [1/s] */
     awiwi_real pace;       /* share of a change that the filters of rates take in a tick */
-} awiwi_tick_of;
+} awiwi_context;
 
-awiwi_tick_of awiwi_tick_with(const awiwi_hand *hand, const awiwi_hand_gains *gains, const awiwi_hand_input *input,
-                              awiwi_hand_state *state);
+/* The context of a tick with these gains. */
+awiwi_context awiwi_context_of(const awiwi_hand *hand, const awiwi_hand_gains *gains, const awiwi_hand_input *input,
+                               awiwi_hand_state *state);
 
 /* Take the sensors: forces, elongations, wrist lengths, and the status of every tendon and of the wrist. A sensor that
    is not good keeps its last value. */
-unsigned awiwi_sense(const awiwi_tick_of *now);
+unsigned awiwi_sense(const awiwi_context *now);
 
 /* A rate of motors, elongations or joints by their filtered change since the last tick. */
-static inline awiwi_real awiwi_rate(const awiwi_tick_of *now, awiwi_real rate, awiwi_real change)
+static inline awiwi_real awiwi_rate(const awiwi_context *now, awiwi_real rate, awiwi_real change)
 {
     return rate + now->pace * (change * now->per_period - rate);
 }
@@ -36,19 +37,19 @@ static inline int awiwi_is_number(awiwi_real x)
 unsigned awiwi_unseen(unsigned status);
 
 /* Lengths [tendons] of a finger as measured. */
-void awiwi_lengths(const awiwi_tick_of *now, const awiwi_finger *finger, awiwi_real *h);
+void awiwi_lengths(const awiwi_context *now, const awiwi_finger *finger, awiwi_real *h);
 
 /* A number of the input, or `instead` where it is none, with AWIWI_REFERENCE in the status. */
 awiwi_real awiwi_given(awiwi_real x, awiwi_real instead, unsigned *status);
 
 /* A finger's joint torques [joints], within their limits: those that are fed forward, and what the law of joint torques
    adds; returns the status. */
-unsigned awiwi_torques(const awiwi_tick_of *now, int finger, awiwi_real *tau);
+unsigned awiwi_torques(const awiwi_context *now, int finger, awiwi_real *tau);
 
 /* Plan a finger's forces, when it is its turn; returns its status. */
-unsigned awiwi_plan(const awiwi_tick_of *now, int finger);
+unsigned awiwi_plan(const awiwi_context *now, int finger);
 
 /* A finger's motor torques [tendons]; returns its status. */
-unsigned awiwi_finger_law(const awiwi_tick_of *now, int finger, awiwi_real *torque);
+unsigned awiwi_finger_law(const awiwi_context *now, int finger, awiwi_real *torque);
 
 #endif

@@ -15,7 +15,7 @@ awiwi_real awiwi_given(awiwi_real x, awiwi_real instead, unsigned *status)
 }
 
 /* Joint torques of the filtered motion and of the caller. */
-static unsigned feed(const awiwi_tick_of *now, const awiwi_finger *finger)
+static unsigned feed(const awiwi_context *now, const awiwi_finger *finger)
 {
     awiwi_hand_state *state = now->state;
     const int n = finger->joints, first = finger->first_joint;
@@ -37,7 +37,7 @@ static unsigned feed(const awiwi_tick_of *now, const awiwi_finger *finger)
 }
 
 /* The torque that a soft end stop adds at the angle q. */
-static awiwi_real end_stop(const awiwi_tick_of *now, int j, unsigned *status)
+static awiwi_real end_stop(const awiwi_context *now, int j, unsigned *status)
 {
     const awiwi_real low = now->hand->joint_low[j] + now->gains->stop_margin, q = now->state->q[j];
     const awiwi_real high = now->hand->joint_high[j] - now->gains->stop_margin;
@@ -49,7 +49,7 @@ static awiwi_real end_stop(const awiwi_tick_of *now, int j, unsigned *status)
 }
 
 /* The fingertip as a point between springs and dampers; nothing where its stiffness is 0. */
-static unsigned hold_tip(const awiwi_tick_of *now, int index, awiwi_real *tau)
+static unsigned hold_tip(const awiwi_context *now, int index, awiwi_real *tau)
 {
     const awiwi_finger *finger = now->hand->finger + index;
     const int n = finger->joints;
@@ -73,7 +73,7 @@ static unsigned hold_tip(const awiwi_tick_of *now, int index, awiwi_real *tau)
 
 /* What the law of joint torques adds (eq. 11.4, 11.10): springs and dampers of the joints, soft end stops, the
    fingertip. */
-static unsigned impedance(const awiwi_tick_of *now, int index, awiwi_real *tau)
+static unsigned impedance(const awiwi_context *now, int index, awiwi_real *tau)
 {
     const awiwi_finger *finger = now->hand->finger + index;
     const awiwi_hand_state *state = now->state;
@@ -88,7 +88,7 @@ static unsigned impedance(const awiwi_tick_of *now, int index, awiwi_real *tau)
     return status | hold_tip(now, index, tau);
 }
 
-unsigned awiwi_torques(const awiwi_tick_of *now, int index, awiwi_real *tau)
+unsigned awiwi_torques(const awiwi_context *now, int index, awiwi_real *tau)
 {
     const awiwi_finger *finger = now->hand->finger + index;
     unsigned status = 0;
@@ -106,7 +106,7 @@ unsigned awiwi_torques(const awiwi_tick_of *now, int index, awiwi_real *tau)
 }
 
 /* Forces of the wanted torque and stiffness, from the solver. */
-static unsigned solve(const awiwi_tick_of *now, int index, const awiwi_real *pose)
+static unsigned solve(const awiwi_context *now, int index, const awiwi_real *pose)
 {
     const awiwi_finger *finger = now->hand->finger + index;
     awiwi_hand_state *state = now->state;
@@ -125,7 +125,7 @@ static unsigned solve(const awiwi_tick_of *now, int index, const awiwi_real *pos
 }
 
 /* The least change of forces per change of torque, P (P'P)^-1. */
-static unsigned spread(const awiwi_tick_of *now, const awiwi_finger *finger, const awiwi_real *pose)
+static unsigned spread(const awiwi_context *now, const awiwi_finger *finger, const awiwi_real *pose)
 {
     const int n = finger->joints, m = finger->tendons, t = finger->first_tendon;
     awiwi_real P[TENDONS * JOINTS], A[JOINTS * JOINTS], W[JOINTS * TENDONS];
@@ -149,7 +149,7 @@ static unsigned spread(const awiwi_tick_of *now, const awiwi_finger *finger, con
 }
 
 /* Elongations, stiffnesses and their slopes at the planned forces. */
-static unsigned elongate(const awiwi_tick_of *now, const awiwi_finger *finger)
+static unsigned elongate(const awiwi_context *now, const awiwi_finger *finger)
 {
     awiwi_hand_state *state = now->state;
     const int t = finger->first_tendon;
@@ -169,7 +169,7 @@ static unsigned elongate(const awiwi_tick_of *now, const awiwi_finger *finger)
 
 /* Joints yield to their loads, as a spring in series with the tendons would, so that they have the wanted stiffness
    (eq. 8.1, each joint with the others held). A joint whose tendons are softer does not yield. */
-static unsigned yield(const awiwi_tick_of *now, const awiwi_finger *finger)
+static unsigned yield(const awiwi_context *now, const awiwi_finger *finger)
 {
     awiwi_hand_state *state = now->state;
     const int n = finger->joints, first = finger->first_joint, t = finger->first_tendon;
@@ -197,7 +197,7 @@ static unsigned yield(const awiwi_tick_of *now, const awiwi_finger *finger)
     return status;
 }
 
-unsigned awiwi_plan(const awiwi_tick_of *now, int index)
+unsigned awiwi_plan(const awiwi_context *now, int index)
 {
     const awiwi_finger *finger = now->hand->finger + index;
     awiwi_real pose[JOINTS];

@@ -9,7 +9,7 @@ static const awiwi_real LOOSE = (awiwi_real)0.002; /* of the span: up to here th
 static const awiwi_real FASTEST = (awiwi_real)4;   /* of the motors' velocity: a faster change is a jump */
 
 /* A lever at its end stop reads as the end, up to noise. */
-static unsigned take_reading(const awiwi_tick_of *now, int i)
+static unsigned take_reading(const awiwi_context *now, int i)
 {
     const awiwi_real slack = now->hand->sensor_slack[i], taut = now->hand->sensor_taut[i];
     const awiwi_real reading = now->input->reading[i], share = (reading - slack) / (taut - slack);
@@ -26,7 +26,7 @@ static unsigned take_reading(const awiwi_tick_of *now, int i)
     return AWIWI_SLACK | (now->state->slack_for[i] > now->gains->slack_ticks ? AWIWI_BROKEN : 0u);
 }
 
-static unsigned take_theta(const awiwi_tick_of *now, int i)
+static unsigned take_theta(const awiwi_context *now, int i)
 {
     const awiwi_real theta = now->input->theta[i], change = awiwi_size(theta - now->state->theta[i]);
     const awiwi_real fastest = FASTEST * now->hand->motor_velocity * now->gains->period;
@@ -38,7 +38,7 @@ static unsigned take_theta(const awiwi_tick_of *now, int i)
     return 0;
 }
 
-static void elongate(const awiwi_tick_of *now)
+static void elongate(const awiwi_context *now)
 {
     const int n = now->hand->tendons;
     awiwi_real travel[AWIWI_ALL_TENDONS], stiffness[AWIWI_ALL_TENDONS], stretch;
@@ -53,7 +53,7 @@ static void elongate(const awiwi_tick_of *now)
     }
 }
 
-static unsigned wrist(const awiwi_tick_of *now)
+static unsigned wrist(const awiwi_context *now)
 {
     awiwi_real lengths[AWIWI_ALL_TENDONS];
     if (!now->hand->wrist_lengths)
@@ -65,15 +65,15 @@ static unsigned wrist(const awiwi_tick_of *now)
     return 0;
 }
 
-awiwi_tick_of awiwi_tick_with(const awiwi_hand *hand, const awiwi_hand_gains *gains, const awiwi_hand_input *input,
-                              awiwi_hand_state *state)
+awiwi_context awiwi_context_of(const awiwi_hand *hand, const awiwi_hand_gains *gains, const awiwi_hand_input *input,
+                               awiwi_hand_state *state)
 {
     const awiwi_real share = gains->velocity_bandwidth * gains->period;
-    const awiwi_tick_of now = {hand, gains, input, state, 1 / gains->period, share / (1 + share)};
+    const awiwi_context now = {hand, gains, input, state, 1 / gains->period, share / (1 + share)};
     return now;
 }
 
-unsigned awiwi_sense(const awiwi_tick_of *now)
+unsigned awiwi_sense(const awiwi_context *now)
 {
     for (int i = 0; i < now->hand->tendons; i++) {
         const awiwi_real last = now->state->theta[i], ticks = 1 + now->state->lost[i];
@@ -91,7 +91,7 @@ unsigned awiwi_unseen(unsigned status)
     return status & (AWIWI_FAULTS | AWIWI_SLACK);
 }
 
-void awiwi_lengths(const awiwi_tick_of *now, const awiwi_finger *finger, awiwi_real *h)
+void awiwi_lengths(const awiwi_context *now, const awiwi_finger *finger, awiwi_real *h)
 {
     const awiwi_hand_state *state = now->state;
     awiwi_real theta[AWIWI_MOST_TENDONS], w[AWIWI_MOST_TENDONS];

@@ -11,7 +11,7 @@ static const awiwi_real HOT = (awiwi_real)0.9; /* heat from which on a motor's l
 /* -- motors -------------------------------------------------------------------------------------------------------- */
 
 /* The largest torque of a motor as hot as this. */
-static awiwi_real limit_of(const awiwi_tick_of *now, int k)
+static awiwi_real limit_of(const awiwi_context *now, int k)
 {
     const awiwi_real most = now->hand->motor_torque, lasting = now->gains->continuous_torque;
     const awiwi_real share = (now->state->heat[k] - HOT) / (1 - HOT);
@@ -21,7 +21,7 @@ static awiwi_real limit_of(const awiwi_tick_of *now, int k)
 }
 
 /* A motor's torque within its limit; its heat follows the square of the torque. */
-static unsigned drive(const awiwi_tick_of *now, int k, awiwi_real wanted)
+static unsigned drive(const awiwi_context *now, int k, awiwi_real wanted)
 {
     const awiwi_real limit = limit_of(now, k), torque = awiwi_clamp(wanted, -limit, limit);
     const awiwi_real load = torque / now->gains->continuous_torque;
@@ -34,7 +34,7 @@ static unsigned drive(const awiwi_tick_of *now, int k, awiwi_real wanted)
 /* -- modes --------------------------------------------------------------------------------------------------------- */
 
 /* A finger's next mode. A fault that lasted longer than hold_ticks ends in AWIWI_FAULT, whether or not it goes away. */
-static int mode_after(const awiwi_tick_of *now, int index, int faulty)
+static int mode_after(const awiwi_context *now, int index, int faulty)
 {
     const awiwi_hand_state *state = now->state;
     const int lasting = state->waited[index] > now->gains->hold_ticks, enabled = now->input->enable != 0;
@@ -52,7 +52,7 @@ static int mode_after(const awiwi_tick_of *now, int index, int faulty)
     }
 }
 
-static void change_mode(const awiwi_tick_of *now, int index, int faulty)
+static void change_mode(const awiwi_context *now, int index, int faulty)
 {
     awiwi_hand_state *state = now->state;
     const awiwi_real step = 1 / (awiwi_real)now->gains->ramp_ticks;
@@ -78,7 +78,7 @@ static void rest(awiwi_hand_state *state, const awiwi_finger *finger)
 }
 
 /* Offsets of a finger's motors, from its pose q of the whole hand's joints. */
-static unsigned place(const awiwi_tick_of *now, const awiwi_finger *finger, const awiwi_real *q)
+static unsigned place(const awiwi_context *now, const awiwi_finger *finger, const awiwi_real *q)
 {
     awiwi_hand_state *state = now->state;
     awiwi_real measured[AWIWI_MOST_TENDONS], known[AWIWI_MOST_TENDONS];
@@ -98,7 +98,7 @@ static unsigned place(const awiwi_tick_of *now, const awiwi_finger *finger, cons
 
 /* Torques of a finger's motors: those of its law, where it has a result, else the last ones. After a pause or a change
    they begin with the last ones. */
-static unsigned give(const awiwi_tick_of *now, int index, const awiwi_real *torque)
+static unsigned give(const awiwi_context *now, int index, const awiwi_real *torque)
 {
     const awiwi_finger *finger = now->hand->finger + index;
     awiwi_hand_state *state = now->state;
@@ -123,7 +123,7 @@ static unsigned give(const awiwi_tick_of *now, int index, const awiwi_real *torq
     return status;
 }
 
-static unsigned step_finger(const awiwi_tick_of *now, int index, unsigned status)
+static unsigned step_finger(const awiwi_context *now, int index, unsigned status)
 {
     const awiwi_finger *finger = now->hand->finger + index;
     awiwi_hand_state *state = now->state;
@@ -191,7 +191,7 @@ unsigned awiwi_hand_init(const awiwi_hand *hand, const awiwi_hand_gains *gains, 
                          const awiwi_real *q, awiwi_hand_state *state)
 {
     awiwi_real ignored_force[AWIWI_ALL_TENDONS], ignored_stiffness[AWIWI_ALL_TENDONS];
-    const awiwi_tick_of now = awiwi_tick_with(hand, gains, input, state);
+    const awiwi_context now = awiwi_context_of(hand, gains, input, state);
     memset(state, 0, sizeof *state);
     if (!usable(gains) || hand->sensors(hand->sensor_slack, state->slack, ignored_force, ignored_stiffness) != AWIWI_OK)
         return state->status = AWIWI_NO_LAW;
@@ -224,7 +224,7 @@ unsigned awiwi_hand_step(const awiwi_hand *hand, const awiwi_hand_gains *gains, 
     if (!state->ready)
         return state->status |= AWIWI_NO_LAW;
     unsigned status = adopt(hand, gains, input, state);
-    const awiwi_tick_of now = awiwi_tick_with(hand, &state->gains, input, state);
+    const awiwi_context now = awiwi_context_of(hand, &state->gains, input, state);
     const unsigned of_all = awiwi_sense(&now);
     for (int i = 0; i < hand->fingers; i++)
         status |= step_finger(&now, i, of_all);

@@ -18,11 +18,10 @@ from scipy.optimize import linear_sum_assignment
 from awiwi_gen.errors import InputError
 from awiwi_gen.hand import Hand
 from awiwi_gen.hand.gains import TendonGains
+from awiwi_gen.loops.assumptions import DAMPING, ENCODER
 from awiwi_gen.simulate import PERIOD, Actuator, Array, Block, Element, Loop, Sensor, Sum
 
 FINGER, JOINT = "index", "pip"
-DAMPING = 2e-4  # N m s/rad, of the link
-ENCODER = 2 * np.pi / 4096  # rad, one step of the motor's sensor before the gear
 TORQUE_NOISE = 2e-4  # N m, standard deviation; one step of it is as much
 ANGLE_NOISE = 1e-4  # rad, likewise of the elongation
 STRETCH = (3.0, 80.0)  # N: tendon forces between which the spring's cubic is fitted

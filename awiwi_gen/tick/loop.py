@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from awiwi_gen.errors import InputError
+from awiwi_gen.loops.assumptions import DAMPING, ENCODER
 from awiwi_gen.tick.structs import Struct, require_tick
 
 if TYPE_CHECKING:
@@ -16,11 +17,8 @@ if TYPE_CHECKING:
 
 Array = np.ndarray[Any, Any]
 GRAVITY = (0.0, 0.0, -9.81)  # m/s^2, of a palm that looks up
-DAMPING = 2e-4  # N m s/rad, of the simulated links
 READING_NOISE = 0.5  # counts
 PRETENSION = 1.5  # of the least force that the law asks for
-WRIST = (0.6239, 0.9725)  # rad
-ENCODER = 2 * np.pi / 4096  # rad, one step of the motor's sensor before the gear
 
 
 class HandStep:
@@ -123,7 +121,8 @@ class ClosedLoop:
         self.start: Array = np.array((low + high) / 2 if q is None else q, library.dtype)
         motors = np.random.default_rng(seed).uniform(-0.3, 0.3, self.step.tendons)
         if self.step.model.wrist_lengths:
-            self.hand.world.wrist = WRIST
+            ports = library.wrist_tendon_lengths.inputs
+            self.hand.world.wrist = [(port["low"][0] + port["high"][0]) / 2 for port in ports]
         self.hand.place(self.start, motors, force or PRETENSION * float(self.step.gains.force_low[0]))
         self.hand.measure(self.step.input)
         self.step.suggest(self.start)

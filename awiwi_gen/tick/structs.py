@@ -53,7 +53,7 @@ class Struct:
 
 
 def _fields(ffi: Any, kind: str) -> list[tuple[str, Any]]:
-    """Members of a struct, those of structs inside it with their names joined by a dot left out."""
+    """Members of a struct that are numbers or arrays of them: no pointers, and no structs inside it."""
     return [(name, field) for name, field in ffi.typeof(kind).fields if _scalar(field.type) is not None]
 
 
