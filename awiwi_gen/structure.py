@@ -236,8 +236,9 @@ def determined(finger: Finger) -> tuple[list[int], list[int]]:
 def rests_in_a_bend(finger: Finger) -> bool:
     """Whether joints rest by springs, and springs or tendons do not act linearly on them: strings, or what bends with q."""
     curves = {coupling.follower for coupling in finger.couplings if coupling.powers}
-    springs = any(link.spring is not None and link.joint in curves for link in finger.links)
-    return bool(resting_parts(finger)) and (bool(finger.strings) or springs or is_curved(finger))
+    springs = [link.joint for link in finger.links if link.spring is not None]
+    bends = is_curved(finger) or any(joint in curves for joint in springs)
+    return bool(finger.strings or (springs and bends)) and bool(resting_parts(finger))
 
 
 def is_curved(finger: Finger) -> bool:

