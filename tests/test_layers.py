@@ -62,7 +62,7 @@ HOMES = {
     "casadi": {"witnesses", "ir/from_casadi.py", "derive.py"},
     "jinja2": {"emit/files.py"},
     "cffi": {"build.py"},
-    "mujoco": {"interchange/mjcf.py", "interchange/wraps.py"},
+    "mujoco": {"interchange/mjcf.py", "interchange/published.py", "interchange/wraps.py"},
 }
 FILES = sorted(path for path in PACKAGE.rglob("*.py"))
 
