@@ -41,7 +41,7 @@ def study(
     samples: Annotated[int, typer.Option("--samples", help="So many at least; by kind if left out.")] = 0,
     seed: Annotated[int, typer.Option("--seed", help="The same seed gives the same samples.")] = 0,
     spread: Annotated[
-        list[str] | None, typer.Option("--spread", help="How well numbers are known, as 'pulleys*=0.05 mm'; the last counts.")
+        list[str] | None, typer.Option("--spread", help="How well numbers are known, as 'pulleys*=0.05 mm'.")
     ] = None,
     goal: Annotated[
         list[str] | None, typer.Option("--goal", help="Largest permitted error, as 'fingertip=1 mm' or 'stiffness=5 %'.")
@@ -70,8 +70,8 @@ def study(
             raise InputError(f"study {kind} takes no --{name}; {' and '.join(kinds)} does")
     if not 0 <= samples <= MOST or seed < 0 or not 0 < force < 1e6 or (workers is not None and not 0 < workers <= 1024):
         raise InputError(
-            f"--samples {samples}, --seed {seed}, --force {force:g}, --workers {workers}: expected at most {MOST} samples, a "
-            "seed of 0 or more, a force above 0, and 1 to 1024 workers"
+            f"--samples {samples}, --seed {seed}, --force {force:g}, --workers {workers}: expected at most {MOST} samples, "
+            "a seed of 0 or more, a force above 0, and 1 to 1024 workers"
         )
     if scheduler and workers is not None:
         raise InputError(

@@ -83,7 +83,7 @@ FIGURES: Mapping[str, Figure] = {
         "1", "a joint's stiffness", ("joint_stiffness", "tendon_stiffness"), _stiffness, lambda values: _largest(values, ())
     ),
     "gravity": Figure(
-        "1", "a joint's torque against gravity, of its largest", ("gravity",), _gravity, lambda values: _largest(values, (0,))
+        "1", "a joint's load by gravity, of its largest", ("gravity",), _gravity, lambda values: _largest(values, (0,))
     ),
 }  # fmt: skip
 

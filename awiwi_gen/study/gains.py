@@ -18,6 +18,7 @@ from awiwi_gen.study.base import Array, Report, Result, Study
 from awiwi_gen.study.folder import Chunks
 from awiwi_gen.study.prepare import Request, generated
 from awiwi_gen.study.run import computed
+from awiwi_gen.study.spreads import shown
 from awiwi_gen.tune.family import NEEDED
 
 USUAL = "backstepping_adaptive"
@@ -73,7 +74,7 @@ def conduct(request: Request) -> Report:
     joint = joint_of(library, hand, finger, name)
     own = gains_of(library, hand, finger, name) if law.name == USUAL else None
     gains = law.gains_from(joint, own) if own else law.gains_for(joint)
-    start = np.array([*gains.values(), float(own.pretension) if own else request.force])
+    start = np.array([*gains.values(), float(own.pretension or request.force) if own else request.force])
     study = Gains(request.seed, "gains", law.name, joint, tuple(gains), start)
     count = request.chunks(study.SIZE)
     chunks = joined(computed(study, kernels, count, request.place, request.progress), count)
@@ -127,7 +128,10 @@ def report(study: Gains, found: Mapping[str, Array], own: Mapping[str, Array], l
         f"{joint}, {law.name}: {len(runs)} sets of gains on {len(FAMILY)} plants each; {runs.mean():.0%} run on all of them",
         f"cost of the joint's own gains {own['cost'][0]:.2f}, of the best that were drawn {found['cost'][best]:.2f}",
         "worst of the family, own and best: "
-        + ", ".join(f"{name} {own[name][0]:.3g} and {found[name][best]:.3g} {unit}" for name, unit in SCORES.items()),
+        + ", ".join(
+            f"{name} {shown(float(own[name][0]), unit)} and {shown(float(found[name][best]), unit)}"
+            for name, unit in SCORES.items()
+        ),
     ]
     results = {
         "factors": Result("1", "factors on the gains, the last on the pretension", found["factors"]),

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -72,7 +72,7 @@ def ranges_of(hand: Hand, finger: str) -> tuple[Array, Array]:
     return np.array(low), np.array(high)
 
 
-def generated(hand: Hand, only: str, progress: Progress, params: str = "baked") -> Path:
+def generated(hand: Hand, only: str, progress: Progress, params: Literal["baked", "runtime"] = "baked") -> Path:
     """The directory of the generated C in the cache, up to date."""
     return cached_tree(Job(hand, Options(params=params), only, progress=progress))
 

@@ -45,8 +45,8 @@ def spreads_of(hand: Hand, finger: str, paths: Sequence[str], given: Sequence[st
         if not fitting and text in given:
             raise InputError(f"--spread {text}: no number of the study has such a path and unit; see awiwi-gen list")
         for path in fitting:
-            value = numbers[path].value
-            found[path] = float(spread) if isinstance(spread, Quantity) else abs(float(value)) * spread
+            value = float(numbers[path])
+            found[path] = float(spread) if isinstance(spread, Quantity) else abs(float(value)) * float(spread)
     for path, spread in found.items():
         (low, high), value = permitted[path], float(numbers[path])
         if not float(low) <= value - spread <= value + spread <= float(high):

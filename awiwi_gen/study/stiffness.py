@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -23,7 +24,7 @@ FAMILIES = ("coupling", "joint_stiffness", "tendon_stiffness")
 
 @dataclass(frozen=True, eq=False)
 class Stiffness(Study):
-    """Poses drawn evenly in the joints' ranges, and forces that turn no joint, between ``SOFTEST`` and one of ``most`` [N]."""
+    """Poses drawn evenly in the joints' ranges, and forces that turn no joint, from a share of ``most`` to it [N]."""
 
     SIZE = 16384
     finger: str
@@ -45,7 +46,7 @@ class Stiffness(Study):
         q, f, K = q[good], f[good], K[good]
         found = {"kept": np.array([len(q), self.SIZE]), "histogram": histogram(f.mean(axis=1) / self.most, K)}
         for end, pick in (("least", np.argmin), ("largest", np.argmax)):
-            at = pick(K, axis=0) if len(K) else np.zeros(0, int)  # type: ignore[operator]
+            at = pick(K, axis=0) if len(K) else np.zeros(0, int)
             found |= {end: K[at, np.arange(len(at))], f"{end}_pose": q[at], f"{end}_forces": f[at]}
         return found
 
@@ -87,7 +88,7 @@ def conduct(request: Request) -> Report:
     kept, drawn = np.sum([each["kept"] for each in chunks], axis=0)
     if not kept:
         raise InputError(
-            f"fingers.{finger}: none of {drawn} forces between {SOFTEST * study.most:g} and {study.most:g} N holds it at rest"
+            f"fingers.{finger}: no forces of {drawn} between {SOFTEST * study.most:g} and {study.most:g} N hold it at rest"
         )
     units = ports["K"]["unit"].split(", ")
     joints = hand.fingers[finger].joints
@@ -98,7 +99,7 @@ def conduct(request: Request) -> Report:
 def report(request: Request, study: Stiffness, chunks: list[dict[str, Array]], units: list[str]) -> Report:
     """The range of every joint over all poses, and between which stiffnesses most of them are."""
     joints = request.hand.fingers[study.finger].joints
-    total = np.sum([each["histogram"] for each in chunks], axis=0, dtype=np.uint64)
+    total: Array = np.asarray(np.sum([each["histogram"] for each in chunks], axis=0, dtype=np.uint64))
     kept, drawn = np.sum([each["kept"] for each in chunks], axis=0)
     filled = [each for each in chunks if each["kept"][0]]
     edges = np.logspace(*DECADES, BINS + 1)
@@ -110,7 +111,7 @@ def report(request: Request, study: Stiffness, chunks: list[dict[str, Array]], u
     ends = {}
     for end, pick in (("least", np.argmin), ("largest", np.argmax)):
         values = np.array([each[end] for each in filled])
-        first = pick(values, axis=0)  # type: ignore[operator]
+        first = pick(values, axis=0)
         ends[end] = values.min(axis=0) if end == "least" else values.max(axis=0)
         results[end] = Result("N m/rad (N/m for slides)", f"{end} stiffness of each joint", ends[end])
         for kind, unit in (("pose", "rad (m for slides)"), ("forces", "N")):
@@ -124,18 +125,16 @@ def report(request: Request, study: Stiffness, chunks: list[dict[str, Array]], u
          f"{ends['largest'][i] / ends['least'][i]:.1f}")
         for i, name in enumerate(joints)
     ]  # fmt: skip
-    lines = [
-        f"{kept} of {drawn} poses and forces, {SOFTEST * study.most:g} to {study.most:g} N, at rest and borne by springs"
-    ]
+    forces = f"{SOFTEST * study.most:g} to {study.most:g} N"
+    lines = [f"{kept} of {drawn} poses and forces, {forces}, turn no joint, and the springs bear them"]
     data = {
         "joints": {name: {"least": float(ends["least"][i]), "largest": float(ends["largest"][i]), "unit": units[i],
                           "5 %": middle[i][0], "95 %": middle[i][1]} for i, name in enumerate(joints)},
         "kept": int(kept), "drawn": int(drawn),
     }  # fmt: skip
     columns = ("joint", "least", "5 % below", "95 % below", "largest", "unit", "times")
-    return Report(
-        results, columns, rows, lines, data, lambda figure: _draw(figure, study, total, edges, list(joints), units)
-    )
+    draw = partial(_draw, study=study, total=total, edges=edges, joints=list(joints), units=units)
+    return Report(results, columns, rows, lines, data, draw)
 
 
 def _quantile(counts: Array, share: float, edges: Array) -> float:

@@ -65,7 +65,7 @@ def goals_of(texts: tuple[str, ...], figures: tuple[str, ...]) -> dict[str, floa
 
 
 def conduct(request: Request) -> Report:
-    """Run the study. Raises InputError for spreads and goals that do not fit the finger, VerificationError if C disagrees."""
+    """Run the study. Raises InputError for spreads and goals that do not fit, VerificationError if C disagrees."""
     hand, finger = request.hand, request.finger
     have = families_of(hand, finger)
     figures = tuple(name for name, each in FIGURES.items() if have.issuperset(each.families))

@@ -23,7 +23,7 @@ NONE = np.zeros(0)
 class Workspace(Study):
     """Joint positions drawn evenly in their ranges.
 
-    ``reach`` [m] is no less than the fingertip's distance, ``most`` no less than manipulability can be.
+    ``reach`` [m] is no less than the fingertip's distance, ``most`` the end of the histogram of manipulability.
     """
 
     SIZE = 65536
@@ -48,7 +48,7 @@ class Workspace(Study):
         return {
             "counts": np.bincount(flat, minlength=VOXELS**3).astype(np.uint32),
             "manipulability": best,
-            "histogram": np.histogram(measure / self.most, BINS, (0, 1))[0],
+            "histogram": np.histogram(np.clip(measure / self.most, 0, 1), BINS, (0, 1))[0],
             "ends": np.array([tips.min(axis=0), tips.max(axis=0)]),
             "most": np.array([measure.max(), far.max()]),
             "most_at": q[[measure.argmax(), far.argmax()]],
@@ -69,13 +69,13 @@ def manipulability(J: Array) -> Array:
 def reach_of(finger: Finger) -> float:
     """The lengths of all links and slides [m], one after another."""
     bones = sum(sqrt(sum(float(x) ** 2 for x in link.offset)) for link in finger.links)
-    slides = sum(max(abs(float(link.low)), abs(float(link.high))) for link in finger.links if link.slides)
+    slides = sum(max(abs(float(link.low or 0)), abs(float(link.high or 0))) for link in finger.links if link.slides)
     return bones + slides
 
 
 def most_of(finger: Finger, reach: float) -> float:
-    """What manipulability never exceeds: no arm is longer than the reach, and a slide moves the fingertip as much."""
-    rank = min(3, len(finger.links))
+    """What manipulability hardly exceeds: no arm is longer than the reach, and a slide moves the fingertip as much."""
+    rank = min(3, len(finger.joints))
     squares = sum(1.0 if link.slides else reach**2 for link in finger.links)
     return float((squares / rank) ** (rank / 2))
 
@@ -94,6 +94,7 @@ def conduct(request: Request) -> Report:
 
 def report(request: Request, study: Workspace, chunks: list[dict[str, Array]]) -> Report:
     """Volume, extent, reach and manipulability over all chunks."""
+    counts: Array
     counts, best = (
         np.sum([each["counts"] for each in chunks], axis=0, dtype=np.uint64).reshape((VOXELS,) * 3),
         np.max([each["manipulability"] for each in chunks], axis=0).reshape((VOXELS,) * 3),
