@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import logging
 import platform
+import re
 import sys
 import threading
 import time
@@ -26,13 +27,14 @@ from awiwi_gen.build import load
 from awiwi_gen.cache import code_digest
 from awiwi_gen.emit.exchange import MANIFEST
 from awiwi_gen.emit.tree import install, read_manifest
-from awiwi_gen.errors import AwiwiError, OutputError
+from awiwi_gen.errors import AwiwiError, InputError, OutputError
 from awiwi_gen.parallel import Progress
 from awiwi_gen.study.base import Array, Study
 from awiwi_gen.study.folder import AGAIN, Chunks
 
 REACHED, LOOK, PATIENCE = 10.0, 1.0, 30.0  # s: to reach a scheduler, between looks at it, without any worker
 QUEUED = 3  # chunks of a thread, one of which is computed
+ADDRESS = re.compile(r"(tcp|tls)://\S+:\d+")
 KERNELS: dict[str, dict[str, str]] = {}  # in a worker: texts of generated files by digest
 LOADING = threading.Lock()  # threads of a worker
 
@@ -107,6 +109,8 @@ def on_cluster(
 @contextmanager
 def _connected(address: str) -> Iterator[Client]:
     """A client of the scheduler; what the cluster does to it is one sentence."""
+    if not ADDRESS.fullmatch(address):
+        raise InputError(f"--scheduler {address}: expected an address such as tcp://host:8786")
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     warnings.filterwarnings("ignore", module="distributed")
     try:

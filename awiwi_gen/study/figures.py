@@ -10,6 +10,7 @@ import numpy as np
 
 from awiwi_gen.study.base import Array
 
+NONE = 1e-6  # of the largest value: less is no reference for a share, such as gravity about an upright axis
 GOALS = {"fingertip": "1 mm", "stiffness": "5 %"}
 
 
@@ -71,7 +72,7 @@ def _gravity(view: View) -> Array:
 
 def _largest(values: Array, axes: tuple[int, ...]) -> Array:
     largest = np.abs(values).max(axis=axes, keepdims=True)
-    return np.where(largest > 0, largest, np.inf)
+    return np.where(largest > NONE * largest.max(), largest, np.inf)
 
 
 FIGURES: Mapping[str, Figure] = {

@@ -41,7 +41,7 @@ class Chunks:
     def read(self, index: int) -> dict[str, Array] | None:
         """A chunk, or None where there is none or it is damaged."""
         try:
-            with np.load(self.path(index), allow_pickle=False) as found:
+            with self.path(index).open("rb") as stream, np.load(stream, allow_pickle=False) as found:
                 return {name: found[name] for name in found.files}
         except Exception:  # a damaged archive may raise anything; the chunk is computed again
             return None

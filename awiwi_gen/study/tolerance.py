@@ -148,7 +148,7 @@ def rounded_down(values: Array) -> Array:
         return np.where(values > 0, np.floor(values / unit * (1 + 1e-12)) * unit, 0.0)
 
 
-def require_agreement(study: Tolerance, library: Any, baked: Any, numbers: Array, what: str) -> float:
+def require_agreement(study: Tolerance, library: Any, baked: Any, numbers: Array) -> float:
     """The largest difference of a baked hand's figures, relative to each figure's largest value.
 
     Raises VerificationError where numbers at run time and numbers in the code do not agree.
@@ -160,8 +160,8 @@ def require_agreement(study: Tolerance, library: Any, baked: Any, numbers: Array
         differs = np.abs(values - at_run_time[name]).max() / np.abs(values).max()
         if not differs <= AGREES:
             raise VerificationError(
-                f"{what}: {name} differs by {differs:.1e} of its largest value between numbers at run time and numbers in "
-                f"the code; at most {AGREES:g} is permitted"
+                f"{study.finger}: {name} differs by {differs:.1e} of its largest value between numbers at run time and "
+                f"numbers in the code; at most {AGREES:g} is permitted"
             )
         furthest = max(furthest, float(differs))
     return furthest

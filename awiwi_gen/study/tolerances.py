@@ -31,6 +31,7 @@ from awiwi_gen.units import Quantity
 
 SAMPLES = 32 * Tolerance.SIZE
 SHOWN = 15  # numbers of a table or a plot
+NEGLIGIBLE = 1e-9  # m or rad in the place of zero: some derived numbers are quotients of numbers that may all be zero
 
 
 @dataclass(frozen=True)
@@ -75,7 +76,7 @@ def conduct(request: Request) -> Report:
     library = load(kernels)
     numbers = hand.quantities()
     read = [entry["path"] for entry in library.manifest["params"]["numbers"]]
-    values = np.array([float(numbers[path]) for path in read])
+    values = np.array([float(numbers[path]) or NEGLIGIBLE * (1 + i / len(read)) for i, path in enumerate(read)])
     paths = [path for path in read if not path.startswith("limits.") and not path.endswith((".low", ".high"))]
     given = spreads_of(hand, finger, paths, request.spreads)
     study = Tolerance(
@@ -96,14 +97,11 @@ def conduct(request: Request) -> Report:
 
 
 def agreed(study: Tolerance, library: Any, request: Request, only: str, read: list[str]) -> float:
-    """The largest difference from C with the numbers in its code: of the hand as known, and of the first that is drawn."""
+    """The largest difference from C with the numbers in its code, of the first hand of the study."""
     drawn = study.drawn(random_of(study.seed, 0, study.stage))[0]
-    found = []
-    for what, numbers in (("the hand as known", study.values), ("the first hand of the study", drawn)):
-        hand = with_numbers(request.hand, dict(zip(read, map(float, numbers), strict=True)))
-        baked = load(generated(hand, only, request.progress))
-        found.append(require_agreement(study, library, baked, numbers, what))
-    return max(found)
+    hand = with_numbers(request.hand, dict(zip(read, map(float, drawn), strict=True)))
+    baked = load(generated(hand, only, request.progress))
+    return require_agreement(study, library, baked, drawn)
 
 
 def joined(chunks: Chunks, count: int) -> dict[str, Array]:
@@ -115,25 +113,26 @@ def joined(chunks: Chunks, count: int) -> dict[str, Array]:
 def report(found: Found) -> Report:
     """The table of numbers, those that cost most first, and the shares of hands that reach the goals."""
     study, alone = found.study, found.slopes.alone
-    units = {path: str(each.unit) for path, each in found.request.hand.quantities().items()}
+    numbers = found.request.hand.quantities()
+    units = {path: str(each.unit) for path, each in numbers.items()}
     guesses = found.request.hand.assumed()
     cost = np.max([alone[name] / goal for name, goal in found.goals.items()] or [*alone.values()], axis=0)
     order = [int(i) for i in np.argsort(-cost, kind="stable") if study.spreads[i] > 0]
     rows = [
         (
             found.paths[i].removeprefix(f"fingers.{study.finger}."),
-            shown(study.values[i], units[found.paths[i]]),
+            shown(float(numbers[found.paths[i]]), units[found.paths[i]]),
             shown(study.spreads[i], units[found.paths[i]]),
             *(shown(float(alone[name][i]), FIGURES[name].unit, 2) for name in study.figures),
             shown(found.demands[i], units[found.paths[i]]) if found.demands[i] < study.spreads[i] else "as it is",
             "guess" if found.paths[i] in guesses else "",
         )
-        for i in order[:SHOWN]
+        for i in order[: max(SHOWN, int((found.demands < study.spreads).sum()))]
     ]
     summaries = {"spread": summary(found.before, found.goals), "demand": summary(found.after, found.goals)}
     demands = [
         {
-            "number": path, "value": float(study.values[i]), "spread": float(study.spreads[i]), "unit": units[path],
+            "number": path, "value": float(numbers[path]), "spread": float(study.spreads[i]), "unit": units[path],
             "alone": {name: float(alone[name][i]) for name in study.figures}, "demand": float(found.demands[i]),
         }
         for i, path in enumerate(found.paths)
