@@ -50,7 +50,7 @@ def _contender(hand: Hand, directory: Path, trig: Any) -> dict[str, Any]:
         "flags": [f"-I{generated.resolve()}", f"-I{CSRC}"],
         "libraries": [],
         "kernels": kernels,
-        "support": [*(path for path in sorted(generated.glob("*.c")) if path.stem not in entries), CSRC / "sincos.c"],
+        "support": [CSRC / "sincos.c"],
         "note": "sine and cosine of the C library" if trig == "libm" else "own sine and cosine, inlined",
     }
 
