@@ -45,6 +45,7 @@ from awiwi_gen.diff.command import diff
 from awiwi_gen.drawing import show
 from awiwi_gen.editing import init, set_
 from awiwi_gen.interchange.command import export, import_
+from awiwi_gen.study.command import study
 from awiwi_gen.tick.command import replay, tick
 from awiwi_gen.tune.command import tune
 
@@ -348,6 +349,7 @@ def simulate(
 
 command(*HAND)(show)
 command("scipy", *GENERATE)(tune)
+command("matplotlib", "scipy", *GENERATE)(study)
 command(*GENERATE)(diff)
 command()(init)
 command(*HAND, ignore_unknown_options=True)(set_)  # "-5 deg" is a value

@@ -53,6 +53,7 @@ TOP = [
     ],
     ["loops", "identify", "tick"],
     [*ROOMS],
+    ["study"],
     ["__init__"],
     ["__main__"],
 ]
@@ -63,6 +64,7 @@ HOMES = {
     "jinja2": {"emit/files.py"},
     "cffi": {"build.py"},
     "mujoco": {"interchange/mjcf.py", "interchange/published.py", "interchange/wraps.py"},
+    "distributed": {"study/cluster.py"},
 }
 FILES = sorted(path for path in PACKAGE.rglob("*.py"))
 
