@@ -67,7 +67,7 @@ def changed(file: HandFile, key: str, value: str) -> tuple[str, int, str, str]:
     """
     from awiwi_gen.hand.lines import values_of_keys
 
-    places, keys = values_of_keys(file.text), _keys(key)
+    places, keys = values_of_keys(file.text), keys_of(key)
     if keys not in places:
         if file.line(keys) and any(known[: len(keys)] == keys for known in places):
             raise InputError(f"{file.name}: {key} is a table; name one of its keys")
@@ -82,7 +82,8 @@ def written(keys: Keys) -> str:
     return "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in keys).removeprefix(".")
 
 
-def _keys(key: str) -> Keys:
+def keys_of(key: str) -> Keys:
+    """The keys of fingers.index.links[0].mass as a tuple."""
     return tuple(int(index) if index else name for name, index in re.findall(r"([^.\[\]]+)|\[(\d+)\]", key))
 
 
