@@ -1,4 +1,4 @@
-"""`awiwi-gen init` and `set`: a hand file to start from, and one number of a hand file changed in its text."""
+"""`awiwi-gen init`, `set` and `schema`: a hand file to start from, one number of it changed in its text, and its schema."""
 
 from __future__ import annotations
 
@@ -57,6 +57,26 @@ def set_(
         print(json.dumps({"file": str(hand), "line": line, "key": key, "old": old, "new": new}))
     else:
         print(printable(f"{hand}:{line} {key}: {old} -> {new}"))
+    return 0
+
+
+def schema(
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="File to write; printed if left out.")] = None,
+    as_json: Json = False,
+) -> int:
+    """Write the JSON Schema of hand files, by which editors complete and check keys."""
+    from awiwi_gen.hand.schema import json_schema
+    from awiwi_gen.writing import write_whole
+
+    text = json.dumps(json_schema(), indent=1, ensure_ascii=False) + "\n"
+    if output is None:
+        print(text, end="")
+        return 0
+    write_whole(output, text)
+    if as_json:
+        print(json.dumps({"file": str(output)}))
+    else:
+        print(printable(f"{output}: for an editor, begin the hand file with the line  #:schema {output.name}"))
     return 0
 
 
