@@ -40,6 +40,9 @@ TOP = [
     [
         "report",
         "explain",
+        "formulas",
+        "mathematics",
+        "provenance",
         "terminal",
         "simulate",
         "results",
@@ -59,7 +62,7 @@ TOP = [
 ]
 WINGS = ("definitions", "witnesses")
 HOMES = {
-    "sympy": {"definitions", "ir/from_sympy.py", "derive.py"},
+    "sympy": {"definitions", "ir/from_sympy.py", "derive.py", "formulas.py", "mathematics.py"},
     "casadi": {"witnesses", "ir/from_casadi.py", "derive.py"},
     "jinja2": {"emit/files.py"},
     "cffi": {"build.py"},
