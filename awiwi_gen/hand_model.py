@@ -127,6 +127,7 @@ def model_files(
         fingers.append(
             {
                 "places": (columns.start, columns.stop - columns.start, rows.start, rows.stop - rows.start),
+                "bent": int(table.kernels[f"{name}_joint_estimate"].solver is not None),
                 "base": ", ".join(options.literal(Fraction(pose[4 * i + j])) for i in range(3) for j in range(3)),
                 "slots": [table.entry(f"{name}_{slot.kernel}", slot) for slot in OF_FINGER],
             }

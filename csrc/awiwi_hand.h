@@ -22,6 +22,7 @@ typedef struct awiwi_finger {
     int joints;
     int first_tendon;
     int tendons;
+    int bent; /* whether the coupling changes with the pose */
     awiwi_real base[9];
     awiwi_of_three measured_lengths; /* theta, x, w -> h */
     awiwi_of_two joint_estimate;     /* h, start -> q */
@@ -180,6 +181,8 @@ typedef struct awiwi_hand_state {
     awiwi_real qd[AWIWI_ALL_JOINTS];
     awiwi_real demand[AWIWI_ALL_JOINTS];    /* the last good q_des */
     awiwi_real motion[AWIWI_ALL_JOINTS][5]; /* filtered references and their derivatives */
+    awiwi_real filter[5][5];                /* what their errors become in a tick, */
+    awiwi_real ahead[2];                    /* and how far the reference moves with its rate and acceleration */
     awiwi_real yield[AWIWI_ALL_JOINTS];     /* angle by which a joint yields to its load */
     awiwi_real tau[AWIWI_ALL_JOINTS];       /* wanted joint torques [N m] */
     awiwi_real feed[AWIWI_ALL_JOINTS];      /* what every finger planned at its last turn: torques fed forward, */
@@ -188,7 +191,9 @@ typedef struct awiwi_hand_state {
     awiwi_real planned_x[AWIWI_ALL_TENDONS];
     awiwi_real stiffness[AWIWI_ALL_TENDONS];
     awiwi_real slope[AWIWI_ALL_TENDONS];
-    awiwi_real spread[AWIWI_ALL_TENDONS][AWIWI_MOST_JOINTS]; /* and forces per torque */
+    awiwi_real spread[AWIWI_ALL_TENDONS][AWIWI_MOST_JOINTS]; /* and forces per torque, which are angles per length */
+    awiwi_real length[AWIWI_ALL_TENDONS];   /* of the tendons at the estimated joints [m] */
+    awiwi_real friction[AWIWI_ALL_TENDONS]; /* of the motors, as compensated [N m] */
     awiwi_real heat[AWIWI_ALL_TENDONS];   /* 1 where a motor is as hot as it may be */
     awiwi_real jump[AWIWI_ALL_TENDONS];   /* torque that is still to be faded out after a change */
     awiwi_real wanted[AWIWI_ALL_TENDONS]; /* torques before they are faded and limited */
@@ -196,6 +201,8 @@ typedef struct awiwi_hand_state {
     awiwi_real share[AWIWI_ALL_FINGERS];  /* of the torques that motors get, from 0 to 1 */
     awiwi_hand_gains gains;               /* of the last tick */
     unsigned plan_status[AWIWI_ALL_FINGERS];
+    unsigned prepare_status[AWIWI_ALL_FINGERS];
+    unsigned spread_status[AWIWI_ALL_FINGERS];
     unsigned tendon_status[AWIWI_ALL_TENDONS];
     unsigned finger_status[AWIWI_ALL_FINGERS]; /* with those of its tendons */
     unsigned status;                           /* with those of all fingers */

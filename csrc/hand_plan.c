@@ -124,28 +124,30 @@ static unsigned solve(const awiwi_context *now, int index, const awiwi_real *pos
     return found == AWIWI_OK || found == AWIWI_NOT_CONVERGED ? status : status | AWIWI_NO_LAW;
 }
 
-/* The least change of forces per change of torque, P (P'P)^-1. */
-static unsigned spread(const awiwi_context *now, const awiwi_finger *finger, const awiwi_real *pose)
+/* The least change of forces per change of torque, P (P'P)^-1: also the change of angles per change of lengths. */
+static unsigned spread(const awiwi_context *now, const awiwi_finger *finger)
 {
     const int n = finger->joints, m = finger->tendons, t = finger->first_tendon;
-    awiwi_real P[TENDONS * JOINTS], A[JOINTS * JOINTS], W[JOINTS * TENDONS];
-    if (finger->coupling(pose, P) != AWIWI_OK)
+    awiwi_real P[TENDONS * JOINTS], A[JOINTS * JOINTS], x[JOINTS];
+    int order[JOINTS], regular;
+    if (finger->coupling(now->state->q + finger->first_joint, P) != AWIWI_OK)
         return AWIWI_NO_LAW;
-    for (int i = 0; i < n; i++) {
-        for (int k = 0; k < n; k++) {
-            A[i * n + k] = 0;
+    for (int i = 0; i < n; i++)
+        for (int k = 0; k <= i; k++) {
+            awiwi_real sum = 0;
             for (int a = 0; a < m; a++)
-                A[i * n + k] += P[a * n + i] * P[a * n + k];
+                sum += P[a * n + i] * P[a * n + k];
+            A[i * n + k] = A[k * n + i] = sum;
         }
-        for (int a = 0; a < m; a++)
-            W[i * m + a] = P[a * n + i];
-    }
-    if (!awiwi_solve(n, m, A, W))
-        return AWIWI_NO_LAW;
-    for (int a = 0; a < m; a++)
+    regular = awiwi_factor(n, A, order);
+    for (int a = 0; a < m && regular; a++) {
         for (int i = 0; i < n; i++)
-            now->state->spread[t + a][i] = W[i * m + a];
-    return 0;
+            x[i] = P[a * n + i];
+        awiwi_substitute(n, 1, A, order, x);
+        for (int i = 0; i < n; i++)
+            now->state->spread[t + a][i] = x[i];
+    }
+    return regular ? 0u : AWIWI_NO_LAW;
 }
 
 /* Elongations, stiffnesses and their slopes at the planned forces. */
@@ -203,16 +205,17 @@ unsigned awiwi_plan(const awiwi_context *now, int index)
     awiwi_real pose[JOINTS];
     for (int i = 0, j = finger->first_joint; i < finger->joints; i++, j++)
         pose[i] = now->state->law == AWIWI_LAW_CASCADE ? now->state->q[j] : now->state->motion[j][0];
-    unsigned status = feed(now, finger);
-    if (!(status & AWIWI_FAULTS))
-        status |= solve(now, index, pose);
-    if (!(status & AWIWI_FAULTS) && now->state->law == AWIWI_LAW_CASCADE)
-        status |= spread(now, finger, pose);
-    if (!(status & AWIWI_FAULTS))
-        status |= elongate(now, finger);
-    if (!(status & AWIWI_FAULTS))
-        status |= yield(now, finger);
-    return status;
+    const unsigned status = solve(now, index, pose);
+    return status & AWIWI_FAULTS ? status : status | elongate(now, finger);
+}
+
+unsigned awiwi_prepare(const awiwi_context *now, int index)
+{
+    const awiwi_finger *finger = now->hand->finger + index;
+    if (finger->bent || !now->state->ready)
+        now->state->spread_status[index] = spread(now, finger);
+    const unsigned status = feed(now, finger);
+    return status & AWIWI_FAULTS || !now->state->ready ? status : status | yield(now, finger);
 }
 
 int awiwi_hand_suggest(const awiwi_hand *hand, const awiwi_hand_gains *gains, const awiwi_real *q,

@@ -246,7 +246,7 @@ static int run_motor_friction(const awiwi_real *in_0, awiwi_real *out_0)
 
 static const awiwi_finger fingers[] = {
     {
-        0, 4, 0, 8,
+        0, 4, 0, 8, 1,
         {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0},
         run_thumb_measured_lengths,
         awiwi_thumb_joint_estimate,
@@ -260,7 +260,7 @@ static const awiwi_finger fingers[] = {
         awiwi_thumb_tendon_distribution,
     },
     {
-        4, 4, 8, 8,
+        4, 4, 8, 8, 0,
         {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0},
         run_index_measured_lengths,
         run_index_joint_estimate,
@@ -274,7 +274,7 @@ static const awiwi_finger fingers[] = {
         awiwi_index_tendon_distribution,
     },
     {
-        8, 4, 16, 8,
+        8, 4, 16, 8, 0,
         {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0},
         run_middle_measured_lengths,
         run_middle_joint_estimate,
@@ -288,7 +288,7 @@ static const awiwi_finger fingers[] = {
         awiwi_middle_tendon_distribution,
     },
     {
-        12, 3, 24, 6,
+        12, 3, 24, 6, 0,
         {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0},
         run_ring_measured_lengths,
         run_ring_joint_estimate,
@@ -302,7 +302,7 @@ static const awiwi_finger fingers[] = {
         awiwi_ring_tendon_distribution,
     },
     {
-        15, 4, 30, 8,
+        15, 4, 30, 8, 0,
         {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0},
         run_fifth_measured_lengths,
         run_fifth_joint_estimate,
