@@ -73,6 +73,9 @@ typedef struct awiwi_hand {
                    const awiwi_real *hdd, const awiwi_real *f_des, const awiwi_real *fd_des, const awiwi_real *fdd_des,
                    const awiwi_real *friction, const awiwi_real *r, const awiwi_real *B, const awiwi_real *kp,
                    const awiwi_real *kd, awiwi_real *tau);
+    int (*backstepping)(const awiwi_real *state, const awiwi_real *desired, const awiwi_real *external,
+                        const awiwi_real *bodies, const awiwi_real *spring, const awiwi_real *gains,
+                        const awiwi_real *weights, awiwi_real *tau);
 } awiwi_hand;
 
 /* -- what the caller gives ----------------------------------------------------------------------------------------- */
@@ -81,6 +84,7 @@ typedef struct awiwi_hand {
 enum awiwi_law {
     AWIWI_LAW_MOTOR_IMPEDANCE, /* motors stand where the tendons' own stiffness holds the joint (eq. 11.3) */
     AWIWI_LAW_CASCADE,         /* joint impedance by torque, over force control of every tendon (eq. 11.16) */
+    AWIWI_LAW_BACKSTEPPING,    /* joint impedance through torques and their rates (eq. 15.71 to 15.106) */
     AWIWI_LAWS
 };
 
@@ -95,7 +99,7 @@ typedef struct awiwi_hand_input {
     awiwi_real qdd_des[AWIWI_ALL_JOINTS];
     awiwi_real torque[AWIWI_ALL_JOINTS];    /* to add [N m] */
     awiwi_real stiffness[AWIWI_ALL_JOINTS]; /* K of every joint [N m/rad] */
-    awiwi_real damping[AWIWI_ALL_JOINTS];   /* D of every joint [N m s/rad]; this and all below only by AWIWI_LAW_CASCADE */
+    awiwi_real damping[AWIWI_ALL_JOINTS];   /* D of every joint [N m s/rad]; this and all below not by AWIWI_LAW_MOTOR_IMPEDANCE */
     awiwi_real tip[AWIWI_ALL_FINGERS][3];   /* desired place of every fingertip in its finger's base frame [m] */
     awiwi_real tip_stiffness[AWIWI_ALL_FINGERS]; /* [N/m]; 0 for none */
     awiwi_real tip_damping[AWIWI_ALL_FINGERS];   /* [N s/m] */
@@ -125,6 +129,8 @@ typedef struct awiwi_hand_gains {
     awiwi_real residual;          /* length by which a tendon may disagree with the joint estimate [m] */
     awiwi_real continuous_torque; /* that a motor bears for ever [N m] */
     awiwi_real heating_time;      /* time constant of a motor's heat [s] */
+    awiwi_real load_bandwidth;    /* of the observer of what acts on a joint besides its tendons [rad/s] */
+    awiwi_real tunings[AWIWI_ALL_JOINTS][4]; /* K_3, K_4 [1/s], C_t [rad/(N m)], C_s [rad s^2/(N m)] of AWIWI_LAW_BACKSTEPPING */
     int hold_ticks;               /* for which a fault is borne with the last torques */
     int slack_ticks;              /* for which a tendon may be slack */
     int ramp_ticks;               /* in which torques then fall to zero, and in which any change is faded in */
@@ -185,6 +191,9 @@ typedef struct awiwi_hand_state {
     awiwi_real ahead[2];                    /* and how far the reference moves with its rate and acceleration */
     awiwi_real yield[AWIWI_ALL_JOINTS];     /* angle by which a joint yields to its load */
     awiwi_real tau[AWIWI_ALL_JOINTS];       /* wanted joint torques [N m] */
+    awiwi_real load[AWIWI_ALL_JOINTS];      /* observed torques of all that acts on a joint besides its tendons */
+    awiwi_real inertia[AWIWI_ALL_JOINTS];   /* of the joints, the others held, and their stiffness by the tendons, */
+    awiwi_real elastic[AWIWI_ALL_JOINTS];
     awiwi_real feed[AWIWI_ALL_JOINTS];      /* what every finger planned at its last turn: torques fed forward, */
     awiwi_real planned_tau[AWIWI_ALL_JOINTS];
     awiwi_real planned_f[AWIWI_ALL_TENDONS]; /* forces, elongations, stiffnesses and their slopes, */
@@ -219,7 +228,7 @@ typedef struct awiwi_hand_state {
 
 /* -- what firmware may log ----------------------------------------------------------------------------------------- */
 
-enum { AWIWI_LOG_VERSION = 1 };
+enum { AWIWI_LOG_VERSION = 2 };
 
 /* A log is this head, and then a record for each tick, as they are in memory. `awiwi-gen replay` runs it again. */
 typedef struct awiwi_hand_log {

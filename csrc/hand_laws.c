@@ -4,6 +4,7 @@
 #include "hand_parts.h"
 
 static const awiwi_real MOST_TRAVEL = (awiwi_real)0.98; /* of the motors' travel is used */
+static const awiwi_real LEAST = (awiwi_real)1e-6; /* stiffness [N m/rad] and damping [N m s/rad] that a law can have */
 static const awiwi_real NEARBY = (awiwi_real)0.05; /* angle for which the coupling of the last round holds [rad] */
 
 enum { JOINTS = AWIWI_MOST_JOINTS, TENDONS = AWIWI_MOST_TENDONS };
@@ -14,6 +15,7 @@ typedef struct finger_now {
     int index;
     awiwi_real measured[TENDONS]; /* lengths as measured, */
     awiwi_real h[TENDONS];        /* and with those of the last estimate where they are unknown */
+    awiwi_real gained[JOINTS];    /* by how much the joints' rates have changed */
 } finger_now;
 
 /* -- where the finger is ------------------------------------------------------------------------------------------- */
@@ -78,7 +80,9 @@ static unsigned estimate(const awiwi_context *now, finger_now *own)
         && (finger->joint_estimate(own->h, q, found) != AWIWI_OK || !awiwi_all_finite(found, finger->joints)))
         return AWIWI_NO_ESTIMATE;
     for (int j = 0; j < finger->joints; j++) {
-        qd[j] = awiwi_rate(now, qd[j], found[j] - q[j]);
+        const awiwi_real last = qd[j];
+        qd[j] = awiwi_rate(now, last, found[j] - q[j]);
+        own->gained[j] = qd[j] - last;
         q[j] = found[j];
     }
     return compare(now, own);
@@ -194,6 +198,73 @@ static unsigned cascade(const awiwi_context *now, const finger_now *own, awiwi_r
     return status;
 }
 
+/* Observe what acts on a joint besides its tendons: the share of its acceleration that they do not explain. It begins as at
+   rest. */
+static void observe(const awiwi_context *now, int j, awiwi_real tau, awiwi_real gained)
+{
+    awiwi_real *load = now->state->load + j;
+    const awiwi_real pace = now->gains->load_bandwidth * now->gains->period;
+    *load += pace / (1 + pace) * (now->state->inertia[j] * gained * now->per_period - tau - *load);
+    if (now->state->changed > 0)
+        *load = -tau;
+}
+
+/* How torques of the joints are to change, twice derived, as far as motors do it: tau, rate and push are torques of the
+   tendons' forces and their first two derivatives. */
+static int backstep(const awiwi_context *now, int j, awiwi_real tau, awiwi_real rate, awiwi_real *push)
+{
+    const awiwi_hand_state *state = now->state;
+    const awiwi_real *motion = state->motion[j], *tunings = now->gains->tunings[j], m = state->inertia[j];
+    const awiwi_real K = awiwi_fmax(now->input->stiffness[j], LEAST), D = awiwi_fmax(now->input->damping[j], LEAST);
+    const awiwi_real law = K * (motion[0] - state->q[j]) + D * (motion[1] - state->qd[j]) + m * motion[2];
+    const awiwi_real other = state->tau[j] - law; /* weight, end stops, fingertip: what is wanted besides the impedance */
+    const awiwi_real at[4] = {state->q[j], state->qd[j], tau - other, rate};
+    const awiwi_real external[2] = {state->load[j] + other, 0}, bodies[2] = {m, 1}, spring[2] = {state->elastic[j], 0};
+    const awiwi_real gains[4] = {K, D, tunings[0], tunings[1]};
+    awiwi_real motor;
+    if (now->hand->backstepping(at, motion, external, bodies, spring, gains, tunings + 2, &motor) != AWIWI_OK)
+        return 0;
+    *push = spring[0] * (motor - at[2]); /* of a motor of inertia 1 */
+    return 1;
+}
+
+/* The impedance of every joint through the torques of its tendons and their rates, chapter 15; forces that change no torque
+   are those planned. */
+static unsigned backstepping(const awiwi_context *now, const finger_now *own, awiwi_real *torque)
+{
+    static const awiwi_real nothing = 0;
+    const awiwi_hand *hand = now->hand;
+    const awiwi_hand_gains *gains = now->gains;
+    const awiwi_finger *finger = own->finger;
+    awiwi_hand_state *state = now->state;
+    const int n = finger->joints, first = finger->first_joint, t = finger->first_tendon;
+    awiwi_real rate[TENDONS], bend[TENDONS], tau[JOINTS], taud[JOINTS], change[JOINTS];
+    unsigned status = follow(now, own);
+    for (int i = 0, k = t; i < finger->tendons; i++, k++) {
+        rate[i] = state->stiffness[k] * state->xd[k];
+        bend[i] = gains->force_kp * (state->planned_f[k] - state->f[k]) - gains->force_kd * rate[i];
+    }
+    if (finger->joint_torque(state->q + first, state->f + t, tau) != AWIWI_OK
+        || finger->joint_torque(state->q + first, rate, taud) != AWIWI_OK
+        || finger->joint_torque(state->q + first, bend, change) != AWIWI_OK)
+        return status | AWIWI_NO_LAW;
+    for (int i = 0, j = first; i < n && !(status & AWIWI_FAULTS); i++, j++) {
+        awiwi_real push;
+        observe(now, j, tau[i], own->gained[i]);
+        if (!backstep(now, j, tau[i], taud[i], &push))
+            return status | AWIWI_NO_LAW;
+        change[i] -= push;
+    }
+    for (int i = 0, k = t; i < finger->tendons && !(status & AWIWI_FAULTS); i++, k++) {
+        const awiwi_real wanted = bend[i] + awiwi_dot(state->spread[k], change, n);
+        if (hand->cascade(state->f + k, state->xd + k, state->stiffness + k, state->slope + k, &nothing, state->f + k,
+                          rate + i, &wanted, state->friction + k, &hand->motor_pulley, &hand->motor_inertia,
+                          &gains->force_kp, &gains->force_kd, torque + i) != AWIWI_OK)
+            return status | AWIWI_NO_LAW;
+    }
+    return status;
+}
+
 /* Motors are held back before the ends of their travel. */
 static unsigned hold_back(const awiwi_context *now, const awiwi_finger *finger, awiwi_real *torque)
 {
@@ -224,6 +295,11 @@ unsigned awiwi_finger_law(const awiwi_context *now, int index, awiwi_real *torqu
     status |= now->state->plan_status[index] | now->state->prepare_status[index];
     if (status & AWIWI_FAULTS)
         return status;
-    status |= now->state->law == AWIWI_LAW_CASCADE ? cascade(now, &own, torque) : motor_impedance(now, &own, torque);
+    if (now->state->law == AWIWI_LAW_BACKSTEPPING)
+        status |= backstepping(now, &own, torque);
+    else if (now->state->law == AWIWI_LAW_CASCADE)
+        status |= cascade(now, &own, torque);
+    else
+        status |= motor_impedance(now, &own, torque);
     return status | hold_back(now, own.finger, torque);
 }

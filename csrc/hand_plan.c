@@ -32,6 +32,7 @@ static unsigned feed(const awiwi_context *now, const awiwi_finger *finger)
         for (int k = 0; k < n; k++)
             tau += M[i * n + k] * state->motion[first + k][2] + C[i * n + k] * state->motion[first + k][1];
         state->feed[first + i] = tau;
+        state->inertia[first + i] = M[i * n + i];
     }
     return status;
 }
@@ -94,7 +95,7 @@ unsigned awiwi_torques(const awiwi_context *now, int index, awiwi_real *tau)
     unsigned status = 0;
     for (int i = 0; i < finger->joints; i++)
         tau[i] = now->state->feed[finger->first_joint + i];
-    if (now->state->law == AWIWI_LAW_CASCADE)
+    if (now->state->law != AWIWI_LAW_MOTOR_IMPEDANCE)
         status |= impedance(now, index, tau);
     for (int i = 0, j = finger->first_joint; i < finger->joints; i++, j++) {
         const awiwi_real within = awiwi_clamp(tau[i], -now->hand->joint_effort[j], now->hand->joint_effort[j]);
@@ -184,6 +185,7 @@ static unsigned yield(const awiwi_context *now, const awiwi_finger *finger)
     for (int i = 0; i < n; i++) {
         const awiwi_real k = now->input->stiffness[first + i];
         awiwi_real k_imp, sensitivity, aim = 0;
+        state->elastic[first + i] = K[i * n + i];
         awiwi_real pace = now->gains->compliance_bandwidth * now->gains->period * (awiwi_real)now->hand->fingers;
         if (now->hand->stiffness_correction(&k, K + i * n + i, &k_imp, &sensitivity) == AWIWI_OK) {
             aim = (wanted[i] - loaded[i]) / k_imp;
@@ -204,7 +206,7 @@ unsigned awiwi_plan(const awiwi_context *now, int index)
     const awiwi_finger *finger = now->hand->finger + index;
     awiwi_real pose[JOINTS];
     for (int i = 0, j = finger->first_joint; i < finger->joints; i++, j++)
-        pose[i] = now->state->law == AWIWI_LAW_CASCADE ? now->state->q[j] : now->state->motion[j][0];
+        pose[i] = now->state->law == AWIWI_LAW_MOTOR_IMPEDANCE ? now->state->motion[j][0] : now->state->q[j];
     const unsigned status = solve(now, index, pose);
     return status & AWIWI_FAULTS ? status : status | elongate(now, finger);
 }
@@ -215,7 +217,7 @@ unsigned awiwi_prepare(const awiwi_context *now, int index)
     if (finger->bent || !now->state->ready)
         now->state->spread_status[index] = spread(now, finger);
     const unsigned status = feed(now, finger);
-    return status & AWIWI_FAULTS || !now->state->ready ? status : status | yield(now, finger);
+    return status & AWIWI_FAULTS ? status : status | yield(now, finger);
 }
 
 int awiwi_hand_suggest(const awiwi_hand *hand, const awiwi_hand_gains *gains, const awiwi_real *q,

@@ -155,6 +155,10 @@ static int usable(const awiwi_hand_gains *gains)
     for (int i = 0; i < REALS_OF_GAINS; i++)
         if (!(number[i] >= 0 && number[i] <= AWIWI_REAL_MAX))
             return 0;
+    for (int j = 0; j < AWIWI_ALL_JOINTS; j++)
+        for (int i = 0; i < 4; i++)
+            if (!(gains->tunings[j][i] > 0))
+                return 0;
     return gains->period > 0 && gains->delay > 0 && gains->motor_kp > 0 && gains->motor_kd > 0 && gains->force_kp > 0
            && gains->force_kd > 0 && gains->force_low < gains->force_high && gains->continuous_torque > 0
            && gains->heating_time >= gains->period && gains->hold_ticks >= 0 && gains->slack_ticks >= 0
@@ -215,9 +219,11 @@ unsigned awiwi_hand_init(const awiwi_hand *hand, const awiwi_hand_gains *gains, 
     for (int i = 0; i < hand->fingers; i++) {
         status |= place(&now, hand->finger + i, q);
         if (!(status & AWIWI_FAULTS))
-            status |= state->prepare_status[i] = awiwi_prepare(&now, i);
+            status |= awiwi_prepare(&now, i) & AWIWI_FAULTS; /* without forces, joints do not yield yet */
         if (!(status & AWIWI_FAULTS))
             status |= state->plan_status[i] = awiwi_plan(&now, i);
+        if (!(status & AWIWI_FAULTS))
+            status |= state->prepare_status[i] = awiwi_prepare(&now, i);
     }
     state->ready = !(status & AWIWI_FAULTS);
     state->status = status;

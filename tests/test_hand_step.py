@@ -86,17 +86,21 @@ def test_the_cascade_controls_the_forces_of_the_impedance(lib, hand, loop):
     loop.run(1200)
     gravity = loop.hand.world.gravity
     for name, rows, joints in fingers(hand):
-        others = list(hand.fingers).index(name) - len(hand.fingers) // 2  # when its model is renewed, half a round later
-        while int(loop.step.state.turn[0]) != others % len(hand.fingers):
+        turn = list(hand.fingers).index(name)
+        while int(loop.step.state.turn[0]) != (turn - len(hand.fingers) // 2) % len(hand.fingers):
             loop.run(1)
-        loop.hand.measure(loop.step.input)
-        torque, state, given = loop.step.step(), loop.step.state, loop.step.input
+        loop.run(1)  # half a round before it plans, its model is renewed
+        state, given = loop.step.state, loop.step.input
         if len(range(*joints.indices(19))) == 4:
             dynamics = lib[f"{name}_dynamics"](state.q[joints], state.qd[joints], gravity)
             K, D = np.diag(given.stiffness[joints]), np.diag(given.damping[joints])
             motion = state.motion[joints]
             tau = lib.joint_impedance(*dynamics[:3], state.q[joints], state.qd[joints], *motion[:, :3].T, K, D)
             assert np.allclose(state.tau[joints], tau, atol=1e-12), name
+        while int(state.turn[0]) != turn:
+            loop.run(1)
+        loop.hand.measure(loop.step.input)
+        torque = loop.step.step()
         assert np.allclose(
             lib[f"{name}_joint_torque"](state.q[joints], state.f_des[rows]), state.tau[joints], atol=2e-5
         )
