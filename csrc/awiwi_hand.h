@@ -66,13 +66,6 @@ typedef struct awiwi_hand {
                                 awiwi_real *sensitivity);
     int (*reference_filter)(const awiwi_real *motion, const awiwi_real *desired, const awiwi_real *delay,
                             const awiwi_real *period, awiwi_real *next);
-    int (*motor_impedance)(const awiwi_real *theta, const awiwi_real *thd, const awiwi_real *theta_des,
-                           const awiwi_real *f_des, const awiwi_real *friction, const awiwi_real *r,
-                           const awiwi_real *kp, const awiwi_real *kd, awiwi_real *tau);
-    int (*cascade)(const awiwi_real *f, const awiwi_real *xd, const awiwi_real *stiffness, const awiwi_real *slope,
-                   const awiwi_real *hdd, const awiwi_real *f_des, const awiwi_real *fd_des, const awiwi_real *fdd_des,
-                   const awiwi_real *friction, const awiwi_real *r, const awiwi_real *B, const awiwi_real *kp,
-                   const awiwi_real *kd, awiwi_real *tau);
     int (*backstepping)(const awiwi_real *state, const awiwi_real *desired, const awiwi_real *external,
                         const awiwi_real *bodies, const awiwi_real *spring, const awiwi_real *gains,
                         const awiwi_real *weights, awiwi_real *tau);

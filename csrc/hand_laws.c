@@ -3,6 +3,8 @@
 #include "dense.h"
 #include "hand_parts.h"
 
+#include <string.h>
+
 static const awiwi_real MOST_TRAVEL = (awiwi_real)0.98; /* of the motors' travel is used */
 static const awiwi_real LEAST = (awiwi_real)1e-6; /* stiffness [N m/rad] and damping [N m s/rad] that a law can have */
 static const awiwi_real NEARBY = (awiwi_real)0.05; /* angle for which the coupling of the last round holds [rad] */
@@ -94,7 +96,7 @@ static unsigned estimate(const awiwi_context *now, finger_now *own)
 static int filter(const awiwi_hand_state *state, awiwi_real *motion, const awiwi_real *goal)
 {
     const awiwi_real e[5] = {motion[0] - goal[0], motion[1] - goal[1], motion[2] - goal[2], motion[3], motion[4]};
-    awiwi_real next[5], nothing = 0;
+    awiwi_real next[5];
     for (int k = 0; k < 5; k++) {
         const awiwi_real *row = state->filter[k];
         next[k] = row[0] * e[0] + row[1] * e[1] + row[2] * e[2] + row[3] * e[3] + row[4] * e[4];
@@ -102,11 +104,10 @@ static int filter(const awiwi_hand_state *state, awiwi_real *motion, const awiwi
     next[0] += goal[0] + state->ahead[0] * goal[1] + state->ahead[1] * goal[2];
     next[1] += goal[1] + state->ahead[0] * goal[2];
     next[2] += goal[2];
-    for (int k = 0; k < 5; k++)
-        nothing += next[k] * 0;
-    for (int k = 0; k < 5 && nothing >= 0; k++)
-        motion[k] = next[k];
-    return nothing >= 0;
+    if (!((next[0] + next[1] + next[2] + next[3] + next[4]) * 0 >= 0))
+        return 0;
+    memcpy(motion, next, sizeof next);
+    return 1;
 }
 
 static unsigned refer(const awiwi_context *now, const awiwi_finger *finger)
@@ -152,7 +153,7 @@ static unsigned follow(const awiwi_context *now, const finger_now *own)
 
 /* -- the laws ------------------------------------------------------------------------------------------------------ */
 
-/* Motors stand where the tendons have the planned forces at the wanted angles. */
+/* Motors stand where the tendons have the planned forces at the wanted angles (eq. 11.3). */
 static unsigned motor_impedance(const awiwi_context *now, const finger_now *own, awiwi_real *torque)
 {
     const awiwi_hand *hand = now->hand;
@@ -160,41 +161,45 @@ static unsigned motor_impedance(const awiwi_context *now, const finger_now *own,
     const awiwi_finger *finger = own->finger;
     awiwi_hand_state *state = now->state;
     const int first = finger->first_joint;
-    const awiwi_real end = MOST_TRAVEL * hand->motor_travel;
+    const awiwi_real end = MOST_TRAVEL * hand->motor_travel, r = hand->motor_pulley, per_r = 1 / r;
     awiwi_real q[JOINTS], h[TENDONS];
     for (int i = 0; i < finger->joints; i++)
         q[i] = awiwi_clamp(state->motion[first + i][0] + state->yield[first + i], hand->joint_low[first + i],
                            hand->joint_high[first + i]);
     if (finger->tendon_lengths(q, h) != AWIWI_OK)
         return AWIWI_NO_LAW;
-    for (int i = 0; i < finger->tendons; i++) {
-        const int k = finger->first_tendon + i;
+    for (int i = 0, k = finger->first_tendon; i < finger->tendons; i++, k++) {
         const awiwi_real shorter = own->measured[i] - h[i] + (state->planned_x[k] - state->x[k]);
-        const awiwi_real theta_des = awiwi_clamp(state->theta[k] + shorter / hand->motor_pulley, -end, end);
+        const awiwi_real theta_des = awiwi_clamp(state->theta[k] + shorter * per_r, -end, end);
         state->f_des[k] = state->planned_f[k];
-        if (hand->motor_impedance(state->theta + k, state->thd + k, &theta_des, state->f_des + k, state->friction + k,
-                                  &hand->motor_pulley, &gains->motor_kp, &gains->motor_kd, torque + i) != AWIWI_OK)
-            return AWIWI_NO_LAW;
+        torque[i] = state->friction[k] + r * state->f_des[k] + gains->motor_kp * (theta_des - state->theta[k])
+                    - gains->motor_kd * state->thd[k];
     }
     return 0;
 }
 
-/* Every tendon's force is controlled. */
+/* Torques of the motors that give the forces of a finger's tendons these second derivatives, for joints at rest
+   (eq. 11.16, mended). */
+static void bend_forces(const awiwi_context *now, const awiwi_finger *finger, const awiwi_real *bend, awiwi_real *torque)
+{
+    const awiwi_hand_state *state = now->state;
+    const awiwi_real r = now->hand->motor_pulley, turned = now->hand->motor_inertia / r;
+    for (int i = 0, k = finger->first_tendon; i < finger->tendons; i++, k++)
+        torque[i] = state->friction[k] + r * state->f[k]
+                    + turned * (bend[i] / state->stiffness[k] - state->slope[k] * (state->xd[k] * state->xd[k]));
+}
+
+/* Every tendon's force is controlled: its error decays as e'' + kd e' + kp e = 0. */
 static unsigned cascade(const awiwi_context *now, const finger_now *own, awiwi_real *torque)
 {
-    static const awiwi_real nothing = 0;
-    const awiwi_hand *hand = now->hand;
-    const awiwi_hand_gains *gains = now->gains;
     const awiwi_finger *finger = own->finger;
-    awiwi_hand_state *state = now->state;
+    const awiwi_hand_state *state = now->state;
+    awiwi_real bend[TENDONS];
     const unsigned status = follow(now, own);
-    for (int i = 0; i < finger->tendons && !(status & AWIWI_FAULTS); i++) {
-        const int k = finger->first_tendon + i;
-        if (hand->cascade(state->f + k, state->xd + k, state->stiffness + k, state->slope + k, &nothing,
-                          state->f_des + k, &nothing, &nothing, state->friction + k, &hand->motor_pulley, &hand->motor_inertia,
-                          &gains->force_kp, &gains->force_kd, torque + i) != AWIWI_OK)
-            return status | AWIWI_NO_LAW;
-    }
+    for (int i = 0, k = finger->first_tendon; i < finger->tendons; i++, k++)
+        bend[i] = now->gains->force_kp * (state->f_des[k] - state->f[k])
+                  - now->gains->force_kd * (state->stiffness[k] * state->xd[k]);
+    bend_forces(now, finger, bend, torque);
     return status;
 }
 
@@ -215,7 +220,8 @@ static int backstep(const awiwi_context *now, int j, awiwi_real tau, awiwi_real 
 {
     const awiwi_hand_state *state = now->state;
     const awiwi_real *motion = state->motion[j], *tunings = now->gains->tunings[j], m = state->inertia[j];
-    const awiwi_real K = awiwi_fmax(now->input->stiffness[j], LEAST), D = awiwi_fmax(now->input->damping[j], LEAST);
+    const awiwi_real K = now->input->stiffness[j] > LEAST ? now->input->stiffness[j] : LEAST;
+    const awiwi_real D = now->input->damping[j] > LEAST ? now->input->damping[j] : LEAST;
     const awiwi_real law = K * (motion[0] - state->q[j]) + D * (motion[1] - state->qd[j]) + m * motion[2];
     const awiwi_real other = state->tau[j] - law; /* weight, end stops, fingertip: what is wanted besides the impedance */
     const awiwi_real at[4] = {state->q[j], state->qd[j], tau - other, rate};
@@ -232,36 +238,31 @@ static int backstep(const awiwi_context *now, int j, awiwi_real tau, awiwi_real 
    are those planned. */
 static unsigned backstepping(const awiwi_context *now, const finger_now *own, awiwi_real *torque)
 {
-    static const awiwi_real nothing = 0;
-    const awiwi_hand *hand = now->hand;
     const awiwi_hand_gains *gains = now->gains;
     const awiwi_finger *finger = own->finger;
     awiwi_hand_state *state = now->state;
     const int n = finger->joints, first = finger->first_joint, t = finger->first_tendon;
     awiwi_real rate[TENDONS], bend[TENDONS], tau[JOINTS], taud[JOINTS], change[JOINTS];
-    unsigned status = follow(now, own);
+    const unsigned status = awiwi_torques(now, own->index, state->tau + first) | state->spread_status[own->index];
     for (int i = 0, k = t; i < finger->tendons; i++, k++) {
+        state->f_des[k] = state->planned_f[k];
         rate[i] = state->stiffness[k] * state->xd[k];
-        bend[i] = gains->force_kp * (state->planned_f[k] - state->f[k]) - gains->force_kd * rate[i];
+        bend[i] = gains->force_kp * (state->f_des[k] - state->f[k]) - gains->force_kd * rate[i];
     }
     if (finger->joint_torque(state->q + first, state->f + t, tau) != AWIWI_OK
         || finger->joint_torque(state->q + first, rate, taud) != AWIWI_OK
         || finger->joint_torque(state->q + first, bend, change) != AWIWI_OK)
         return status | AWIWI_NO_LAW;
-    for (int i = 0, j = first; i < n && !(status & AWIWI_FAULTS); i++, j++) {
+    for (int i = 0, j = first; i < n; i++, j++) {
         awiwi_real push;
         observe(now, j, tau[i], own->gained[i]);
         if (!backstep(now, j, tau[i], taud[i], &push))
             return status | AWIWI_NO_LAW;
         change[i] -= push;
     }
-    for (int i = 0, k = t; i < finger->tendons && !(status & AWIWI_FAULTS); i++, k++) {
-        const awiwi_real wanted = bend[i] + awiwi_dot(state->spread[k], change, n);
-        if (hand->cascade(state->f + k, state->xd + k, state->stiffness + k, state->slope + k, &nothing, state->f + k,
-                          rate + i, &wanted, state->friction + k, &hand->motor_pulley, &hand->motor_inertia,
-                          &gains->force_kp, &gains->force_kd, torque + i) != AWIWI_OK)
-            return status | AWIWI_NO_LAW;
-    }
+    for (int i = 0, k = t; i < finger->tendons; i++, k++)
+        bend[i] += awiwi_dot(state->spread[k], change, n);
+    bend_forces(now, finger, bend, torque);
     return status;
 }
 

@@ -161,7 +161,7 @@ static unsigned elongate(const awiwi_context *now, const awiwi_finger *finger)
         return AWIWI_NO_LAW;
     for (int k = t; k < t + finger->tendons; k++) {
         awiwi_real x, stretch = 0;
-        if (now->hand->spring_elongation(state->planned_f + k, &x) != AWIWI_OK)
+        if (!(state->stiffness[k] > 0) || now->hand->spring_elongation(state->planned_f + k, &x) != AWIWI_OK)
             return AWIWI_NO_LAW;
         if (now->hand->tendon_stretch)
             (void)now->hand->tendon_stretch(state->planned_f + k, &stretch);
