@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
 import sys
 import zipfile
 from pathlib import Path
@@ -15,10 +14,10 @@ from fmpy import extract, read_model_description
 from fmpy.build import build_platform_binary
 from fmpy.fmi3 import FMU3Slave
 from fmpy.simulation import simulate_fmu
-from fmpy.validation import _validate_variable_names
+from fmpy.validation import validate_fmu
 
 import awiwi_gen
-from awiwi_gen.interchange.fmu_variables import gains, resting_wrist
+from awiwi_gen.interchange.fmu_variables import at_rest, gains
 from awiwi_gen.tick.loop import ClosedLoop
 from awiwi_gen.tick.structs import Struct
 
@@ -93,7 +92,8 @@ def built(claw_hand, tmp_path_factory):
     os.environ["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{path}"  # where the CMake of fmpy is
     try:
         for folder in folders:
-            build_platform_binary(folder, configuration="Debug")  # equal bits at any level of optimisation
+            (folder / "build").mkdir()
+            build_platform_binary(folder, folder / "build", configuration="Debug")  # equal bits at any optimisation
     finally:
         os.environ["PATH"] = path
     return folders
@@ -147,18 +147,17 @@ def test_fmpy_compiles_them_from_their_sources_with_the_same_bits(built, claw_ha
     in_a_loop(built, awiwi_gen.build(awiwi_gen.Hand.load(claw_hand)), TICKS)
 
 
-@pytest.mark.parametrize("part", [0, 1], ids=["controller", "plant"])
-def test_the_descriptions_are_valid(part, compiled, built):
-    for folder in (compiled[part], built[part]):
-        found = read_model_description(str(folder), validate=True, validate_model_structure=True)
-        found.modelVariables = [each for each in found.modelVariables if ".index." in each.name or "." not in each.name]
-        assert _validate_variable_names(found) == []
-        assert len(found.modelVariables) < 120 or part == 0
+def test_the_descriptions_are_valid(compiled, built):
+    assert validate_fmu(str(built[1])) == []  # with every name by the grammar, which takes its time
+    for folder in (*compiled, built[0]):
+        read_model_description(str(folder), validate=True, validate_model_structure=True)
 
 
 def test_names_have_fingers_joints_and_units(compiled, hand):
     controller, plant = map(Slave, compiled)
-    assert len(controller.names("q_des")) == len(plant.names("load")) == sum(len(f.joints) for f in hand.fingers.values())
+    assert (
+        len(controller.names("q_des")) == len(plant.names("load")) == sum(len(f.joints) for f in hand.fingers.values())
+    )
     assert controller.variables["stiffness.index.pip"].unit == "N m/rad"
     assert controller.variables["law"].declaredType.items[1].name == "cascade"
     assert plant.variables["reading.thumb.tendon_7"].causality == "output"
@@ -172,16 +171,25 @@ def test_every_demand_and_every_gain_of_the_tick_is_a_variable(compiled, lib):
     assert {name for name, *_ in gains()} == Struct(lib, "awiwi_hand_gains").members.keys() - {"period"}
 
 
-def test_the_plant_alone_rests_on_its_start_values_and_its_load_moves_it(compiled, lib):
-    period = 1 / 3000
-    loop = started(lib)
-    loop.hand.world.theta_step = loop.hand.world.theta_step
-    output = ["q.index.pip", "reading.index.tendon_0"]
+def test_the_plant_alone_has_the_bits_of_the_simulated_hand(compiled, lib):
+    """By fmpy's own master, from start values only: motors hold the hand, a load moves it."""
+    simulated, _, force = at_rest(lib)
+    period, ticks = float(simulated.world.period[0]), 60
+    load = np.array([(0.0, 2e-3), (1.0, 2e-3)], [("time", float), ("load.index.pip", float)])
     result = simulate_fmu(
-        str(compiled[1]), stop_time=60 * period, step_size=period, output_interval=period, output=output, apply_default_start_values=True
+        str(compiled[1]),
+        stop_time=ticks * period,
+        output_interval=period,
+        input=load,
+        output=["q.index.pip", "f.index.tendon_0"],
     )
-    assert len(result) == 61
-    assert abs(np.ptp(result["q.index.pip"])) < 0.02
+    simulated.world.load[6] = 2e-3
+    torque = np.full(simulated.tendons, simulated.plant.hand.motor_pulley * force)
+    for row in result[1:]:
+        simulated.move(torque)
+        assert (row["q.index.pip"], row["f.index.tendon_0"]) == (simulated.world.q[6], simulated.world.f[8])
+    assert len(result) == ticks + 1
+    assert np.ptp(result["q.index.pip"]) > 1e-3
 
 
 def test_the_controller_alone_has_the_torques_of_recorded_sensors(compiled, lib):
@@ -229,7 +237,10 @@ def test_longer_steps_are_several_ticks_and_states_come_back(compiled, lib):
         (lambda slave: slave.unit.getFloat64([99999]), "no variable of this type has this value reference"),
         (lambda slave: slave.unit.doStep(0.0, -1.0), "a step is above 0 s"),
         (lambda slave: slave.unit.enterEventMode(), "fmi3EnterEventMode is for what this unit does not have"),
-        (lambda slave: (slave.write("reading", [0.0] * 38), slave.step(0, 1e-3)), "the hand cannot begin with these sensors"),
+        (
+            lambda slave: (slave.write("reading", [0.0] * 38), slave.step(0, 1e-3)),
+            "the hand cannot begin with these sensors",
+        ),
     ],
 )
 def test_misuse_is_an_error_with_a_message(spoil, expected, compiled):

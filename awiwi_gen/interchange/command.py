@@ -101,7 +101,9 @@ def export(
     else:
         targets, losses = _export_model(loaded, form, output, motors, replace)
     if as_json:
-        _print_json({"file": str(targets[0]), "files": list(map(str, targets)), "losses": [loss.as_dict() for loss in losses]})
+        _print_json(
+            {"file": str(targets[0]), "files": list(map(str, targets)), "losses": [loss.as_dict() for loss in losses]}
+        )
     else:
         print(printable("\n".join([*(f"{target}: written" for target in targets), *loss_lines(losses)])))
     return 0

@@ -78,7 +78,9 @@ class Unit:
         headers = Path(str(find_spec("fmpy").origin)).parent / "c-code"  # type: ignore[union-attr]
         with tempfile.TemporaryDirectory() as scratch:
             folder = Path(scratch)
-            objects = [path for path in compile_objects(self.tree, store, folder) if f"sources/{path.stem}.c" in self.files]
+            objects = [
+                path for path in compile_objects(self.tree, store, folder) if f"sources/{path.stem}.c" in self.files
+            ]
             (folder / "fmu.c").write_text(self.files["sources/fmu.c"], encoding="utf-8")
             includes = (f"-I{self.tree}", f"-I{CSRC}", f"-I{headers}")
             compiler().run(*FLAGS, *includes, "-c", str(folder / "fmu.c"), "-o", str(folder / "fmu.o"))
@@ -117,7 +119,7 @@ def units(hand: Hand) -> tuple[list[Unit], list[Loss]]:
         code["fmu.c"] = render("fmu.c.j2", **strings, token=token)
         files = {
             "modelDescription.xml": _description(hand, part, identifier, token, period, variables),
-            "sources/buildDescription.xml": _build_description(identifier, sorted(each for each in code if each.endswith(".c"))),
+            "sources/buildDescription.xml": _build_description(identifier, sorted(code)),
             **{f"sources/{each}": text for each, text in sorted(code.items())},
         }
         made.append(Unit(identifier, files, variables, tree))
@@ -156,14 +158,15 @@ def _needed(called: Iterable[str], texts: Mapping[str, str]) -> list[str]:
     return sorted(found)
 
 
-def _build_description(name: str, sources: Iterable[str]) -> str:
+def _build_description(name: str, code: Iterable[str]) -> str:
     root = ElementTree.Element("fmiBuildDescription", fmiVersion="3.0")
     build = ElementTree.SubElement(root, "BuildConfiguration", modelIdentifier=name)
     files = ElementTree.SubElement(
         build, "SourceFileSet", language="C99", compilerOptions="-ffp-contract=off"
     )  # the bits depend on it
-    for source in sources:
-        ElementTree.SubElement(files, "SourceFile", name=source)
+    for source in code:
+        if source.endswith(".c"):
+            ElementTree.SubElement(files, "SourceFile", name=source)
     ElementTree.SubElement(build, "Library", name="m", external="true")
     return _document(root)
 

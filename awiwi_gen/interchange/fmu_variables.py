@@ -1,4 +1,4 @@
-"""The variables of the two FMUs: places in the structs of csrc/awiwi_hand.h under the names of fingers, joints and tendons."""
+"""The variables of the two FMUs: members of the structs of csrc/awiwi_hand.h, by finger, joint and tendon."""
 
 from __future__ import annotations
 
@@ -183,8 +183,8 @@ def plant_variables(hand: Hand, library: Library) -> list[Variable]:
     torque = np.full(simulated.tendons, simulated.plant.hand.motor_pulley * force)
     start = ("FIXED", "parameter", "fixed")
     found = [TIME]
-    found += _plain(places, "torque", "torque", "tendon", "N m", "torque of the motor, on its output shaft; positive winds up",
-                    torque, "INPUT", "input", "discrete")  # fmt: skip
+    found += _plain(places, "torque", "torque", "tendon", "N m", "torque of the motor's output shaft; positive "
+                    "winds up", torque, "INPUT", "input", "discrete")  # fmt: skip
     found += _variables(places, SURROUNDINGS, world, "world", "INPUT", "input", "continuous")
     sensed = [row for row in INPUTS if row[0] in SENSED]
     found += _variables(places, sensed, measured, "sensors", "TOLD", "output", "discrete")
