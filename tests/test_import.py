@@ -371,6 +371,7 @@ def test_mimic_joints_without_a_leader_are_known():
         text = text.replace(f'<joint name="{name}">', f'<joint name="{name}"><mimic joint="{leader}"/>')
 
     assert without_leader(text) == {"r": "s"}
+    assert without_leader(text.replace("robot>", "robot:x>")) == {}
 
 
 @pytest.mark.parametrize(

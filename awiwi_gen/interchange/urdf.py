@@ -21,7 +21,10 @@ def require_tree(text: str, file: str) -> None:
 
 def without_leader(text: str) -> dict[str, str]:
     """Joint -> the leader that it should follow, of mimic joints whose leader the file does not have."""
-    joints = list(ElementTree.fromstring(text).findall("joint"))  # noqa: S314 MuJoCo has read the same text
+    try:
+        joints = ElementTree.fromstring(text).findall("joint")  # noqa: S314 MuJoCo has read the same text
+    except ElementTree.ParseError:  # MuJoCo also takes XML that is not well formed
+        return {}
     names = {joint.get("name", "") for joint in joints}
     mimics = {joint.get("name", ""): joint.find("mimic") for joint in joints}
     leaders = {name: mimic.get("joint", "") for name, mimic in mimics.items() if mimic is not None}
