@@ -44,6 +44,7 @@ from awiwi_gen.arguments import (
 from awiwi_gen.diff.command import diff
 from awiwi_gen.drawing import show
 from awiwi_gen.editing import init, set_
+from awiwi_gen.identify.command import identify
 from awiwi_gen.interchange.command import export, import_
 from awiwi_gen.tick.command import replay, tick
 from awiwi_gen.tune.command import tune
@@ -351,6 +352,7 @@ command("scipy", *GENERATE)(tune)
 command(*GENERATE)(diff)
 command()(init)
 command(*HAND, ignore_unknown_options=True)(set_)  # "-5 deg" is a value
+command("scipy", *HAND)(identify)
 command(*HAND)(import_)
 command(*HAND)(export)
 command()(tick)
