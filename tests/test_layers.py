@@ -40,6 +40,9 @@ TOP = [
     [
         "report",
         "explain",
+        "formulas",
+        "mathematics",
+        "provenance",
         "terminal",
         "simulate",
         "results",
@@ -52,16 +55,18 @@ TOP = [
     ],
     ["loops", "identify", "tick", "interchange"],
     [*ROOMS],
+    ["study"],
     ["__init__"],
     ["__main__"],
 ]
 WINGS = ("definitions", "witnesses")
 HOMES = {
-    "sympy": {"definitions", "ir/from_sympy.py", "derive.py"},
+    "sympy": {"definitions", "ir/from_sympy.py", "derive.py", "formulas.py", "mathematics.py"},
     "casadi": {"witnesses", "ir/from_casadi.py", "derive.py"},
     "jinja2": {"emit/files.py"},
     "cffi": {"build.py"},
-    "mujoco": {"interchange/mjcf.py", "interchange/wraps.py"},
+    "mujoco": {"interchange/mjcf.py", "interchange/published.py", "interchange/wraps.py"},
+    "distributed": {"study/cluster.py"},
 }
 FILES = sorted(path for path in PACKAGE.rglob("*.py"))
 

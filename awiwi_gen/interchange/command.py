@@ -35,6 +35,7 @@ def import_(
     without: Annotated[list[str] | None, typer.Option("--without", help="Tendon to leave out.")] = None,
     exact: Annotated[bool, typer.Option("--exact", help="Keep published roundings of quarter turns.")] = False,
     fit: Annotated[bool, typer.Option("--fit-wraps", help="Constant arms for tendons that wrap around geoms.")] = False,
+    assume: Annotated[bool, typer.Option("--assume-tensors", help="Solid bodies for tensors that no body has.")] = False,
     replace: Replace = False, as_json: Json = False,
 ) -> int:  # fmt: skip
     """Make a hand file of an MJCF or URDF model, or update a hand file's masses from a table in CSV."""
@@ -46,15 +47,16 @@ def import_(
     from awiwi_gen.interchange.draft import draft
     from awiwi_gen.interchange.loss import loss_lines
     from awiwi_gen.interchange.mjcf import read
+    from awiwi_gen.interchange.solids import with_assumed_tensors
     from awiwi_gen.interchange.toml import hand_text
     from awiwi_gen.writing import write_whole
 
     target = output or Path(f"{file.stem}.toml")
-    hand = draft(read(file, exact, without or (), fit), palm, _named(finger or []))
-    text = hand_text(
-        hand, " ".join(["awiwi-gen import", *(["--exact"] if exact else []), *(["--fit-wraps"] if fit else [])])
-    )
-    faults = [_with_tendon(fault, hand) for fault in _faults(text, str(target))]
+    hand = draft(read(file, exact, without or (), fit, assume), palm, _named(finger or []))
+    hand = with_assumed_tensors(hand) if assume else hand
+    flags = {"--exact": exact, "--fit-wraps": fit, "--assume-tensors": assume}
+    text = hand_text(hand, " ".join(["awiwi-gen import", *(flag for flag, given in flags.items() if given)]))
+    faults = [_with_mend(fault, hand) for fault in _faults(text, str(target))]
     write_whole(target, text, replace)
     joints = sum(len(each.links) - len(each.followed) for each in hand.fingers)
     tendons = sum(len(each.tendons) for each in hand.fingers)
@@ -173,8 +175,12 @@ def _named(options: list[str]) -> dict[str, str]:
     return found
 
 
-def _with_tendon(fault: str, hand: DraftHand) -> str:
-    """A fault of a hand file, with the name that the model has for the tendon in it."""
+def _with_mend(fault: str, hand: DraftHand) -> str:
+    """A fault of a hand file, with the name that the model has for the tendon or body in it, and the flag that mends it."""
+    if place := re.search(r"fingers\.(\w+)\.links\[(\d+)\]\.inertia", fault):
+        finger = next(each for each in hand.fingers if each.name == place[1])
+        body = finger.links[int(place[2])].body
+        return f"{fault}; it is the body {body}; --assume-tensors assumes solids in the place of such tensors"
     place = re.search(r"fingers\.(\w+)\.tendons\[(\d+)\]", fault)
     if place is None:
         return fault
