@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 import subprocess
 
+from awiwi_gen.build import compile_objects
+from awiwi_gen.cache import Cache
 from awiwi_gen.emit.options import Options
 from awiwi_gen.hand import Hand
 from awiwi_gen.pipeline import Job, cached_tree
@@ -44,10 +46,13 @@ def run_whole_hands(hand: Hand) -> list[str]:
     generated, faults, expected = cached_tree(Job(hand)), [], {}
     for cpu, goal in (("posix", "run"), ("posix", "run-guide"), *WHOLE):
         build = ROOT / "build" / "targets" / "hand" / f"{cpu}-{generated.name}"
+        if cpu == "posix":
+            (build / "awiwi").mkdir(parents=True, exist_ok=True)
+            compile_objects(generated, Cache(), build / "awiwi")
         settings = [f"AWIWI_GENERATED={generated}", f"BUILD={build}"]
         settings += ["-f", "posix.mk"] if cpu == "posix" else [f"CPU={cpu}"]
         command = ["make", "--no-print-directory", "-s", "-j2", "-C", str(BOARD), goal, *settings]
-        done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=PATIENCE)
+        done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=4 * PATIENCE)
         digest = re.search(r"^digest: \d+$", done.stdout, re.MULTILINE)
         program = goal.replace("run-hand", "run")
         if done.returncode or not digest or expected.setdefault(program, digest[0]) != digest[0]:
