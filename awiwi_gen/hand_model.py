@@ -175,7 +175,7 @@ def tunings(hand: Hand) -> Iterator[tuple[Fraction, ...]]:
     for rows, columns in hand.blocks.values():
         found = [each for each in hand.gains if rows.start <= each.tendon < rows.stop]
         slowest = min(found, key=lambda each: float(each.K_3) * float(each.K_4), default=None)
-        values = TUNINGS
+        values: tuple[Fraction, ...] = TUNINGS
         if slowest is not None:
             rates = [Fraction(float(each)) * SLOWER for each in (slowest.K_3, slowest.K_4)]
             values = (*rates, Fraction(float(slowest.C_t)), Fraction(float(slowest.C_s)))
