@@ -45,6 +45,7 @@ from awiwi_gen.diff.command import diff
 from awiwi_gen.drawing import show
 from awiwi_gen.editing import init, schema, set_
 from awiwi_gen.explain import explain
+from awiwi_gen.identify.command import identify
 from awiwi_gen.interchange.command import export, import_
 from awiwi_gen.study.command import study
 from awiwi_gen.tick.command import replay, tick
@@ -335,6 +336,7 @@ command(*GENERATE)(diff)
 command()(init)
 command(*HAND, ignore_unknown_options=True)(set_)  # "-5 deg" is a value
 command(*HAND)(schema)
+command("scipy", *HAND)(identify)
 command(*HAND)(import_)
 command(*HAND)(export)
 command()(tick)

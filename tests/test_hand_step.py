@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import awiwi_gen
-from awiwi_gen.build import FLAGS, compiler
 from awiwi_gen.errors import InputError
 from awiwi_gen.hand_model import gains, no_tick
 from awiwi_gen.kernels import catalog
@@ -252,19 +251,6 @@ def test_a_library_without_a_tick_is_refused():
     bare = SimpleNamespace(manifest={"hand": "Bare hand"})
     with pytest.raises(InputError, match="Bare hand has no tick"):
         ClosedLoop(bare)
-
-
-def test_the_c_of_the_guide_compiles_without_a_warning(root, tmp_path):
-    """The firmware as the guide prints it, and its log as the body of a function."""
-    program, log = re.findall(r"```c\n(.*?)```", (root / "docs" / "hand_step.md").read_text(), flags=re.S)
-    logged = f"void log_it(const awiwi_real *pose);\nvoid log_it(const awiwi_real *pose)\n{{\n{log}}}\n"
-    for name in ("begin(void", "tick(void"):
-        head = program[program.index(f"unsigned {name}") :].partition("\n{")[0]
-        program = program.replace(f"unsigned {name}", f"{head};\nunsigned {name}")
-    source = tmp_path / "guide.c"
-    source.write_text(program + logged)
-    includes = (f"-I{root / 'generated'}", f"-I{root / 'csrc'}")
-    compiler().run(*FLAGS, *includes, "-c", str(source), "-o", str(tmp_path / "guide.o"))
 
 
 def test_another_hand_has_its_tick_too(root):
