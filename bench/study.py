@@ -57,7 +57,7 @@ def cluster(workers: int) -> Iterator[Place]:
     """A Dask cluster of so many processes on this machine, that is running when the clock starts."""
     from distributed import LocalCluster
 
-    with LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None) as local:
+    with LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None, silence_logs=50) as local:
         local.wait_for_workers(workers, timeout=60)
         yield Place(Path(), local.scheduler_address)
 
