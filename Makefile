@@ -2,6 +2,7 @@
 # make test   all tests              make lint   ruff, mypy, layers
 # make check  is generated/ fresh?   make bench  us and the peers, side by side
 # make report the hand in figures, those of the source computed again, all proofs: build/report/index.html
+# make docs   the documentation site with its gallery: build/site/index.html
 # make torture  hours: 10 000 mutated hand files, 200 random hands, 10 000 damaged caches, 200 kills
 # make firmware  every kernel on every target: equal bits, committed figures (ACCEPT=1 writes them, ALL=1: more, QUICK=1: what CI runs)
 # make analysis  gcc -fanalyzer, clang-tidy and cppcheck: no finding without a reason
@@ -43,6 +44,9 @@ check: .venv/installed
 report: .venv/installed
 	@$(BIN)/awiwi-gen report
 
+docs: all .venv-docs/installed
+	@PYTHONPATH=.venv-docs $(BIN)/python docs/site/build.py
+
 bench: .venv/installed .venv-bench/installed
 	@$(BIN)/python -m bench
 
@@ -64,6 +68,11 @@ test-hands: .venv/installed .venv-hands/installed
 	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --upgrade --target .venv-hands --requirement $<
 	@touch $@
 
+# Sphinx and its extensions beside .venv, as only the site needs them.
+.venv-docs/installed: docs/requirements.lock .venv/installed
+	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --upgrade --target .venv-docs --requirement $<
+	@touch $@
+
 # The peers live in an environment of their own. Where one cannot be installed, the others are compared.
 .venv-bench/installed: bench/requirements.lock
 	$(PYTHON) -m venv .venv-bench
@@ -73,7 +82,7 @@ test-hands: .venv/installed .venv-hands/installed
 	@touch $@
 
 clean:
-	rm -rf .venv .venv-bench .venv-hands .cache build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf .venv .venv-bench .venv-hands .venv-docs .cache build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
-.PHONY: all test test-hands lint torture check report bench firmware analysis mutants clean
+.PHONY: all docs test test-hands lint torture check report bench firmware analysis mutants clean

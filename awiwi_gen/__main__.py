@@ -43,7 +43,8 @@ from awiwi_gen.arguments import (
 )
 from awiwi_gen.diff.command import diff
 from awiwi_gen.drawing import show
-from awiwi_gen.editing import init, set_
+from awiwi_gen.editing import init, schema, set_
+from awiwi_gen.explain import explain
 from awiwi_gen.interchange.command import export, import_
 from awiwi_gen.study.command import study
 from awiwi_gen.tick.command import replay, tick
@@ -265,27 +266,6 @@ def call(
 
 
 @command(*GENERATE)
-def explain(
-    kernel: KernelName,
-    hand: HandFile = None, as_json: Json = False,
-) -> int:  # fmt: skip
-    """Show a kernel's mathematics, source, units and cost."""
-    from awiwi_gen.explain import explanation, explanation_lines
-    from awiwi_gen.report import print_json
-
-    job = make_job(hand)
-    known = [each.name for each in job.catalog]
-    if kernel not in known:
-        raise terminal.no_kernel(job.hand, hand, kernel, known)
-    explained = explanation(job, kernel)
-    if as_json:
-        print_json(explained)
-    else:
-        print(printable("\n".join(explanation_lines(explained))))
-    return 0
-
-
-@command(*GENERATE)
 def params(
     hand: HandFile = None, as_json: Json = False,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="File to write for the C.")] = None,
@@ -347,12 +327,14 @@ def simulate(
     return 0
 
 
+command(*GENERATE)(explain)
 command(*HAND)(show)
 command("scipy", *GENERATE)(tune)
 command("matplotlib", "scipy", *GENERATE)(study)
 command(*GENERATE)(diff)
 command()(init)
 command(*HAND, ignore_unknown_options=True)(set_)  # "-5 deg" is a value
+command(*HAND)(schema)
 command(*HAND)(import_)
 command(*HAND)(export)
 command()(tick)

@@ -1,4 +1,4 @@
-"""`awiwi-gen init` and `set`: a hand file to start from, and one number of a hand file changed in its text."""
+"""`awiwi-gen init`, `set` and `schema`: a hand file to start from, one number of it changed in its text, and its schema."""
 
 from __future__ import annotations
 
@@ -60,6 +60,26 @@ def set_(
     return 0
 
 
+def schema(
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="File to write; printed if left out.")] = None,
+    as_json: Json = False,
+) -> int:
+    """Write the JSON Schema of hand files, by which editors complete and check keys."""
+    from awiwi_gen.hand.schema import json_schema
+    from awiwi_gen.writing import write_whole
+
+    text = json.dumps(json_schema(), indent=1, ensure_ascii=False) + "\n"
+    if output is None:
+        print(text, end="")
+        return 0
+    write_whole(output, text)
+    if as_json:
+        print(json.dumps({"file": str(output)}))
+    else:
+        print(printable(f"{output}: for an editor, begin the hand file with the line  #:schema {output.name}"))
+    return 0
+
+
 def changed(file: HandFile, key: str, value: str) -> tuple[str, int, str, str]:
     """The text with a new value of a key, the key's line, the old value and the new one as TOML.
 
@@ -67,7 +87,7 @@ def changed(file: HandFile, key: str, value: str) -> tuple[str, int, str, str]:
     """
     from awiwi_gen.hand.lines import values_of_keys
 
-    places, keys = values_of_keys(file.text), _keys(key)
+    places, keys = values_of_keys(file.text), keys_of(key)
     if keys not in places:
         if file.line(keys) and any(known[: len(keys)] == keys for known in places):
             raise InputError(f"{file.name}: {key} is a table; name one of its keys")
@@ -82,7 +102,8 @@ def written(keys: Keys) -> str:
     return "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in keys).removeprefix(".")
 
 
-def _keys(key: str) -> Keys:
+def keys_of(key: str) -> Keys:
+    """The keys of fingers.index.links[0].mass as a tuple."""
     return tuple(int(index) if index else name for name, index in re.findall(r"([^.\[\]]+)|\[(\d+)\]", key))
 
 

@@ -15,6 +15,7 @@ INTERCHANGE = "interchange"  # beside studies, includes generate
 EXTRAS = {
     "casadi": ("casadi", "generate"),
     "flint": ("python-flint", "generate"),
+    "fmpy": ("fmpy", INTERCHANGE),
     "jinja2": ("jinja2", "generate"),
     "pydantic": ("pydantic", "cli"),
     "sympy": ("sympy", "generate"),

@@ -326,7 +326,8 @@ def test_a_kernel_is_explained_down_to_the_numbers():
     assert lines[0] == "jaw_tendon_lengths"
     assert any(line.split() == ["source", "eq.", "5.5,", "5.18,", "5.22"] for line in lines)
     assert "    t0 = q[0]*pulleys[0].radius" in lines
-    assert "    pulleys[0].radius = 9 mm" in lines
+    assert "    h₂ = -q₁⋅radius₁ + rest₂" in lines
+    assert "    pulleys[0].radius = 9 mm (radius₀)" in lines
 
 
 def test_an_explanation_in_json_has_all_its_parts():

@@ -40,18 +40,20 @@ TOP = [
     [
         "report",
         "explain",
+        "formulas",
+        "mathematics",
+        "provenance",
         "terminal",
         "simulate",
         "results",
         "amalgamate",
-        "interchange",
         "arguments",
         "editing",
         "drawing",
         "diff",
         "certificates",
     ],
-    ["loops", "identify", "tick"],
+    ["loops", "identify", "tick", "interchange"],
     [*ROOMS],
     ["study"],
     ["__init__"],
@@ -59,11 +61,11 @@ TOP = [
 ]
 WINGS = ("definitions", "witnesses")
 HOMES = {
-    "sympy": {"definitions", "ir/from_sympy.py", "derive.py"},
+    "sympy": {"definitions", "ir/from_sympy.py", "derive.py", "formulas.py", "mathematics.py"},
     "casadi": {"witnesses", "ir/from_casadi.py", "derive.py"},
     "jinja2": {"emit/files.py"},
     "cffi": {"build.py"},
-    "mujoco": {"interchange/mjcf.py", "interchange/wraps.py"},
+    "mujoco": {"interchange/mjcf.py", "interchange/published.py", "interchange/wraps.py"},
     "distributed": {"study/cluster.py"},
 }
 FILES = sorted(path for path in PACKAGE.rglob("*.py"))
