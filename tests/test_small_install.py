@@ -72,13 +72,21 @@ def test_all_that_is_missing_is_named_at_once(tmp_path):
 
 @pytest.mark.parametrize(
     ("words", "module"),
-    [("simulate", "scipy"), ("tune --costs c.toml", "scipy"), ("report", "matplotlib"), ("report", "scipy")],
-)
+    [("simulate", "scipy"), ("tune --costs c.toml", "scipy"), ("report", "matplotlib"), ("report", "scipy"),
+     ("study workspace", "matplotlib")],
+)  # fmt: skip
 def test_a_study_names_the_extra_of_studies(words, module, tmp_path):
     done = command(*words.split(), hidden=[module], cwd=tmp_path)
 
     assert done.returncode == 2
     assert done.stderr == (f"{words.split()[0]} needs {module}; install it: pip install 'awiwi_gen[studies]'\n")
+
+
+def test_a_study_on_a_cluster_names_its_extra(tmp_path):
+    done = command("study", "workspace", "--scheduler", "tcp://h:1", hidden=["distributed"], cwd=tmp_path)
+
+    assert done.stderr == "study --scheduler needs distributed; install it: pip install 'awiwi_gen[cluster]'\n"
+    assert [*tmp_path.iterdir()] == []
 
 
 def test_the_sentence_comes_in_json_where_json_was_asked_for(tmp_path):

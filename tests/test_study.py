@@ -285,7 +285,7 @@ def test_a_cluster_gives_the_bits_of_one_process_though_a_worker_is_killed(
         computed(poses, kernels, 1, Place(tmp_path / "none", "tcp://127.0.0.1:1"), silent)
     monkeypatch.undo()
     killed = []
-    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as local:
+    with distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as local:
 
         def kill_one(stage, done, total):
             if not killed:

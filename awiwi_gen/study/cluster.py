@@ -111,7 +111,8 @@ def _connected(address: str) -> Iterator[Client]:
     """A client of the scheduler; what the cluster does to it is one sentence."""
     if not ADDRESS.fullmatch(address):
         raise InputError(f"--scheduler {address}: expected an address such as tcp://host:8786")
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    for name in ("distributed", "distributed.client"):
+        logging.getLogger(name).setLevel(logging.CRITICAL)
     warnings.filterwarnings("ignore", module="distributed")
     try:
         client = Client(address, timeout=REACHED, set_as_default=False)
@@ -125,7 +126,9 @@ def _connected(address: str) -> Iterator[Client]:
         raise
     except KilledWorker as error:
         raise OutputError(f"workers of {address} died several times of one chunk ({error.task}); {AGAIN}") from None
-    except (CancelledError, OSError, TimeoutError) as error:
+    except CancelledError:
+        raise OutputError(f"--scheduler {address} was lost: it does not answer any more; {AGAIN}") from None
+    except (OSError, TimeoutError) as error:
         reason = str(error).partition("\n")[0] or type(error).__name__
         raise OutputError(f"--scheduler {address} was lost: {reason}; {AGAIN}") from None
     finally:
