@@ -47,6 +47,7 @@ from awiwi_gen.drawing import show
 from awiwi_gen.editing import init, schema, set_
 from awiwi_gen.explain import explain
 from awiwi_gen.interchange.command import export, import_
+from awiwi_gen.study.command import study
 from awiwi_gen.tick.command import replay, tick
 from awiwi_gen.tune.command import tune
 
@@ -337,6 +338,7 @@ def simulate(
 command(*GENERATE)(explain)
 command(*HAND)(show)
 command("scipy", *GENERATE)(tune)
+command("matplotlib", "scipy", *GENERATE)(study)
 command(*GENERATE)(diff)
 command()(init)
 command(*HAND, ignore_unknown_options=True)(set_)  # "-5 deg" is a value

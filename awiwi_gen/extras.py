@@ -9,18 +9,20 @@ from importlib.util import find_spec
 
 from awiwi_gen.errors import MissingExtraError
 
-ORDER = ("cli", "generate", "studies")  # each includes those before it
+ORDER = ("cli", "generate", "studies", "cluster")  # each includes those before it
 INTERCHANGE = "interchange"  # beside studies, includes generate
 # The module, the package that has it, and the extra that installs it.
 EXTRAS = {
     "casadi": ("casadi", "generate"),
     "flint": ("python-flint", "generate"),
+    "fmpy": ("fmpy", INTERCHANGE),
     "jinja2": ("jinja2", "generate"),
     "pydantic": ("pydantic", "cli"),
     "sympy": ("sympy", "generate"),
     "tree_sitter": ("tree-sitter", "generate"),
     "tree_sitter_toml": ("tree-sitter-toml", "generate"),
     "typer": ("typer", "cli"),
+    "distributed": ("distributed", "cluster"),
     "matplotlib": ("matplotlib", "studies"),
     "mujoco": ("mujoco", INTERCHANGE),
     "scipy": ("scipy", "studies"),

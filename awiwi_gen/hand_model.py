@@ -55,29 +55,9 @@ OF_HAND = (
     Slot("stiffness_correction", "stiffness_correction_scalar", ("k_eff", "k_mech"), 2),
     Slot("reference_filter", "reference_filter", ("motion", "desired", "delay", "period"), 1),
     Slot(
-        "motor_impedance",
-        "motor_impedance",
-        ("theta", "thd", "theta_des", "f_des", "friction", "r", "motor_kp", "motor_kd"),
-        1,
-    ),
-    Slot(
-        "cascade",
-        "cascade",
-        (
-            "f",
-            "xd",
-            "stiffness",
-            "slope",
-            "hdd",
-            "f_des",
-            "fd_des",
-            "fdd_des",
-            "friction",
-            "r",
-            "B",
-            "force_kp",
-            "force_kd",
-        ),
+        "backstepping",
+        "backstepping_nonlinear",
+        ("state", "desired", "external", "bodies", "spring", "gains", "weights"),
         1,
     ),
 )
@@ -85,6 +65,8 @@ OF_PLANT = (
     Slot("motor_acceleration", "motor_acceleration", ("theta", "thd", "tau", "f"), 1),
     Slot("motor_friction", "motor_friction", ("thd",), 1),
 )
+TUNINGS = (Fraction(200), Fraction(200), Fraction(100), Fraction(1))  # K_3, K_4, C_t, C_s where the hand file has none
+SLOWER = Fraction(1, 2)  # K_3 and K_4 than those of the hand file, whose law knows speeds by an observer of its own
 FORWARD = Slot("forward_dynamics", "forward_dynamics", ("q", "qd", "tau", "g"), 1)
 
 
@@ -127,6 +109,7 @@ def model_files(
         fingers.append(
             {
                 "places": (columns.start, columns.stop - columns.start, rows.start, rows.stop - rows.start),
+                "bent": int(table.kernels[f"{name}_joint_estimate"].solver is not None),
                 "base": ", ".join(options.literal(Fraction(pose[4 * i + j])) for i in range(3) for j in range(3)),
                 "slots": [table.entry(f"{name}_{slot.kernel}", slot) for slot in OF_FINGER],
             }
@@ -138,7 +121,7 @@ def model_files(
         fingers=fingers,
         slots=[table.entry(slot.kernel, slot) for slot in OF_HAND],
         adapters=table.adapters,
-        gains=[(name, options.literal(value) if isinstance(value, Fraction) else value) for name, value in gains(hand)],
+        gains=[(name, _initialiser(value, options)) for name, value in gains(hand)],
     )
     table.adapters = []
     plant = render(
@@ -187,6 +170,25 @@ def _adapter(kernel: Kernel, slot: Slot, prefix: str, refuses: bool) -> str:
     return "\n".join([f"static int run_{kernel.name}({', '.join(arguments)})", "{", *lines, "}"])
 
 
+def tunings(hand: Hand) -> Iterator[tuple[Fraction, ...]]:
+    """K_3, K_4, C_t and C_s of every joint: joints of a finger share tendons, and have those of its slowest tendon."""
+    for rows, columns in hand.blocks.values():
+        found = [each for each in hand.gains if rows.start <= each.tendon < rows.stop]
+        slowest = min(found, key=lambda each: float(each.K_3) * float(each.K_4), default=None)
+        values: tuple[Fraction, ...] = TUNINGS
+        if slowest is not None:
+            rates = [Fraction(float(each)) * SLOWER for each in (slowest.K_3, slowest.K_4)]
+            values = (*rates, Fraction(float(slowest.C_t)), Fraction(float(slowest.C_s)))
+        yield from [values] * (columns.stop - columns.start)
+
+
+def _initialiser(value: Any, options: Options) -> str:
+    """A number, or an array of some, as C has it."""
+    if isinstance(value, Sequence):
+        return f"{{{', '.join(_initialiser(each, options) for each in value)}}}"
+    return options.literal(value) if isinstance(value, Fraction) else str(value)
+
+
 def gains(hand: Hand) -> list[tuple[str, Any]]:
     """Gains that run on any hand, in the order of the struct; reals as fractions."""
     motor: Any = hand.motor
@@ -211,6 +213,8 @@ def gains(hand: Hand) -> list[tuple[str, Any]]:
         ("residual", Fraction(1, 1000)),
         ("continuous_torque", torque / 2),
         ("heating_time", Fraction(20)),
+        ("load_bandwidth", Fraction(300)),
+        ("tunings", list(tunings(hand))),
         ("hold_ticks", 30),
         ("slack_ticks", 1500),
         ("ramp_ticks", 300),

@@ -329,6 +329,11 @@ class Library(Mapping[str, KernelFunction]):
         """The same kernels with other numbers, where they read any: in the order of the manifest's list of numbers."""
         return Library(self.manifest, self.c, self.ffi, self._vectorised, self.origin, list(values))
 
+    def change_numbers(self, values: Array) -> None:
+        """Change the numbers of a library that `with_numbers` made, in place; doubles in the same order."""
+        self._own_numbers, prefix = values.tolist(), self.manifest["prefix"]
+        getattr(self.c, f"{prefix}_params_derive")(self.ffi.from_buffer(f"{prefix}_numbers[]", values), self.params)
+
     def pointer(self, array: Array) -> Any:
         """Where an array's first element is; the array must outlive the pointer."""
         kind = C_TYPES[array.dtype.char]

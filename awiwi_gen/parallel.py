@@ -30,9 +30,13 @@ def run(
     items: Sequence[Any],
     progress: Progress,
     after: Sequence[set[int]] = (),
+    workers: int | None = None,
 ) -> None:
-    """Apply a function to items on all cores; to each when the items whose indices ``after`` names for it are done."""
-    with running(stage, function, items, progress, after) as finish:
+    """Apply a function to items on all cores; to each when the items whose indices ``after`` names for it are done.
+
+    ``workers`` is the number of processes, if not one for each core.
+    """
+    with running(stage, function, items, progress, after, workers) as finish:
         finish()
 
 
@@ -43,6 +47,7 @@ def running(
     items: Sequence[Any],
     progress: Progress,
     after: Sequence[set[int]] = (),
+    workers: int | None = None,
 ) -> Iterator[Callable[[], None]]:
     """The same while the body of the `with` statement does something else; calling the target waits for the end.
 
@@ -54,7 +59,7 @@ def running(
     waiting = dict(enumerate(after or [set() for _ in items]))
     active: dict[Future[Any], int] = {}
     alive, parent = multiprocessing.Pipe(duplex=False)
-    workers = min(os.cpu_count() or 1, len(items))
+    workers = min(workers or os.cpu_count() or 1, len(items))
     with ProcessPoolExecutor(workers, initializer=_end_with_parent, initargs=(alive, parent)) as pool:
 
         def start() -> None:

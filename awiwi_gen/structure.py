@@ -26,6 +26,7 @@ The numbers may be symbols of either library. Independent joints are counted alo
 """
 
 from collections import Counter
+from fractions import Fraction
 from typing import Any
 
 Finger = Any
@@ -167,7 +168,62 @@ def estimated_parts(finger: Finger) -> list[tuple[list[int], list[int]]]:
 
 def resting_parts(finger: Finger) -> list[tuple[list[int], list[int]]]:
     """Those of the estimated parts where lengths are too few, so that springs of joints have to tell the rest."""
-    return [(joints, tendons) for joints, tendons in estimated_parts(finger) if len(tendons) < len(joints)]
+    return [part for part in estimated_parts(finger) if len(independent(finger, part[1])[0]) < len(part[0])]
+
+
+def independent(finger: Finger, tendons: list[int]) -> tuple[list[int], list[list[Fraction]]]:
+    """Those of some tendons whose arms determine the others' whatever the radii are, and all rows by the rows of these.
+
+    Tendons that only run over pulleys depend on one another where their senses do, as antagonists over the same joints.
+    """
+    found: list[int] = []
+    rows: list[list[Fraction]] = []
+    for i in tendons:
+        chosen = [_turns(finger, j) for j in found]
+        wanted = _turns(finger, i)
+        share = None if wanted is None else _combined([each or {} for each in chosen], wanted)
+        if share is None:
+            found.append(i)
+            share = [Fraction(j == i) for j in found]
+        rows.append(share)
+    return found, [row + [Fraction(0)] * (len(found) - len(row)) for row in rows]
+
+
+def _turns(finger: Finger, transmission: int) -> dict[str, int] | None:
+    """Signed number of pulleys of each joint under what a motor pulls; None if it is not one tendon over pulleys only."""
+    tendon, *more = finger.transmissions[transmission].tendons
+    others = more or finger.transmissions[transmission].ratios or tendon.arms or tendon.span or tendon.path
+    return None if others or geared(finger, tendon) else dict(senses(finger, tendon))
+
+
+def _combined(rows: list[dict[str, int]], wanted: dict[str, int]) -> list[Fraction] | None:
+    """Shares by which the independent `rows` add up to the wanted one; None if they cannot."""
+    joints = sorted({*wanted, *(joint for row in rows for joint in row)})
+    table = [[Fraction(row.get(joint, 0)) for row in (*rows, wanted)] for joint in joints]
+    shares, used = [Fraction(0)] * len(rows), 0
+    pivots: list[int] = []
+    for column in range(len(rows)):
+        pivot = next((k for k in range(used, len(table)) if table[k][column]), None)
+        if pivot is None:
+            continue
+        table[used], table[pivot] = table[pivot], table[used]
+        table[used] = [x / table[used][column] for x in table[used]]
+        for k in range(len(table)):
+            if k != used:
+                table[k] = [x - table[k][column] * y for x, y in zip(table[k], table[used], strict=True)]
+        pivots.append(column)
+        used += 1
+    if any(row[-1] for row in table[used:]):
+        return None
+    for row, column in zip(table, pivots, strict=False):
+        shares[column] = row[-1]
+    return shares
+
+
+def resting(finger: Finger) -> tuple[list[int], list[int]]:
+    """The joints of all resting parts, and their tendons, by index."""
+    parts = resting_parts(finger)
+    return sorted(j for joints, _ in parts for j in joints), sorted(i for _, tendons in parts for i in tendons)
 
 
 def determined(finger: Finger) -> tuple[list[int], list[int]]:
@@ -180,8 +236,9 @@ def determined(finger: Finger) -> tuple[list[int], list[int]]:
 def rests_in_a_bend(finger: Finger) -> bool:
     """Whether joints rest by springs, and springs or tendons do not act linearly on them: strings, or what bends with q."""
     curves = {coupling.follower for coupling in finger.couplings if coupling.powers}
-    springs = any(link.spring is not None and link.joint in curves for link in finger.links)
-    return bool(resting_parts(finger)) and (bool(finger.strings) or springs or is_curved(finger))
+    springs = [link.joint for link in finger.links if link.spring is not None]
+    bends = is_curved(finger) or any(joint in curves for joint in springs)
+    return bool(finger.strings or (springs and bends)) and bool(resting_parts(finger))
 
 
 def is_curved(finger: Finger) -> bool:

@@ -13,10 +13,15 @@ from awiwi_gen.errors import OutputError
 
 def write_whole(path: Path, text: str, replace: bool = True) -> None:
     """Write a text file, all or nothing. Raises OutputError where the system refuses, or where a file would be lost."""
-    if path.exists() and not replace:
-        raise OutputError(f"{path} exists; choose another name with -o, or replace it with --replace")
+    refuse_to_replace(path, replace)
     with whole_file(path) as stream:
         stream.write(text.encode())
+
+
+def refuse_to_replace(path: Path, replace: bool) -> None:
+    """Raise OutputError where a file would be lost."""
+    if path.exists() and not replace:
+        raise OutputError(f"{path} exists; choose another name with -o, or replace it with --replace")
 
 
 @contextmanager

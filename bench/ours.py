@@ -26,6 +26,12 @@ def contenders(hand: Hand, directory: Path) -> list[dict[str, Any]]:
     return [_contender(hand, directory / f"ours-{trig}", trig) for trig in ("libm", "own")]
 
 
+def kernels_of(quantity: str, present: set[str]) -> list[str]:
+    """The kernels that give a quantity, of those that are present."""
+    choices = [[f"{FINGER}_{kernel}" for kernel in names] for names in KERNELS.get(quantity, ((quantity,),))]
+    return next(names for names in choices if all(name in present for name in names))
+
+
 def _contender(hand: Hand, directory: Path, trig: Any) -> dict[str, Any]:
     generated = directory / "generated"
     directory.mkdir(parents=True, exist_ok=True)
@@ -34,8 +40,7 @@ def _contender(hand: Hand, directory: Path, trig: Any) -> dict[str, Any]:
     entries = {entry["name"]: entry for entry in manifest["kernels"]}
     kernels = {}
     for quantity in QUANTITIES.values():
-        choices = [[f"{FINGER}_{k}" for k in names] for names in KERNELS.get(quantity.name, ((quantity.name,),))]
-        chosen = next(names for names in choices if all(name in entries for name in names))
+        chosen = kernels_of(quantity.name, set(entries))
         calls = []
         for name in chosen:
             inputs, outputs = ([port["name"] for port in entries[name][side]] for side in ("inputs", "outputs"))
@@ -50,7 +55,7 @@ def _contender(hand: Hand, directory: Path, trig: Any) -> dict[str, Any]:
         "flags": [f"-I{generated.resolve()}", f"-I{CSRC}"],
         "libraries": [],
         "kernels": kernels,
-        "support": [*(path for path in sorted(generated.glob("*.c")) if path.stem not in entries), CSRC / "sincos.c"],
+        "support": [CSRC / "sincos.c"],
         "note": "sine and cosine of the C library" if trig == "libm" else "own sine and cosine, inlined",
     }
 

@@ -22,6 +22,7 @@ typedef struct awiwi_finger {
     int joints;
     int first_tendon;
     int tendons;
+    int bent; /* whether the coupling changes with the pose */
     awiwi_real base[9];
     awiwi_of_three measured_lengths; /* theta, x, w -> h */
     awiwi_of_two joint_estimate;     /* h, start -> q */
@@ -65,13 +66,9 @@ typedef struct awiwi_hand {
                                 awiwi_real *sensitivity);
     int (*reference_filter)(const awiwi_real *motion, const awiwi_real *desired, const awiwi_real *delay,
                             const awiwi_real *period, awiwi_real *next);
-    int (*motor_impedance)(const awiwi_real *theta, const awiwi_real *thd, const awiwi_real *theta_des,
-                           const awiwi_real *f_des, const awiwi_real *friction, const awiwi_real *r,
-                           const awiwi_real *kp, const awiwi_real *kd, awiwi_real *tau);
-    int (*cascade)(const awiwi_real *f, const awiwi_real *xd, const awiwi_real *stiffness, const awiwi_real *slope,
-                   const awiwi_real *hdd, const awiwi_real *f_des, const awiwi_real *fd_des, const awiwi_real *fdd_des,
-                   const awiwi_real *friction, const awiwi_real *r, const awiwi_real *B, const awiwi_real *kp,
-                   const awiwi_real *kd, awiwi_real *tau);
+    int (*backstepping)(const awiwi_real *state, const awiwi_real *desired, const awiwi_real *external,
+                        const awiwi_real *bodies, const awiwi_real *spring, const awiwi_real *gains,
+                        const awiwi_real *weights, awiwi_real *tau);
 } awiwi_hand;
 
 /* -- what the caller gives ----------------------------------------------------------------------------------------- */
@@ -80,6 +77,7 @@ typedef struct awiwi_hand {
 enum awiwi_law {
     AWIWI_LAW_MOTOR_IMPEDANCE, /* motors stand where the tendons' own stiffness holds the joint (eq. 11.3) */
     AWIWI_LAW_CASCADE,         /* joint impedance by torque, over force control of every tendon (eq. 11.16) */
+    AWIWI_LAW_BACKSTEPPING,    /* joint impedance through torques and their rates (eq. 15.71 to 15.106) */
     AWIWI_LAWS
 };
 
@@ -94,7 +92,7 @@ typedef struct awiwi_hand_input {
     awiwi_real qdd_des[AWIWI_ALL_JOINTS];
     awiwi_real torque[AWIWI_ALL_JOINTS];    /* to add [N m] */
     awiwi_real stiffness[AWIWI_ALL_JOINTS]; /* K of every joint [N m/rad] */
-    awiwi_real damping[AWIWI_ALL_JOINTS];   /* D of every joint [N m s/rad]; this and all below only by AWIWI_LAW_CASCADE */
+    awiwi_real damping[AWIWI_ALL_JOINTS];   /* D of every joint [N m s/rad]; this and all below not by AWIWI_LAW_MOTOR_IMPEDANCE */
     awiwi_real tip[AWIWI_ALL_FINGERS][3];   /* desired place of every fingertip in its finger's base frame [m] */
     awiwi_real tip_stiffness[AWIWI_ALL_FINGERS]; /* [N/m]; 0 for none */
     awiwi_real tip_damping[AWIWI_ALL_FINGERS];   /* [N s/m] */
@@ -124,6 +122,8 @@ typedef struct awiwi_hand_gains {
     awiwi_real residual;          /* length by which a tendon may disagree with the joint estimate [m] */
     awiwi_real continuous_torque; /* that a motor bears for ever [N m] */
     awiwi_real heating_time;      /* time constant of a motor's heat [s] */
+    awiwi_real load_bandwidth;    /* of the observer of what acts on a joint besides its tendons [rad/s] */
+    awiwi_real tunings[AWIWI_ALL_JOINTS][4]; /* K_3, K_4 [1/s], C_t [rad/(N m)], C_s [rad s^2/(N m)] of AWIWI_LAW_BACKSTEPPING */
     int hold_ticks;               /* for which a fault is borne with the last torques */
     int slack_ticks;              /* for which a tendon may be slack */
     int ramp_ticks;               /* in which torques then fall to zero, and in which any change is faded in */
@@ -180,15 +180,22 @@ typedef struct awiwi_hand_state {
     awiwi_real qd[AWIWI_ALL_JOINTS];
     awiwi_real demand[AWIWI_ALL_JOINTS];    /* the last good q_des */
     awiwi_real motion[AWIWI_ALL_JOINTS][5]; /* filtered references and their derivatives */
+    awiwi_real filter[5][5];                /* what their errors become in a tick, */
+    awiwi_real ahead[2];                    /* and how far the reference moves with its rate and acceleration */
     awiwi_real yield[AWIWI_ALL_JOINTS];     /* angle by which a joint yields to its load */
     awiwi_real tau[AWIWI_ALL_JOINTS];       /* wanted joint torques [N m] */
+    awiwi_real load[AWIWI_ALL_JOINTS];      /* observed torques of all that acts on a joint besides its tendons */
+    awiwi_real inertia[AWIWI_ALL_JOINTS];   /* of the joints, the others held, and their stiffness by the tendons, */
+    awiwi_real elastic[AWIWI_ALL_JOINTS];
     awiwi_real feed[AWIWI_ALL_JOINTS];      /* what every finger planned at its last turn: torques fed forward, */
     awiwi_real planned_tau[AWIWI_ALL_JOINTS];
     awiwi_real planned_f[AWIWI_ALL_TENDONS]; /* forces, elongations, stiffnesses and their slopes, */
     awiwi_real planned_x[AWIWI_ALL_TENDONS];
     awiwi_real stiffness[AWIWI_ALL_TENDONS];
     awiwi_real slope[AWIWI_ALL_TENDONS];
-    awiwi_real spread[AWIWI_ALL_TENDONS][AWIWI_MOST_JOINTS]; /* and forces per torque */
+    awiwi_real spread[AWIWI_ALL_TENDONS][AWIWI_MOST_JOINTS]; /* and forces per torque, which are angles per length */
+    awiwi_real length[AWIWI_ALL_TENDONS];   /* of the tendons at the estimated joints [m] */
+    awiwi_real friction[AWIWI_ALL_TENDONS]; /* of the motors, as compensated [N m] */
     awiwi_real heat[AWIWI_ALL_TENDONS];   /* 1 where a motor is as hot as it may be */
     awiwi_real jump[AWIWI_ALL_TENDONS];   /* torque that is still to be faded out after a change */
     awiwi_real wanted[AWIWI_ALL_TENDONS]; /* torques before they are faded and limited */
@@ -196,6 +203,8 @@ typedef struct awiwi_hand_state {
     awiwi_real share[AWIWI_ALL_FINGERS];  /* of the torques that motors get, from 0 to 1 */
     awiwi_hand_gains gains;               /* of the last tick */
     unsigned plan_status[AWIWI_ALL_FINGERS];
+    unsigned prepare_status[AWIWI_ALL_FINGERS];
+    unsigned spread_status[AWIWI_ALL_FINGERS];
     unsigned tendon_status[AWIWI_ALL_TENDONS];
     unsigned finger_status[AWIWI_ALL_FINGERS]; /* with those of its tendons */
     unsigned status;                           /* with those of all fingers */
@@ -212,7 +221,7 @@ typedef struct awiwi_hand_state {
 
 /* -- what firmware may log ----------------------------------------------------------------------------------------- */
 
-enum { AWIWI_LOG_VERSION = 1 };
+enum { AWIWI_LOG_VERSION = 2 };
 
 /* A log is this head, and then a record for each tick, as they are in memory. `awiwi-gen replay` runs it again. */
 typedef struct awiwi_hand_log {

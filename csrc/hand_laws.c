@@ -3,7 +3,11 @@
 #include "dense.h"
 #include "hand_parts.h"
 
+#include <string.h>
+
 static const awiwi_real MOST_TRAVEL = (awiwi_real)0.98; /* of the motors' travel is used */
+static const awiwi_real LEAST = (awiwi_real)1e-6; /* stiffness [N m/rad] and damping [N m s/rad] that a law can have */
+static const awiwi_real NEARBY = (awiwi_real)0.05; /* angle for which the coupling of the last round holds [rad] */
 
 enum { JOINTS = AWIWI_MOST_JOINTS, TENDONS = AWIWI_MOST_TENDONS };
 
@@ -13,31 +17,20 @@ typedef struct finger_now {
     int index;
     awiwi_real measured[TENDONS]; /* lengths as measured, */
     awiwi_real h[TENDONS];        /* and with those of the last estimate where they are unknown */
+    awiwi_real gained[JOINTS];    /* by how much the joints' rates have changed */
 } finger_now;
 
 /* -- where the finger is ------------------------------------------------------------------------------------------- */
 
 /* Tendons of unknown length have that of the last estimate. */
-static int fill_in(const awiwi_context *now, finger_now *own)
+static void fill_in(const awiwi_context *now, finger_now *own)
 {
     const awiwi_finger *finger = own->finger;
-    const unsigned *status = now->state->tendon_status + finger->first_tendon;
-    awiwi_real expected[TENDONS];
-    unsigned unseen = 0;
-    for (int i = 0; i < finger->tendons; i++) {
-        own->h[i] = own->measured[i];
-        unseen |= awiwi_unseen(status[i]);
-    }
-    if (!unseen)
-        return AWIWI_OK;
-    const int found = finger->tendon_lengths(now->state->q + finger->first_joint, expected);
-    for (int i = 0; i < finger->tendons; i++)
-        if (awiwi_unseen(status[i]))
-            own->h[i] = expected[i];
-    return found;
+    for (int i = 0, k = finger->first_tendon; i < finger->tendons; i++, k++)
+        own->h[i] = awiwi_unseen(now->state->tendon_status[k]) ? now->state->length[k] : own->measured[i];
 }
 
-/* Tendons whose lengths disagree with those of the estimated joints. */
+/* Lengths of the tendons at the estimated joints; which of the measured ones disagree. */
 static unsigned compare(const awiwi_context *now, const finger_now *own)
 {
     const awiwi_finger *finger = own->finger;
@@ -45,8 +38,9 @@ static unsigned compare(const awiwi_context *now, const finger_now *own)
     unsigned status = 0;
     if (finger->tendon_lengths(now->state->q + finger->first_joint, expected) != AWIWI_OK)
         return AWIWI_NO_ESTIMATE;
-    for (int i = 0; i < finger->tendons; i++) {
-        unsigned *known = now->state->tendon_status + finger->first_tendon + i;
+    for (int i = 0, k = finger->first_tendon; i < finger->tendons; i++, k++) {
+        unsigned *known = now->state->tendon_status + k;
+        now->state->length[k] = expected[i];
         if (!awiwi_unseen(*known) && awiwi_size(own->h[i] - expected[i]) > now->gains->residual) {
             *known |= AWIWI_INCONSISTENT;
             status = AWIWI_INCONSISTENT;
@@ -55,18 +49,42 @@ static unsigned compare(const awiwi_context *now, const finger_now *own)
     return status;
 }
 
+/* The step of Gauss and Newton from the last estimate, with the coupling of the last round: of the next tick's error it
+   leaves a share as small as the coupling has changed. Returns whether it is short, and ends within the joints' limits or near
+   them; longer ones are the solver's. */
+static int correct(const awiwi_context *now, const finger_now *own, awiwi_real *found)
+{
+    const awiwi_finger *finger = own->finger;
+    const awiwi_hand_state *state = now->state;
+    int near = !state->spread_status[own->index];
+    for (int j = 0; j < finger->joints; j++)
+        found[j] = 0;
+    for (int i = 0, k = finger->first_tendon; i < finger->tendons; i++, k++) {
+        const awiwi_real longer = own->h[i] - state->length[k];
+        for (int j = 0; j < finger->joints; j++)
+            found[j] += state->spread[k][j] * longer;
+    }
+    for (int i = 0, j = finger->first_joint; i < finger->joints; i++, j++) {
+        near = near && awiwi_size(found[i]) <= NEARBY;
+        found[i] += state->q[j];
+        near = near && found[i] >= now->hand->joint_low[j] - NEARBY && found[i] <= now->hand->joint_high[j] + NEARBY;
+    }
+    return near;
+}
+
 static unsigned estimate(const awiwi_context *now, finger_now *own)
 {
     const awiwi_finger *finger = own->finger;
     awiwi_real *q = now->state->q + finger->first_joint, *qd = now->state->qd + finger->first_joint, found[JOINTS];
     awiwi_lengths(now, finger, own->measured);
-    if (fill_in(now, own) != AWIWI_OK)
-        return AWIWI_NO_ESTIMATE;
-    const int status = finger->joint_estimate(own->h, q, found);
-    if (status != AWIWI_OK || !awiwi_all_finite(found, finger->joints))
+    fill_in(now, own);
+    if (!(finger->bent && correct(now, own, found))
+        && (finger->joint_estimate(own->h, q, found) != AWIWI_OK || !awiwi_all_finite(found, finger->joints)))
         return AWIWI_NO_ESTIMATE;
     for (int j = 0; j < finger->joints; j++) {
-        qd[j] = awiwi_rate(now, qd[j], found[j] - q[j]);
+        const awiwi_real last = qd[j];
+        qd[j] = awiwi_rate(now, last, found[j] - q[j]);
+        own->gained[j] = qd[j] - last;
         q[j] = found[j];
     }
     return compare(now, own);
@@ -74,27 +92,45 @@ static unsigned estimate(const awiwi_context *now, finger_now *own)
 
 /* -- what is wanted ------------------------------------------------------------------------------------------------ */
 
+/* The filtered motion of a joint a tick later, by the filter's matrices; 0 where it has no value. */
+static int filter(const awiwi_hand_state *state, awiwi_real *motion, const awiwi_real *goal)
+{
+    const awiwi_real e[5] = {motion[0] - goal[0], motion[1] - goal[1], motion[2] - goal[2], motion[3], motion[4]};
+    awiwi_real next[5];
+    for (int k = 0; k < 5; k++) {
+        const awiwi_real *row = state->filter[k];
+        next[k] = row[0] * e[0] + row[1] * e[1] + row[2] * e[2] + row[3] * e[3] + row[4] * e[4];
+    }
+    next[0] += goal[0] + state->ahead[0] * goal[1] + state->ahead[1] * goal[2];
+    next[1] += goal[1] + state->ahead[0] * goal[2];
+    next[2] += goal[2];
+    if (!((next[0] + next[1] + next[2] + next[3] + next[4]) * 0 >= 0))
+        return 0;
+    memcpy(motion, next, sizeof next);
+    return 1;
+}
+
 static unsigned refer(const awiwi_context *now, const awiwi_finger *finger)
 {
+    const awiwi_hand_input *input = now->input;
     awiwi_hand_state *state = now->state;
     unsigned status = 0;
     for (int i = 0, j = finger->first_joint; i < finger->joints; i++, j++) {
-        const awiwi_real wanted = awiwi_given(now->input->q_des[j], state->demand[j], &status);
-        const awiwi_real within = awiwi_clamp(wanted, now->hand->joint_low[j] + now->gains->stop_margin,
-                                              now->hand->joint_high[j] - now->gains->stop_margin);
-        awiwi_real desired[5] = {within, awiwi_given(now->input->qd_des[j], 0, &status),
-                                 awiwi_given(now->input->qdd_des[j], 0, &status), 0, 0};
-        awiwi_real next[5];
-        if (within < wanted || within > wanted) {
-            status |= AWIWI_REFERENCE;
-            desired[1] = desired[2] = 0;
+        awiwi_real goal[3] = {input->q_des[j], input->qd_des[j], input->qdd_des[j]};
+        if (!(goal[0] * 0 + goal[1] * 0 + goal[2] * 0 >= 0)) {
+            goal[0] = awiwi_given(goal[0], state->demand[j], &status);
+            goal[1] = awiwi_given(goal[1], 0, &status);
+            goal[2] = awiwi_given(goal[2], 0, &status);
         }
-        state->demand[j] = within;
-        if (now->hand->reference_filter(state->motion[j], desired, &now->gains->delay, &now->gains->period, next)
-            != AWIWI_OK)
+        const awiwi_real within = awiwi_clamp(goal[0], now->hand->joint_low[j] + now->gains->stop_margin,
+                                              now->hand->joint_high[j] - now->gains->stop_margin);
+        if (within < goal[0] || within > goal[0]) {
+            status |= AWIWI_REFERENCE;
+            goal[1] = goal[2] = 0;
+        }
+        state->demand[j] = goal[0] = within;
+        if (!filter(state, state->motion[j], goal))
             return status | AWIWI_NO_LAW;
-        for (int k = 0; k < 5; k++)
-            state->motion[j][k] = next[k];
     }
     return status;
 }
@@ -106,7 +142,7 @@ static unsigned follow(const awiwi_context *now, const finger_now *own)
     awiwi_hand_state *state = now->state;
     const int n = finger->joints, first = finger->first_joint;
     awiwi_real change[JOINTS];
-    const unsigned status = awiwi_torques(now, own->index, state->tau + first);
+    const unsigned status = awiwi_torques(now, own->index, state->tau + first) | state->spread_status[own->index];
     for (int i = 0; i < n; i++)
         change[i] = state->planned_tau[first + i] - state->tau[first + i];
     for (int i = 0, k = finger->first_tendon; i < finger->tendons; i++, k++)
@@ -117,16 +153,7 @@ static unsigned follow(const awiwi_context *now, const finger_now *own)
 
 /* -- the laws ------------------------------------------------------------------------------------------------------ */
 
-/* The friction of a motor, as far as it is compensated. */
-static awiwi_real friction(const awiwi_context *now, int k)
-{
-    awiwi_real tau = 0;
-    if (now->hand->motor_friction && now->hand->motor_friction(now->state->thd + k, &tau) != AWIWI_OK)
-        return 0;
-    return now->gains->friction_share * tau;
-}
-
-/* Motors stand where the tendons have the planned forces at the wanted angles. */
+/* Motors stand where the tendons have the planned forces at the wanted angles (eq. 11.3). */
 static unsigned motor_impedance(const awiwi_context *now, const finger_now *own, awiwi_real *torque)
 {
     const awiwi_hand *hand = now->hand;
@@ -134,43 +161,108 @@ static unsigned motor_impedance(const awiwi_context *now, const finger_now *own,
     const awiwi_finger *finger = own->finger;
     awiwi_hand_state *state = now->state;
     const int first = finger->first_joint;
-    const awiwi_real end = MOST_TRAVEL * hand->motor_travel;
+    const awiwi_real end = MOST_TRAVEL * hand->motor_travel, r = hand->motor_pulley, per_r = 1 / r;
     awiwi_real q[JOINTS], h[TENDONS];
     for (int i = 0; i < finger->joints; i++)
         q[i] = awiwi_clamp(state->motion[first + i][0] + state->yield[first + i], hand->joint_low[first + i],
                            hand->joint_high[first + i]);
     if (finger->tendon_lengths(q, h) != AWIWI_OK)
         return AWIWI_NO_LAW;
-    for (int i = 0; i < finger->tendons; i++) {
-        const int k = finger->first_tendon + i;
-        const awiwi_real resistance = friction(now, k);
+    for (int i = 0, k = finger->first_tendon; i < finger->tendons; i++, k++) {
         const awiwi_real shorter = own->measured[i] - h[i] + (state->planned_x[k] - state->x[k]);
-        const awiwi_real theta_des = awiwi_clamp(state->theta[k] + shorter / hand->motor_pulley, -end, end);
+        const awiwi_real theta_des = awiwi_clamp(state->theta[k] + shorter * per_r, -end, end);
         state->f_des[k] = state->planned_f[k];
-        if (hand->motor_impedance(state->theta + k, state->thd + k, &theta_des, state->f_des + k, &resistance,
-                                  &hand->motor_pulley, &gains->motor_kp, &gains->motor_kd, torque + i) != AWIWI_OK)
-            return AWIWI_NO_LAW;
+        torque[i] = state->friction[k] + r * state->f_des[k] + gains->motor_kp * (theta_des - state->theta[k])
+                    - gains->motor_kd * state->thd[k];
     }
     return 0;
 }
 
-/* Every tendon's force is controlled. */
+/* Torques of the motors that give the forces of a finger's tendons these second derivatives, for joints at rest
+   (eq. 11.16, mended). */
+static void bend_forces(const awiwi_context *now, const awiwi_finger *finger, const awiwi_real *bend, awiwi_real *torque)
+{
+    const awiwi_hand_state *state = now->state;
+    const awiwi_real r = now->hand->motor_pulley, turned = now->hand->motor_inertia / r;
+    for (int i = 0, k = finger->first_tendon; i < finger->tendons; i++, k++)
+        torque[i] = state->friction[k] + r * state->f[k]
+                    + turned * (bend[i] / state->stiffness[k] - state->slope[k] * (state->xd[k] * state->xd[k]));
+}
+
+/* Every tendon's force is controlled: its error decays as e'' + kd e' + kp e = 0. */
 static unsigned cascade(const awiwi_context *now, const finger_now *own, awiwi_real *torque)
 {
-    static const awiwi_real nothing = 0;
-    const awiwi_hand *hand = now->hand;
+    const awiwi_finger *finger = own->finger;
+    const awiwi_hand_state *state = now->state;
+    awiwi_real bend[TENDONS];
+    const unsigned status = follow(now, own);
+    for (int i = 0, k = finger->first_tendon; i < finger->tendons; i++, k++)
+        bend[i] = now->gains->force_kp * (state->f_des[k] - state->f[k])
+                  - now->gains->force_kd * (state->stiffness[k] * state->xd[k]);
+    bend_forces(now, finger, bend, torque);
+    return status;
+}
+
+/* Observe what acts on a joint besides its tendons: the share of its acceleration that they do not explain. It begins as at
+   rest. */
+static void observe(const awiwi_context *now, int j, awiwi_real tau, awiwi_real gained)
+{
+    awiwi_real *load = now->state->load + j;
+    const awiwi_real pace = now->gains->load_bandwidth * now->gains->period;
+    *load += pace / (1 + pace) * (now->state->inertia[j] * gained * now->per_period - tau - *load);
+    if (now->state->changed > 0)
+        *load = -tau;
+}
+
+/* How torques of the joints are to change, twice derived, as far as motors do it: tau, rate and push are torques of the
+   tendons' forces and their first two derivatives. */
+static int backstep(const awiwi_context *now, int j, awiwi_real tau, awiwi_real rate, awiwi_real *push)
+{
+    const awiwi_hand_state *state = now->state;
+    const awiwi_real *motion = state->motion[j], *tunings = now->gains->tunings[j], m = state->inertia[j];
+    const awiwi_real K = now->input->stiffness[j] > LEAST ? now->input->stiffness[j] : LEAST;
+    const awiwi_real D = now->input->damping[j] > LEAST ? now->input->damping[j] : LEAST;
+    const awiwi_real law = K * (motion[0] - state->q[j]) + D * (motion[1] - state->qd[j]) + m * motion[2];
+    const awiwi_real other = state->tau[j] - law; /* weight, end stops, fingertip: what is wanted besides the impedance */
+    const awiwi_real at[4] = {state->q[j], state->qd[j], tau - other, rate};
+    const awiwi_real external[2] = {state->load[j] + other, 0}, bodies[2] = {m, 1}, spring[2] = {state->elastic[j], 0};
+    const awiwi_real gains[4] = {K, D, tunings[0], tunings[1]};
+    awiwi_real motor;
+    if (now->hand->backstepping(at, motion, external, bodies, spring, gains, tunings + 2, &motor) != AWIWI_OK)
+        return 0;
+    *push = spring[0] * (motor - at[2]); /* of a motor of inertia 1 */
+    return 1;
+}
+
+/* The impedance of every joint through the torques of its tendons and their rates, chapter 15; forces that change no torque
+   are those planned. */
+static unsigned backstepping(const awiwi_context *now, const finger_now *own, awiwi_real *torque)
+{
     const awiwi_hand_gains *gains = now->gains;
     const awiwi_finger *finger = own->finger;
     awiwi_hand_state *state = now->state;
-    const unsigned status = follow(now, own);
-    for (int i = 0; i < finger->tendons && !(status & AWIWI_FAULTS); i++) {
-        const int k = finger->first_tendon + i;
-        const awiwi_real resistance = friction(now, k);
-        if (hand->cascade(state->f + k, state->xd + k, state->stiffness + k, state->slope + k, &nothing,
-                          state->f_des + k, &nothing, &nothing, &resistance, &hand->motor_pulley, &hand->motor_inertia,
-                          &gains->force_kp, &gains->force_kd, torque + i) != AWIWI_OK)
-            return status | AWIWI_NO_LAW;
+    const int n = finger->joints, first = finger->first_joint, t = finger->first_tendon;
+    awiwi_real rate[TENDONS], bend[TENDONS], tau[JOINTS], taud[JOINTS], change[JOINTS];
+    const unsigned status = awiwi_torques(now, own->index, state->tau + first) | state->spread_status[own->index];
+    for (int i = 0, k = t; i < finger->tendons; i++, k++) {
+        state->f_des[k] = state->planned_f[k];
+        rate[i] = state->stiffness[k] * state->xd[k];
+        bend[i] = gains->force_kp * (state->f_des[k] - state->f[k]) - gains->force_kd * rate[i];
     }
+    if (finger->joint_torque(state->q + first, state->f + t, tau) != AWIWI_OK
+        || finger->joint_torque(state->q + first, rate, taud) != AWIWI_OK
+        || finger->joint_torque(state->q + first, bend, change) != AWIWI_OK)
+        return status | AWIWI_NO_LAW;
+    for (int i = 0, j = first; i < n; i++, j++) {
+        awiwi_real push;
+        observe(now, j, tau[i], own->gained[i]);
+        if (!backstep(now, j, tau[i], taud[i], &push))
+            return status | AWIWI_NO_LAW;
+        change[i] -= push;
+    }
+    for (int i = 0, k = t; i < finger->tendons; i++, k++)
+        bend[i] += awiwi_dot(state->spread[k], change, n);
+    bend_forces(now, finger, bend, torque);
     return status;
 }
 
@@ -197,11 +289,18 @@ unsigned awiwi_finger_law(const awiwi_context *now, int index, awiwi_real *torqu
     own.index = index;
     unsigned status = estimate(now, &own);
     status |= refer(now, own.finger);
+    if ((now->state->turn + now->hand->fingers / 2) % now->hand->fingers == index && !(status & AWIWI_FAULTS))
+        now->state->prepare_status[index] = awiwi_prepare(now, index);
     if (now->state->turn == index && !(status & AWIWI_FAULTS))
         now->state->plan_status[index] = awiwi_plan(now, index);
-    status |= now->state->plan_status[index];
+    status |= now->state->plan_status[index] | now->state->prepare_status[index];
     if (status & AWIWI_FAULTS)
         return status;
-    status |= now->state->law == AWIWI_LAW_CASCADE ? cascade(now, &own, torque) : motor_impedance(now, &own, torque);
+    if (now->state->law == AWIWI_LAW_BACKSTEPPING)
+        status |= backstepping(now, &own, torque);
+    else if (now->state->law == AWIWI_LAW_CASCADE)
+        status |= cascade(now, &own, torque);
+    else
+        status |= motor_impedance(now, &own, torque);
     return status | hold_back(now, own.finger, torque);
 }

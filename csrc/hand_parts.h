@@ -12,6 +12,9 @@ typedef struct awiwi_context {
     awiwi_hand_state *state;
     awiwi_real per_period; /* 1/period [1/s] */
     awiwi_real pace;       /* share of a change that the filters of rates take in a tick */
+    awiwi_real fade;       /* share of the torque after a change that a tick takes away */
+    awiwi_real heating;    /* share of the load that becomes heat in a tick */
+    awiwi_real per_lasting; /* 1/continuous_torque [1/(N m)] */
 } awiwi_context;
 
 /* The context of a tick with these gains. */
@@ -34,7 +37,17 @@ static inline int awiwi_is_number(awiwi_real x)
 }
 
 /* Whether a tendon of this status has an unknown length. */
-unsigned awiwi_unseen(unsigned status);
+static inline unsigned awiwi_unseen(unsigned status)
+{
+    return status & (AWIWI_FAULTS | AWIWI_SLACK);
+}
+
+/* Find anew the friction of some motors, of each in one of a few ticks: speeds are filtered for longer than that. */
+void awiwi_resist(const awiwi_context *now);
+
+/* The matrices of the reference filter, by the columns that its kernel gives; not AWIWI_OK, and no other matrices, where
+   these gains have none. */
+int awiwi_set_filter(const awiwi_hand *hand, const awiwi_hand_gains *gains, awiwi_hand_state *state);
 
 /* Lengths [tendons] of a finger as measured. */
 void awiwi_lengths(const awiwi_context *now, const awiwi_finger *finger, awiwi_real *h);
@@ -48,6 +61,10 @@ unsigned awiwi_torques(const awiwi_context *now, int finger, awiwi_real *tau);
 
 /* Plan a finger's forces, when it is its turn; returns its status. */
 unsigned awiwi_plan(const awiwi_context *now, int finger);
+
+/* What changes slowly, half a round after a finger has planned: torques fed forward, how joints yield, and where the
+   coupling changes the forces per torque; returns its status. */
+unsigned awiwi_prepare(const awiwi_context *now, int finger);
 
 /* A finger's motor torques [tendons]; returns its status. */
 unsigned awiwi_finger_law(const awiwi_context *now, int finger, awiwi_real *torque);

@@ -32,6 +32,7 @@ static unsigned feed(const awiwi_context *now, const awiwi_finger *finger)
         for (int k = 0; k < n; k++)
             tau += M[i * n + k] * state->motion[first + k][2] + C[i * n + k] * state->motion[first + k][1];
         state->feed[first + i] = tau;
+        state->inertia[first + i] = M[i * n + i];
     }
     return status;
 }
@@ -94,7 +95,7 @@ unsigned awiwi_torques(const awiwi_context *now, int index, awiwi_real *tau)
     unsigned status = 0;
     for (int i = 0; i < finger->joints; i++)
         tau[i] = now->state->feed[finger->first_joint + i];
-    if (now->state->law == AWIWI_LAW_CASCADE)
+    if (now->state->law != AWIWI_LAW_MOTOR_IMPEDANCE)
         status |= impedance(now, index, tau);
     for (int i = 0, j = finger->first_joint; i < finger->joints; i++, j++) {
         const awiwi_real within = awiwi_clamp(tau[i], -now->hand->joint_effort[j], now->hand->joint_effort[j]);
@@ -124,28 +125,30 @@ static unsigned solve(const awiwi_context *now, int index, const awiwi_real *pos
     return found == AWIWI_OK || found == AWIWI_NOT_CONVERGED ? status : status | AWIWI_NO_LAW;
 }
 
-/* The least change of forces per change of torque, P (P'P)^-1. */
-static unsigned spread(const awiwi_context *now, const awiwi_finger *finger, const awiwi_real *pose)
+/* The least change of forces per change of torque, P (P'P)^-1: also the change of angles per change of lengths. */
+static unsigned spread(const awiwi_context *now, const awiwi_finger *finger)
 {
     const int n = finger->joints, m = finger->tendons, t = finger->first_tendon;
-    awiwi_real P[TENDONS * JOINTS], A[JOINTS * JOINTS], W[JOINTS * TENDONS];
-    if (finger->coupling(pose, P) != AWIWI_OK)
+    awiwi_real P[TENDONS * JOINTS], A[JOINTS * JOINTS], x[JOINTS];
+    int order[JOINTS], regular;
+    if (finger->coupling(now->state->q + finger->first_joint, P) != AWIWI_OK)
         return AWIWI_NO_LAW;
-    for (int i = 0; i < n; i++) {
-        for (int k = 0; k < n; k++) {
-            A[i * n + k] = 0;
+    for (int i = 0; i < n; i++)
+        for (int k = 0; k <= i; k++) {
+            awiwi_real sum = 0;
             for (int a = 0; a < m; a++)
-                A[i * n + k] += P[a * n + i] * P[a * n + k];
+                sum += P[a * n + i] * P[a * n + k];
+            A[i * n + k] = A[k * n + i] = sum;
         }
-        for (int a = 0; a < m; a++)
-            W[i * m + a] = P[a * n + i];
-    }
-    if (!awiwi_solve(n, m, A, W))
-        return AWIWI_NO_LAW;
-    for (int a = 0; a < m; a++)
+    regular = awiwi_factor(n, A, order);
+    for (int a = 0; a < m && regular; a++) {
         for (int i = 0; i < n; i++)
-            now->state->spread[t + a][i] = W[i * m + a];
-    return 0;
+            x[i] = P[a * n + i];
+        awiwi_substitute(n, 1, A, order, x);
+        for (int i = 0; i < n; i++)
+            now->state->spread[t + a][i] = x[i];
+    }
+    return regular ? 0u : AWIWI_NO_LAW;
 }
 
 /* Elongations, stiffnesses and their slopes at the planned forces. */
@@ -158,7 +161,7 @@ static unsigned elongate(const awiwi_context *now, const awiwi_finger *finger)
         return AWIWI_NO_LAW;
     for (int k = t; k < t + finger->tendons; k++) {
         awiwi_real x, stretch = 0;
-        if (now->hand->spring_elongation(state->planned_f + k, &x) != AWIWI_OK)
+        if (!(state->stiffness[k] > 0) || now->hand->spring_elongation(state->planned_f + k, &x) != AWIWI_OK)
             return AWIWI_NO_LAW;
         if (now->hand->tendon_stretch)
             (void)now->hand->tendon_stretch(state->planned_f + k, &stretch);
@@ -182,6 +185,7 @@ static unsigned yield(const awiwi_context *now, const awiwi_finger *finger)
     for (int i = 0; i < n; i++) {
         const awiwi_real k = now->input->stiffness[first + i];
         awiwi_real k_imp, sensitivity, aim = 0;
+        state->elastic[first + i] = K[i * n + i];
         awiwi_real pace = now->gains->compliance_bandwidth * now->gains->period * (awiwi_real)now->hand->fingers;
         if (now->hand->stiffness_correction(&k, K + i * n + i, &k_imp, &sensitivity) == AWIWI_OK) {
             aim = (wanted[i] - loaded[i]) / k_imp;
@@ -202,17 +206,18 @@ unsigned awiwi_plan(const awiwi_context *now, int index)
     const awiwi_finger *finger = now->hand->finger + index;
     awiwi_real pose[JOINTS];
     for (int i = 0, j = finger->first_joint; i < finger->joints; i++, j++)
-        pose[i] = now->state->law == AWIWI_LAW_CASCADE ? now->state->q[j] : now->state->motion[j][0];
-    unsigned status = feed(now, finger);
-    if (!(status & AWIWI_FAULTS))
-        status |= solve(now, index, pose);
-    if (!(status & AWIWI_FAULTS) && now->state->law == AWIWI_LAW_CASCADE)
-        status |= spread(now, finger, pose);
-    if (!(status & AWIWI_FAULTS))
-        status |= elongate(now, finger);
-    if (!(status & AWIWI_FAULTS))
-        status |= yield(now, finger);
-    return status;
+        pose[i] = now->state->law == AWIWI_LAW_MOTOR_IMPEDANCE ? now->state->motion[j][0] : now->state->q[j];
+    const unsigned status = solve(now, index, pose);
+    return status & AWIWI_FAULTS ? status : status | elongate(now, finger);
+}
+
+unsigned awiwi_prepare(const awiwi_context *now, int index)
+{
+    const awiwi_finger *finger = now->hand->finger + index;
+    if (finger->bent || !now->state->ready)
+        now->state->spread_status[index] = spread(now, finger);
+    const unsigned status = feed(now, finger);
+    return status & AWIWI_FAULTS ? status : status | yield(now, finger);
 }
 
 int awiwi_hand_suggest(const awiwi_hand *hand, const awiwi_hand_gains *gains, const awiwi_real *q,

@@ -6,6 +6,7 @@
 static const awiwi_real WITHIN = (awiwi_real)0.02; /* of a sensor's span: so far beyond its ends it is believed */
 static const awiwi_real BEYOND = (awiwi_real)1.004; /* of the motors' travel: so far kernels compute */
 static const awiwi_real LOOSE = (awiwi_real)0.002; /* of the span: up to here the lever is at its slack end */
+enum { FRICTION_TICKS = 3 };                      /* in which the friction of each motor is found once */
 static const awiwi_real FASTEST = (awiwi_real)4;   /* of the motors' velocity: a faster change is a jump */
 
 /* A lever at its end stop reads as the end, up to noise. */
@@ -69,7 +70,17 @@ awiwi_context awiwi_context_of(const awiwi_hand *hand, const awiwi_hand_gains *g
                                awiwi_hand_state *state)
 {
     const awiwi_real share = gains->velocity_bandwidth * gains->period;
-    const awiwi_context now = {hand, gains, input, state, 1 / gains->period, share / (1 + share)};
+    const awiwi_context now = {
+        hand,
+        gains,
+        input,
+        state,
+        1 / gains->period,
+        share / (1 + share),
+        1 / (awiwi_real)gains->ramp_ticks,
+        gains->period / gains->heating_time,
+        1 / gains->continuous_torque,
+    };
     return now;
 }
 
@@ -86,9 +97,14 @@ unsigned awiwi_sense(const awiwi_context *now)
     return wrist(now);
 }
 
-unsigned awiwi_unseen(unsigned status)
+void awiwi_resist(const awiwi_context *now)
 {
-    return status & (AWIWI_FAULTS | AWIWI_SLACK);
+    const unsigned first = now->state->tick % FRICTION_TICKS;
+    for (int k = (int)first; now->hand->motor_friction && k < now->hand->tendons; k += FRICTION_TICKS) {
+        awiwi_real tau;
+        const int status = now->hand->motor_friction(now->state->thd + k, &tau);
+        now->state->friction[k] = status == AWIWI_OK ? now->gains->friction_share * tau : 0;
+    }
 }
 
 void awiwi_lengths(const awiwi_context *now, const awiwi_finger *finger, awiwi_real *h)
@@ -100,4 +116,26 @@ void awiwi_lengths(const awiwi_context *now, const awiwi_finger *finger, awiwi_r
         w[i] = state->wrist[k] - state->wrist_start[k];
     }
     (void)finger->measured_lengths(theta, state->x + finger->first_tendon, w, h);
+}
+
+int awiwi_set_filter(const awiwi_hand *hand, const awiwi_hand_gains *gains, awiwi_hand_state *state)
+{
+    static const awiwi_real still[5];
+    awiwi_real columns[5][5], motion[5] = {0}, moved[5] = {0}, ahead[2];
+    int status = AWIWI_OK;
+    for (int i = 0; i < 5; i++) {
+        motion[i] = 1;
+        status |= hand->reference_filter(motion, still, &gains->delay, &gains->period, columns[i]);
+        if (i == 1 || i == 2) { /* a motion that follows what it wants moves as that does */
+            status |= hand->reference_filter(motion, motion, &gains->delay, &gains->period, moved);
+            ahead[i - 1] = moved[0];
+        }
+        motion[i] = 0;
+    }
+    for (int i = 0; i < 5 && status == AWIWI_OK; i++)
+        for (int k = 0; k < 5; k++)
+            state->filter[k][i] = columns[i][k];
+    for (int i = 0; i < 2 && status == AWIWI_OK; i++)
+        state->ahead[i] = ahead[i];
+    return status;
 }

@@ -14,9 +14,9 @@ static const awiwi_real HOT = (awiwi_real)0.9; /* heat from which on a motor's l
 static awiwi_real limit_of(const awiwi_context *now, int k)
 {
     const awiwi_real most = now->hand->motor_torque, lasting = now->gains->continuous_torque;
-    const awiwi_real share = (now->state->heat[k] - HOT) / (1 - HOT);
-    if (share <= 0 || lasting >= most)
+    if (now->state->heat[k] <= HOT || lasting >= most)
         return most;
+    const awiwi_real share = (now->state->heat[k] - HOT) / (1 - HOT);
     return share < 1 ? most + share * (lasting - most) : lasting;
 }
 
@@ -24,8 +24,8 @@ static awiwi_real limit_of(const awiwi_context *now, int k)
 static unsigned drive(const awiwi_context *now, int k, awiwi_real wanted)
 {
     const awiwi_real limit = limit_of(now, k), torque = awiwi_clamp(wanted, -limit, limit);
-    const awiwi_real load = torque / now->gains->continuous_torque;
-    now->state->heat[k] += now->gains->period / now->gains->heating_time * (load * load - now->state->heat[k]);
+    const awiwi_real load = torque * now->per_lasting;
+    now->state->heat[k] += now->heating * (load * load - now->state->heat[k]);
     now->state->torque[k] = torque;
     return (torque < wanted || torque > wanted ? AWIWI_SATURATED : 0u)
            | (limit < now->hand->motor_torque ? AWIWI_HOT : 0u);
@@ -55,14 +55,13 @@ static int mode_after(const awiwi_context *now, int index, int faulty)
 static void change_mode(const awiwi_context *now, int index, int faulty)
 {
     awiwi_hand_state *state = now->state;
-    const awiwi_real step = 1 / (awiwi_real)now->gains->ramp_ticks;
     const int lasting = state->waited[index] > now->gains->hold_ticks;
     state->waited[index] = lasting ? state->waited[index] : faulty ? state->waited[index] + 1 : 0;
     state->mode[index] = mode_after(now, index, faulty);
     if (state->mode[index] == AWIWI_RUN)
-        state->share[index] = awiwi_clamp(state->share[index] + step, 0, 1);
+        state->share[index] = awiwi_clamp(state->share[index] + now->fade, 0, 1);
     else if (state->mode[index] == AWIWI_RAMP)
-        state->share[index] = awiwi_clamp(state->share[index] - step, 0, 1);
+        state->share[index] = awiwi_clamp(state->share[index] - now->fade, 0, 1);
     else if (state->mode[index] == AWIWI_OFF)
         state->waited[index] = 0;
 }
@@ -88,6 +87,7 @@ static unsigned place(const awiwi_context *now, const awiwi_finger *finger, cons
     awiwi_lengths(now, finger, measured);
     for (int i = 0; i < finger->tendons; i++) {
         state->offset[t + i] = (measured[i] - known[i]) / now->hand->motor_pulley;
+        state->length[t + i] = known[i];
         state->f_des[t + i] = state->f[t + i];
     }
     for (int i = 0; i < finger->joints; i++)
@@ -112,7 +112,7 @@ static unsigned give(const awiwi_context *now, int index, const awiwi_real *torq
         } else if (begins) {
             state->jump[k] = 0;
         }
-        state->jump[k] -= state->jump[k] / (awiwi_real)now->gains->ramp_ticks;
+        state->jump[k] -= state->jump[k] * now->fade;
         if (torque)
             state->wanted[k] = torque[i] + state->jump[k];
         const unsigned found = drive(now, k, share > 0 ? share * state->wanted[k] : 0);
@@ -155,19 +155,30 @@ static int usable(const awiwi_hand_gains *gains)
     for (int i = 0; i < REALS_OF_GAINS; i++)
         if (!(number[i] >= 0 && number[i] <= AWIWI_REAL_MAX))
             return 0;
+    for (int j = 0; j < AWIWI_ALL_JOINTS; j++)
+        for (int i = 0; i < 4; i++)
+            if (!(gains->tunings[j][i] > 0))
+                return 0;
     return gains->period > 0 && gains->delay > 0 && gains->motor_kp > 0 && gains->motor_kd > 0 && gains->force_kp > 0
            && gains->force_kd > 0 && gains->force_low < gains->force_high && gains->continuous_torque > 0
            && gains->heating_time >= gains->period && gains->hold_ticks >= 0 && gains->slack_ticks >= 0
            && gains->ramp_ticks > 0;
 }
 
+/* Whether gains have other bits. */
 static int differ(const awiwi_hand_gains *a, const awiwi_hand_gains *b)
 {
-    const awiwi_real *first = &a->period, *second = &b->period;
-    for (int i = 0; i < REALS_OF_GAINS; i++)
-        if (first[i] < second[i] || first[i] > second[i])
-            return 1;
-    return a->hold_ticks != b->hold_ticks || a->slack_ticks != b->slack_ticks || a->ramp_ticks != b->ramp_ticks;
+    return memcmp(a, b, offsetof(awiwi_hand_gains, hold_ticks)) != 0 || a->hold_ticks != b->hold_ticks
+           || a->slack_ticks != b->slack_ticks || a->ramp_ticks != b->ramp_ticks;
+}
+
+/* Take over gains that a law can take, and what follows from them. */
+static int take_gains(const awiwi_hand *hand, const awiwi_hand_gains *gains, awiwi_hand_state *state)
+{
+    if (!usable(gains) || awiwi_set_filter(hand, gains, state) != AWIWI_OK)
+        return 0;
+    state->gains = *gains;
+    return 1;
 }
 
 /* Take over new gains and another law; what changes is faded in until all fingers have planned with it, and from then
@@ -175,15 +186,14 @@ static int differ(const awiwi_hand_gains *a, const awiwi_hand_gains *b)
 static unsigned adopt(const awiwi_hand *hand, const awiwi_hand_gains *gains, const awiwi_hand_input *input,
                       awiwi_hand_state *state)
 {
-    const int law = input->law, known = law >= 0 && law < AWIWI_LAWS, good = usable(gains);
-    if ((known && law != state->law) || (good && differ(&state->gains, gains)))
+    const int law = input->law, known = law >= 0 && law < AWIWI_LAWS, others = differ(&state->gains, gains);
+    const int good = !others || take_gains(hand, gains, state);
+    if ((known && law != state->law) || (good && others))
         state->changed = hand->fingers;
     else if (state->changed > 0)
         state->changed--;
     if (known)
         state->law = law;
-    if (good)
-        state->gains = *gains;
     return known && good ? 0u : AWIWI_REFERENCE;
 }
 
@@ -193,7 +203,7 @@ unsigned awiwi_hand_init(const awiwi_hand *hand, const awiwi_hand_gains *gains, 
     awiwi_real ignored_force[AWIWI_ALL_TENDONS], ignored_stiffness[AWIWI_ALL_TENDONS];
     const awiwi_context now = awiwi_context_of(hand, gains, input, state);
     memset(state, 0, sizeof *state);
-    if (!usable(gains) || hand->sensors(hand->sensor_slack, state->slack, ignored_force, ignored_stiffness) != AWIWI_OK)
+    if (!take_gains(hand, gains, state) || hand->sensors(hand->sensor_slack, state->slack, ignored_force, ignored_stiffness) != AWIWI_OK)
         return state->status = AWIWI_NO_LAW;
     (void)adopt(hand, gains, input, state);
     state->changed = 0;
@@ -209,7 +219,11 @@ unsigned awiwi_hand_init(const awiwi_hand *hand, const awiwi_hand_gains *gains, 
     for (int i = 0; i < hand->fingers; i++) {
         status |= place(&now, hand->finger + i, q);
         if (!(status & AWIWI_FAULTS))
+            status |= awiwi_prepare(&now, i) & AWIWI_FAULTS; /* without forces, joints do not yield yet */
+        if (!(status & AWIWI_FAULTS))
             status |= state->plan_status[i] = awiwi_plan(&now, i);
+        if (!(status & AWIWI_FAULTS))
+            status |= state->prepare_status[i] = awiwi_prepare(&now, i);
     }
     state->ready = !(status & AWIWI_FAULTS);
     state->status = status;
@@ -226,6 +240,7 @@ unsigned awiwi_hand_step(const awiwi_hand *hand, const awiwi_hand_gains *gains, 
     unsigned status = adopt(hand, gains, input, state);
     const awiwi_context now = awiwi_context_of(hand, &state->gains, input, state);
     const unsigned of_all = awiwi_sense(&now);
+    awiwi_resist(&now);
     for (int i = 0; i < hand->fingers; i++)
         status |= step_finger(&now, i, of_all);
     for (int k = 0; k < hand->tendons; k++)

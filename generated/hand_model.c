@@ -246,7 +246,7 @@ static int run_motor_friction(const awiwi_real *in_0, awiwi_real *out_0)
 
 static const awiwi_finger fingers[] = {
     {
-        0, 4, 0, 8,
+        0, 4, 0, 8, 1,
         {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0},
         run_thumb_measured_lengths,
         awiwi_thumb_joint_estimate,
@@ -260,7 +260,7 @@ static const awiwi_finger fingers[] = {
         awiwi_thumb_tendon_distribution,
     },
     {
-        4, 4, 8, 8,
+        4, 4, 8, 8, 0,
         {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0},
         run_index_measured_lengths,
         run_index_joint_estimate,
@@ -274,7 +274,7 @@ static const awiwi_finger fingers[] = {
         awiwi_index_tendon_distribution,
     },
     {
-        8, 4, 16, 8,
+        8, 4, 16, 8, 0,
         {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0},
         run_middle_measured_lengths,
         run_middle_joint_estimate,
@@ -288,7 +288,7 @@ static const awiwi_finger fingers[] = {
         awiwi_middle_tendon_distribution,
     },
     {
-        12, 3, 24, 6,
+        12, 3, 24, 6, 0,
         {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0},
         run_ring_measured_lengths,
         run_ring_joint_estimate,
@@ -302,7 +302,7 @@ static const awiwi_finger fingers[] = {
         awiwi_ring_tendon_distribution,
     },
     {
-        15, 4, 30, 8,
+        15, 4, 30, 8, 0,
         {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0},
         run_fifth_measured_lengths,
         run_fifth_joint_estimate,
@@ -342,8 +342,7 @@ const awiwi_hand awiwi_hand_model = {
     run_motor_friction,
     awiwi_stiffness_correction_scalar,
     awiwi_reference_filter,
-    awiwi_motor_impedance,
-    awiwi_cascade,
+    awiwi_backstepping_nonlinear,
 };
 
 const awiwi_hand_gains awiwi_default_gains = {
@@ -363,6 +362,8 @@ const awiwi_hand_gains awiwi_default_gains = {
     0.001, /* residual */
     1.5, /* continuous_torque */
     20.0, /* heating_time */
+    300.0, /* load_bandwidth */
+    {{278.5, 169.45, 99.91, 1.68}, {278.5, 169.45, 99.91, 1.68}, {278.5, 169.45, 99.91, 1.68}, {278.5, 169.45, 99.91, 1.68}, {179.15, 112.3, 191.6, 1.366}, {179.15, 112.3, 191.6, 1.366}, {179.15, 112.3, 191.6, 1.366}, {179.15, 112.3, 191.6, 1.366}, {242.3, 80.35, 239.2, 2.54}, {242.3, 80.35, 239.2, 2.54}, {242.3, 80.35, 239.2, 2.54}, {242.3, 80.35, 239.2, 2.54}, {204.1, 148.45, 99.05, 0.6594}, {204.1, 148.45, 99.05, 0.6594}, {204.1, 148.45, 99.05, 0.6594}, {216.75, 119.7, 128.7, 0.6844}, {216.75, 119.7, 128.7, 0.6844}, {216.75, 119.7, 128.7, 0.6844}, {216.75, 119.7, 128.7, 0.6844}}, /* tunings */
     30, /* hold_ticks */
     1500, /* slack_ticks */
     300, /* ramp_ticks */

@@ -322,7 +322,8 @@ AWIWI_MUST_CHECK int awiwi_thumb_joint_estimate(const double h_in[8], const doub
 
 /*
  * Errors of the joint estimate: covariance for lengths with standard deviation noise, worst for errors
- * up to noise.
+ * up to noise. Where springs tell the rest, the finger rests at q, and no joint is at a stop: one that
+ * is has no error there.
  * Source: eq. 5.14, linearised.
  *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
  *   in   noise[1] in m, 0 to 0.001
@@ -608,7 +609,8 @@ void awiwi_index_joint_estimate(const double h_in[8], const double start_in[4], 
 
 /*
  * Errors of the joint estimate: covariance for lengths with standard deviation noise, worst for errors
- * up to noise.
+ * up to noise. Where springs tell the rest, the finger rests at q, and no joint is at a stop: one that
+ * is has no error there.
  * Source: eq. 5.14, linearised.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   noise[1] in m, 0 to 0.001
@@ -882,7 +884,8 @@ void awiwi_middle_joint_estimate(const double h_in[8], const double start_in[4],
 
 /*
  * Errors of the joint estimate: covariance for lengths with standard deviation noise, worst for errors
- * up to noise.
+ * up to noise. Where springs tell the rest, the finger rests at q, and no joint is at a stop: one that
+ * is has no error there.
  * Source: eq. 5.14, linearised.
  *   in   q[4] in rad, from [-0.3491, -0.1745, -0.08727, -0.08727] to [0.3491, 1.484, 1.571, 1.396]
  *   in   noise[1] in m, 0 to 0.001
@@ -1156,7 +1159,8 @@ void awiwi_ring_joint_estimate(const double h_in[6], const double start_in[3], d
 
 /*
  * Errors of the joint estimate: covariance for lengths with standard deviation noise, worst for errors
- * up to noise.
+ * up to noise. Where springs tell the rest, the finger rests at q, and no joint is at a stop: one that
+ * is has no error there.
  * Source: eq. 5.14, linearised.
  *   in   q[3] in rad, from [-0.3491, -0.1745, -0.08727] to [0.3491, 1.484, 1.571]
  *   in   noise[1] in m, 0 to 0.001
@@ -1458,7 +1462,8 @@ void awiwi_fifth_joint_estimate(const double h_in[8], const double start_in[4], 
 
 /*
  * Errors of the joint estimate: covariance for lengths with standard deviation noise, worst for errors
- * up to noise.
+ * up to noise. Where springs tell the rest, the finger rests at q, and no joint is at a stop: one that
+ * is has no error there.
  * Source: eq. 5.14, linearised.
  *   in   q[4] in rad, from [-0.5236, -0.3491, -0.1745, -0.08727] to [0.6981, 0.3491, 1.484, 1.571]
  *   in   noise[1] in m, 0 to 0.001

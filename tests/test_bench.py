@@ -16,6 +16,7 @@ from bench import hands, skew
 from bench.counts import count
 from bench.measure import Driver, called_costs
 from bench.objects import build, code_bytes
+from bench.ours import kernels_of
 from bench.peers.formulas import outputs
 from bench.peers.recursion import Algebra
 from bench.quantities import QUANTITIES, SIZES
@@ -54,6 +55,16 @@ def test_the_rule_counts_what_the_generator_says_of_its_own_code(kernel):
 
     assert {name: getattr(counted, name) for name in said} == said
     assert counted.operations == sum(said.values())
+
+
+@pytest.mark.parametrize("quantity", QUANTITIES)
+def test_our_side_links_with_our_sine_alone(quantity):
+    present = {path.stem for path in (ROOT / "generated").glob("index_*.c")}
+    chosen = kernels_of(quantity, present)
+    texts = "".join((ROOT / "generated" / f"{name}.c").read_text(encoding="utf-8") for name in chosen)
+    called = set(re.findall(r"(awiwi_\w+)\(", texts)) - {f"awiwi_{name}" for name in chosen}
+
+    assert all(name.startswith("awiwi_sincos") for name in called)
 
 
 def ours(lib, quantity, x):

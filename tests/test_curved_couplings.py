@@ -131,3 +131,16 @@ def test_a_fault_of_a_curve_is_told_with_its_place(old, new, message):
         Hand.parse(FILE.replace(old, new))
 
     assert f"fingers.claw.{message}" in str(caught.value)
+
+
+def test_a_fingertip_that_never_turns_obeys_mechanics():
+    """As in a gripper whose last joint turns back by what its leader turns: its angular velocity is zero, not undefined."""
+    body = 'mass = "5 g"\ncom = ["9 mm", "1 mm", "0 mm"]\nsource = "assumed"\ninertia = { xx = "60 g mm^2", ' \
+           'yy = "400 g mm^2", zz = "405 g mm^2", xy = "3 g mm^2", xz = "-2 g mm^2", yz = "1 g mm^2" }\n'  # fmt: skip
+    link = f'[[fingers.claw.links]]\nturn = "none"\noffset = ["20 mm", "0 mm", "0 mm"]\n{body}'
+    coupling = 'couplings = [{ follower = "end", leader = "root", ratio = "-1" }]\n'
+    text = f"{FILE.partition('[fingers.claw]')[0]}[fingers.claw]\n{coupling}"
+    text += f'{link}joint = "root"\nlow = "0 deg"\nhigh = "80 deg"\n{link}joint = "end"\n'
+    job = Job(Hand.parse(text), only="claw_jacobian,claw_fingertip_pose")
+
+    assert [law.passed for law in verify(job, cached_tree(job)).laws] == [True, True]

@@ -64,10 +64,20 @@ def test_motors_take_the_torques_of_the_motor_impedance(lib, hand, loop):
         x = lib.spring_elongation(f).x + lib.tendon_stretch(f)
         at_goal = lib[f"{name}_measured_lengths"](theta, x, w)  # lengths fall by r for each radian that motors wind up
         theta_des = state.theta[rows] + (at_goal - lib[f"{name}_tendon_lengths"](q)) / r
-        friction = float(loop.step.gains.friction_share[0]) * lib.motor_friction(state.thd[rows])
+        friction = state.friction[rows]
         law = (float(loop.step.gains.motor_kp[0]), float(loop.step.gains.motor_kd[0]))
         expected = lib.motor_impedance(state.theta[rows], state.thd[rows], theta_des, f, friction, r, *law).tau
         assert np.allclose(torque[rows], expected + state.jump[rows], atol=1e-9), name
+
+
+def test_friction_is_compensated_as_it_was_at_most_two_ticks_ago(lib, loop):
+    speeds = []
+    loop.run(3, lambda _: speeds.append(loop.step.state.thd.copy()))
+    speeds = [*speeds[1:], loop.step.state.thd]
+
+    share = float(loop.step.gains.friction_share[0])
+    found = share * lib.motor_friction(np.array(speeds))
+    assert (loop.step.state.friction == found).any(axis=0).all()
 
 
 def test_the_cascade_controls_the_forces_of_the_impedance(lib, hand, loop):
@@ -77,20 +87,24 @@ def test_the_cascade_controls_the_forces_of_the_impedance(lib, hand, loop):
     gravity = loop.hand.world.gravity
     for name, rows, joints in fingers(hand):
         turn = list(hand.fingers).index(name)
-        while int(loop.step.state.turn[0]) != turn:
+        while int(loop.step.state.turn[0]) != (turn - len(hand.fingers) // 2) % len(hand.fingers):
             loop.run(1)
-        loop.hand.measure(loop.step.input)
-        torque, state, given = loop.step.step(), loop.step.state, loop.step.input
+        loop.run(1)  # half a round before it plans, its model is renewed
+        state, given = loop.step.state, loop.step.input
         if len(range(*joints.indices(19))) == 4:
             dynamics = lib[f"{name}_dynamics"](state.q[joints], state.qd[joints], gravity)
             K, D = np.diag(given.stiffness[joints]), np.diag(given.damping[joints])
             motion = state.motion[joints]
             tau = lib.joint_impedance(*dynamics[:3], state.q[joints], state.qd[joints], *motion[:, :3].T, K, D)
             assert np.allclose(state.tau[joints], tau, atol=1e-12), name
+        while int(state.turn[0]) != turn:
+            loop.run(1)
+        loop.hand.measure(loop.step.input)
+        torque = loop.step.step()
         assert np.allclose(
             lib[f"{name}_joint_torque"](state.q[joints], state.f_des[rows]), state.tau[joints], atol=2e-5
         )
-        friction = float(loop.step.gains.friction_share[0]) * lib.motor_friction(state.thd[rows])
+        friction = state.friction[rows]
         tension = lib[f"{name}_tendon_stiffness"](state.planned_f[rows])
         law = [float(getattr(loop.step.gains, gain)[0]) for gain in ("force_kp", "force_kd")]
         motor = (float(loop.step.model.motor_pulley), float(loop.step.model.motor_inertia))

@@ -303,6 +303,9 @@ def test_the_finger_is_not_in_the_names_of_its_joints_twice():
     assert joint_names({"index": ["r_index_mcp", "r_index_pip"], "thumb": ["r_thumb_ip"]}) == {
         "r_index_mcp": "mcp", "r_index_pip": "pip", "r_thumb_ip": "ip",
     }  # fmt: skip
+    assert joint_names({"thumb": ["thumb_0_joint", "thumb_1_joint"]}) == {
+        "thumb_0_joint": "thumb_0_joint", "thumb_1_joint": "thumb_1_joint",
+    }  # fmt: skip
 
 
 def test_fingers_are_called_by_the_word_that_their_bodies_use():

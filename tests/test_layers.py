@@ -47,15 +47,15 @@ TOP = [
         "simulate",
         "results",
         "amalgamate",
-        "interchange",
         "arguments",
         "editing",
         "drawing",
         "diff",
         "certificates",
     ],
-    ["loops", "identify", "tick"],
+    ["loops", "identify", "tick", "interchange"],
     [*ROOMS],
+    ["study"],
     ["__init__"],
     ["__main__"],
 ]
@@ -65,7 +65,8 @@ HOMES = {
     "casadi": {"witnesses", "ir/from_casadi.py", "derive.py"},
     "jinja2": {"emit/files.py"},
     "cffi": {"build.py"},
-    "mujoco": {"interchange/mjcf.py", "interchange/wraps.py"},
+    "mujoco": {"interchange/mjcf.py", "interchange/published.py", "interchange/wraps.py"},
+    "distributed": {"study/cluster.py"},
 }
 FILES = sorted(path for path in PACKAGE.rglob("*.py"))
 

@@ -90,6 +90,20 @@ def test_errors_are_those_by_which_the_estimate_moves_with_the_lengths(compiled)
     assert worst == pytest.approx(2e-4 * np.abs(slopes).sum(axis=1), rel=1e-6)
 
 
+def test_errors_of_a_bent_finger_are_those_by_which_it_moves_at_rest(hand, compiled):
+    low, high = limits(hand, "ring").T
+    q = compiled.ring_joint_estimate(lengths(compiled, "ring", low + 0.5 * (high - low)), low).q
+    h, step = lengths(compiled, "ring", q), 1e-6
+    ahead, back = (compiled.ring_joint_estimate(h + each, q).q for each in (step, -step))
+    slopes = (ahead - back) / (2 * step)
+    found = compiled.ring_joint_estimate_error(q, 2e-4)
+
+    assert np.all((q > low) & (q < high))
+    assert np.all(np.abs(slopes) > 1)
+    assert found.covariance == pytest.approx(4e-8 * np.outer(slopes, slopes), rel=1e-5)
+    assert found.worst == pytest.approx(2e-4 * np.abs(slopes), rel=1e-5)
+
+
 def test_a_string_a_body_and_stops_are_in_the_energy(hand, compiled):
     bounds = limits(hand, "ring")
     low, high = bounds.T
@@ -146,7 +160,9 @@ def test_estimates_by_springs_are_proved_in_all_forms(hand, options):
     job = Job(hand, options, only="*joint_estimate*,ring_resting_balance")
     proof = verify(job, cached_tree(job))
 
-    assert {"index_joint_estimate", "ring_joint_estimate", "ring_resting_balance"} <= {v.name for v in proof.verdicts}
+    assert {"index_joint_estimate", "ring_joint_estimate", "ring_joint_estimate_error"} <= {
+        v.name for v in proof.verdicts
+    }
     assert [verdict.name for verdict in proof.verdicts if not verdict.passed] == []
 
 
@@ -167,6 +183,24 @@ def test_what_springs_cannot_tell_is_left_out_with_the_reason(old, new, finger, 
 
     assert reason in left_out_names(hand)[f"{finger}_joint_estimate"]
     assert not [line for line in estimate_lines(hand) if finger in line]
+
+
+def test_antagonists_over_the_same_pulleys_count_as_one_and_are_averaged():
+    one = 'tendons = [{ rest = "12 mm", arms = { mcp = "-9 mm", pip = "-7 mm", dip = "-5.5 mm" }, source = "assumed" }]'
+    radii = {"mcp": "9 mm", "pip": "7 mm", "dip": "5.5 mm"}
+    pulleys = ", ".join(f'{{ joint = "{joint}", radius = "{r}", source = "assumed" }}' for joint, r in radii.items())
+    senses = (("12 mm", ["-mcp", "-pip", "-dip"]), ("10 mm", ["+mcp", "+pip", "+dip"]))
+    pair = ", ".join(f'{{ rest = "{rest}", over = {over}, source = "assumed" }}' for rest, over in senses)
+    assert TEXT.count(one) == 1
+    job = Job(Hand.parse(TEXT.replace(one, f"pulleys = [{pulleys}]\ntendons = [{pair}]")), only="index_joint_estimate*")
+    tree = cached_tree(job)
+    found, q, h = load(tree), np.array([0.1, 0.5, 0.4]), np.array([0.005, 0.017])
+    slopes = [(found.index_joint_estimate(h + each, q) - found.index_joint_estimate(h, q)) / 1e-4
+              for each in 1e-4 * np.eye(2)]  # fmt: skip
+
+    assert [verdict.name for verdict in verify(job, tree).verdicts if not verdict.passed] == []
+    assert slopes[0] == pytest.approx(-slopes[1])
+    assert found.index_joint_estimate_error(q, 1e-3).worst == pytest.approx(2e-3 * np.abs(slopes[0]))
 
 
 def test_a_string_that_is_slack_in_some_pose_is_no_spring():

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from awiwi_gen.hand.parts import Finger
 from awiwi_gen.hand.pose import Chain
-from awiwi_gen.structure import resting_parts, rests_in_a_bend
+from awiwi_gen.structure import independent, resting_parts, rests_in_a_bend
 
 if TYPE_CHECKING:
     from awiwi_gen.hand import Hand
@@ -29,9 +29,6 @@ _NEED_LENGTHS = ("joint_estimate", "joint_estimate_error")
 _NEED_TORQUES = ("tendon_distribution",)
 _NEED_SPANS = ("base_estimate_by_gradient",)
 _TWO_WAY = "a motor of the finger pulls both ways, and the stiffness of its tendons follows from their pretension"
-_BENT = (
-    "where springs give the missing equations, and these are not linear in the angles, errors depend on tendon forces"
-)
 _RANK = 1e-7  # a singular value below this share of the largest is zero; central differences are good to 1e-10
 _TURN = 1e-4  # rad or m, of differences of arms
 _FIRM = 1e-3  # least stiffness of what springs hold, as a share of the largest
@@ -106,7 +103,7 @@ def _reasons(finger: Finger, couplings: Sequence[Any]) -> tuple[tuple[str, str],
     unknown = _unknown_angles(finger, couplings)
     found += [(family, reason) for family in _NEED_LENGTHS for reason in unknown]
     if rests_in_a_bend(finger):
-        found += [("resting_balance", reason) for reason in unknown] or [("joint_estimate_error", _BENT)]
+        found += [("resting_balance", reason) for reason in unknown]
     found += [(family, torques) for family in _NEED_TORQUES if torques]
     if not any(transmission.ratios for transmission in finger.transmissions):
         found += [(family, reason) for family in _NEED_SPANS for reason in _indistinct_base(finger, couplings)]
@@ -168,6 +165,7 @@ def _no_rest(finger: Finger) -> str:
     stiffnesses = [_spring_stiffness(chain, q, coupling) for q, coupling in zip(chain.poses(), couplings, strict=True)]
     for joints, tendons in resting_parts(finger):
         names, firm = ", ".join(finger.joints[j] for j in joints), []
+        tendons = tendons if rests_in_a_bend(finger) else independent(finger, tendons)[0]
         for coupling, stiffness in zip(pulled, stiffnesses, strict=True):
             arms = _scaled(np.array(coupling).reshape(-1, len(finger.joints))[np.ix_(tendons, joints)])
             if np.linalg.matrix_rank(arms, _RANK) == len(tendons) or not tendons:

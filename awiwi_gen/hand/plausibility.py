@@ -14,7 +14,7 @@ from typing import NamedTuple
 from awiwi_gen.hand.parts import Finger, Keys, Link
 from awiwi_gen.hand.pose import Chain, point
 
-__all__ = ["Remark", "remarks"]
+__all__ = ["Body", "Remark", "remarks"]
 
 _FARTHEST_COM = 1.5  # of the centre of mass from its bone, in lengths of the bone
 _WIDEST, _NARROWEST = 1.5, 0.05  # radius of gyration in lengths of the bone; a uniform rod has 0.29

@@ -14,8 +14,13 @@ from awiwi_gen.arguments import Json
 from awiwi_gen.errors import InputError, printable
 
 if TYPE_CHECKING:
-    from awiwi_gen.interchange.draft import DraftHand
+    from collections.abc import Sequence
 
+    from awiwi_gen.hand import Hand
+    from awiwi_gen.interchange.draft import DraftHand
+    from awiwi_gen.interchange.model import Loss
+
+EXPORTS = ("mjcf", "urdf", "fmu")
 _SHOWN = 6  # roundings that are printed; the file has all
 
 Replace = Annotated[bool, typer.Option("--replace", help="Replace a file that exists.")]
@@ -30,6 +35,7 @@ def import_(
     without: Annotated[list[str] | None, typer.Option("--without", help="Tendon to leave out.")] = None,
     exact: Annotated[bool, typer.Option("--exact", help="Keep published roundings of quarter turns.")] = False,
     fit: Annotated[bool, typer.Option("--fit-wraps", help="Constant arms for tendons that wrap around geoms.")] = False,
+    assume: Annotated[bool, typer.Option("--assume-tensors", help="Solid bodies for tensors that no body has.")] = False,
     replace: Replace = False, as_json: Json = False,
 ) -> int:  # fmt: skip
     """Make a hand file of an MJCF or URDF model, or update a hand file's masses from a table in CSV."""
@@ -41,15 +47,16 @@ def import_(
     from awiwi_gen.interchange.draft import draft
     from awiwi_gen.interchange.loss import loss_lines
     from awiwi_gen.interchange.mjcf import read
+    from awiwi_gen.interchange.solids import with_assumed_tensors
     from awiwi_gen.interchange.toml import hand_text
     from awiwi_gen.writing import write_whole
 
     target = output or Path(f"{file.stem}.toml")
-    hand = draft(read(file, exact, without or (), fit), palm, _named(finger or []))
-    text = hand_text(
-        hand, " ".join(["awiwi-gen import", *(["--exact"] if exact else []), *(["--fit-wraps"] if fit else [])])
-    )
-    faults = [_with_tendon(fault, hand) for fault in _faults(text, str(target))]
+    hand = draft(read(file, exact, without or (), fit, assume), palm, _named(finger or []))
+    hand = with_assumed_tensors(hand) if assume else hand
+    flags = {"--exact": exact, "--fit-wraps": fit, "--assume-tensors": assume}
+    text = hand_text(hand, " ".join(["awiwi-gen import", *(flag for flag, given in flags.items() if given)]))
+    faults = [_with_mend(fault, hand) for fault in _faults(text, str(target))]
     write_whole(target, text, replace)
     joints = sum(len(each.links) - len(each.followed) for each in hand.fingers)
     tendons = sum(len(each.tendons) for each in hand.fingers)
@@ -73,35 +80,71 @@ def import_(
 
 
 def export(
-    form: Annotated[str, typer.Argument(metavar="FORMAT", help="mjcf or urdf")],
+    form: Annotated[str, typer.Argument(metavar="FORMAT", help="mjcf, urdf or fmu")],
     hand: Annotated[Path | None, typer.Option("--hand", help="Hand file; the Awiwi hand if left out.")] = None,
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="File to write.")] = None,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="File to write; of fmu a folder.")] = None,
     motors: Annotated[str, typer.Option("--motors", help="mjcf: force, torque or position.")] = "",
+    compiled: Annotated[bool, typer.Option("--compile", help="fmu: with a library for this machine.")] = False,
     replace: Replace = False, as_json: Json = False,
 ) -> int:  # fmt: skip
-    """Write the hand as a model of MuJoCo (mjcf) or as URDF, and say what the format cannot hold."""
+    """Write the hand as a model of MuJoCo (mjcf), as URDF, or as FMUs (fmu), and say what the format cannot hold."""
     from awiwi_gen.hand import Hand
-    from awiwi_gen.interchange import export_mjcf, export_urdf
     from awiwi_gen.interchange.loss import loss_lines
+
+    if form not in EXPORTS:
+        raise InputError(f"{form} is no format of export; expected {', '.join(EXPORTS[:-1])} or {EXPORTS[-1]}")
+    if motors and form != "mjcf":
+        raise InputError(f"--motors {motors}: {form.upper()} has no motors to choose; expected mjcf")
+    if compiled and form != "fmu":
+        raise InputError(f"--compile: {form.upper()} has nothing to compile; expected fmu")
+    loaded = Hand.load(hand)
+    if form == "fmu":
+        targets, losses = _export_fmu(loaded, output or Path(), compiled, replace)
+    else:
+        targets, losses = _export_model(loaded, form, output, motors, replace)
+    if as_json:
+        _print_json(
+            {"file": str(targets[0]), "files": list(map(str, targets)), "losses": [loss.as_dict() for loss in losses]}
+        )
+    else:
+        print(printable("\n".join([*(f"{target}: written" for target in targets), *loss_lines(losses)])))
+    return 0
+
+
+def _export_model(
+    hand: Hand, form: str, output: Path | None, motors: str, replace: bool
+) -> tuple[list[Path], Sequence[Loss]]:
+    """Write an MJCF or a URDF."""
+    from awiwi_gen.interchange import export_mjcf, export_urdf
     from awiwi_gen.writing import write_whole
 
-    endings = {"mjcf": ".xml", "urdf": ".urdf"}
-    if form not in endings:
-        raise InputError(f"{form} is no format of export; expected mjcf or urdf")
-    if motors and form == "urdf":
-        raise InputError(f"--motors {motors}: URDF has no motors; expected mjcf")
-    loaded = Hand.load(hand)
     if form == "mjcf":
-        text, losses = export_mjcf.text_and_losses(loaded, motors or export_mjcf.MOTORS[0])
+        text, losses = export_mjcf.text_and_losses(hand, motors or export_mjcf.MOTORS[0])
     else:
-        text, losses = export_urdf.text_and_losses(loaded)
-    target = output or Path(f"{loaded.prefix}{endings[form]}")
+        text, losses = export_urdf.text_and_losses(hand)
+    target = output or Path(f"{hand.prefix}{'.xml' if form == 'mjcf' else '.urdf'}")
     write_whole(target, text, replace)
-    if as_json:
-        _print_json({"file": str(target), "losses": [loss.as_dict() for loss in losses]})
-    else:
-        print(printable("\n".join([f"{target}: written", *loss_lines(losses)])))
-    return 0
+    return [target], losses
+
+
+def _export_fmu(hand: Hand, folder: Path, compiled: bool, replace: bool) -> tuple[list[Path], Sequence[Loss]]:
+    """Write both FMUs into a folder, or none where one would replace a file."""
+    extras.require("export fmu", *extras.GENERATE)
+    if compiled:
+        extras.require("--compile", "fmpy")
+    from awiwi_gen.cache import Cache
+    from awiwi_gen.interchange.fmu import units
+    from awiwi_gen.writing import refuse_to_replace, whole_file
+
+    made, losses = units(hand)
+    targets = [folder / f"{unit.name}.fmu" for unit in made]
+    for target in targets:
+        refuse_to_replace(target, replace)
+    archives = [unit.archive(unit.compiled(Cache()) if compiled else None) for unit in made]
+    for target, data in zip(targets, archives, strict=True):
+        with whole_file(target) as stream:
+            stream.write(data)
+    return targets, losses
 
 
 def _import_table(file: Path, into: Path | None, output: Path | None, as_json: bool) -> int:
@@ -132,8 +175,12 @@ def _named(options: list[str]) -> dict[str, str]:
     return found
 
 
-def _with_tendon(fault: str, hand: DraftHand) -> str:
-    """A fault of a hand file, with the name that the model has for the tendon in it."""
+def _with_mend(fault: str, hand: DraftHand) -> str:
+    """A fault of a hand file, with the name that the model has for the tendon or body in it, and the flag that mends it."""
+    if place := re.search(r"fingers\.(\w+)\.links\[(\d+)\]\.inertia", fault):
+        finger = next(each for each in hand.fingers if each.name == place[1])
+        body = finger.links[int(place[2])].body
+        return f"{fault}; it is the body {body}; --assume-tensors assumes solids in the place of such tensors"
     place = re.search(r"fingers\.(\w+)\.tendons\[(\d+)\]", fault)
     if place is None:
         return fault

@@ -17,20 +17,23 @@ from numpy.polynomial import Polynomial
 
 from awiwi_gen.errors import Fault, InputError
 from awiwi_gen.interchange.model import LEAST_MASS, Array, Body, Joint, Loss, Mimic, Model, Site
+from awiwi_gen.interchange.published import forgotten, give_moments, is_lock, join_locked, sources
 from awiwi_gen.interchange.quarter import quarter_angle, quarter_axis, quarter_rotation
 from awiwi_gen.interchange.urdf import require_tree
 from awiwi_gen.interchange.wraps import tendons_of
 
 KINDS = ("free", "ball", "slide", "hinge")
-_INCLUDE = re.compile(r'<include\s[^>]*?file\s*=\s*"([^"]+)"')
 _RPY = re.compile(r'(\brpy\s*=\s*")([^"]*)(")')
 
 
-def read(path: Path, exact: bool = False, without: Iterable[str] = (), fit: bool = False) -> Model:
+def read(
+    path: Path, exact: bool = False, without: Iterable[str] = (), fit: bool = False, assume: bool = False
+) -> Model:
     """Read a file. Raises `InputError` where MuJoCo refuses it.
 
     Unless `exact`, published roundings of quarter turns (1.5708) become quarter turns. The tendons named in `without`
-    are left out. With `fit`, tendons that wrap around geoms get constant arms; else they are lost.
+    are left out. With `fit`, tendons that wrap around geoms get constant arms; else they are lost. With `assume`,
+    tensors that MuJoCo refuses become some that are too large by far, for others to replace.
     """
     spec, notes = parse(path, exact)
     forces = _forces(spec)
@@ -38,6 +41,8 @@ def read(path: Path, exact: bool = False, without: Iterable[str] = (), fit: bool
     driven = {name: bool(min(ends) < 0 < max(ends)) for name, ends in forces.items()}
     measured = {each.objname for each in spec.sensors if each.type == mujoco.mjtSensor.mjSENS_JOINTPOS}
     losses = prepare(spec, set(without))
+    if assume:
+        give_moments(spec)
     massless = {body.name for body in spec.bodies[1:] if _has_no_mass(body)}
     compiled = compile_spec(spec, path)
     tensors = unbalanced(spec, compiled)
@@ -76,7 +81,10 @@ def _forces(spec: Any) -> dict[str, list[float]]:
 
 
 def parse(path: Path, exact: bool) -> tuple[Any, list[str]]:
-    """The MjSpec of a file, with quarter turns where they are meant, and notes about these."""
+    """The MjSpec of a file, with quarter turns where they are meant, and notes about these.
+
+    Locked tendons of two joints are couplings in it.
+    """
     text, notes = urdf_text(path, exact)
     is_urdf = re.search(r"<robot\b", text) is not None
     if is_urdf:
@@ -87,15 +95,25 @@ def parse(path: Path, exact: bool) -> tuple[Any, list[str]]:
         elif path.suffix == ".xml":
             spec = mujoco.MjSpec.from_file(str(path))
         else:  # MuJoCo decodes only .xml and .urdf
-            spec = mujoco.MjSpec.from_string(text, include=_includes(text, path.parent))
+            included = {name: each.encode() for name, each in sources(path, text).items()}
+            spec = mujoco.MjSpec.from_string(text, include=included)
     except (ValueError, mujoco.FatalError) as error:
-        raise _refused(path, error) from None
+        spec, dropped = _without_forgotten(path, text, error)
+        notes += [f"{each}: not read, MuJoCo {mujoco.__version__} does not know it" for each in dropped]
     spec.compiler.fusestatic = False
     if is_urdf:
         _weigh(spec)
+    join_locked(spec)
     if not exact:
         notes += _quarter_turns(spec)
     return spec, notes
+
+
+def _without_forgotten(path: Path, text: str, error: Exception) -> tuple[Any, list[str]]:
+    try:
+        return forgotten(path, text, error)
+    except (ValueError, mujoco.FatalError) as last:
+        raise _refused(path, last) from None
 
 
 def urdf_text(path: Path, exact: bool) -> tuple[str, list[str]]:
@@ -120,15 +138,6 @@ def _weigh(spec: Any) -> None:
         if not (body.explicitinertial or body.mass):
             least = LEAST_MASS if body.joints else 0.0
             body.mass, body.inertia, body.explicitinertial = least, [least * 1e-6] * 3, True
-
-
-def _includes(text: str, folder: Path) -> dict[str, bytes]:
-    found: dict[str, bytes] = {}
-    for name in _INCLUDE.findall(text):
-        if (folder / name).is_file():
-            data = (folder / name).read_bytes()
-            found |= {name: data, **_includes(data.decode("utf-8", "replace"), folder)}
-    return found
 
 
 def _quarter_rpy(match: re.Match[str], notes: list[str]) -> str:
@@ -252,11 +261,6 @@ def _is_geom(wrap: Any) -> bool:
     return wrap.type in (mujoco.mjtWrap.mjWRAP_SPHERE, mujoco.mjtWrap.mjWRAP_CYLINDER)
 
 
-def is_lock(equality: Any) -> bool:
-    """Whether an equality makes one joint follow another."""
-    return bool(equality.type == mujoco.mjtEq.mjEQ_JOINT and equality.name2 and equality.active)
-
-
 def _loss(what: str, elements: Iterable[Any], counts: Any = lambda each: True) -> Loss:
     places = tuple(getattr(each, "name", "") or "(no name)" for each in elements if counts(each))
     return Loss(what, places)
@@ -278,6 +282,8 @@ def compile_spec(spec: Any, path: Path) -> Any:
 
 def _refused(path: Path, error: Exception) -> InputError:
     reason = " ".join(str(error).split())
+    if "eigenvalues" in reason:
+        reason += "; --assume-tensors assumes a solid body instead"
     needed = "Error opening file" in reason and "include" not in reason
     missing = "; the mass of a body is computed from it: get the file, or give the body an inertial" if needed else ""
     return InputError(Fault(file=str(path), message=f"is refused by MuJoCo {mujoco.__version__}: {reason}{missing}"))

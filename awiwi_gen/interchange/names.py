@@ -40,13 +40,14 @@ def plain(text: str) -> str:
 def joint_names(fingers: Mapping[str, list[str]]) -> dict[str, str]:
     """Published name -> name in the hand file, for all joints of all fingers.
 
-    A prefix that all joints of the hand have is dropped, and the finger's name where all its joints begin with it.
+    A prefix that all joints of the hand have is dropped, and the finger's name where all its joints begin with it and a
+    letter follows.
     """
     common = _common([name for names in fingers.values() for name in names])
     found: dict[str, str] = {}
     for finger, names in fingers.items():
         short = {name: plain(name.removeprefix(common)) for name in names}
-        own = f"{finger}_" if all(each.startswith(f"{finger}_") for each in short.values()) else ""
+        own = f"{finger}_" if all(re.match(f"{finger}_[a-z]", each) for each in short.values()) else ""
         found |= _unique({name: _fitted(each.removeprefix(own)) for name, each in short.items()})
     return found
 

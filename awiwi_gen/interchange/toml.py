@@ -151,7 +151,7 @@ def _link_lines(link: DraftLink, file: str) -> list[str]:
     sources = dict.fromkeys(link.assumed, "assumed")
     if link.mass is not None:
         lines += [f"{key} = {each}" for key, each in mass_and_inertia(link.mass, link.com, link.inertia).items()]
-        sources |= dict.fromkeys(("mass", "com", "inertia"), body)
+        sources |= {key: sources.get(key, body) for key in ("mass", "com", "inertia")}
     inertia, torque, unit = ("kg", "N", "m") if link.slides else ("kg m^2", "N m", "rad")
     if joint.armature:
         lines += [f"armature = {_text(quantity(joint.armature, inertia))}"]

@@ -348,4 +348,7 @@ def joint_estimate(finger: Any, h: Any, start: Any, measured: Any = None) -> Any
     subject="joint_estimate",
 )
 def joint_estimate_error(finger: Any, q: Any, noise: Any) -> Any:
-    """Errors of the joint estimate: covariance for lengths with standard deviation noise, worst for errors up to noise."""
+    """Errors of the joint estimate: covariance for lengths with standard deviation noise, worst for errors up to noise.
+
+    Where springs tell the rest, the finger rests at q, and no joint is at a stop: one that is has no error there.
+    """

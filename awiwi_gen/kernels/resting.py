@@ -11,7 +11,7 @@ import math
 from awiwi_gen.hand.parts import Finger
 from awiwi_gen.kernel import Solver
 from awiwi_gen.kernels.estimates import NEAR, SLIDE_UNIT, joint_limits, limit_paths
-from awiwi_gen.structure import determined, resting_parts
+from awiwi_gen.structure import determined, resting
 
 LENGTH = 2.0**-7  # m, the solver's unit of lengths: near the arms that tendons have at hinges
 STEPS = 24  # evaluations of the balance between two changes of stops
@@ -33,8 +33,7 @@ def energy_unit(finger: Finger) -> float:
 def resting_estimate(finger: Finger) -> Solver:
     """The solver of a finger with resting joints."""
     low, high = joint_limits(finger)
-    joints = sorted({j for part, _ in resting_parts(finger) for j in part})
-    tendons = sorted({i for _, part in resting_parts(finger) for i in part})
+    joints, tendons = resting(finger)
     known, lengths = determined(finger)
     size = len(low) + len(finger.transmissions)
     calls = 2 + (STEPS - 1) * bool(known) + rounds(len(joints)) * (STEPS + 1)

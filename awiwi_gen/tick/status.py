@@ -7,7 +7,7 @@ from functools import cache
 
 from awiwi_gen.resources import CSRC
 
-LAWS = ("motor_impedance", "cascade")
+LAWS = ("motor_impedance", "cascade", "backstepping")
 MODES = ("off", "run", "hold", "ramp", "fault")
 FAULTS = (1 << 8) - 1
 

@@ -92,7 +92,7 @@ class Motion:
         return self.at("passive_torque", at_rest)["passive"] if passive_torque else 0 * self.inputs["qd"]
 
     def per_radian(self, output: Tensor) -> Tensor:
-        """The size of the rate of an output of joint angles, whose derivatives are about as large as itself."""
+        """The size of the rate of an output of joint angles, whose derivatives are about as large; they may cancel."""
         return np.array([_largest(output) * _largest(self.inputs["qd"])])
 
 
@@ -217,7 +217,7 @@ def the_jacobian_gives_the_velocity_of_the_tip(x: Motion, jacobian: Any, fingert
 def the_jacobian_gives_the_angular_velocity_of_the_tip(x: Motion, jacobian: Any, fingertip_pose: Any) -> Residual:
     omega = _times(jacobian["J"], x.inputs["qd"])[:, 3:]
     spin = x.rate("fingertip_pose", "T", q=x.inputs["qd"])[:, :3, :3] @ _transposed(fingertip_pose["T"][:, :3, :3])
-    return np.stack([spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0]], axis=1) - omega, omega
+    return np.stack([spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0]], axis=1) - omega, _terms(omega, x.per_radian(ONE))
 
 
 def the_derivatives_are_the_rates_of_the_inverse_dynamics(

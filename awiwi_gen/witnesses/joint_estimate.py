@@ -6,14 +6,24 @@ positive definite; forces that act at once leave these tendons without stretch, 
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import casadi as ca
 from casadi import SX
 
-from awiwi_gen.structure import Finger, determined, leaders, resting_parts, straight
+from awiwi_gen.structure import (
+    Finger,
+    determined,
+    independent,
+    leaders,
+    resting,
+    resting_parts,
+    rests_in_a_bend,
+    straight,
+)
 from awiwi_gen.witnesses.joints import passive_springs
-from awiwi_gen.witnesses.tendons import coupling, tendon_lengths
+from awiwi_gen.witnesses.tendons import coupling, resting_balance, tendon_lengths
 
 Hand = Any
 
@@ -50,7 +60,8 @@ def joint_estimate(finger: Finger, h: SX, start: SX, measured: SX | None = None)
             continue
         stiff = _stiffness(finger, P, joints, tendons)
         pulls = stiff * P[tendons, joints].T @ missing[tendons]
-        found = _eliminate(*_energy(finger, P, joints, tendons), ca.vertcat(pulls - torques[joints], missing[tendons]))
+        fit = _fit(finger, tendons) @ missing[tendons]
+        found = _eliminate(*_energy(finger, P, joints, tendons), ca.vertcat(pulls - torques[joints], fit))
         about[joints] = found[: len(joints), :]
     return about
 
@@ -58,6 +69,9 @@ def joint_estimate(finger: Finger, h: SX, start: SX, measured: SX | None = None)
 def joint_estimate_error(finger: Finger, q: SX, noise: SX) -> tuple[SX, SX]:
     """Covariance (n x n) [rad^2] and worst errors (n) [rad], from R alone: (P'P)^-1 = R^-1 R^-T; zero where measured."""
     P = coupling(finger, q)
+    if rests_in_a_bend(finger):
+        slopes = _slopes_at_rest(finger, P, q)
+        return noise**2 * slopes @ slopes.T, noise * ca.sum2(ca.fabs(slopes))
     covariance, worst = SX.zeros(q.numel(), q.numel()), SX.zeros(q.numel())
     joints, tendons = determined(finger)
     if joints:
@@ -68,10 +82,38 @@ def joint_estimate_error(finger: Finger, q: SX, noise: SX) -> tuple[SX, SX]:
     for joints, tendons in resting_parts(finger):
         if tendons:
             pulls = _stiffness(finger, P, joints, tendons) * P[tendons, joints].T
-            left = _eliminate(*_energy(finger, P, joints, tendons), ca.vertcat(pulls, SX.eye(len(tendons))))
+            left = _eliminate(*_energy(finger, P, joints, tendons), ca.vertcat(pulls, _fit(finger, tendons)))
             covariance[joints, joints] = noise**2 * left[: len(joints), :] @ left[: len(joints), :].T
             worst[joints] = noise * ca.sum2(ca.fabs(left[: len(joints), :]))
     return covariance, worst
+
+
+def _slopes_at_rest(finger: Finger, P: SX, q: SX) -> SX:
+    """Derivatives (n x m) [rad/m] of the angles of a finger that rests at q by its tendon lengths.
+
+    The forces are the projection of the springs' torque on the tendons' arms, by Q R of these; they bend the energy, to
+    which tendons with a stiffness are added, as above.
+    """
+    slopes, every, f = SX.zeros(q.numel(), P.size1()), SX.eye(P.size1()), SX.sym("f", P.size1())
+    (known, lengths), (joints, tendons) = determined(finger), resting(finger)
+    if known:
+        Q, R = _gram_schmidt(P[lengths, known])
+        slopes[known, lengths] = _solve_upper(R, Q.T)
+    missing, hessian = resting_balance(finger, q, f)
+    forces = SX.zeros(f.numel())
+    if tendons:
+        Q, R = _gram_schmidt(P[tendons, joints].T)
+        forces[tendons] = -_solve_upper(R, Q.T @ ca.substitute(missing, f, SX.zeros(f.numel()))[joints])
+    hessian = ca.substitute(hessian, f, forces)
+    right = -hessian[joints, known] @ slopes[known, :] if known else SX.zeros(len(joints), f.numel())
+    stiff, arms, dh = SX(0), SX.zeros(0, len(joints)), SX.zeros(0, f.numel())
+    if tendons:
+        arms, dh = P[tendons, joints], every[tendons, :]
+        stiff = finger.strings[0].spring.stiffness if finger.strings else _stiffness(finger, P, joints, tendons)
+    pulled = stiff * arms.T @ dh if tendons else SX.zeros(len(joints), f.numel())
+    found = _eliminate(hessian[joints, joints] + stiff * arms.T @ arms, arms, ca.vertcat(right + pulled, dh))
+    slopes[joints, :] = found[: len(joints), :]
+    return slopes
 
 
 def _stiffness(finger: Finger, P: SX, joints: list[int], tendons: list[int]) -> SX:
@@ -92,7 +134,19 @@ def _energy(finger: Finger, P: SX, joints: list[int], tendons: list[int]) -> tup
     """Second derivatives of the energy of springs and stiff tendons by the angles, and the rows of the lengths."""
     arms = P[tendons, joints]
     stiff = _stiffness(finger, P, joints, tendons)
-    return ca.diag(_springs(finger, P)[joints]) + stiff * arms.T @ arms, arms
+    return ca.diag(_springs(finger, P)[joints]) + stiff * arms.T @ arms, _fit(finger, tendons) @ arms
+
+
+def _fit(finger: Finger, tendons: list[int]) -> SX:
+    """C' (r x m), where C has the arms of all tendons by those of r independent ones: the rows of a least-squares fit.
+
+    Each row is times a number that leaves integers, which CasADi does not round.
+    """
+    rows: list[SX] = []
+    for weights in zip(*independent(finger, tendons)[1], strict=True):
+        times = math.lcm(*(each.denominator for each in weights))
+        rows.append(ca.horzcat(*(SX(int(times * each)) for each in weights)))
+    return ca.vertcat(*rows)
 
 
 def _eliminate(hessian: SX, arms: SX, right: SX) -> SX:

@@ -1,4 +1,4 @@
-/* The whole hand at 3 kHz: awiwi_hand_step drives a simulated hand, in both laws, through a fault and out of it. On a real
+/* The whole hand at 3 kHz: awiwi_hand_step drives a simulated hand, in all laws, through a fault and out of it. On a real
    board sense() reads converters and act() writes drives. Build and run with `make hand` (POSIX) or `make run-hand`
    (bare metal); the digest of all torques is the same on every machine. */
 #include "awiwi.h"
@@ -10,7 +10,7 @@
 #include <string.h>
 
 #ifndef TICKS
-#define TICKS 1000 /* of which the second half runs the second law */
+#define TICKS 1200 /* of which each law runs the same share */
 #endif
 
 enum { FAULTY = 8, FAULT_BEGINS = 200, FAULT_ENDS = 205 };
@@ -56,7 +56,7 @@ static void demand(int tick, const awiwi_real *start)
 {
     for (int j = 0; j < AWIWI_JOINTS; j++)
         input.q_des[j] = start[j] + (tick % 400 < 200 ? (awiwi_real)0.1 : (awiwi_real)-0.1);
-    input.law = tick < TICKS / 2 ? AWIWI_LAW_MOTOR_IMPEDANCE : AWIWI_LAW_CASCADE;
+    input.law = tick / (TICKS / AWIWI_LAWS);
     input.enable = 1;
     if (tick >= FAULT_BEGINS && tick < FAULT_ENDS)
         input.reading_valid[FAULTY] = 0; /* sense() sets it again */
@@ -104,10 +104,12 @@ int main(void)
     meter_print("ticks", TICKS);
     meter_print("status", seen);
     meter_print("digest", (uint32_t)(digest ^ digest >> 32));
-    meter_print("motor impedance, instructions on average", total[0] / (TICKS / 2));
+    meter_print("motor impedance, instructions on average", total[0] / (TICKS / AWIWI_LAWS));
     meter_print("motor impedance, instructions at most", longest[0]);
-    meter_print("cascade, instructions on average", total[1] / (TICKS - TICKS / 2));
+    meter_print("cascade, instructions on average", total[1] / (TICKS / AWIWI_LAWS));
     meter_print("cascade, instructions at most", longest[1]);
+    meter_print("backstepping, instructions on average", total[2] / (TICKS / AWIWI_LAWS));
+    meter_print("backstepping, instructions at most", longest[2]);
     meter_print("stack", deepest);
     meter_print("overruns", late);
     return late != 0;

@@ -12,8 +12,8 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 BOARD = ROOT / "examples" / "firmware"
-STRICT = ("-std=c99", "-ffp-contract=off")  # the documented flags
-PLAIN = ("-std=gnu99",)  # what a project has that never heard of contraction: gcc and clang contract then
+STRICT = ("-std=c99", "-ffp-contract=off", "-fno-math-errno")  # the documented flags
+PLAIN = ("-std=gnu99",)  # what a project has that never heard of them: gcc and clang contract then, and call sqrt
 CONTRACTED = (*PLAIN, "-ffp-contract=fast", "-DAWIWI_ALLOW_CONTRACTION")
 REORDERED = ("-fassociative-math", "-freciprocal-math", "-fno-signed-zeros", "-fno-trapping-math")  # no macro tells
 PACKAGES = {

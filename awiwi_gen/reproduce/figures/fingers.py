@@ -161,7 +161,7 @@ def estimates(library: Any, hand: Hand, finger: str) -> list[Figure]:
                 scatter(inset, result.poses, result.found[noise][count])
                 inset.set_title(f"{count} iterations, {noise * 1e3:g} mm", fontsize=7)
                 inset.set(xticks=[], yticks=[])
-        axes.legend(*inset.get_legend_handles_labels(), loc="upper center", bbox_to_anchor=(0.5, 0.05), ncols=2)
+        axes.legend(*inset.get_legend_handles_labels(), loc="upper center", bbox_to_anchor=(0.5, -0.01), ncols=2)
 
     return [
         Figure(
