@@ -66,9 +66,6 @@ typedef struct awiwi_hand {
                                 awiwi_real *sensitivity);
     int (*reference_filter)(const awiwi_real *motion, const awiwi_real *desired, const awiwi_real *delay,
                             const awiwi_real *period, awiwi_real *next);
-    int (*backstepping)(const awiwi_real *state, const awiwi_real *desired, const awiwi_real *external,
-                        const awiwi_real *bodies, const awiwi_real *spring, const awiwi_real *gains,
-                        const awiwi_real *weights, awiwi_real *tau);
 } awiwi_hand;
 
 /* -- what the caller gives ----------------------------------------------------------------------------------------- */

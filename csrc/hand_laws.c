@@ -6,7 +6,6 @@
 #include <string.h>
 
 static const awiwi_real MOST_TRAVEL = (awiwi_real)0.98; /* of the motors' travel is used */
-static const awiwi_real LEAST = (awiwi_real)1e-6; /* stiffness [N m/rad] and damping [N m s/rad] that a law can have */
 static const awiwi_real NEARBY = (awiwi_real)0.05; /* angle for which the coupling of the last round holds [rad] */
 
 enum { JOINTS = AWIWI_MOST_JOINTS, TENDONS = AWIWI_MOST_TENDONS };
@@ -214,24 +213,22 @@ static void observe(const awiwi_context *now, int j, awiwi_real tau, awiwi_real 
         *load = -tau;
 }
 
-/* How torques of the joints are to change, twice derived, as far as motors do it: tau, rate and push are torques of the
-   tendons' forces and their first two derivatives. */
-static int backstep(const awiwi_context *now, int j, awiwi_real tau, awiwi_real rate, awiwi_real *push)
+/* The second derivative that motors are to give the torque of a joint, from the torque that there is and its rate
+   (eq. 15.71 to 15.81, mended, with the tendons for the spring): errors of torque and rate decay, and the joint is a mass on a
+   spring and a damper. */
+static awiwi_real backstep(const awiwi_context *now, int j, awiwi_real tau, awiwi_real rate)
 {
     const awiwi_hand_state *state = now->state;
     const awiwi_real *motion = state->motion[j], *tunings = now->gains->tunings[j], m = state->inertia[j];
-    const awiwi_real K = now->input->stiffness[j] > LEAST ? now->input->stiffness[j] : LEAST;
-    const awiwi_real D = now->input->damping[j] > LEAST ? now->input->damping[j] : LEAST;
-    const awiwi_real law = K * (motion[0] - state->q[j]) + D * (motion[1] - state->qd[j]) + m * motion[2];
-    const awiwi_real other = state->tau[j] - law; /* weight, end stops, fingertip: what is wanted besides the impedance */
-    const awiwi_real at[4] = {state->q[j], state->qd[j], tau - other, rate};
-    const awiwi_real external[2] = {state->load[j] + other, 0}, bodies[2] = {m, 1}, spring[2] = {state->elastic[j], 0};
-    const awiwi_real gains[4] = {K, D, tunings[0], tunings[1]};
-    awiwi_real motor;
-    if (now->hand->backstepping(at, motion, external, bodies, spring, gains, tunings + 2, &motor) != AWIWI_OK)
-        return 0;
-    *push = spring[0] * (motor - at[2]); /* of a motor of inertia 1 */
-    return 1;
+    unsigned told = 0; /* with the torques already */
+    const awiwi_real K = awiwi_given(now->input->stiffness[j], 0, &told);
+    const awiwi_real D = awiwi_given(now->input->damping[j], 0, &told);
+    const awiwi_real faster = tunings[0], slower = tunings[1], per_weight = 1 / tunings[2];
+    const awiwi_real acceleration = (state->load[j] + tau) / m;
+    const awiwi_real e1 = state->qd[j] - motion[1], e2 = acceleration - motion[2], e3 = rate / m - motion[3];
+    const awiwi_real wrong = tau - state->tau[j], drifts = rate + K * e1 + D * e2 - m * motion[3];
+    const awiwi_real back = (faster * slower + tunings[2] / tunings[3]) * wrong + (faster + slower) * drifts;
+    return state->elastic[j] * acceleration - (back + K * e2 + D * e3 - m * motion[4] + (slower * e1 + e2) * per_weight);
 }
 
 /* The impedance of every joint through the torques of its tendons and their rates, chapter 15; forces that change no torque
@@ -254,11 +251,8 @@ static unsigned backstepping(const awiwi_context *now, const finger_now *own, aw
         || finger->joint_torque(state->q + first, bend, change) != AWIWI_OK)
         return status | AWIWI_NO_LAW;
     for (int i = 0, j = first; i < n; i++, j++) {
-        awiwi_real push;
         observe(now, j, tau[i], own->gained[i]);
-        if (!backstep(now, j, tau[i], taud[i], &push))
-            return status | AWIWI_NO_LAW;
-        change[i] -= push;
+        change[i] -= backstep(now, j, tau[i], taud[i]);
     }
     for (int i = 0, k = t; i < finger->tendons; i++, k++)
         bend[i] += awiwi_dot(state->spread[k], change, n);
