@@ -1,5 +1,5 @@
-/* Ticks of the whole hand in closed loop with inputs drawn to make them dear. With trace-pc coverage it counts the basic blocks
-   of each tick and saves the dearest one of each law; without, it runs a saved tick again, for callgrind.
+/* Ticks of the whole hand in closed loop with inputs drawn to make them dear. With trace-pc coverage it counts the
+   basic blocks of each tick and saves the dearest one of each law; without, it runs a saved tick again, for callgrind.
    Arguments: file, ticks to draw (0 to run the file's), law. */
 #include "awiwi.h"
 #include "hand.h"

@@ -2,9 +2,9 @@
 
 python bench/adversarial.py [--ticks 100000]
 
-The simulated hand runs with demands, gravity, loads, limits of forces, laws and faults of sensors that change at random. The
-compiler counts the basic blocks of every tick; the dearest one of each law is run again under callgrind, which counts its
-instructions on x86-64. It is the worst that was found, and no bound.
+The simulated hand runs with demands, gravity, loads, limits of forces, laws and faults of sensors that change at
+random. The compiler counts the basic blocks of every tick; the dearest one of each law is run again under callgrind,
+which counts its instructions on x86-64. It is the worst that was found, and no bound.
 """
 
 from __future__ import annotations
@@ -42,7 +42,15 @@ def program(scratch: Path, counting: bool) -> Path:
 def instructions(driver: Path, worst: Path, law: int) -> float:
     """Those of the saved tick of a law."""
     profile = worst.with_suffix(f".{law}")
-    command = ["valgrind", "--tool=callgrind", f"--callgrind-out-file={profile}", str(driver), str(worst), "0", str(law)]
+    command = [
+        "valgrind",
+        "--tool=callgrind",
+        f"--callgrind-out-file={profile}",
+        str(driver),
+        str(worst),
+        "0",
+        str(law),
+    ]
     subprocess.run(command, check=True, capture_output=True)
     costs = {name: cost for (_, name), cost in called_costs(profile.read_text(encoding="utf-8")).items()}
     return costs["awiwi_hand_step"]
