@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from decimal import Decimal
+from math import prod
 from numbers import Real
 from typing import Any
 
@@ -11,6 +12,7 @@ import numpy as np
 
 Array = np.ndarray[Any, Any]
 Shape = tuple[int, ...]
+Samples = tuple[Array, int, int]  # an array to point at, the steps from sample to sample and element to element
 
 KINDS = {"c": "complex numbers", "U": "text", "S": "bytes", "M": "dates", "m": "durations", "V": "records"}
 
@@ -70,3 +72,34 @@ def direct_call(
     exec(text, names)  # noqa: S102 names and numbers of a checked manifest
     made: Callable[..., Any] = names["call"]
     return made
+
+
+def as_samples(array: Array, own: tuple[int, ...], lead: tuple[int, ...], shape: tuple[int, ...]) -> Samples:
+    """An input as samples and elements that are evenly apart; the step between elements is 0 where there is one."""
+    size = prod(shape)
+    tight = size, int(size > 1)
+    flags = array.flags
+    if flags.c_contiguous and flags.aligned and (own == lead or not own):
+        return array, size if own else 0, tight[1]
+    if not prod(lead):
+        return np.empty(0, array.dtype), *tight
+    matrix = array if array.ndim == 2 and own == lead and len(lead) == 1 else rows(array, lead + shape, size)
+    (step, misfit), (element, askew) = (divmod(stride, array.itemsize) for stride in matrix.strides)
+    if misfit or askew or not flags.aligned or (size > 1 and not element):
+        return np.array(matrix, order="C"), *tight
+    return matrix, step, element if size > 1 else 0
+
+
+def packed(array: Array, step: int, element: int) -> tuple[Array, int]:
+    """The same with elements one after another."""
+    return (array, step) if element in (0, 1) else (np.array(array, order="C"), array.shape[1])
+
+
+def rows(array: Array, shape: tuple[int, ...], size: int) -> Array:
+    """An array broadcast to a shape, as a matrix with a row for each sample."""
+    return np.broadcast_to(array, shape).reshape(-1, size)
+
+
+def rolled(array: Array, count: int) -> Array:
+    """The first so many dimensions after the others."""
+    return array.transpose(*range(count, array.ndim), *range(count))

@@ -121,6 +121,7 @@ def load(directory: str | Path, store: Cache | None = None) -> Library:
     BuildError where it refuses the code.
     """
     from awiwi_gen.library import Library
+    from awiwi_gen.views import names_in
 
     directory, store = Path(directory), store or Cache()
     manifest = read_manifest(directory)
@@ -145,7 +146,8 @@ def load(directory: str | Path, store: Cache | None = None) -> Library:
         return batch_function(entry, manifest, directory, store, frozenset(objects), module.ffi)
 
     origin = (load_again, (str(directory.resolve()), str(store.directory.resolve()), digest))
-    return Library(manifest, module.lib, module.ffi, vectorised, origin)
+    names = names_in(_text(directory / "hand.h"), manifest["prefix"])
+    return Library(manifest, module.lib, module.ffi, vectorised, origin, names=names)
 
 
 _MODULES: dict[str, Any] = {}  # by the digest of their library: a process maps each once
@@ -158,6 +160,11 @@ def load_again(directory: str, cached: str, digest: str) -> Library:
     if library.origin[1] != (directory, cached, digest):
         raise BuildError(f"{directory} has changed since its library was pickled; build and pickle it again")
     return library
+
+
+def _text(path: Path) -> str:
+    """What a file holds, or nothing where there is none."""
+    return path.read_text(encoding="utf-8") if path.is_file() else ""
 
 
 def _linked(name: str, glue: str, directory: Path, store: Cache, scratch: Path) -> bytes:

@@ -18,12 +18,13 @@ from typing import Any
 
 import numpy as np
 
-from awiwi_gen.arrays import as_numbers, direct_call
-from awiwi_gen.errors import BuildError, InputError, OutputError
+from awiwi_gen.arrays import Samples, as_numbers, as_samples, direct_call, packed, rolled
+from awiwi_gen.docstrings import docstring
+from awiwi_gen.errors import BuildError, InputError, OutputError, unknown
 from awiwi_gen.ir.cost import SINCOS
+from awiwi_gen.views import FingerView, Names, PartView
 
 Array = np.ndarray[Any, Any]
-Samples = tuple[Array, int, int]  # an array to point at, the steps from sample to sample and element to element
 Place = tuple[Any, int, tuple[int, ...]]  # pointer to the samples, step between them, steps that a loop is given
 
 C_TYPES = {"d": "double", "f": "float", "i": "int"}  # by NumPy's characters
@@ -71,7 +72,7 @@ class KernelFunction:
         self.cost: dict[str, int] = dict(entry["cost"])
         self.inputs: list[dict[str, Any]] = entry["inputs"]
         self.outputs: list[dict[str, Any]] = entry["outputs"]
-        self.__doc__ = f"{self.doc}\n\n{self.signature}\nSource: {self.source}."
+        self.__doc__ = docstring(entry)
         self.dtype = library.dtype
         self.flat = flat
         self._entry, self._library, self._loop = entry, library, loop
@@ -86,7 +87,8 @@ class KernelFunction:
         if entry["status"]:
             self._results.append(((), 1, np.dtype(np.intc)))
             fields.append("status")
-        self._result = result_type(self.name, tuple(fields))
+        self.results = tuple(fields)
+        self._result = result_type(self.name, self.results)
         pointer = partial(library.ffi.from_buffer, library.ffi.typeof(C_TYPES[self.dtype.char] + "[]"))
         c = getattr(library.c, f"{library.manifest['prefix']}_{self.name}")
         self._direct = direct_call(
@@ -125,7 +127,7 @@ class KernelFunction:
         leads = [a.shape[: a.ndim - len(shape)] for a, shape in zip(arrays, self._shapes, strict=True)]
         several = {lead for lead in leads if lead}
         lead = self._common(leads, arrays) if len(several) > 1 else several.pop() if several else ()
-        samples = [_samples(a, own, lead, shape) for a, own, shape in zip(arrays, leads, self._shapes, strict=True)]
+        samples = [as_samples(a, own, lead, shape) for a, own, shape in zip(arrays, leads, self._shapes, strict=True)]
         steps = {abs(element) > abs(step) for _, step, element in samples if step and element}
         by_element = steps == {True}
         results = self._targets(lead, by_element, out, arrays)
@@ -133,7 +135,7 @@ class KernelFunction:
         if out is not None:
             return out
         if by_element:
-            results = [_rolled(result, result.ndim - len(lead)) for result in results]
+            results = [rolled(result, result.ndim - len(lead)) for result in results]
         return results[0] if len(results) == 1 else self._result(*results)
 
     def _targets(self, lead: tuple[int, ...], by_element: bool, out: Any, arrays: list[Array]) -> list[Array]:
@@ -150,7 +152,7 @@ class KernelFunction:
         wanted = [(lead + shape, dtype) for shape, _, dtype in self._results]
         if found != wanted:
             raise InputError(f"{self.name}: out is {_described(found)}; expected {_described(wanted)}")
-        targets = [_rolled(one, len(lead)) if by_element else one for one in given]
+        targets = [rolled(one, len(lead)) if by_element else one for one in given]
         if not all(one.flags.carray for one in targets):
             order = "elements" if by_element else "samples"
             raise InputError(
@@ -174,13 +176,13 @@ class KernelFunction:
                 places[-1] = (*places[-1][:2], ())
             self._run(loop, n, places)
             return
-        packed = [np.empty(lead + shape, dtype) for shape, _, dtype in self._results] if by_element else results
-        places = [(pointer(array), step, (step,)) for array, step in (_packed(*each) for each in samples)]
-        places += [(pointer(r), size, ()) for r, (_, size, _) in zip(packed, self._results, strict=True)]
+        made = [np.empty(lead + shape, dtype) for shape, _, dtype in self._results] if by_element else results
+        places = [(pointer(array), step, (step,)) for array, step in (packed(*each) for each in samples)]
+        places += [(pointer(r), size, ()) for r, (_, size, _) in zip(made, self._results, strict=True)]
         self._run(self._loop, n, places)
         if by_element:
-            for result, each in zip(results, packed, strict=True):
-                result[...] = _rolled(each, len(lead))
+            for result, each in zip(results, made, strict=True):
+                result[...] = rolled(each, len(lead))
 
     def _run(self, loop: Any, n: int, places: list[Place]) -> None:
         """Evaluate n samples, in equal parts on several cores where that pays for the threads."""
@@ -252,37 +254,6 @@ def _described(arrays: list[tuple[tuple[int, ...], Any]]) -> str:
     return ", ".join(f"{shape} of {dtype}" for shape, dtype in arrays)
 
 
-def _samples(array: Array, own: tuple[int, ...], lead: tuple[int, ...], shape: tuple[int, ...]) -> Samples:
-    """An input as samples and elements that are evenly apart; the step between elements is 0 where there is one."""
-    size = prod(shape)
-    packed = size, int(size > 1)
-    flags = array.flags
-    if flags.c_contiguous and flags.aligned and (own == lead or not own):
-        return array, size if own else 0, packed[1]
-    if not prod(lead):
-        return np.empty(0, array.dtype), *packed
-    rows = array if array.ndim == 2 and own == lead and len(lead) == 1 else _rows(array, lead + shape, size)
-    (step, misfit), (element, askew) = (divmod(stride, array.itemsize) for stride in rows.strides)
-    if misfit or askew or not flags.aligned or (size > 1 and not element):
-        return np.array(rows, order="C"), *packed
-    return rows, step, element if size > 1 else 0
-
-
-def _packed(array: Array, step: int, element: int) -> tuple[Array, int]:
-    """The same with elements one after another."""
-    return (array, step) if element in (0, 1) else (np.array(array, order="C"), array.shape[1])
-
-
-def _rows(array: Array, shape: tuple[int, ...], size: int) -> Array:
-    """An array broadcast to a shape, as a matrix with a row for each sample."""
-    return np.broadcast_to(array, shape).reshape(-1, size)
-
-
-def _rolled(array: Array, count: int) -> Array:
-    """The first so many dimensions after the others."""
-    return array.transpose(*range(count, array.ndim), *range(count))
-
-
 class Library(Mapping[str, KernelFunction]):
     """All kernels of a compiled hand, by name as attributes or items.
 
@@ -303,6 +274,7 @@ class Library(Mapping[str, KernelFunction]):
         vectorised: Callable[[Mapping[str, Any]], Any],
         origin: tuple[Callable[..., Library], tuple[str, ...]],
         numbers: list[float] | None = None,
+        names: Mapping[str, Names] | None = None,
     ) -> None:
         self.dtype = np.dtype(np.float64 if manifest["c_type"] == "double" else np.float32)
         prefix = manifest["prefix"]
@@ -312,6 +284,7 @@ class Library(Mapping[str, KernelFunction]):
         self.threads: int = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
         self.vectorise_after: float = VECTORISE_AFTER
         self.origin = origin  # a function and its arguments that load this library in another process
+        self.names = dict(names or {})
         self._vectorised = vectorised
         self._kernels = {}
         self._own_numbers, self.params = numbers, None
@@ -325,9 +298,29 @@ class Library(Mapping[str, KernelFunction]):
             loop = getattr(lib, f"Batch_{entry['name']}")
             self._kernels[entry["name"]] = KernelFunction(entry, self, loop, lib.FlatKernels[place], params)
 
+    def finger(self, name: str) -> FingerView:
+        """One finger: its kernels without its name, its joints and tendons. Raises InputError for a name it lacks."""
+        if name not in self.names:
+            raise unknown("finger", name, self.names, f"this hand has {', '.join(self.names) or 'no hand.h'}")
+        return FingerView(self, name)
+
+    def part(self, name: str) -> PartView:
+        """The kernels whose names begin with a part's, such as "wrist" or "motor"; raises InputError if there are none."""
+        parts = dict.fromkeys(kernel.partition("_")[0] for kernel in self)
+        if name not in parts:
+            raise unknown("part", name, parts, f"this hand has {', '.join(parts)}")
+        return PartView(self, name)
+
     def with_numbers(self, values: Iterable[float]) -> Library:
         """The same kernels with other numbers, where they read any: in the order of the manifest's list of numbers."""
-        return Library(self.manifest, self.c, self.ffi, self._vectorised, self.origin, list(values))
+        return Library(self.manifest, self.c, self.ffi, self._vectorised, self.origin, list(values), self.names)
+
+    def default_numbers(self) -> Array:
+        """The numbers that kernels read at run time, as they were generated; none where all are in the code."""
+        if self.params is None:
+            return np.zeros(0)
+        numbers = getattr(self.c, f"{self.manifest['prefix']}_default_numbers")
+        return np.frombuffer(self.ffi.buffer(self.ffi.addressof(numbers)), float).copy()
 
     def change_numbers(self, values: Array) -> None:
         """Change the numbers of a library that `with_numbers` made, in place; doubles in the same order."""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from samples import fields, points, same_bits, tree, vectorised
 
-from awiwi_gen import library as library_module
+from awiwi_gen.arrays import as_samples
 from awiwi_gen.build import load
 from awiwi_gen.errors import InputError
 
@@ -57,7 +57,7 @@ def test_the_layout_of_an_input_does_not_matter(jaw, view):
     ],
 )
 def test_inputs_whose_samples_are_evenly_apart_are_not_copied(array, lead, step, element):
-    rows, *found = library_module._samples(array, array.shape[:-1], lead, (4,))
+    rows, *found = as_samples(array, array.shape[:-1], lead, (4,))
 
     assert found == [step, element]
     assert np.shares_memory(rows, array)

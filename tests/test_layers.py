@@ -26,7 +26,7 @@ COMPILER = [
     ["kernel", "cache", "sources"],
     ["ir"],
     ["emit"],
-    ["library", "arrays", "compiler"],
+    ["library", "arrays", "compiler", "docstrings", "views"],
     ["build"],
     ["verify"],
 ]
@@ -53,7 +53,7 @@ TOP = [
         "diff",
         "certificates",
     ],
-    ["loops", "identify", "tick", "interchange"],
+    ["loops", "identify", "tick", "interchange", "gym"],
     [*ROOMS],
     ["study"],
     ["__init__"],
@@ -67,6 +67,7 @@ HOMES = {
     "cffi": {"build.py"},
     "mujoco": {"interchange/mjcf.py", "interchange/published.py", "interchange/wraps.py"},
     "distributed": {"study/cluster.py"},
+    "gymnasium": {"gym/environments.py"},
 }
 FILES = sorted(path for path in PACKAGE.rglob("*.py"))
 

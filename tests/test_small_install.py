@@ -14,7 +14,7 @@ import pytest
 from commands import ONE_FINGER, small  # noqa: F401 a fixture
 
 import awiwi_gen
-from awiwi_gen.extras import COMMAND_LINE, EXTRAS, GENERATE, HAND, INTERCHANGE, ORDER
+from awiwi_gen.extras import COMMAND_LINE, EXTRAS, GENERATE, HAND, INTERCHANGE, LEARN, ORDER
 
 BEYOND_CLI = sorted(EXTRAS.keys() - COMMAND_LINE)
 HIDE = "import sys; sys.modules.update(dict.fromkeys({!r}))\n"  # None there is a module that cannot be found
@@ -38,15 +38,16 @@ lib = awiwi_gen.load(sys.argv[1])
 lib.vectorise_after = 0  # the loop for vector units is compiled too
 again = pickle.loads(pickle.dumps(lib.jaw_coupling))
 q = [[0.1, 0.2], [0.3, 0.1]]
-print(json.dumps([lib.jaw_coupling(q).tolist(), again(q[0]).tolist(), sorted(sys.modules)]))
+print(json.dumps([lib.jaw_coupling(q).tolist(), again(q[0]).tolist(), lib.finger('jaw').joints, sorted(sys.modules)]))
 """
     done = python(code, small, hidden=EXTRAS, cwd=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
-    coupling, again, modules = json.loads(done.stdout)
+    coupling, again, joints, modules = json.loads(done.stdout)
     expected = awiwi_gen.load(str(small)).jaw_coupling([[0.1, 0.2], [0.3, 0.1]])
 
     assert np.array_equal(coupling, expected)
     assert np.array_equal(again, expected[0])
+    assert joints == ["root", "mid"]
     assert not [name for name in modules if "definitions" in name or "witnesses" in name]
 
 
@@ -144,6 +145,7 @@ def test_the_extras_are_those_of_the_project(root):
         assert f"awiwi_gen[{before}]" in own[extra]
         own[extra].remove(f"awiwi_gen[{before}]")
     own[INTERCHANGE] = set(project["optional-dependencies"][INTERCHANGE]) - {"awiwi_gen[generate]"}
+    own[LEARN] = set(project["optional-dependencies"][LEARN])
     for extra, packages in own.items():
         names = {package.partition(">=")[0] for package in packages}
         assert names == {package for package, of in EXTRAS.values() if of == extra}
