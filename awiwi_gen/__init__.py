@@ -27,15 +27,16 @@ from awiwi_gen.errors import (
     OutputError,
     VerificationError,
 )
-from awiwi_gen.extras import GENERATE, HAND, require
+from awiwi_gen.extras import COMMAND_LINE, GENERATE, HAND, require
 
 if TYPE_CHECKING:
+    from awiwi_gen.drawing import Drawing
     from awiwi_gen.hand import Hand
     from awiwi_gen.library import Library
 
 __all__ = [
     "AwiwiError", "BuildError", "DimensionError", "Hand", "InputError", "MissingExtraError", "OutputError",
-    "VerificationError", "build", "load",
+    "VerificationError", "build", "load", "plot",
 ]  # fmt: skip
 
 Scalar = Literal["f64", "f32"]
@@ -93,3 +94,14 @@ def build(
     library = load(directory, job.store)
     progress("compile", 1, 1)
     return library
+
+
+def plot(hand: Hand, before: Hand | None = None) -> Drawing:
+    """A drawing of the hand with its tendons, true to scale; over a hand ``before`` where they differ.
+
+    A notebook shows it; a script writes it to a file: ``plot(hand).save("hand.svg")``.
+    """
+    require("awiwi_gen.plot", *HAND, *COMMAND_LINE)
+    from awiwi_gen.drawing import drawing
+
+    return drawing(hand, before)

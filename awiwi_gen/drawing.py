@@ -38,6 +38,19 @@ polyline, path { fill: none; stroke: currentColor; stroke-linejoin: round; strok
 """
 
 
+class Drawing(str):
+    """The text of an SVG file, which notebooks show as a picture."""
+
+    def _repr_svg_(self) -> str:
+        return str(self)
+
+    def save(self, path: str | Path) -> None:
+        """Write it to a file, all or nothing. Raises OutputError where that cannot be."""
+        from awiwi_gen.writing import write_whole
+
+        write_whole(Path(path), str(self))
+
+
 def show(
     hand: HandFile = None,
     output: Annotated[Path, typer.Option("--output", "-o", help="SVG file to write.")] = Path("hand.svg"),
@@ -63,7 +76,7 @@ def show(
     return 0
 
 
-def drawing(hand: Hand, before: Hand | None = None) -> str:
+def drawing(hand: Hand, before: Hand | None = None) -> Drawing:
     """The hand as SVG text: one row for each finger, all at one scale, over those of a hand ``before`` that differ."""
     from awiwi_gen.hand.pose import Chain
 
@@ -82,7 +95,7 @@ def drawing(hand: Hand, before: Hand | None = None) -> str:
         top = _finger(root, name, chain, olds.get(name), scale, top + GAP)
     root.set("viewBox", f"0 0 {WIDTH:g} {top + MARGIN:.0f}")
     ElementTree.indent(root)
-    return ElementTree.tostring(root, encoding="unicode") + "\n"
+    return Drawing(ElementTree.tostring(root, encoding="unicode") + "\n")
 
 
 def skeleton(chain: Chain, q: Sequence[float]) -> Array:

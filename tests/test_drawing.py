@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from commands import ONE_FINGER, complaint, told
 
+import awiwi_gen
 from awiwi_gen.drawing import VIEW, drawing, skeleton
 from awiwi_gen.hand import Hand
 from awiwi_gen.hand.pose import Chain
@@ -85,3 +86,11 @@ def test_a_faulty_hand_leaves_the_drawing_that_is_there(tmp_path):
 
     assert "prefix" in complaint("show", "--hand", tmp_path / "hand.toml", "-o", tmp_path / "one.svg")
     assert (tmp_path / "one.svg").read_text(encoding="utf-8") == "old"
+
+
+def test_a_plot_is_a_picture_for_notebooks_and_a_file_for_scripts(tmp_path):
+    hand = Hand.load(STARTER_HAND)
+    plotted = awiwi_gen.plot(hand)
+    plotted.save(tmp_path / "hand.svg")
+
+    assert plotted._repr_svg_() == drawing(hand) == (tmp_path / "hand.svg").read_text(encoding="utf-8")

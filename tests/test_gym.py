@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 
 import numpy as np
@@ -160,6 +161,18 @@ def test_hands_of_other_numbers_move_otherwise_and_come_of_the_seed(runtime):
     assert np.allclose(run(1, 1e-9), run(2, 1e-9), rtol=1e-6)
 
 
+def test_the_numbers_that_are_drawn_are_those_that_the_patterns_name_within_their_spread(runtime):
+    envs = FingerVectorEnv(2, runtime, "jaw", Physics(damping=0.0), spread=0.1, varied=["links[0].*", "pulleys*"])
+    paths = [entry["path"] for entry in runtime.manifest["params"]["numbers"]]
+    library = envs._fingers[0].view.library
+    envs.reset(seed=1)
+    change = np.array(library._own_numbers) / runtime.default_numbers() - 1
+    drawn = [path for path, share in zip(paths, change, strict=True) if share]
+
+    assert drawn == [p for p in paths if p.startswith(("fingers.jaw.links[0].", "fingers.jaw.pulleys"))]
+    assert np.abs(change).max() <= 0.1 + 1e-12
+
+
 def test_what_cannot_be_is_refused_with_what_can(lib, runtime):
     with pytest.raises(InputError, match=r"damping = 1 N m s/rad is too strong .* expected at most 0\.000\d"):
         FingerEnv(lib, physics=Physics(damping=1.0))
@@ -177,3 +190,13 @@ def test_what_cannot_be_is_refused_with_what_can(lib, runtime):
         FingerEnv(lib, "indx")
     with pytest.raises(InputError, match=r"actions of shape \(2, 3\); expected numbers of shape \(2, 4\)"):
         FingerVectorEnv(2, lib).step(np.zeros((2, 3)))
+
+
+def test_the_example_of_the_guide_runs(root, lib, monkeypatch, capsys):
+    example = re.search(r"```python\n(.*?)```", (root / "docs" / "learning.md").read_text(encoding="utf-8"), re.DOTALL)[
+        1
+    ]
+    monkeypatch.setattr(awiwi_gen, "load", lambda place: lib)
+    exec(example.replace("1024", "16").replace("range(50)", "range(2)"), {})  # noqa: S102 our own text
+
+    assert capsys.readouterr().out.startswith("(16, 14) 0.0")

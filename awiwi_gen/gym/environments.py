@@ -33,7 +33,8 @@ class FingerVectorEnv(VectorEnv):  # type: ignore[misc]
     off after ``steps`` actions. An episode that ended begins anew at the next step, whose action counts for nothing.
 
     ``hands`` groups of fingers have numbers of their own, drawn evenly within ``spread`` (a share) at every reset of
-    all: those of the finger that fit the patterns ``varied``. This needs a library built with ``params="runtime"``.
+    all: those whose paths below the finger fit a pattern of ``varied``. This needs a library that was built
+    with ``params="runtime"``.
 
     Without a library the packaged hand is built. Raises InputError for a finger, numbers or kernels that are not there.
     """
@@ -173,11 +174,13 @@ class Spread:
             raise InputError(f"spread = {spread!r}; expected a share from 0 to below 1")
         paths = [entry["path"] for entry in layout["numbers"]]
         own = f"fingers.{finger}."
-        chosen = [
-            p.startswith(own) and any(fnmatchcase(p, pattern.replace("[", "[[]")) for pattern in varied) for p in paths
-        ]
+        relative = [path.removeprefix(own) if path.startswith(own) else "" for path in paths]
+        patterns = [pattern.replace("[", "[[]") for pattern in varied]
+        chosen = [bool(path) and any(fnmatchcase(path, pattern) for pattern in patterns) for path in relative]
         if not any(chosen):
-            raise InputError(f"varied = {list(varied)!r} fits no number of {finger}; such are {', '.join(paths[:3])}")
+            raise InputError(
+                f"varied = {list(varied)!r} fits no number of {finger}; such are {', '.join(filter(None, relative))}"
+            )
         self._library = library
         self._shares = spread * np.array(chosen, float)
         self._values = library.default_numbers()
