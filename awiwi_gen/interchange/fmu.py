@@ -161,9 +161,8 @@ def _needed(called: Iterable[str], texts: Mapping[str, str]) -> list[str]:
 def _build_description(name: str, code: Iterable[str]) -> str:
     root = ElementTree.Element("fmiBuildDescription", fmiVersion="3.0")
     build = ElementTree.SubElement(root, "BuildConfiguration", modelIdentifier=name)
-    files = ElementTree.SubElement(
-        build, "SourceFileSet", language="C99", compilerOptions="-ffp-contract=off"
-    )  # the bits depend on it
+    options = "-ffp-contract=off -fno-math-errno"  # the bits depend on the first, the time on the second
+    files = ElementTree.SubElement(build, "SourceFileSet", language="C99", compilerOptions=options)
     for source in code:
         if source.endswith(".c"):
             ElementTree.SubElement(files, "SourceFile", name=source)
