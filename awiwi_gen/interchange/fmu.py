@@ -89,6 +89,11 @@ class Unit:
             return made.read_bytes()
 
 
+def names(hand: Hand) -> list[str]:
+    """The identifiers of a hand's units."""
+    return [f"{hand.prefix}_{part}" for part in CALLED]
+
+
 def units(hand: Hand) -> tuple[list[Unit], list[Loss]]:
     """The controller and the plant of a hand, and what they do not hold.
 
