@@ -19,6 +19,7 @@ from awiwi_gen.errors import AwiwiError, InputError, printable
 from awiwi_gen.extras import GENERATE, HAND
 from awiwi_gen.patterns import matches
 from awiwi_gen.resources import DEFAULT_HAND
+from awiwi_gen.tables import fitted, print_table
 
 if absent := extras.missing("awiwi-gen", *extras.COMMAND_LINE):
     exits.leave(exits.SYSTEM, f'{absent}; Python alone has awiwi_gen.load("generated")')
@@ -45,6 +46,7 @@ from awiwi_gen.diff.command import diff
 from awiwi_gen.drawing import show
 from awiwi_gen.editing import init, schema, set_
 from awiwi_gen.explain import explain
+from awiwi_gen.identify.command import identify
 from awiwi_gen.interchange.command import export, import_
 from awiwi_gen.study.command import study
 from awiwi_gen.tick.command import replay, tick
@@ -84,7 +86,7 @@ def command(*needs: str, **settings: Any) -> Callable[[Callable[..., int | None]
 
                     print_json(error_entry(known))
                 else:
-                    print(printable(str(known)), file=sys.stderr)
+                    print(fitted(printable(str(known)), sys.stderr), file=sys.stderr)
                 code = known.exit_code
             raise typer.Exit(code or 0)
 
@@ -167,7 +169,7 @@ def check(
     else:
         more = f", {counted(len(warnings), 'warning')}" if warnings else ""
         print(printable(f"{hand or 'hand.toml'}: {counted(len(job.hand.fingers), 'finger')}, no faults{more}"))
-        print("".join(f"warning: {each}\n" for each in warnings), end="")
+        print("".join(fitted(f"warning: {each}\n", sys.stdout) for each in warnings), end="")
         print_left_out(absent)
         gained = certificate_lines(read, job.store, (hand or DEFAULT_HAND).parent)
         lines = (*estimate_lines(read), *tick_lines(read), *gained)
@@ -219,7 +221,7 @@ def list_(
     assumed: Annotated[bool, typer.Option("--assumed", help="The hand's numbers without a source.")] = False,
 ) -> int:  # fmt: skip
     """List the kernels of the hand with their ports and costs, or its numbers that are assumed."""
-    from awiwi_gen.report import list_kernels, print_json, print_kernels, print_table
+    from awiwi_gen.report import list_kernels, print_json, print_kernels
 
     if output is not None and hand is None and not assumed:
         (print_json if as_json else print_kernels)(terminal.require(output)["kernels"])
@@ -314,14 +316,21 @@ def simulate(
     plant: Annotated[str, typer.Option("--plant", help="Plant of that run.")] = "as known",
     joint: Annotated[str, typer.Option("--joint", help="A joint such as index_pip, or all.")] = "index_pip",
     sensing: Annotated[str, typer.Option("--sensing", help="Of that run: force sensor, or lever.")] = "force sensor",
+    plot: Annotated[Path | None, typer.Option("--plot", help="PNG or SVG file for a plot of that run.")] = None,
     hand: HandFile = None, as_json: Json = False,
 ) -> int:  # fmt: skip
     """Simulate control laws on a joint between two tendons, at the hand's clock rate, and compare the results."""
     from awiwi_gen.compare import benchmark, one_run
 
+    if plot is not None:
+        extras.require("simulate --plot", "matplotlib")
+        if not scenario:
+            raise InputError("--plot shows one run; choose it with --scenario step, load or sine")
     one = scenario != ""
     shown = (
-        one_run(hand, law, gains, scenario, force, plant, joint, sensing) if one else benchmark(hand, law, gains, joint)
+        one_run(hand, law, gains, scenario, force, plant, joint, sensing, plot)
+        if one
+        else benchmark(hand, law, gains, joint)
     )
     shown.show(as_json)
     return 0
@@ -335,6 +344,7 @@ command(*GENERATE)(diff)
 command()(init)
 command(*HAND, ignore_unknown_options=True)(set_)  # "-5 deg" is a value
 command(*HAND)(schema)
+command("scipy", *HAND)(identify)
 command(*HAND)(import_)
 command(*HAND)(export)
 command()(tick)

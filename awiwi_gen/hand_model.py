@@ -54,12 +54,6 @@ OF_HAND = (
     Slot("motor_friction", "motor_friction", ("thd",), 1, optional=True),
     Slot("stiffness_correction", "stiffness_correction_scalar", ("k_eff", "k_mech"), 2),
     Slot("reference_filter", "reference_filter", ("motion", "desired", "delay", "period"), 1),
-    Slot(
-        "backstepping",
-        "backstepping_nonlinear",
-        ("state", "desired", "external", "bodies", "spring", "gains", "weights"),
-        1,
-    ),
 )
 OF_PLANT = (
     Slot("motor_acceleration", "motor_acceleration", ("theta", "thd", "tau", "f"), 1),

@@ -6,6 +6,7 @@ import json
 import math
 import sys
 import textwrap
+import time
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from awiwi_gen.emit.tree import State
 from awiwi_gen.errors import AwiwiError, InputError, printable
 from awiwi_gen.ir.cost import operations_text
+from awiwi_gen.tables import NARROW, print_table
 
 if TYPE_CHECKING:
     from awiwi_gen.hand import Hand
@@ -21,8 +23,9 @@ if TYPE_CHECKING:
     from awiwi_gen.verify.objects import Seal
     from awiwi_gen.verify.verdict import Verdict
 
-NARROW = 80  # characters of a line on the narrowest terminal
+SILENCE = 5.0  # s without a word, after which progress is told to a file, too
 COLUMNS = ("kernel", "operations", "sincos", "worst ulp", "scaled error", "witnesses agree", "verdict")
+NARROW_COLUMNS = ("kernel", "ops", "ulp", "error", "agree", "verdict")  # without sines, to fit 80 characters
 
 
 def print_json(value: Any) -> None:
@@ -69,8 +72,13 @@ def print_numbers(rows: Sequence[Mapping[str, Any]], file: Path | None, size: in
 
 def print_proof(proof: Proof, manifest: Mapping[str, Any]) -> None:
     """The proof sheet: a table of kernels, the laws of physics, a sentence."""
-    rows = proof_rows(proof.verdicts, manifest)
-    print_table(COLUMNS, rows, f"{manifest['hand']}: {len(rows)} kernels, {manifest['c_type']}")
+    rows = [
+        (name, count.replace(" + solver", "*"), *others)
+        for name, count, _, *others in proof_rows(proof.verdicts, manifest)
+    ]
+    print_table(NARROW_COLUMNS, rows, f"{manifest['hand']}: {len(rows)} kernels, {manifest['c_type']}")
+    print("ops: operations, * without a solver's own; ulp, error: the largest, error as a")
+    print("share of the output; agree: difference of the two derivations, likewise")
     parts = dict.fromkeys(law.part for law in proof.laws)
     for part in parts:
         laws = [law for law in proof.laws if law.part == part]
@@ -98,23 +106,6 @@ def seal_lines(seal: Seal) -> list[str]:
     return faults or [
         f"single precision: {seal.examined} objects compute nothing in double and call no double function"
     ]
-
-
-def print_table(columns: Sequence[str], rows: Sequence[Sequence[str]], title: str = "") -> None:
-    """Aligned columns, never shortened; on a terminal, rows of failed kernels are red."""
-    if title:
-        print(printable(title))
-    table = [columns, *rows]
-    widths = [max(len(row[i]) for row in table) for i in range(len(columns))]
-    numeric = [all(not row[i][:1].isalpha() for row in rows) for i in range(len(columns))]
-    for number, row in enumerate(table):
-        cells = [
-            cell.rjust(width) if right else cell.ljust(width)
-            for cell, width, right in zip(row, widths, numeric, strict=True)
-        ]
-        line = printable("  ".join(cells).rstrip())
-        failed = number > 0 and columns[-1] == "verdict" and row[-1] != "proved"
-        print(f"\033[31m{line}\033[0m" if failed and sys.stdout.isatty() else line)
 
 
 def state_lines(state: State, directory: str, fix: str) -> list[str]:
@@ -240,10 +231,11 @@ REASONS = {
 
 
 class Progress:
-    """Progress on standard error: one line rewritten on a terminal, one line per stage elsewhere."""
+    """Progress on standard error: one line rewritten on a terminal, elsewhere a line every few seconds and at the end."""
 
     def __init__(self) -> None:
         self._terminal = sys.stderr.isatty()
+        self._said = time.monotonic()
 
     def __call__(self, stage: str, done: int, total: int) -> None:
         """Show how many tasks of a stage are done."""
@@ -252,3 +244,8 @@ class Progress:
             print(f"\r{stage} {done}/{total}", end=end, file=sys.stderr, flush=True)
         elif done == total:
             print(f"{stage}: {total} done", file=sys.stderr, flush=True)
+        elif time.monotonic() - self._said > SILENCE:
+            print(f"{stage}: {done} of {total}", file=sys.stderr, flush=True)
+        else:
+            return
+        self._said = time.monotonic()

@@ -8,6 +8,7 @@ from decimal import Decimal, InvalidOperation
 from typing import Any, Literal
 
 Verdict = Literal["agrees", "misprint", "not reproducible"]
+CROWDED = 6  # lines of a figure whose legend stands beside it
 Draw = Callable[[Any], None]
 
 
@@ -92,16 +93,17 @@ def curves(x: Any, lines: Any, xlabel: str, ylabel: str, *styles: str, markersiz
     def draw(axes: Any) -> None:
         labelled = isinstance(lines, dict)
         for index, (label, values) in enumerate(lines.items() if labelled else [(None, lines)]):
-            style = styles[index] if index < len(styles) else "-"
+            style = styles[index] if index < len(styles) else ""
             axes.plot(
                 *(values if isinstance(values, tuple) else (x, values)),
-                style,
+                *([style] if style else []),
                 linewidth=0.8,
                 markersize=markersize,
                 label=label,
             )
         axes.set(xlabel=xlabel, ylabel=ylabel, **settings)
         if labelled:
-            axes.legend()
+            beside = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0)} if len(lines) > CROWDED else {}
+            axes.legend(**beside)
 
     return draw

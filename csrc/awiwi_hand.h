@@ -66,9 +66,6 @@ typedef struct awiwi_hand {
                                 awiwi_real *sensitivity);
     int (*reference_filter)(const awiwi_real *motion, const awiwi_real *desired, const awiwi_real *delay,
                             const awiwi_real *period, awiwi_real *next);
-    int (*backstepping)(const awiwi_real *state, const awiwi_real *desired, const awiwi_real *external,
-                        const awiwi_real *bodies, const awiwi_real *spring, const awiwi_real *gains,
-                        const awiwi_real *weights, awiwi_real *tau);
 } awiwi_hand;
 
 /* -- what the caller gives ----------------------------------------------------------------------------------------- */
@@ -92,7 +89,7 @@ typedef struct awiwi_hand_input {
     awiwi_real qdd_des[AWIWI_ALL_JOINTS];
     awiwi_real torque[AWIWI_ALL_JOINTS];    /* to add [N m] */
     awiwi_real stiffness[AWIWI_ALL_JOINTS]; /* K of every joint [N m/rad] */
-    awiwi_real damping[AWIWI_ALL_JOINTS];   /* D of every joint [N m s/rad]; this and all below not by AWIWI_LAW_MOTOR_IMPEDANCE */
+    awiwi_real damping[AWIWI_ALL_JOINTS];   /* D of every joint [N m s/rad]; this and the next not in every law */
     awiwi_real tip[AWIWI_ALL_FINGERS][3];   /* desired place of every fingertip in its finger's base frame [m] */
     awiwi_real tip_stiffness[AWIWI_ALL_FINGERS]; /* [N/m]; 0 for none */
     awiwi_real tip_damping[AWIWI_ALL_FINGERS];   /* [N s/m] */
@@ -123,7 +120,7 @@ typedef struct awiwi_hand_gains {
     awiwi_real continuous_torque; /* that a motor bears for ever [N m] */
     awiwi_real heating_time;      /* time constant of a motor's heat [s] */
     awiwi_real load_bandwidth;    /* of the observer of what acts on a joint besides its tendons [rad/s] */
-    awiwi_real tunings[AWIWI_ALL_JOINTS][4]; /* K_3, K_4 [1/s], C_t [rad/(N m)], C_s [rad s^2/(N m)] of AWIWI_LAW_BACKSTEPPING */
+    awiwi_real tunings[AWIWI_ALL_JOINTS][4]; /* K_3, K_4 [1/s], C_t [rad/(N m)], C_s [rad s^2/(N m)] of backstepping */
     int hold_ticks;               /* for which a fault is borne with the last torques */
     int slack_ticks;              /* for which a tendon may be slack */
     int ramp_ticks;               /* in which torques then fall to zero, and in which any change is faded in */

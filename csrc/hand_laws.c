@@ -6,7 +6,7 @@
 #include <string.h>
 
 static const awiwi_real MOST_TRAVEL = (awiwi_real)0.98; /* of the motors' travel is used */
-static const awiwi_real LEAST = (awiwi_real)1e-6; /* stiffness [N m/rad] and damping [N m s/rad] that a law can have */
+static const unsigned LIMITED = AWIWI_UNREACHABLE | AWIWI_TORQUE_LIMIT; /* torques do not follow the impedance then */
 static const awiwi_real NEARBY = (awiwi_real)0.05; /* angle for which the coupling of the last round holds [rad] */
 
 enum { JOINTS = AWIWI_MOST_JOINTS, TENDONS = AWIWI_MOST_TENDONS };
@@ -49,9 +49,9 @@ static unsigned compare(const awiwi_context *now, const finger_now *own)
     return status;
 }
 
-/* The step of Gauss and Newton from the last estimate, with the coupling of the last round: of the next tick's error it
-   leaves a share as small as the coupling has changed. Returns whether it is short, and ends within the joints' limits or near
-   them; longer ones are the solver's. */
+/* The step of Gauss and Newton from the last estimate, with the coupling of the last round: of the error it leaves a
+   share as small as the coupling has changed. Returns whether it is short, and ends within the joints' limits or near
+   them; other steps are the solver's. */
 static int correct(const awiwi_context *now, const finger_now *own, awiwi_real *found)
 {
     const awiwi_finger *finger = own->finger;
@@ -180,7 +180,8 @@ static unsigned motor_impedance(const awiwi_context *now, const finger_now *own,
 
 /* Torques of the motors that give the forces of a finger's tendons these second derivatives, for joints at rest
    (eq. 11.16, mended). */
-static void bend_forces(const awiwi_context *now, const awiwi_finger *finger, const awiwi_real *bend, awiwi_real *torque)
+static void bend_forces(const awiwi_context *now, const awiwi_finger *finger, const awiwi_real *bend,
+                        awiwi_real *torque)
 {
     const awiwi_hand_state *state = now->state;
     const awiwi_real r = now->hand->motor_pulley, turned = now->hand->motor_inertia / r;
@@ -203,8 +204,8 @@ static unsigned cascade(const awiwi_context *now, const finger_now *own, awiwi_r
     return status;
 }
 
-/* Observe what acts on a joint besides its tendons: the share of its acceleration that they do not explain. It begins as at
-   rest. */
+/* Observe what acts on a joint besides its tendons: the share of its acceleration that they do not explain. It begins
+   as at rest. */
 static void observe(const awiwi_context *now, int j, awiwi_real tau, awiwi_real gained)
 {
     awiwi_real *load = now->state->load + j;
@@ -214,51 +215,47 @@ static void observe(const awiwi_context *now, int j, awiwi_real tau, awiwi_real 
         *load = -tau;
 }
 
-/* How torques of the joints are to change, twice derived, as far as motors do it: tau, rate and push are torques of the
-   tendons' forces and their first two derivatives. */
-static int backstep(const awiwi_context *now, int j, awiwi_real tau, awiwi_real rate, awiwi_real *push)
+/* The second derivative that motors are to give the torque of a joint, from the wanted torque, the torque that there
+   is and its rate (eq. 15.71 to 15.81, mended, with the tendons for the spring). Errors of torque and rate decay, and
+   the joint is a mass on a spring and a damper. */
+static awiwi_real backstep(const awiwi_context *now, int j, awiwi_real wanted, awiwi_real tau, awiwi_real rate)
 {
     const awiwi_hand_state *state = now->state;
     const awiwi_real *motion = state->motion[j], *tunings = now->gains->tunings[j], m = state->inertia[j];
-    const awiwi_real K = now->input->stiffness[j] > LEAST ? now->input->stiffness[j] : LEAST;
-    const awiwi_real D = now->input->damping[j] > LEAST ? now->input->damping[j] : LEAST;
-    const awiwi_real law = K * (motion[0] - state->q[j]) + D * (motion[1] - state->qd[j]) + m * motion[2];
-    const awiwi_real other = state->tau[j] - law; /* weight, end stops, fingertip: what is wanted besides the impedance */
-    const awiwi_real at[4] = {state->q[j], state->qd[j], tau - other, rate};
-    const awiwi_real external[2] = {state->load[j] + other, 0}, bodies[2] = {m, 1}, spring[2] = {state->elastic[j], 0};
-    const awiwi_real gains[4] = {K, D, tunings[0], tunings[1]};
-    awiwi_real motor;
-    if (now->hand->backstepping(at, motion, external, bodies, spring, gains, tunings + 2, &motor) != AWIWI_OK)
-        return 0;
-    *push = spring[0] * (motor - at[2]); /* of a motor of inertia 1 */
-    return 1;
+    unsigned told = 0; /* with the torques already */
+    const awiwi_real K = awiwi_given(now->input->stiffness[j], 0, &told);
+    const awiwi_real D = awiwi_given(now->input->damping[j], 0, &told);
+    const awiwi_real faster = tunings[0], slower = tunings[1], weight = tunings[2];
+    const awiwi_real acceleration = (state->load[j] + tau) / m;
+    const awiwi_real e1 = state->qd[j] - motion[1], e2 = acceleration - motion[2], e3 = rate / m - motion[3];
+    const awiwi_real drift = rate + K * e1 + D * e2 - m * motion[3];
+    const awiwi_real back = (faster * slower + weight / tunings[3]) * (tau - wanted) + (faster + slower) * drift;
+    return state->elastic[j] * acceleration
+           - (back + K * e2 + D * e3 - m * motion[4] + (slower * e1 + e2) / weight);
 }
 
-/* The impedance of every joint through the torques of its tendons and their rates, chapter 15; forces that change no torque
-   are those planned. */
+/* The impedance of every joint through the torques of its tendons and their rates (chapter 15), as far as forces
+   within their limits give the torques; what forces change no torque are those of the cascade. */
 static unsigned backstepping(const awiwi_context *now, const finger_now *own, awiwi_real *torque)
 {
     const awiwi_hand_gains *gains = now->gains;
     const awiwi_finger *finger = own->finger;
     awiwi_hand_state *state = now->state;
     const int n = finger->joints, first = finger->first_joint, t = finger->first_tendon;
-    awiwi_real rate[TENDONS], bend[TENDONS], tau[JOINTS], taud[JOINTS], change[JOINTS];
-    const unsigned status = awiwi_torques(now, own->index, state->tau + first) | state->spread_status[own->index];
+    awiwi_real fd[TENDONS], bend[TENDONS], tau[JOINTS], taud[JOINTS], wanted[JOINTS], change[JOINTS];
+    const unsigned status = follow(now, own);
     for (int i = 0, k = t; i < finger->tendons; i++, k++) {
-        state->f_des[k] = state->planned_f[k];
-        rate[i] = state->stiffness[k] * state->xd[k];
-        bend[i] = gains->force_kp * (state->f_des[k] - state->f[k]) - gains->force_kd * rate[i];
+        fd[i] = state->stiffness[k] * state->xd[k];
+        bend[i] = gains->force_kp * (state->f_des[k] - state->f[k]) - gains->force_kd * fd[i];
     }
     if (finger->joint_torque(state->q + first, state->f + t, tau) != AWIWI_OK
-        || finger->joint_torque(state->q + first, rate, taud) != AWIWI_OK
-        || finger->joint_torque(state->q + first, bend, change) != AWIWI_OK)
+        || finger->joint_torque(state->q + first, fd, taud) != AWIWI_OK
+        || finger->joint_torque(state->q + first, state->f_des + t, wanted) != AWIWI_OK)
         return status | AWIWI_NO_LAW;
     for (int i = 0, j = first; i < n; i++, j++) {
-        awiwi_real push;
         observe(now, j, tau[i], own->gained[i]);
-        if (!backstep(now, j, tau[i], taud[i], &push))
-            return status | AWIWI_NO_LAW;
-        change[i] -= push;
+        change[i] = gains->force_kp * (wanted[i] - tau[i]) - gains->force_kd * taud[i]
+                    - backstep(now, j, wanted[i], tau[i], taud[i]);
     }
     for (int i = 0, k = t; i < finger->tendons; i++, k++)
         bend[i] += awiwi_dot(state->spread[k], change, n);
@@ -296,11 +293,11 @@ unsigned awiwi_finger_law(const awiwi_context *now, int index, awiwi_real *torqu
     status |= now->state->plan_status[index] | now->state->prepare_status[index];
     if (status & AWIWI_FAULTS)
         return status;
-    if (now->state->law == AWIWI_LAW_BACKSTEPPING)
-        status |= backstepping(now, &own, torque);
-    else if (now->state->law == AWIWI_LAW_CASCADE)
+    if (now->state->law == AWIWI_LAW_MOTOR_IMPEDANCE)
+        status |= motor_impedance(now, &own, torque);
+    else if (now->state->law == AWIWI_LAW_CASCADE || (now->state->plan_status[index] & LIMITED))
         status |= cascade(now, &own, torque);
     else
-        status |= motor_impedance(now, &own, torque);
+        status |= backstepping(now, &own, torque);
     return status | hold_back(now, own.finger, torque);
 }

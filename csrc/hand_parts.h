@@ -45,8 +45,8 @@ static inline unsigned awiwi_unseen(unsigned status)
 /* Find anew the friction of some motors, of each in one of a few ticks: speeds are filtered for longer than that. */
 void awiwi_resist(const awiwi_context *now);
 
-/* The matrices of the reference filter, by the columns that its kernel gives; not AWIWI_OK, and no other matrices, where
-   these gains have none. */
+/* The matrices of the reference filter, by the columns that its kernel gives; not AWIWI_OK, and no other matrices,
+   where these gains have none. */
 int awiwi_set_filter(const awiwi_hand *hand, const awiwi_hand_gains *gains, awiwi_hand_state *state);
 
 /* Lengths [tendons] of a finger as measured. */

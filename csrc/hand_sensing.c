@@ -6,7 +6,7 @@
 static const awiwi_real WITHIN = (awiwi_real)0.02; /* of a sensor's span: so far beyond its ends it is believed */
 static const awiwi_real BEYOND = (awiwi_real)1.004; /* of the motors' travel: so far kernels compute */
 static const awiwi_real LOOSE = (awiwi_real)0.002; /* of the span: up to here the lever is at its slack end */
-enum { FRICTION_TICKS = 3 };                      /* in which the friction of each motor is found once */
+enum { FRICTION_TICKS = 4 };                      /* in which the friction of each motor is found once */
 static const awiwi_real FASTEST = (awiwi_real)4;   /* of the motors' velocity: a faster change is a jump */
 
 /* A lever at its end stop reads as the end, up to noise. */

@@ -342,7 +342,6 @@ const awiwi_hand awiwi_hand_model = {
     run_motor_friction,
     awiwi_stiffness_correction_scalar,
     awiwi_reference_filter,
-    awiwi_backstepping_nonlinear,
 };
 
 const awiwi_hand_gains awiwi_default_gains = {

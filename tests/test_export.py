@@ -195,4 +195,4 @@ def test_export_replaces_a_file_only_if_asked(tmp_path):
 
 
 def test_an_unknown_format_is_refused():
-    assert complaint("export", "sdf") == "sdf is no format of export; expected mjcf or urdf"
+    assert complaint("export", "sdf") == "sdf is no format of export; expected mjcf, urdf or fmu"

@@ -168,7 +168,11 @@ def test_every_demand_and_every_gain_of_the_tick_is_a_variable(compiled, lib):
     controller = Slave(compiled[0])
     inputs, known = Struct(lib, "awiwi_hand_input").members, {name.split(".")[0] for name in controller.variables}
     assert [name for name in inputs if name not in known] == []
-    assert {name for name, *_ in gains()} == Struct(lib, "awiwi_hand_gains").members.keys() - {"period"}
+    given = Struct(lib, "awiwi_hand_gains").members
+    found = list(gains())
+    assert [gain.name for gain in found] == [name for name in given if name != "period"]
+    for gain in found:
+        assert len(gain.parts) == (given[gain.name].shape[1] if gain.over else 1), gain
 
 
 def test_the_plant_alone_has_the_bits_of_the_simulated_hand(compiled, lib):

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import awiwi_gen
-from awiwi_gen.build import FLAGS, compiler
 from awiwi_gen.errors import InputError
 from awiwi_gen.hand_model import gains, no_tick
 from awiwi_gen.kernels import catalog
@@ -70,9 +69,9 @@ def test_motors_take_the_torques_of_the_motor_impedance(lib, hand, loop):
         assert np.allclose(torque[rows], expected + state.jump[rows], atol=1e-9), name
 
 
-def test_friction_is_compensated_as_it_was_at_most_two_ticks_ago(lib, loop):
+def test_friction_is_compensated_as_it_was_at_most_three_ticks_ago(lib, loop):
     speeds = []
-    loop.run(3, lambda _: speeds.append(loop.step.state.thd.copy()))
+    loop.run(4, lambda _: speeds.append(loop.step.state.thd.copy()))
     speeds = [*speeds[1:], loop.step.state.thd]
 
     share = float(loop.step.gains.friction_share[0])
@@ -116,6 +115,52 @@ def test_the_cascade_controls_the_forces_of_the_impedance(lib, hand, loop):
         loop.hand.move(torque)
 
 
+def test_backstepping_gives_the_forces_what_its_kernel_says(lib, hand, loop):
+    """Each joint as a link behind a spring as stiff as its tendons, by the law's kernel with a motor of inertia 1; the
+    forces that this leaves free go to the planned ones; the cascade's kernel gives the motor torques for them."""
+    loop.step.input.law = LAWS.index("backstepping")
+    loop.run(900, lambda tick: setattr(loop.step.input, "q_des", loop.start + 0.05 * np.sin(0.004 * tick)))
+    loop.hand.measure(loop.step.input)
+    torque, state, given, gains = loop.step.step(), loop.step.state, loop.step.input, loop.step.gains
+    motor = (float(loop.step.model.motor_pulley), float(loop.step.model.motor_inertia))
+    kp, kd = float(gains.force_kp[0]), float(gains.force_kd[0])
+    assert np.abs(state.load).max() > 1e-4
+    for name, rows, joints in fingers(hand):
+        of_forces, q = lib[f"{name}_joint_torque"], state.q[joints]
+        f, fd = state.f[rows], state.stiffness[rows] * state.xd[rows]
+        K, D, m = given.stiffness[joints], given.damping[joints], state.inertia[joints]
+        motion, rates, spring = state.motion[joints], gains.tunings[joints], state.elastic[joints]
+        impedance = K * (motion[:, 0] - q) + D * (motion[:, 1] - state.qd[joints]) + m * motion[:, 2]
+        other = of_forces(q, state.f_des[rows]) - impedance
+        tau, taud = of_forces(q, f) - other, of_forces(q, fd)
+        at = np.stack([q, state.qd[joints], tau, taud], 1)
+        external, bodies, springs = (np.stack(pair, 1) for pair in (
+            (state.load[joints] + other, 0 * m), (m, 0 * m + 1), (spring, 0 * m)
+        ))  # fmt: skip
+        wanted = lib.backstepping_nonlinear(
+            at, motion, external, bodies, springs, np.stack([K, D, *rates[:, :2].T], 1), rates[:, 2:]
+        ).tau_m
+        bend = kp * (state.f_des[rows] - f) - kd * fd
+        change = of_forces(q, bend) - spring * (wanted - tau)
+        bend += state.spread[rows, : len(change)] @ change
+        expected = lib.cascade(
+            f,
+            state.xd[rows],
+            state.stiffness[rows],
+            state.slope[rows],
+            0,
+            f,
+            fd,
+            bend,
+            state.friction[rows],
+            *motor,
+            kp,
+            kd,
+        ).tau
+        limit = loop.step.model.motor_torque
+        assert np.allclose(torque[rows], np.clip(expected + state.jump[rows], -limit, limit), atol=1e-9), name
+
+
 def test_another_law_and_other_gains_come_without_a_bump(loop):
     def largest_change(ticks):
         torques = []
@@ -125,10 +170,11 @@ def test_another_law_and_other_gains_come_without_a_bump(loop):
     calm = largest_change(300)
     loop.step.gains.motor_kp = loop.step.gains.motor_kp * 0.5
     assert largest_change(10) < 2 * calm + 0.05
-    loop.step.input.law = CASCADE
-    at_change = largest_change(3)
-    loop.run(600)
-    assert at_change < 1.5 * largest_change(300)  # the cascade itself is louder
+    for law in (CASCADE, LAWS.index("backstepping"), CASCADE, 0):
+        loop.step.input.law = law
+        at_change = largest_change(3)
+        loop.run(600)
+        assert at_change < max(1.5 * largest_change(300), 2 * calm + 0.05), law  # both laws of forces are louder
 
 
 def test_disabled_fingers_fade_out_and_enabled_ones_begin_where_they_are(loop):
@@ -252,19 +298,6 @@ def test_a_library_without_a_tick_is_refused():
     bare = SimpleNamespace(manifest={"hand": "Bare hand"})
     with pytest.raises(InputError, match="Bare hand has no tick"):
         ClosedLoop(bare)
-
-
-def test_the_c_of_the_guide_compiles_without_a_warning(root, tmp_path):
-    """The firmware as the guide prints it, and its log as the body of a function."""
-    program, log = re.findall(r"```c\n(.*?)```", (root / "docs" / "hand_step.md").read_text(), flags=re.S)
-    logged = f"void log_it(const awiwi_real *pose);\nvoid log_it(const awiwi_real *pose)\n{{\n{log}}}\n"
-    for name in ("begin(void", "tick(void"):
-        head = program[program.index(f"unsigned {name}") :].partition("\n{")[0]
-        program = program.replace(f"unsigned {name}", f"{head};\nunsigned {name}")
-    source = tmp_path / "guide.c"
-    source.write_text(program + logged)
-    includes = (f"-I{root / 'generated'}", f"-I{root / 'csrc'}")
-    compiler().run(*FLAGS, *includes, "-c", str(source), "-o", str(tmp_path / "guide.o"))
 
 
 def test_another_hand_has_its_tick_too(root):

@@ -19,7 +19,7 @@ from awiwi_gen.interchange.model import Loss, Mimic, Model, Place, Tendon
 from awiwi_gen.interchange.names import finger_names, joint_names, plain
 from awiwi_gen.interchange.quarter import quarter_angle, quarter_axis, quarter_rotation
 from awiwi_gen.interchange.toml import angle, cite, hand_text, length, quantity, tidy
-from awiwi_gen.interchange.urdf import require_tree
+from awiwi_gen.interchange.urdf import require_tree, without_leader
 
 POINTS = {1: np.array([0.0, 0.01, 0.0]), 2: np.array([0.01, 0.0, 0.004]), 4: np.array([0.0, 0.0, 0.002])}
 PATH = Tendon("string", path=tuple(Place(*each) for each in POINTS.items()))
@@ -303,9 +303,8 @@ def test_the_finger_is_not_in_the_names_of_its_joints_twice():
     assert joint_names({"index": ["r_index_mcp", "r_index_pip"], "thumb": ["r_thumb_ip"]}) == {
         "r_index_mcp": "mcp", "r_index_pip": "pip", "r_thumb_ip": "ip",
     }  # fmt: skip
-    assert joint_names({"thumb": ["thumb_0_joint", "thumb_1_joint"]}) == {
-        "thumb_0_joint": "thumb_0_joint", "thumb_1_joint": "thumb_1_joint",
-    }  # fmt: skip
+    numbered = joint_names({"thumb": ["thumb_0_joint", "thumb_1_joint"], "index": ["index_0_joint"]})
+    assert list(numbered.values()) == ["thumb_0_joint", "thumb_1_joint", "index_0_joint"]
 
 
 def test_fingers_are_called_by_the_word_that_their_bodies_use():
@@ -364,6 +363,15 @@ def urdf(links: str, **joints: str) -> str:
 
 def test_a_tree_of_links_is_accepted():
     require_tree(urdf("abc", p="ab", q="ac"), "r.urdf")
+
+
+def test_mimic_joints_without_a_leader_are_known():
+    text = urdf("abcd", p="ab", q="bc", r="cd")
+    for name, leader in (("q", "p"), ("r", "s")):
+        text = text.replace(f'<joint name="{name}">', f'<joint name="{name}"><mimic joint="{leader}"/>')
+
+    assert without_leader(text) == {"r": "s"}
+    assert without_leader(text.replace("robot>", "robot:x>")) == {}
 
 
 @pytest.mark.parametrize(

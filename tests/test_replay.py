@@ -55,7 +55,7 @@ def test_one_other_bit_is_found_in_its_tick(lib, log, tmp_path, part):
         (lambda data: b"x" + data[1:], "is no log"),
         (lambda data: data[:100], "the head of a log alone"),
         (lambda data: data[:-3], "ends within a record"),
-        (lambda data: data[:8] + b"\x09" + data[9:], "version 9; expected 1"),
+        (lambda data: data[:8] + b"\x09" + data[9:], "version 9; expected 2"),
         (lambda data: data[:12] + b"\x00\x01\x02\x03" + data[16:], "from build 0x03020100"),
     ],
 )

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 import awiwi_gen
 from awiwi_gen.compare import comparison
@@ -15,29 +17,35 @@ from awiwi_gen.loops import clock
 from awiwi_gen.loops.clock import require_clocked
 from awiwi_gen.loops.hand_joint import FINGER, JOINT, SENSING, joint_of
 from awiwi_gen.loops.laws import LAWS, law_of
-from awiwi_gen.loops.scenarios import BEFORE, FAMILY, FORCES, PLANTS, run
-from awiwi_gen.report import print_json, print_table
+from awiwi_gen.loops.scenarios import BEFORE, FAMILY, FORCES, LAST, PLANTS, load_of, motions, run
+from awiwi_gen.report import print_json
 from awiwi_gen.results import Table
+from awiwi_gen.simulate import Array
+from awiwi_gen.tables import print_table
+from awiwi_gen.writing import whole_file
 
 DEFAULT = f"{FINGER}_{JOINT}"
 MOST_FORCE = 60.0  # N
+SUFFIXES = (".png", ".svg")
 SHOWN = 30  # ticks between two printed rows of a run
 
 
 @dataclass(frozen=True)
 class Shown:
-    """A result as plain data for JSON, and as tables."""
+    """A result as plain data for JSON, and as tables and lines."""
 
     data: Any
     tables: Sequence[Table]
+    lines: Sequence[str] = ()
 
     def show(self, as_json: bool) -> None:
-        """Print the data or the tables."""
+        """Print the data, or tables and lines."""
         if as_json:
             print_json(self.data)
             return
         for table in self.tables:
             print_table(table.columns, table.rows, table.title)
+        print("".join(f"{line}\n" for line in self.lines), end="")
 
 
 def read_gains(text: str) -> dict[str, float]:
@@ -78,7 +86,7 @@ def benchmark(hand_file: Path | None, name: str, gains: str, where: str) -> Show
             "clock": [{"force": force, **found.as_dict()} for force, found in clocked],
             "benchmark": [row.as_dict() for row in rows],
         },
-        comparison.tables(clocked, rows),
+        [*comparison.tables(clocked, rows), comparison.summary(rows)],
     )
 
 
@@ -93,9 +101,12 @@ def named_joint(hand: Hand, where: str) -> tuple[str, str]:
 
 
 def one_run(
-    hand_file: Path | None, name: str, gains: str, scenario: str, force: float, plant: str, where: str, sensing: str
-) -> Shown:
-    """One run of one law. Raises InputError for an unknown law, scenario or plant, and for gains that cannot run."""
+    hand_file: Path | None, name: str, gains: str, scenario: str, force: float, plant: str, where: str, sensing: str,
+    plot: Path | None = None,
+) -> Shown:  # fmt: skip
+    """One run of one law, with a plot if asked. Raises InputError for an unknown law, scenario or plant, and for gains
+    that cannot run.
+    """
     law = law_of(name)
     chosen = read_gains(gains)
     law.gains_with(chosen)
@@ -116,6 +127,9 @@ def one_run(
     time = trace.time - BEFORE * joint.period
     columns = {"q": trace["x"][:, 0], "tau_1": trace["tau"][:, 0], "tau_2": trace["tau"][:, 1]}
     columns |= {"u_1": trace["u"][:, 0], "u_2": trace["u"][:, 1]}
+    goal = motions(load_of(joint.believed()), joint.period)[scenario].goal[: len(time), 0]
+    if plot is not None:
+        plotted(plot, f"{name}: {scenario} of {'_'.join(place)}, {plant}", time, goal, columns)
     rows = [(f"{time[i]:.3f}", *(f"{c[i]:.4f}" for c in columns.values())) for i in range(0, len(time), SHOWN)]
     head = ("t [s]", "q [rad]", *(f"{name} [N m]" for name in list(columns)[1:]))
     return Shown(
@@ -125,4 +139,40 @@ def one_run(
             "status": trace.status, "time": time.tolist(), **{name: c.tolist() for name, c in columns.items()},
         },
         [Table(f"{name}: {scenario}, {plant}, {sensing}", head, rows)],
+        summary_lines(time, goal, columns),
     )  # fmt: skip
+
+
+def summary_lines(time: Array, goal: Array, columns: Mapping[str, Array]) -> list[str]:
+    """What a run comes to, in two lines."""
+    error = (columns["q"] - goal)[time >= 0]
+    torque = max(float(np.abs(columns[name]).max()) for name in ("u_1", "u_2"))
+    least = min(float(columns[name].min()) for name in ("tau_1", "tau_2"))
+    return [
+        f"summary: {max(error.max(), 0) * 1e3:.1f} mrad beyond the wanted angle at most, "
+        f"{np.abs(error[-LAST:]).mean() * 1e3:.3f} mrad off in the last {LAST * (time[1] - time[0]) * 1e3:.0f} ms,",
+        f"    motor torques up to {torque:.2f} N m, least spring torque {least:.4f} N m"
+        + (": a tendon was slack" if least <= 0 else ""),
+    ]
+
+
+def plotted(path: Path, title: str, time: Array, goal: Array, columns: Mapping[str, Array]) -> None:
+    """Write a run's angle, spring torques and motor torques as PNG or SVG. Raises InputError for another suffix."""
+    if path.suffix not in SUFFIXES:
+        raise InputError(f"--plot {path}: expected a name that ends with {' or '.join(SUFFIXES)}")
+    from matplotlib.figure import Figure
+
+    canvas = Figure(figsize=(7, 8), layout="constrained")
+    above, middle, below = canvas.subplots(3, 1, sharex=True)
+    above.plot(1e3 * time, goal, "--", color="grey", label="wanted")
+    above.plot(1e3 * time, columns["q"], label="q")
+    above.set(ylabel="angle [rad]", title=title)
+    for axes, kind, label in ((middle, "tau", "spring torques [N m]"), (below, "u", "motor torques [N m]")):
+        for number in (1, 2):
+            axes.plot(1e3 * time, columns[f"{kind}_{number}"], label=f"tendon {number}", linewidth=0.9)
+        axes.set(ylabel=label)
+    below.set(xlabel="time [ms]")
+    for axes in (above, middle, below):
+        axes.legend()
+    with whole_file(path) as stream:
+        canvas.savefig(stream, format=path.suffix[1:])

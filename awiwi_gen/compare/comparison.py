@@ -121,6 +121,28 @@ def clocks(
     return found
 
 
+SUMMARY_COLUMNS = ("law", "sensing", "pretension", "goal", "settling", "of all", "overshoot", "of all")
+
+
+def summary(rows: Iterable[Row]) -> Table:
+    """One row for each law, sensing and pretension: plants on which the goal is reached, results as known and the worst."""
+    groups: dict[tuple[str, str, float], list[Row]] = {}
+    for row in rows:
+        groups.setdefault((row.law, row.sensing, row.force), []).append(row)
+
+    def milliseconds(settling: float) -> str:
+        return f"{settling * 1e3:.0f} ms" if settling < float("inf") else "never"
+
+    cells: list[tuple[str, ...]] = []
+    for (law, sensing, force), members in groups.items():
+        scores = [row.score for row in members]
+        reached = f"{sum(each.good for each in scores)} of {len(scores)}"
+        settling = milliseconds(scores[0].settling), milliseconds(max(each.settling for each in scores))
+        overshoot = f"{scores[0].overshoot:.0%}", f"{max(each.overshoot for each in scores):.0%}"
+        cells.append((law, sensing, f"{force:g} N", reached, *settling, *overshoot))
+    return Table("Summary: plants that reach the goal; results as known, and the worst of all", SUMMARY_COLUMNS, cells)
+
+
 def tables(clocked: Iterable[tuple[float, Clocked]], rows: Iterable[Row]) -> list[Table]:
     """Both results as tables."""
     return [

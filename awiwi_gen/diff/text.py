@@ -9,7 +9,8 @@ from textwrap import wrap
 from awiwi_gen.diff.difference import Difference, Effect
 from awiwi_gen.diff.kernels import OutputChange
 from awiwi_gen.errors import printable
-from awiwi_gen.report import counted, print_table
+from awiwi_gen.report import counted
+from awiwi_gen.tables import print_table
 
 WIDTH = 80
 STRONGEST = 3  # numbers of each figure in the tornado

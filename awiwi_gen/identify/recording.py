@@ -13,6 +13,7 @@ from awiwi_gen.hand.lever import POWERS
 Array = np.ndarray[Any, Any]
 
 OUTLIER = 8.0  # times the typical residual: one in 10^14 of normal errors is as large
+MOST_HYSTERESIS = 4.0  # times the largest residual
 LEAST_COVERAGE = 0.9  # of a period, or of the lever's travel: a fit does not extrapolate
 
 
@@ -56,6 +57,35 @@ def positions(reading: Array, ends: tuple[float, float]) -> Array:
     if distinct < 2 * POWERS:
         raise InputError(f"counts has {distinct} different readings; expected at least {2 * POWERS}")
     return position
+
+
+def refuse_bends(x: Array, y: Array, names: tuple[str, str]) -> None:
+    """Raise InputError unless y goes one way with x, in the means of eighths of the points in the order of x."""
+    means = np.array([part.mean() for part in np.array_split(y[np.argsort(x, kind="stable")], 8)])
+    steps = np.diff(means) * np.sign(means[-1] - means[0])
+    if not np.all(steps > 0):
+        at = np.sort(x)[int((int(np.argmin(steps)) + 1) / 8 * len(x))]
+        raise InputError(f"{names[1]} does not go one way with {names[0]}: it turns at about {at:.4g}")
+
+
+def without_hysteresis(x: Array, errors: Array, limit: float, what: str) -> tuple[float, float]:
+    """The distance between the errors of rising and of falling x, and the RMS of the errors about both.
+
+    Points are in the order of the measurement. Raises InputError where either is above its limit: a fit through the
+    middle is then none of the mechanism.
+    """
+    rising = np.gradient(x) >= 0
+    groups = [errors[rising], errors[~rising]]
+    both = min(map(len, groups)) >= 8
+    hysteresis = float(abs(groups[0].mean() - groups[1].mean())) if both else 0.0
+    left = np.concatenate([group - group.mean() for group in groups]) if both else errors
+    residual = float(np.sqrt(np.mean(left**2)))
+    for name, value, most in (("a hysteresis", hysteresis, MOST_HYSTERESIS * limit), ("a residual", residual, limit)):
+        if value > most:
+            raise InputError(
+                f"{what} has {name} of {value:.3g} where {most:.3g} is the most; is this the mechanism of the hand file?"
+            )
+    return hysteresis, residual
 
 
 def refuse_outliers(errors: Array, columns: Mapping[str, Array]) -> None:

@@ -49,6 +49,7 @@ def import_(
     from awiwi_gen.interchange.mjcf import read
     from awiwi_gen.interchange.solids import with_assumed_tensors
     from awiwi_gen.interchange.toml import hand_text
+    from awiwi_gen.report import counted
     from awiwi_gen.writing import write_whole
 
     target = output or Path(f"{file.stem}.toml")
@@ -66,8 +67,13 @@ def import_(
                  "losses": [loss.as_dict() for loss in hand.losses]}  # fmt: skip
         _print_json(found)
     else:
-        lines = [f"{target}: {len(hand.fingers)} fingers ({', '.join(each.name for each in hand.fingers)}), "
-                 f"{joints} independent joints, {tendons} tendons"]  # fmt: skip
+        names = ", ".join(each.name for each in hand.fingers)
+        counts = (
+            counted(len(hand.fingers), "finger"),
+            counted(joints, "independent joint"),
+            counted(tendons, "tendon"),
+        )
+        lines = [f"{target}: {counts[0]} ({names}), {counts[1]}, {counts[2]}"]
         lines += [f"named: {old} -> {new}" for old, new in hand.names.items()]
         lines += [f"taken: {note}" for note in hand.notes[:_SHOWN]]
         if (more := len(hand.notes) - _SHOWN) > 0:

@@ -149,7 +149,7 @@ class Places:
 
 
 def _variables(
-    places: Places, rows: Any, struct: Any, of_model: str, role: str, causality: str, variability: str, prefix: str = ""
+    places: Places, rows: Any, struct: Any, of_model: str, role: str, causality: str, variability: str
 ) -> Iterator[Variable]:
     """A variable for each element of the members of a struct, which has their start values unless they are TOLD."""
     for member, over, unit, doc in rows:
@@ -159,7 +159,7 @@ def _variables(
         when = "discrete" if kind != "REAL" and variability == "continuous" else variability
         for (name, index, own), value in zip(places.of(over, unit), values.ravel(), strict=False):
             yield Variable(
-                ".".join(part for part in (prefix, member, name) if part), f"{of_model}.{member}{index}", kind, role,
+                ".".join(part for part in (member, name) if part), f"{of_model}.{member}{index}", kind, role,
                 causality, when, own, doc, None if role == "TOLD" else value, member if member in CHOICES else "",
             )  # fmt: skip
 
@@ -211,7 +211,7 @@ def controller_variables(hand: Hand, library: Library) -> list[Variable]:
                     "winds up", 0, "TOLD", "output", "discrete")  # fmt: skip
     status = (("status", "", "", "bits of AWIWI_READING_LOST and so on, of all fingers"),)
     found += _variables(places, status, step.state, "state", "TOLD", "output", "discrete")
-    found += _variables(places, list(gains()), step.gains, "gains", "TUNABLE", "parameter", "tunable", "gains")
+    found += _gain_variables(places, step.gains)
     found += _plain(
         places, "start.q", "q", "joint", "rad", "known position at the start", middle, "FIXED", "parameter", "fixed"
     )
@@ -219,17 +219,45 @@ def controller_variables(hand: Hand, library: Library) -> list[Variable]:
     return found
 
 
-def gains() -> Iterator[tuple[str, str, str, str]]:
-    """Every gain but the period with the unit and the words that the header has for it, or for the one before."""
+@dataclass(frozen=True)
+class Gain:
+    """A member of awiwi_hand_gains: one number, or for every joint one for each of ``parts``, which are (name, unit)."""
+
+    name: str
+    over: str
+    parts: tuple[tuple[str, str], ...]
+    doc: str
+
+
+def gains() -> Iterator[Gain]:
+    """Every gain but the period with the units and the words that the header has for it, or for the one before."""
     header = (CSRC / "awiwi_hand.h").read_text(encoding="utf-8")
     body = header.partition("typedef struct awiwi_hand_gains {")[2].partition("}")[0]
-    doc = unit = ""
-    for name, comment in re.findall(r"(?:awiwi_real|int) (\w+);(?:\s*/\*(.*?)\*/)?", body):
-        if comment:
-            found = re.search(r"\[([^\]]*)\]", comment)
-            doc, unit = comment.partition("[")[0].strip(), found[1] if found else "1"
+    before = ""
+    for name, sizes, comment in re.findall(r"(?:awiwi_real|int) (\w+)((?:\[\w+\])*);(?:\s*/\*(.*?)\*/)?", body):
+        before = comment or before
+        named = [(words, unit) for words, unit in re.findall(r"([^\[\]]*)\[([^\]]*)\]", before)]
+        if sizes:
+            parts = [(part, unit) for words, unit in named for part in re.findall(r"\w+", words)]
+        else:
+            parts = [("", named[0][1] if named else "" if name.endswith("_ticks") else "1")]
         if name != "period":
-            yield name, "", "" if name.endswith("_ticks") else unit, doc
+            yield Gain(name, "joint" if sizes else "", tuple(parts), re.sub(r"\s*\[[^\]]*\]", "", before).strip())
+
+
+def _gain_variables(places: Places, struct: Any) -> Iterator[Variable]:
+    """A variable for each number of all gains."""
+    for gain in gains():
+        values = getattr(struct, gain.name)
+        kind = "INTEGER" if values.dtype.kind == "i" else "REAL"
+        rows = values.reshape(-1, len(gain.parts))
+        for j, (place, row) in enumerate(zip(places.names[gain.over], rows, strict=False)):
+            for i, ((part, unit), value) in enumerate(zip(gain.parts, row, strict=True)):
+                yield Variable(
+                    ".".join(word for word in ("gains", gain.name, place, part) if word),
+                    f"gains.{gain.name}[{j}][{i}]" if gain.over else f"gains.{gain.name}",
+                    kind, "TUNABLE", "parameter", "tunable", unit, gain.doc, value,
+                )  # fmt: skip
 
 
 def at_rest(library: Library) -> tuple[SimulatedHand, Any, float]:

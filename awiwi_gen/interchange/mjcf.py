@@ -7,7 +7,7 @@ A mesh stays only where a body's mass is to be computed from it.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,16 @@ from numpy.polynomial import Polynomial
 
 from awiwi_gen.errors import Fault, InputError
 from awiwi_gen.interchange.model import LEAST_MASS, Array, Body, Joint, Loss, Mimic, Model, Site
-from awiwi_gen.interchange.published import forgotten, give_moments, is_lock, join_locked, sources
+from awiwi_gen.interchange.published import (
+    forgotten,
+    give_moments,
+    is_lock,
+    join_locked,
+    left_out,
+    meshed,
+    sources,
+    warnings_kept,
+)
 from awiwi_gen.interchange.quarter import quarter_angle, quarter_axis, quarter_rotation
 from awiwi_gen.interchange.urdf import require_tree
 from awiwi_gen.interchange.wraps import tendons_of
@@ -35,7 +44,8 @@ def read(
     are left out. With `fit`, tendons that wrap around geoms get constant arms; else they are lost. With `assume`,
     tensors that MuJoCo refuses become some that are too large by far, for others to replace.
     """
-    spec, notes = parse(path, exact)
+    with warnings_kept() as warned:
+        spec, notes = parse(path, exact)
     forces = _forces(spec)
     most = [max(map(abs, ends)) for ends in forces.values()]
     driven = {name: bool(min(ends) < 0 < max(ends)) for name, ends in forces.items()}
@@ -58,7 +68,7 @@ def read(
             Site(compiled.site(i).name, int(compiled.site_bodyid[i]), compiled.site_pos[i].copy())
             for i in range(compiled.nsite)
         ),
-        losses=(*losses, *(each for each in (*lost, *_of_joints(compiled)) if each.places)),
+        losses=(*losses, *left_out(path, warned), *(each for each in (*lost, *_of_joints(compiled)) if each.places)),
         notes=tuple(notes),
         tendon_force=max(most) if most and min(most) > 0 else 0.0,
     )
@@ -271,21 +281,27 @@ def compile_spec(spec: Any, path: Path) -> Any:
 
     Where it refuses tensors that no body has, the hand file's checks say more of them: MuJoCo balances them.
     """
+    meshes = meshed(spec)  # after an error, MuJoCo raises it again for every element
     try:
         return spec.compile()
     except (ValueError, mujoco.FatalError) as error:
-        if "balanceinertia" in str(error) and not spec.compiler.balanceinertia:
-            spec.compiler.balanceinertia = True
-            return compile_spec(spec, path)
-        raise _refused(path, error) from None
+        refused = _refused(path, error, meshes)
+        if "balanceinertia" not in str(error) or spec.compiler.balanceinertia:
+            raise refused from None
+    spec.compiler.balanceinertia = True
+    try:
+        return spec.compile()
+    except (ValueError, mujoco.FatalError) as error:
+        raise _refused(path, error, meshes) from None
 
 
-def _refused(path: Path, error: Exception) -> InputError:
+def _refused(path: Path, error: Exception, meshes: Mapping[str, str] | None = None) -> InputError:
     reason = " ".join(str(error).split())
     if "eigenvalues" in reason:
         reason += "; --assume-tensors assumes a solid body instead"
     needed = "Error opening file" in reason and "include" not in reason
-    missing = "; the mass of a body is computed from it: get the file, or give the body an inertial" if needed else ""
+    body = next((f"the body {bodies}" for mesh, bodies in (meshes or {}).items() if mesh in reason), "a body")
+    missing = f"; the mass of {body} is computed from it: get the file, or give the body an inertial" if needed else ""
     return InputError(Fault(file=str(path), message=f"is refused by MuJoCo {mujoco.__version__}: {reason}{missing}"))
 
 

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import mujoco
 import numpy as np
 
-__all__ = ["forgotten", "give_moments", "is_lock", "join_locked", "sources"]
+from awiwi_gen.interchange.model import Loss
+from awiwi_gen.interchange.urdf import without_leader
+
+__all__ = ["forgotten", "give_moments", "is_lock", "join_locked", "left_out", "meshed", "sources", "warnings_kept"]
 
 _INCLUDE = re.compile(r'<include\s[^>]*?file\s*=\s*"([^"]+)"')
 _UNKNOWN = re.compile(r"unrecognized attribute: '(\w+)'\s+Element '(\w+)'")
@@ -65,6 +70,43 @@ def give_moments(spec: Any) -> None:
         moments = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
         if body.explicitinertial and body.mass and moments[0] <= 0:
             body.fullinertia, body.inertia = [np.nan] * 6, [_TOO_LARGE * body.mass] * 3
+
+
+@contextmanager
+def warnings_kept() -> Iterator[list[str]]:
+    """What MuJoCo warns of meanwhile, which it would print and write into a file in the working directory."""
+    found: list[str] = []
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(found.append)
+    try:
+        yield found
+    finally:
+        mujoco.set_mju_user_warning(before)
+
+
+def left_out(path: Path, warned: list[str]) -> list[Loss]:
+    """What MuJoCo warned of, and mimic joints of a URDF that have no leader, by name: it only says that it ignores them."""
+    text = path.read_text(encoding="utf-8-sig")
+    lost = without_leader(text) if re.search(r"<robot\b", text) else {}
+    others = [each for each in warned if not any(f"'{joint}'" in each for joint in lost)]
+    losses = [
+        Loss(
+            "mimic joints whose leader the file does not have: independent",
+            tuple(f"{k} of {v}" for k, v in lost.items()),
+        ),
+        Loss("what MuJoCo warns of and leaves out", tuple(" ".join(each.split()) for each in others)),
+    ]
+    return [loss for loss in losses if loss.places]
+
+
+def meshed(spec: Any) -> dict[str, str]:
+    """File -> the bodies whose geoms are its mesh."""
+    found: dict[str, list[str]] = {}
+    files = {mesh.name: mesh.file for mesh in spec.meshes}
+    for body in spec.bodies:
+        for name in dict.fromkeys(geom.meshname for geom in body.geoms if geom.meshname in files):
+            found.setdefault(files[name], []).append(body.name)
+    return {file: ", ".join(bodies) for file, bodies in found.items()}
 
 
 def is_lock(equality: Any) -> bool:

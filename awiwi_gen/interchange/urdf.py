@@ -19,6 +19,18 @@ def require_tree(text: str, file: str) -> None:
         raise InputError(faults)
 
 
+def without_leader(text: str) -> dict[str, str]:
+    """Joint -> the leader that it should follow, of mimic joints whose leader the file does not have."""
+    try:
+        joints = ElementTree.fromstring(text).findall("joint")  # noqa: S314 MuJoCo has read the same text
+    except ElementTree.ParseError:  # MuJoCo also takes XML that is not well formed
+        return {}
+    names = {joint.get("name", "") for joint in joints}
+    mimics = {joint.get("name", ""): joint.find("mimic") for joint in joints}
+    leaders = {name: mimic.get("joint", "") for name, mimic in mimics.items() if mimic is not None}
+    return {name: leader for name, leader in leaders.items() if leader not in names}
+
+
 def _faults(root: ElementTree.Element) -> Iterator[tuple[str, str]]:
     for kind in ("link", "joint"):
         counts = Counter(element.get("name", "") for element in root.findall(kind))

@@ -159,15 +159,19 @@ def _shown(figure: Figure) -> dict[str, str]:
 def drawing(figure: Figure) -> str:
     """A figure as SVG text, without date or version."""
     import matplotlib as mpl
+    from cycler import cycler
     from matplotlib.figure import Figure as Canvas
 
     text = io.StringIO()
     # identifiers inside a drawing are made from the salt, and must be unique on the page
-    with mpl.rc_context(STYLE | {"svg.hashsalt": figure.number}):
+    colours = mpl.rcParamsDefault["axes.prop_cycle"]
+    cycle = cycler("linestyle", ["-", "--", "-.", ":"]) * colours  # lines beyond ten differ, too
+    with mpl.rc_context(STYLE | {"svg.hashsalt": figure.number, "axes.prop_cycle": cycle}):
         canvas = Canvas(figsize=SIZE, layout="constrained")
         figure.draw(canvas.add_subplot())
         canvas.savefig(text, format="svg", metadata={"Date": None, "Creator": None, "Format": None, "Type": None})
-    return text.getvalue()[text.getvalue().index("<svg") :]
+    drawn = text.getvalue()[text.getvalue().index("<svg") :]
+    return drawn.replace("<svg", f'<svg role="img" aria-label="{escape(figure.title)}"', 1)
 
 
 def _escaped(rows: Iterable[Sequence[str]]) -> list[list[str]]:

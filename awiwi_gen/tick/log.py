@@ -16,7 +16,7 @@ from awiwi_gen.tick.structs import Struct, require_tick
 if TYPE_CHECKING:
     from awiwi_gen.library import Library
 
-MAGIC, VERSION = b"AWIWILOG", 1
+MAGIC, VERSION = b"AWIWILOG", 2
 
 
 class Writer:

@@ -25,7 +25,8 @@ def tune(
 ) -> int:  # fmt: skip
     """Find gains that hold on a family of wrong plants, for each joint, and write a file that the hand file can name."""
     from awiwi_gen.hand import Hand
-    from awiwi_gen.report import Progress, print_json, print_table
+    from awiwi_gen.report import Progress, print_json
+    from awiwi_gen.tables import print_table
 
     read = Hand.load(hand)
     if costs is not None:

@@ -1,4 +1,4 @@
-# The hand as a program of this machine: make -f posix.mk run
+# The hand as a program of this machine: make -f posix.mk run; the firmware of docs/hand_step.md: run-guide
 
 BUILD ?= build/posix
 AWIWI_BUILD := $(BUILD)/awiwi
@@ -7,6 +7,7 @@ CFLAGS := -O2
 all: $(BUILD)/hand
 
 include ../../csrc/awiwi.mk
+include guide.mk
 
 $(BUILD)/hand: $(BUILD)/hand.o $(BUILD)/meter.o $(AWIWI_OBJECTS)
 	$(CC) $(filter %.o,$^) -lm -o $@
@@ -17,4 +18,10 @@ $(BUILD)/%.o: %.c meter.h $(AWIWI_HEADERS) | $(AWIWI_BUILD)
 run: $(BUILD)/hand
 	@$(BUILD)/hand
 
-.PHONY: all run
+$(BUILD)/guide: $(BUILD)/guide.o $(BUILD)/meter.o $(AWIWI_OBJECTS)
+	$(CC) $(filter %.o,$^) -lm -o $@
+
+run-guide: $(BUILD)/guide
+	@$(BUILD)/guide $(LOG)
+
+.PHONY: all run run-guide

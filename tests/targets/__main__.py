@@ -26,7 +26,7 @@ from awiwi_gen.emit.options import Options
 from awiwi_gen.errors import AwiwiError
 from awiwi_gen.pipeline import Job, cached_tree
 
-from .board import run_board
+from .board import run_board, run_whole_hands
 from .driver import golden_inputs, python_digests, write_driver
 from .figures import Figures, compare, measure, read_table, write_table
 from .programs import SELF_TEST, Run, TargetError, kernel_objects, run_kernels
@@ -73,7 +73,7 @@ def main() -> int:
                 if result.figures:
                     table[column], compilers[column] = result.figures, version(target.compiler)
         if chosen.hand is None:
-            faults += run_board(hand)
+            faults += run_board(hand) + run_whole_hands(hand)
             faults += judge(compilers, table, chosen.accept)
     except (AwiwiError, TargetError) as error:
         print(f"make firmware: {error}", file=sys.stderr)

@@ -1,9 +1,12 @@
-"""The example firmware in QEMU's virtual time: it keeps 3 kHz, and says so when it does not."""
+"""The example firmware in QEMU: it keeps 3 kHz or says so, and whole hands have the bits of this machine."""
 
 from __future__ import annotations
 
+import re
 import subprocess
 
+from awiwi_gen.build import compile_objects
+from awiwi_gen.cache import Cache
 from awiwi_gen.emit.options import Options
 from awiwi_gen.hand import Hand
 from awiwi_gen.pipeline import Job, cached_tree
@@ -29,4 +32,31 @@ def run_board(hand: Hand) -> list[str]:
                 faults.append(f"{' '.join(command)} ended with {done.returncode}:\n{done.stdout}{done.stderr}")
             else:
                 print(f"examples/firmware {cpu} {scalar}, load {load}: {done.stdout.splitlines()[0]}", flush=True)
+    return faults
+
+
+WHOLE = (("cortex-m7", "run-hand"), ("cortex-m7", "run-guide"), ("cortex-m4", "run-guide"))
+
+
+def run_whole_hands(hand: Hand) -> list[str]:
+    """Build and run hand.c and the guide's firmware, in double precision, on bare metal; returns what went wrong.
+
+    A Cortex-M4F computes doubles in software, with the same bits.
+    """
+    generated, faults, expected = cached_tree(Job(hand)), [], {}
+    for cpu, goal in (("posix", "run"), ("posix", "run-guide"), *WHOLE):
+        build = ROOT / "build" / "targets" / "hand" / f"{cpu}-{generated.name}"
+        if cpu == "posix":
+            (build / "awiwi").mkdir(parents=True, exist_ok=True)
+            compile_objects(generated, Cache(), build / "awiwi")
+        settings = [f"AWIWI_GENERATED={generated}", f"BUILD={build}"]
+        settings += ["-f", "posix.mk"] if cpu == "posix" else [f"CPU={cpu}"]
+        command = ["make", "--no-print-directory", "-s", "-j2", "-C", str(BOARD), goal, *settings]
+        done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=4 * PATIENCE)
+        digest = re.search(r"^digest: \d+$", done.stdout, re.MULTILINE)
+        program = goal.replace("run-hand", "run")
+        if done.returncode or not digest or expected.setdefault(program, digest[0]) != digest[0]:
+            faults.append(f"{' '.join(command)} ended with {done.returncode}:\n{done.stdout}{done.stderr}")
+        else:
+            print(f"examples/firmware {cpu} {goal}: {digest[0]}", flush=True)
     return faults

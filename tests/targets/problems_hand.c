@@ -13,6 +13,9 @@ static const awiwi_hand_gains ordinary = {
     .period = 0.001, .delay = 0.01, .velocity_bandwidth = 300, .compliance_bandwidth = 20, .motor_kp = 0.6,
     .motor_kd = 0.008, .friction_share = 0.8, .force_kp = 10000, .force_kd = 250, .force_low = 0.5, .force_high = 8,
     .stop_margin = 0.05, .stop_stiffness = 0.3, .residual = 0.0015, .continuous_torque = 0.05, .heating_time = 0.05,
+    .load_bandwidth = 200,
+    .tunings = {{60, 50, 100, 1}, {50, 60, 80, 2}, {70, 40, 90, 1}, {60, 60, 100, 3}, {50, 50, 70, 2}, {40, 60, 60, 1},
+                {70, 50, 50, 2}, {60, 40, 40, 3}},
     .hold_ticks = 3, .slack_ticks = 4, .ramp_ticks = 6,
 };
 
@@ -177,7 +180,7 @@ static void changes(const scene *start)
 {
     now = *start;
     for (int i = 0; i < 9; i++) {
-        now.input.law = i % 3 == 2 ? i - 3 : i % 3; /* -1 and 2 are no laws */
+        now.input.law = i % 4 == 3 ? i - 4 : i % 4; /* -1 and 3 are no laws */
         run("law", 2 + i);
         now.gains.motor_kd *= 0.9;
         now.gains.force_kd *= 0.9;
@@ -187,12 +190,12 @@ static void changes(const scene *start)
         now.gains.motor_kp = 0.6 + 0.1 * i;
         run("gain in every tick", 1);
     }
-    for (int i = 0; i < 16 * 6 + 6; i++) {
+    for (int i = 0; i < 19 * 6 + 6; i++) {
         static const double odd[] = {0, -1, 0.5, NAN, INFINITY, AWIWI_REAL_MAX};
         now = *start;
-        double *number = &now.gains.period + i / 6;
-        int *count = &now.gains.hold_ticks + (i - 96) / 2;
-        if (i < 96)
+        double *number = i / 6 < 18 ? &now.gains.period + i / 6 : &now.gains.tunings[AWIWI_ALL_JOINTS - 1][3];
+        int *count = &now.gains.hold_ticks + (i - 114) / 2;
+        if (i < 114)
             *number = odd[i % 6];
         else
             *count = i % 2 - 1;
@@ -281,7 +284,7 @@ static void refusing_simulation(const scene *start)
 static void beginnings(const awiwi_hand_plant *plant)
 {
     for (int i = 0; i < 8 + 3 * HAND_KERNELS; i++) {
-        place(plant, i % 2);
+        place(plant, i % AWIWI_LAWS);
         if (i == 0)
             now.gains.ramp_ticks = 0;
         if (i == 1)

@@ -273,22 +273,6 @@ static int filter(const double *motion, const double *desired, const double *del
     return answer(REFERENCE_FILTER, next);
 }
 
-static int impedance(const double *theta, const double *thd, const double *theta_des, const double *f_des,
-                     const double *resistance, const double *r, const double *kp, const double *kd, double *tau)
-{
-    *tau = *resistance + *r * *f_des + *kp * (*theta_des - *theta) - *kd * *thd;
-    return answer(MOTOR_IMPEDANCE, tau);
-}
-
-static int cascade(const double *f, const double *xd, const double *k, const double *slope, const double *hdd,
-                   const double *f_des, const double *fd_des, const double *fdd_des, const double *resistance,
-                   const double *r, const double *B, const double *kp, const double *kd, double *tau)
-{
-    const double fdd = *fdd_des + *kp * (*f_des - *f) + *kd * (*fd_des - *k * *xd) - *slope * *xd * *xd;
-    *tau = *resistance + *r * *f + *B * (fdd / *k - *hdd) / *r;
-    return answer(CASCADE, tau);
-}
-
 static int acceleration(const double *theta, const double *thd, const double *tau, const double *f, double *thdd)
 {
     *thdd = (*tau - PULLEY * *f - FRICTION * *thd - 1e-6 * *theta) / MOTOR;
@@ -296,8 +280,8 @@ static int acceleration(const double *theta, const double *thd, const double *ta
 }
 
 static const awiwi_finger fingers[FINGERS] = {
-    {0, 2, 0, 4, {0.8, -0.6, 0, 0.6, 0.8, 0, 0, 0, 1}, KERNELS(2)},
-    {2, 1, 4, 2, {0, 0, 1, 1, 0, 0, 0, 1, 0}, KERNELS(1)},
+    {0, 2, 0, 4, 1, {0.8, -0.6, 0, 0.6, 0.8, 0, 0, 0, 1}, KERNELS(2)},
+    {2, 1, 4, 2, 0, {0, 0, 1, 1, 0, 0, 0, 1, 0}, KERNELS(1)},
 };
 static const double joint_low[] = {-0.8, -0.9, -0.5}, joint_high[] = {0.9, 0.8, 1}, efforts[] = {0.06, 0.05, 0.07};
 static const double tendon_low[] = {0.1, 0.1, 0.2, 0, 0.1, 0.1}, tendon_high[] = {9, 9, 8, 9, 9, 9};
@@ -305,17 +289,17 @@ static const double tendon_low[] = {0.1, 0.1, 0.2, 0, 0.1, 0.1}, tendon_high[] =
 #define HAND(wrist, stretches, resistance) \
     {77, FINGERS, HAND_JOINTS, HAND_TENDONS, fingers, joint_low, joint_high, efforts, tendon_low, tendon_high, \
      slack_ends, taut_ends, MOTOR, PULLEY, 0.2, 2.5, 20, sensors, wrist, elongation, stretches, resistance, \
-     correction, filter, impedance, cascade}
+     correction, filter}
 
 static const awiwi_hand stub_hand = HAND(wrist_lengths, stretch, friction), plain_hand = HAND(0, 0, 0);
 static const awiwi_forward forwards[] = {forward_2, forward_1};
 const awiwi_hand_plant stub_plant = {&stub_hand, forwards, acceleration, friction};
-static const awiwi_finger whole_finger = {0, 8, 0, 16, {0.8, -0.6, 0, 0.6, 0.8, 0, 0, 0, 1}, KERNELS(8)};
+static const awiwi_finger whole_finger = {0, 8, 0, 16, 1, {0.8, -0.6, 0, 0.6, 0.8, 0, 0, 0, 1}, KERNELS(8)};
 static const double many_low[] = {-1, -1, -1, -1, -1, -1, -1, -1}, many_high[] = {1, 1, 1, 1, 1, 1, 1, 1};
 static const awiwi_hand whole_hand = {
     78, 1, AWIWI_ALL_JOINTS, AWIWI_ALL_TENDONS, &whole_finger, many_low, many_high, many_high, many_zeros, many_ends,
     many_zeros, many_ends, MOTOR, PULLEY, 0.2, 2.5, 20, many_sensors, 0, elongation, stretch, friction,
-    correction, filter, impedance, cascade};
+    correction, filter};
 static const awiwi_forward whole_forward[] = {forward_8};
 const awiwi_hand_plant whole_plant = {&whole_hand, whole_forward, acceleration, friction};
 const awiwi_hand_plant plain_plant = {&plain_hand, forwards, acceleration, friction};

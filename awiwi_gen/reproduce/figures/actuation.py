@@ -162,11 +162,12 @@ def repeatability(recordings: Recordings) -> Figure:
     mean = recordings.repeated.mean(axis=0)
     spread = float(np.std(recordings.repeated - mean))
     share = spread / float(np.std(mean))
+    lines = {f"run {number}": run for number, run in enumerate(recordings.repeated, start=1)}
     return Figure(
         "3.4", f"Commanded torque of {RUNS} motions at {recordings.speed:g} rad/s from the same angle",
         "The disturbance repeats: it depends on the position.",
         f"Runs differ by {share:.0%} of what they have in common.", share < 0.2,
-        curves(recordings.theta, recordings.repeated.T, "output angle [rad]", "commanded torque [N m]"),
+        curves(recordings.theta, lines, "output angle [rad]", "commanded torque [N m]"),
     )  # fmt: skip
 
 

@@ -151,6 +151,7 @@ def estimates(library: Any, hand: Hand, finger: str) -> list[Figure]:
     def draw_one(axes: Any) -> None:
         scatter(axes, result.poses, result.found[0.0][30])
         axes.set(xlabel="flexion [rad]", ylabel="abduction [rad]")
+        axes.legend(loc="upper center", bbox_to_anchor=(0.5, 1.1), ncols=2)
 
     def draw_all(axes: Any) -> None:
         axes.set_axis_off()
@@ -160,6 +161,7 @@ def estimates(library: Any, hand: Hand, finger: str) -> list[Figure]:
                 scatter(inset, result.poses, result.found[noise][count])
                 inset.set_title(f"{count} iterations, {noise * 1e3:g} mm", fontsize=7)
                 inset.set(xticks=[], yticks=[])
+        axes.legend(*inset.get_legend_handles_labels(), loc="upper center", bbox_to_anchor=(0.5, -0.01), ncols=2)
 
     return [
         Figure(
@@ -193,8 +195,8 @@ def estimated(search: BaseSearch) -> Estimates:
 
 def scatter(axes: Any, poses: Array, found: Array) -> None:
     """Circles where the joints are, crosses where they are found."""
-    axes.plot(*poses.T, "o", color="tab:red", fillstyle="none", markersize=4)
-    axes.plot(*found.T, "x", color="tab:blue", markersize=4)
+    axes.plot(*poses.T, "o", color="tab:red", fillstyle="none", markersize=4, label="joints")
+    axes.plot(*found.T, "x", color="tab:blue", markersize=4, label="found")
 
 
 def resolution(library: Any, spring: Spring, finger: str) -> float:

@@ -145,13 +145,13 @@ def nonlinear(library: Any) -> list[Figure]:
             f"settle after {settled[0][0]:.1f} and {settled[0][1]:.1f} ms and overshoot by "
             f"{over[0][0]:.0%} and {over[0][1]:.0%}.",
             bool(apart < 0.02 * STEP and settled[0][0] < settled[0][1] and over[0][0] > over[0][1]),
-            curves(times, angles[0], "t [s]", "q [rad]"),
+            curves(times, angles[0], "t [s]", "q [rad]", "-", "--"),
         ),
         Figure(
             "15.20", "Stiffness of the spring during figure 15.19",
             "Accelerating the link changes the stiffness little, loading it much.",
             f"By {changes[0]:.0%} and by {changes[1]:.0%}.", changes[0] < 0.1 * changes[1],
-            curves(times, stiffness, "t [s]", "k [N m/rad]"),
+            curves(times, stiffness, "t [s]", "k [N m/rad]", "-", "--"),
         ),
         Figure(
             "15.21", f"The same with torques cut at {SATURATION:g} N m",

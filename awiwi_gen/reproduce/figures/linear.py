@@ -47,9 +47,9 @@ def open_loop() -> Figure:
     return Figure(
         "12.3", "Poles of the joint alone over the stiffness of its spring",
         "The third and fourth pole hardly move.",
-        f"They move by {moved:.1%}, while the fast pair grows from {fast[0]:.0f} to "
-        f"{fast[-1]:.0f} 1/s. The captioned range of link friction is that of the spring; with it the fastest pole would "
-        f"be at {real:.2g} 1/s or beyond.", moved < 0.05, _poles(shown),
+        f"They move by {moved:.1%}, while the fast pair {'grows' if fast[-1] > fast[0] else 'falls'} from "
+        f"{fast[0]:.0f} to {fast[-1]:.0f} 1/s. The captioned range of link friction is that of the spring; with it the "
+        f"fastest pole would be at {real:.2g} 1/s or beyond.", moved < 0.05, _poles(shown),
     )  # fmt: skip
 
 

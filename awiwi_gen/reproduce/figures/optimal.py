@@ -41,10 +41,11 @@ def draws(library: Any, number: str, title: str, R: float, box: Box, runs: int, 
     slowest = [float(loop.poles().real.max()) for loop in loops]
     apart = float(np.ptp(steps, axis=0).max() / STEP)
     arrived = float(steps[:, -1].min() / STEP)
+    lines = {f"search {seed + 1}": step for seed, step in enumerate(steps)}
     return Figure(
         f"{number} ({title})", f"Steps of drawn gains, {title}",
         "All drawn gains move the link alike.", "The curves are up to "
         f"{apart:.0%} of the step apart, have slowest poles from {min(slowest):.2g} to {max(slowest):.2g} 1/s, "
         f"and cover at least {arrived:.0%} of the step in {END * 1e3:.0f} ms.", apart < ALIKE and arrived > 0.95,
-        curves(times * 1e3, steps.T, "t [ms]", "q [rad]"),
+        curves(times * 1e3, lines, "t [ms]", "q [rad]"),
     )  # fmt: skip
