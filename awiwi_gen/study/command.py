@@ -57,11 +57,12 @@ def study(
     """Study a finger by millions of samples: tolerances of its numbers, workspace, stiffness, or gains of a joint."""
     from awiwi_gen import extras
     from awiwi_gen.hand import Hand
-    from awiwi_gen.report import Progress, print_json, print_table
+    from awiwi_gen.report import Progress, print_json
     from awiwi_gen.study.folder import claim, write_results
     from awiwi_gen.study.plot import draw_to
     from awiwi_gen.study.prepare import Request, require_finger
     from awiwi_gen.study.run import Place
+    from awiwi_gen.tables import print_table
 
     asked = {"spread": bool(spread), "goal": bool(goal), "force": force != FORCE, "joint": bool(joint), "law": bool(law),
              "finger": bool(finger)}  # fmt: skip
