@@ -66,7 +66,7 @@ def show(
 
 
 def drawing(hand: Hand, before: Hand | None = None) -> str:
-    """The hand as SVG text: a row for each finger and the wrist, at one scale, over those of a hand ``before`` that differ."""
+    """The hand as SVG text: a row for each finger and the wrist, over those of a hand ``before`` that differ."""
     from awiwi_gen.hand.pose import Chain
 
     chains = {name: Chain(finger) for name, finger in hand.fingers.items()}
