@@ -162,7 +162,11 @@ def _wrist(root: ElementTree.Element, wrist: Wrist, scale: float, top: float) ->
     lines += [("rim", np.array([a, b, c, a])), ("end", np.array([a0, b0, c0, a0]))]
     lines += [("link", np.array(bar)) for bar in ((a0, a), (b0, b), (c0, c))]
     _, lowest = _row(root, [[(kind, line[:, axes]) for kind, line in lines] for axes in ([0, 1], [0, 2])], scale, top)
-    notes = ["bars A0A, B0B and C0C, the palm's triangle ABC", f"{len(wrist.tendons)} tendons run straight through it"]
+    notes = [
+        "bars A0A, B0B and C0C",
+        "triangle ABC of the palm",
+        f"{len(wrist.tendons)} tendons run straight through it",
+    ]
     for index, note in enumerate(notes):
         _text(root, ROUTES, top + LINE * (index + 1), note, "small")
     return max(lowest, top + LINE * len(notes))
