@@ -85,3 +85,14 @@ def test_a_faulty_hand_leaves_the_drawing_that_is_there(tmp_path):
 
     assert "prefix" in complaint("show", "--hand", tmp_path / "hand.toml", "-o", tmp_path / "one.svg")
     assert (tmp_path / "one.svg").read_text(encoding="utf-8") == "old"
+
+
+def test_the_wrist_is_drawn_with_its_bars_and_all_its_tendons():
+    hand = Hand.load()
+    without = hand.model_copy(update={"wrist": None})
+    views = 2
+
+    assert len(lines(hand, "link")) - len(lines(without, "link")) == views * 3
+    assert len(lines(hand, "return")) - len(lines(without, "return")) == views * len(hand.wrist.tendons)
+    assert "38 tendons run straight through it" in words(hand)
+    assert not any("wrist" in word for word in words(without))
