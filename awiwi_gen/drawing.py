@@ -18,8 +18,10 @@ from awiwi_gen.errors import printable
 if TYPE_CHECKING:
     from awiwi_gen.hand import Finger, Hand
     from awiwi_gen.hand.pose import Chain
+    from awiwi_gen.hand.wrist import Wrist
 
 Array = np.ndarray[Any, Any]
+Shapes = Sequence[tuple[str, Array]]
 
 WIDTH, MARGIN, GAP, LINE = 1000.0, 24.0, 36.0, 16.0  # px
 VIEW = 330.0  # px, of the longest finger
@@ -57,7 +59,7 @@ def show(
     open_: Annotated[bool, typer.Option("--open", help="Open the drawing in a browser.")] = False,
     as_json: Json = False,
 ) -> int:
-    """Draw the hand: links in the middle of their ranges and at both ends, joints, pulleys and tendons."""
+    """Draw the hand: links in the middle of their ranges and at both ends, joints, pulleys, tendons, wrist."""
     from awiwi_gen.hand import Hand
     from awiwi_gen.report import counted
     from awiwi_gen.writing import write_whole
@@ -77,7 +79,7 @@ def show(
 
 
 def drawing(hand: Hand, before: Hand | None = None) -> Drawing:
-    """The hand as SVG text: one row for each finger, all at one scale, over those of a hand ``before`` that differ."""
+    """The hand as SVG text: a row for each finger and the wrist, over those of a hand ``before`` that differ."""
     from awiwi_gen.hand.pose import Chain
 
     chains = {name: Chain(finger) for name, finger in hand.fingers.items()}
@@ -93,6 +95,8 @@ def drawing(hand: Hand, before: Hand | None = None) -> Drawing:
     _text(root, WIDTH - MARGIN, top, f"{_bar(root, scale, top)} mm", "small", "end")
     for name, chain in chains.items():
         top = _finger(root, name, chain, olds.get(name), scale, top + GAP)
+    if hand.wrist:
+        top = _wrist(root, hand.wrist, scale, top + GAP)
     root.set("viewBox", f"0 0 {WIDTH:g} {top + MARGIN:.0f}")
     ElementTree.indent(root)
     return Drawing(ElementTree.tostring(root, encoding="unicode") + "\n")
@@ -137,23 +141,48 @@ def _finger(root: ElementTree.Element, name: str, chain: Chain, old: Chain | Non
         [*[("before", line) for _, line in (_shapes(old, view) if old else ())], *_shapes(chain, view)]
         for view in _views(chain)
     ]
-    left, lowest = 2 * MARGIN, top
-    for view, drawn in enumerate(shapes):
-        points = np.concatenate([points for _, points in drawn]) * scale
-        low, high = points.min(axis=0), points.max(axis=0)
-        corner = np.array([left - low[0], top + LINE + high[1]])
-        for kind, line in drawn:
-            place = corner + line * scale * [1, -1]
-            ElementTree.SubElement(
-                root, "polyline", {"class": kind, "points": " ".join(f"{x:.1f},{y:.1f}" for x, y in place)}
-            )
-        if view == 0:
-            joints = skeleton(chain, _poses(chain)[0]) @ _views(chain)[0].T
-            _name_joints(root, chain, corner + joints * scale * [1, -1], scale)
-        left, lowest = left + high[0] - low[0] + GAP, max(lowest, top + LINE + high[1] - low[1])
+    corners, lowest = _row(root, shapes, scale, top)
+    joints = skeleton(chain, _poses(chain)[0]) @ _views(chain)[0].T
+    _name_joints(root, chain, corners[0] + joints * scale * [1, -1], scale)
     for index, route in enumerate(_routes(chain.finger)):
         _text(root, ROUTES, top + LINE * (index + 1), route, "small")
     return max(lowest, top + LINE * len(chain.finger.tendons))
+
+
+def _row(root: ElementTree.Element, views: Sequence[Shapes], scale: float, top: float) -> tuple[list[Array], float]:
+    """Draw views side by side below `top`; returns where the origin of each is, and where the lowest ends."""
+    left, lowest, corners = 2 * MARGIN, top, []
+    for drawn in views:
+        points = np.concatenate([points for _, points in drawn]) * scale
+        low, high = points.min(axis=0), points.max(axis=0)
+        corners.append(np.array([left - low[0], top + LINE + high[1]]))
+        for kind, line in drawn:
+            text = " ".join(f"{x:.1f},{y:.1f}" for x, y in corners[-1] + line * scale * [1, -1])
+            ElementTree.SubElement(root, "polyline", {"class": kind, "points": text})
+        left, lowest = left + high[0] - low[0] + GAP, max(lowest, top + LINE + high[1] - low[1])
+    return corners, lowest
+
+
+def _wrist(root: ElementTree.Element, wrist: Wrist, scale: float, top: float) -> float:
+    """Draw the wrist's bars in its neutral pose and its tendons, from above and from the side; returns where it ends."""
+    _text(root, MARGIN, top, "wrist, neutral, from above and from the side", "title")
+    a0, a, b, palm = (np.array([float(x) for x in each]) for each in (wrist.a0, wrist.a, wrist.b, wrist.palm))
+    b0, (c0, c) = np.zeros(3), map(np.array, wrist.far_bar)
+    lines: list[tuple[str, Array]] = [
+        ("return", np.array([[float(x) for x in each.forearm], palm + [float(x) for x in each.palm]]))
+        for each in wrist.tendons
+    ]
+    lines += [("rim", np.array([a, b, c, a])), ("end", np.array([a0, b0, c0, a0]))]
+    lines += [("link", np.array(bar)) for bar in ((a0, a), (b0, b), (c0, c))]
+    _, lowest = _row(root, [[(kind, line[:, axes]) for kind, line in lines] for axes in ([0, 1], [0, 2])], scale, top)
+    notes = [
+        "bars A0A, B0B and C0C",
+        "triangle ABC of the palm",
+        f"{len(wrist.tendons)} tendons run straight through it",
+    ]
+    for index, note in enumerate(notes):
+        _text(root, ROUTES, top + LINE * (index + 1), note, "small")
+    return max(lowest, top + LINE * len(notes))
 
 
 def _name_joints(root: ElementTree.Element, chain: Chain, places: Array, scale: float) -> None:

@@ -165,15 +165,15 @@ def _adapter(kernel: Kernel, slot: Slot, prefix: str, refuses: bool) -> str:
 
 
 def tunings(hand: Hand) -> Iterator[tuple[Fraction, ...]]:
-    """K_3, K_4, C_t and C_s of every joint: joints of a finger share tendons, and have those of its slowest tendon."""
-    for rows, columns in hand.blocks.values():
+    """K_3, K_4, C_t and C_s of every finger: joints share tendons, and have those of the slowest one."""
+    for rows, _ in hand.blocks.values():
         found = [each for each in hand.gains if rows.start <= each.tendon < rows.stop]
         slowest = min(found, key=lambda each: float(each.K_3) * float(each.K_4), default=None)
         values: tuple[Fraction, ...] = TUNINGS
         if slowest is not None:
             rates = [Fraction(float(each)) * SLOWER for each in (slowest.K_3, slowest.K_4)]
             values = (*rates, Fraction(float(slowest.C_t)), Fraction(float(slowest.C_s)))
-        yield from [values] * (columns.stop - columns.start)
+        yield values
 
 
 def _initialiser(value: Any, options: Options) -> str:

@@ -14,7 +14,7 @@ from bench.measure import TOLERANCE, Driver
 from bench.quantities import QUANTITIES
 
 ROOT = Path(__file__).resolve().parent.parent
-PEERS = ("casadi", "sympy", "symengine", "symforce", "wrenfold", "mujoco")
+PEERS = ("casadi", "sympy", "symengine", "symforce", "wrenfold", "cppadcodegen", "mujoco", "pinocchio")
 PYTHON = ROOT / ".venv-bench" / "bin" / "python"
 MARKS = ("/* -- counted from here */", "/* -- to here */")
 

@@ -218,13 +218,13 @@ static void observe(const awiwi_context *now, int j, awiwi_real tau, awiwi_real 
 /* The second derivative that motors are to give the torque of a joint, from the wanted torque, the torque that there
    is and its rate (eq. 15.71 to 15.81, mended, with the tendons for the spring). Errors of torque and rate decay, and
    the joint is a mass on a spring and a damper. */
-static awiwi_real backstep(const awiwi_context *now, int j, awiwi_real wanted, awiwi_real tau, awiwi_real rate)
+static awiwi_real backstep(const awiwi_context *now, int j, const awiwi_real *tunings, awiwi_real wanted, awiwi_real tau,
+                           awiwi_real rate)
 {
     const awiwi_hand_state *state = now->state;
-    const awiwi_real *motion = state->motion[j], *tunings = now->gains->tunings[j], m = state->inertia[j];
-    unsigned told = 0; /* with the torques already */
-    const awiwi_real K = awiwi_given(now->input->stiffness[j], 0, &told);
-    const awiwi_real D = awiwi_given(now->input->damping[j], 0, &told);
+    const awiwi_real *motion = state->motion[j], m = state->inertia[j];
+    const awiwi_real K = now->input->stiffness[j] * 0 >= 0 ? now->input->stiffness[j] : 0; /* told with the torques */
+    const awiwi_real D = now->input->damping[j] * 0 >= 0 ? now->input->damping[j] : 0;
     const awiwi_real faster = tunings[0], slower = tunings[1], weight = tunings[2];
     const awiwi_real acceleration = (state->load[j] + tau) / m;
     const awiwi_real e1 = state->qd[j] - motion[1], e2 = acceleration - motion[2], e3 = rate / m - motion[3];
@@ -255,7 +255,7 @@ static unsigned backstepping(const awiwi_context *now, const finger_now *own, aw
     for (int i = 0, j = first; i < n; i++, j++) {
         observe(now, j, tau[i], own->gained[i]);
         change[i] = gains->force_kp * (wanted[i] - tau[i]) - gains->force_kd * taud[i]
-                    - backstep(now, j, wanted[i], tau[i], taud[i]);
+                    - backstep(now, j, gains->tunings[own->index], wanted[i], tau[i], taud[i]);
     }
     for (int i = 0, k = t; i < finger->tendons; i++, k++)
         bend[i] += awiwi_dot(state->spread[k], change, n);

@@ -155,9 +155,9 @@ static int usable(const awiwi_hand_gains *gains)
     for (int i = 0; i < REALS_OF_GAINS; i++)
         if (!(number[i] >= 0 && number[i] <= AWIWI_REAL_MAX))
             return 0;
-    for (int j = 0; j < AWIWI_ALL_JOINTS; j++)
+    for (int finger = 0; finger < AWIWI_ALL_FINGERS; finger++)
         for (int i = 0; i < 4; i++)
-            if (!(gains->tunings[j][i] > 0))
+            if (!(gains->tunings[finger][i] > 0))
                 return 0;
     return gains->period > 0 && gains->delay > 0 && gains->motor_kp > 0 && gains->motor_kd > 0 && gains->force_kp > 0
            && gains->force_kd > 0 && gains->force_low < gains->force_high && gains->continuous_torque > 0
@@ -234,18 +234,17 @@ unsigned awiwi_hand_init(const awiwi_hand *hand, const awiwi_hand_gains *gains, 
 unsigned awiwi_hand_step(const awiwi_hand *hand, const awiwi_hand_gains *gains, const awiwi_hand_input *input,
                          awiwi_hand_state *state, awiwi_real *torque)
 {
-    for (int k = 0; k < hand->tendons; k++)
-        torque[k] = 0;
-    if (!state->ready)
+    if (!state->ready) {
+        memset(torque, 0, (size_t)hand->tendons * sizeof *torque);
         return state->status |= AWIWI_NO_LAW;
+    }
     unsigned status = adopt(hand, gains, input, state);
     const awiwi_context now = awiwi_context_of(hand, &state->gains, input, state);
     const unsigned of_all = awiwi_sense(&now);
     awiwi_resist(&now);
     for (int i = 0; i < hand->fingers; i++)
         status |= step_finger(&now, i, of_all);
-    for (int k = 0; k < hand->tendons; k++)
-        torque[k] = state->torque[k];
+    memcpy(torque, state->torque, (size_t)hand->tendons * sizeof *torque);
     state->turn = (state->turn + 1) % hand->fingers;
     state->tick++;
     state->status = status;

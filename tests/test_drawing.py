@@ -88,6 +88,17 @@ def test_a_faulty_hand_leaves_the_drawing_that_is_there(tmp_path):
     assert (tmp_path / "one.svg").read_text(encoding="utf-8") == "old"
 
 
+def test_the_wrist_is_drawn_with_its_bars_and_all_its_tendons():
+    hand = Hand.load()
+    without = hand.model_copy(update={"wrist": None})
+    views = 2
+
+    assert len(lines(hand, "link")) - len(lines(without, "link")) == views * 3
+    assert len(lines(hand, "return")) - len(lines(without, "return")) == views * len(hand.wrist.tendons)
+    assert "38 tendons run straight through it" in words(hand)
+    assert not any("wrist" in word for word in words(without))
+
+
 def test_a_plot_is_a_picture_for_notebooks_and_a_file_for_scripts(tmp_path):
     hand = Hand.load(STARTER_HAND)
     plotted = awiwi_gen.plot(hand)

@@ -11,7 +11,7 @@ from commands import answer, complaint, told
 from awiwi_gen.mathematics import COLUMNS
 
 GENERATED = Path(__file__).resolve().parent.parent / "generated"
-DYNAMICS = GENERATED / "index_inverse_dynamics.c"
+WEIGHT = GENERATED / "index_gravity.c"
 
 
 def line_of(file: Path, text: str) -> int:
@@ -31,7 +31,7 @@ def test_a_fraction_is_typeset_in_unicode_and_in_latex():
 
 
 def test_formulas_that_nobody_can_read_are_left_to_the_source():
-    assert "too long to be read as a whole; see eq. 2.4" in told("explain", "index_inverse_dynamics")
+    assert "too long to be read as a whole; see eq. 2.17" in told("explain", "index_gravity")
 
 
 def test_a_line_leads_back_to_its_equation_and_to_the_line_of_its_number():
@@ -52,10 +52,10 @@ def test_a_line_without_a_number_leads_to_those_of_the_lines_that_it_reads():
 
 
 def test_a_constant_of_several_numbers_leads_back_to_all_of_them():
-    last = line_of(DYNAMICS, "9.538979534520451e-07*")  # mass, distance of its centre, length of the link before
-    found = answer("explain", "--line", f"{DYNAMICS}:{last}")
+    line = line_of(WEIGHT, "3.2009998437988094e-05*a0.sin")  # the last link's mass, and how far off its centre is
+    found = answer("explain", "--line", f"{WEIGHT}:{line}")
 
-    assert set(found["numbers"]) == {"links[2].offset[0]", "links[3].com[0]", "links[3].com[1]", "links[3].mass"}
+    assert set(found["numbers"]) == {"links[3].com[0]", "links[3].com[1]", "links[3].mass"}
 
 
 @pytest.mark.parametrize(
@@ -63,10 +63,10 @@ def test_a_constant_of_several_numbers_leads_back_to_all_of_them():
     [
         ((), "explain: which kernel? name one"),
         (("--line", "20"), "--line 20: expected FILE:N such as"),
-        (("--line", f"{DYNAMICS}:99999"), "lines; name one of them"),
+        (("--line", f"{WEIGHT}:99999"), "lines; name one of them"),
         (("--line", "nowhere.c:3"), "nowhere.c: cannot be read; expected a generated C file"),
         (("--line", f"{GENERATED / 'self_test.c'}:3"), "no kernel 'self_test'"),
-        (("--line", f"{DYNAMICS}:3", "--hand", str(Path(__file__).with_name("one_finger.toml"))), "no kernel"),
+        (("--line", f"{WEIGHT}:3", "--hand", str(Path(__file__).with_name("one_finger.toml"))), "no kernel"),
     ],
 )
 def test_a_line_that_is_not_of_a_kernel_is_refused(arguments, message):

@@ -93,7 +93,7 @@ def built(claw_hand, tmp_path_factory):
     try:
         for folder in folders:
             (folder / "build").mkdir()
-            build_platform_binary(folder, folder / "build", configuration="Debug")  # equal bits at any optimisation
+            build_platform_binary(folder, folder / "build", configuration="None")  # equal bits at any optimisation
     finally:
         os.environ["PATH"] = path
     return folders
@@ -263,12 +263,12 @@ def test_a_hand_without_a_tick_has_no_fmu_and_says_why(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_files_that_exist_are_kept_and_equal_hands_give_equal_bytes(claw_hand, tmp_path):
+def test_files_that_exist_are_kept_and_equal_hands_give_equal_bytes(built, claw_hand, tmp_path):
+    first = built[0].parent
+    assert "exists; choose another name" in complaint("export", "fmu", "--hand", claw_hand, "-o", first)
     told("export", "fmu", "--hand", claw_hand, "-o", tmp_path)
-    first = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
-    assert "exists; choose another name" in complaint("export", "fmu", "--hand", claw_hand, "-o", tmp_path)
-    told("export", "fmu", "--hand", claw_hand, "-o", tmp_path, "--replace")
-    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == first
+    for path in tmp_path.iterdir():
+        assert path.read_bytes() == (first / path.name).read_bytes()
     with zipfile.ZipFile(tmp_path / "claw_plant.fmu") as archive:
         assert not [name for name in archive.namelist() if name.endswith((".so", "fmi3Functions.h"))]
 

@@ -33,6 +33,7 @@ def test_one_law_is_shown_on_every_plant(lib):
     assert "at 3 kHz with one sample of delay" in shown
     assert shown.count("reached") == 2 * len(PLANTS) - 4  # two of them for the springs' scale, which no sensor shows
     assert shown.count("link three times heavier") == 2
+    assert "18 of 22" in shown or shown.count(" of 11 ") == 2
 
 
 def test_programs_get_the_same_as_numbers(lib):
@@ -50,6 +51,17 @@ def test_one_run_is_shown_sample_by_sample(lib):
     assert found["q"][-1] == pytest.approx(0.2, rel=0.01)
     assert len(found["q"]) == len(found["u_1"]) == len(found["time"])
     assert "q [rad]" in told("simulate", "motor_pd", "--scenario", "load", "--force", "20")
+
+
+def test_a_run_ends_with_a_summary_and_can_be_plotted(lib, tmp_path):
+    shown = told("simulate", "motor_pd", "--scenario", "step", "--plot", tmp_path / "step.svg")
+
+    assert "summary: " in shown.splitlines()[-2]
+    assert "motor torques up to" in shown.splitlines()[-1]
+    assert "<svg" in (tmp_path / "step.svg").read_text(encoding="utf-8")
+    refused = complaint("simulate", "motor_pd", "--scenario", "step", "--plot", tmp_path / "step.txt")
+    assert refused.endswith("expected a name that ends with .png or .svg")
+    assert "choose it with --scenario" in complaint("simulate", "motor_pd", "--plot", tmp_path / "step.svg")
 
 
 @pytest.mark.parametrize(

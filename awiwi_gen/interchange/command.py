@@ -139,13 +139,13 @@ def _export_fmu(hand: Hand, folder: Path, compiled: bool, replace: bool) -> tupl
     if compiled:
         extras.require("--compile", "fmpy")
     from awiwi_gen.cache import Cache
-    from awiwi_gen.interchange.fmu import units
+    from awiwi_gen.interchange.fmu import names, units
     from awiwi_gen.writing import refuse_to_replace, whole_file
 
-    made, losses = units(hand)
-    targets = [folder / f"{unit.name}.fmu" for unit in made]
+    targets = [folder / f"{name}.fmu" for name in names(hand)]
     for target in targets:
         refuse_to_replace(target, replace)
+    made, losses = units(hand)
     archives = [unit.archive(unit.compiled(Cache()) if compiled else None) for unit in made]
     for target, data in zip(targets, archives, strict=True):
         with whole_file(target) as stream:

@@ -89,6 +89,11 @@ class Unit:
             return made.read_bytes()
 
 
+def names(hand: Hand) -> list[str]:
+    """The identifiers of a hand's units."""
+    return [f"{hand.prefix}_{part}" for part in CALLED]
+
+
 def units(hand: Hand) -> tuple[list[Unit], list[Loss]]:
     """The controller and the plant of a hand, and what they do not hold.
 
@@ -161,9 +166,8 @@ def _needed(called: Iterable[str], texts: Mapping[str, str]) -> list[str]:
 def _build_description(name: str, code: Iterable[str]) -> str:
     root = ElementTree.Element("fmiBuildDescription", fmiVersion="3.0")
     build = ElementTree.SubElement(root, "BuildConfiguration", modelIdentifier=name)
-    files = ElementTree.SubElement(
-        build, "SourceFileSet", language="C99", compilerOptions="-ffp-contract=off"
-    )  # the bits depend on it
+    options = "-ffp-contract=off -fno-math-errno"  # the bits depend on the first, the time on the second
+    files = ElementTree.SubElement(build, "SourceFileSet", language="C99", compilerOptions=options)
     for source in code:
         if source.endswith(".c"):
             ElementTree.SubElement(files, "SourceFile", name=source)

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from awiwi_gen.tick.log import Replay
     from awiwi_gen.tick.motion import Motion
 
-Law = Annotated[str, typer.Option("--law", help=f"{' or '.join(LAWS)}; both if left out.")]
+Law = Annotated[str, typer.Option("--law", help=f"{' or '.join(LAWS)}; all if left out.")]
 LONGEST = 100_000.0  # s
 
 

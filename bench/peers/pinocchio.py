@@ -89,7 +89,7 @@ def main(finger: dict[str, Any], directory: Path) -> None:
     """All quantities but our tendons' stiffness, which it does not compute."""
     prefix = Path(cmeel.__file__).parent.parent / "cmeel.prefix"
     links, tip = model(finger)
-    contender = Contender("pinocchio", version("pin"), directory, "c++", counted=False, variants=["portable"])
+    contender = Contender("pinocchio", version("libpinocchio"), directory, "c++", counted=False, variants=["portable"])
     contender.flags = ["-DNDEBUG", *(f"-D{name}={value}" for name, value in BOOST.items())]
     contender.flags += [f"-I{prefix / 'include'}", f"-I{prefix / 'include' / 'eigen3'}"]
     contender.note = "C++ templates of its wheel, with -DNDEBUG; a model at run time"

@@ -35,14 +35,11 @@ def run_board(hand: Hand) -> list[str]:
     return faults
 
 
-WHOLE = (("cortex-m7", "run-hand"), ("cortex-m7", "run-guide"), ("cortex-m4", "run-guide"))
+WHOLE = (("cortex-m7", "run-hand"), ("cortex-m7", "run-guide"))
 
 
 def run_whole_hands(hand: Hand) -> list[str]:
-    """Build and run hand.c and the guide's firmware, in double precision, on bare metal; returns what went wrong.
-
-    A Cortex-M4F computes doubles in software, with the same bits.
-    """
+    """Build and run hand.c and the guide's firmware, in double precision, on bare metal; returns what went wrong."""
     generated, faults, expected = cached_tree(Job(hand)), [], {}
     for cpu, goal in (("posix", "run"), ("posix", "run-guide"), *WHOLE):
         build = ROOT / "build" / "targets" / "hand" / f"{cpu}-{generated.name}"

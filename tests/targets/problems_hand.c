@@ -14,8 +14,7 @@ static const awiwi_hand_gains ordinary = {
     .motor_kd = 0.008, .friction_share = 0.8, .force_kp = 10000, .force_kd = 250, .force_low = 0.5, .force_high = 8,
     .stop_margin = 0.05, .stop_stiffness = 0.3, .residual = 0.0015, .continuous_torque = 0.05, .heating_time = 0.05,
     .load_bandwidth = 200,
-    .tunings = {{60, 50, 100, 1}, {50, 60, 80, 2}, {70, 40, 90, 1}, {60, 60, 100, 3}, {50, 50, 70, 2}, {40, 60, 60, 1},
-                {70, 50, 50, 2}, {60, 40, 40, 3}},
+    .tunings = {{60, 50, 100, 1}, {50, 60, 80, 2}, {70, 40, 90, 1}, {60, 60, 100, 3}, {50, 50, 70, 2}},
     .hold_ticks = 3, .slack_ticks = 4, .ramp_ticks = 6,
 };
 
@@ -193,7 +192,7 @@ static void changes(const scene *start)
     for (int i = 0; i < 19 * 6 + 6; i++) {
         static const double odd[] = {0, -1, 0.5, NAN, INFINITY, AWIWI_REAL_MAX};
         now = *start;
-        double *number = i / 6 < 18 ? &now.gains.period + i / 6 : &now.gains.tunings[AWIWI_ALL_JOINTS - 1][3];
+        double *number = i / 6 < 18 ? &now.gains.period + i / 6 : &now.gains.tunings[AWIWI_ALL_FINGERS - 1][3];
         int *count = &now.gains.hold_ticks + (i - 114) / 2;
         if (i < 114)
             *number = odd[i % 6];
