@@ -136,6 +136,21 @@ for wanted in (lambda: awiwi_gen.Hand, lambda: awiwi_gen.build(None)):
     ]
 
 
+def test_environments_for_learning_need_gymnasium_alone_and_name_it(tmp_path):
+    without = python("import awiwi_gen.gym", hidden=["gymnasium"], cwd=tmp_path)
+    code = """
+import awiwi_gen, awiwi_gen.gym
+try:
+    awiwi_gen.gym.FingerEnv()
+except awiwi_gen.MissingExtraError as error:
+    print(error)
+"""
+    alone = python(code, hidden=EXTRAS.keys() - {"gymnasium"}, cwd=tmp_path)
+
+    assert "awiwi_gen.gym needs gymnasium; install it: pip install 'awiwi_gen[learn]'" in without.stderr
+    assert alone.stdout.startswith("awiwi_gen.Hand needs pydantic"), alone.stderr
+
+
 def test_the_extras_are_those_of_the_project(root):
     project = tomllib.loads((root / "pyproject.toml").read_text())["project"]
     own = {extra: set(project["optional-dependencies"][extra]) for extra in ORDER}

@@ -198,7 +198,6 @@ class Spread:
 
 
 def _packaged() -> Library:
-    from awiwi_gen import build
-    from awiwi_gen.hand import Hand
+    import awiwi_gen
 
-    return build(Hand.load())
+    return awiwi_gen.build(awiwi_gen.Hand.load())
