@@ -3,10 +3,10 @@
 python bench/learn.py [--envs 4096]
 
 The index finger, driven by torques, at the clock's period, 60 steps of integration an action. MuJoCo gets the same
-links, damping, stops and semi-implicit Euler, and computes in C: `mujoco.rollout`, one call an action; ours is Python
-with one call of a kernel a step, and observations, rewards and resets besides. First both are asked for the same
-motion between the stops. Runs alternate; medians of steps of one finger a second, of processor time on one core, which
-others on the machine lengthen little, and of the wall's on all. Needs `make bench` once, for MuJoCo.
+links, damping, places of (soft) stops and semi-implicit Euler, and computes in C: `mujoco.rollout`, one call an action;
+ours is Python with one call of a kernel a step, and observations, rewards and resets besides. First both are asked for
+the same motion between the stops. Runs alternate; medians of steps of one finger a second, of processor time on one
+core, which others on the machine lengthen little, and of the wall's on all. Needs `make bench` once, for MuJoCo.
 """
 
 from __future__ import annotations

@@ -299,10 +299,7 @@ def test_results_survive_pickling_and_copying(lib, duplicate):
 def test_a_kernel_explains_itself(lib):
     function = lib.index_mass_matrix
 
-    assert function.__doc__.splitlines() == [
-        "Mass matrix: the kinetic energy is half qd' M qd.", "", "q(4) [rad] -> M(4, 4) [kg m^2]",
-        "Source: eq. 2.17, 5.4.",
-    ]  # fmt: skip
+    assert function.__doc__.startswith("Mass matrix: the kinetic energy is half qd' M qd.\n\nParameters\n")
     assert repr(function) == "<kernel index_mass_matrix: q(4) [rad] -> M(4, 4) [kg m^2]>"
     assert str(inspect.signature(function)) == "(q, *, out=None)"
     assert str(inspect.signature(lib.index_gravity)) == "(q, g, *, out=None)"

@@ -35,10 +35,6 @@ def test_a_docstring_states_one_number_where_all_elements_have_one_range(lib):
     )
 
 
-def test_a_signature_has_the_inputs_in_order_and_out(lib):
-    assert str(inspect.signature(lib.index_inverse_dynamics)) == "(q, qd, qdd, g, *, out=None)"
-
-
 def test_a_finger_has_the_kernels_of_its_name_under_the_rest_of_theirs(lib):
     index = lib.finger("index")
 

@@ -114,7 +114,7 @@ class Fingers:
         tau = np.ascontiguousarray(tau - self.physics.damping * self.qd)
         qdd = first(self.view.forward_dynamics(self.q.T, self.qd.T, tau.T, self._gravity)).T
         self.qd += self.physics.period * qdd
-        self.qd /= np.maximum(1.0, (np.abs(self.qd) / self.fastest).max(axis=0))
+        self._slow(self.qd)
         self.q += self.physics.period * self.qd
         beyond = (self.q < self.low) | (self.q > self.high)
         if beyond.any():
@@ -130,7 +130,12 @@ class Fingers:
                 (q[joint] >= self.high[joint]) & (qd[joint] > 0)
             )
             qd -= np.where(outwards, qd[joint] / inverse[joint, joint], 0.0) * inverse[joint]
+        self._slow(qd)  # an impulse can make another joint faster
         self.q[:, which], self.qd[:, which] = q, qd
+
+    def _slow(self, qd: Array) -> None:
+        """Slow those fingers down, in place, that have a joint beyond its fastest."""
+        qd /= np.maximum(1.0, (np.abs(qd) / self.fastest).max(axis=0))
 
 
 def first(result: Any) -> Array:
