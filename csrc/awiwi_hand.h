@@ -120,7 +120,7 @@ typedef struct awiwi_hand_gains {
     awiwi_real continuous_torque; /* that a motor bears for ever [N m] */
     awiwi_real heating_time;      /* time constant of a motor's heat [s] */
     awiwi_real load_bandwidth;    /* of the observer of what acts on a joint besides its tendons [rad/s] */
-    awiwi_real tunings[AWIWI_ALL_FINGERS][4]; /* of backstepping: K_3, K_4 [1/s], C_t [rad/(N m)], C_s [rad s^2/(N m)] */
+    awiwi_real tunings[AWIWI_ALL_FINGERS][4]; /* K_3, K_4 [1/s], C_t [rad/(N m)], C_s [rad s^2/(N m)] of backstepping */
     int hold_ticks;               /* for which a fault is borne with the last torques */
     int slack_ticks;              /* for which a tendon may be slack */
     int ramp_ticks;               /* in which torques then fall to zero, and in which any change is faded in */

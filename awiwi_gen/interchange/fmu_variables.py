@@ -221,7 +221,7 @@ def controller_variables(hand: Hand, library: Library) -> list[Variable]:
 
 @dataclass(frozen=True)
 class Gain:
-    """A member of awiwi_hand_gains: one number, or for every joint one for each of ``parts``, which are (name, unit)."""
+    """A member of awiwi_hand_gains: one number, or for all ``over`` one for each of ``parts``, which are (name, unit)."""
 
     name: str
     over: str
@@ -242,7 +242,8 @@ def gains() -> Iterator[Gain]:
         else:
             parts = [("", named[0][1] if named else "" if name.endswith("_ticks") else "1")]
         if name != "period":
-            yield Gain(name, "joint" if sizes else "", tuple(parts), re.sub(r"\s*\[[^\]]*\]", "", before).strip())
+            over = next((kind for kind in ("joint", "finger", "tendon") if f"ALL_{kind.upper()}S" in sizes), "")
+            yield Gain(name, over, tuple(parts), re.sub(r"\s*\[[^\]]*\]", "", before).strip())
 
 
 def _gain_variables(places: Places, struct: Any) -> Iterator[Variable]:
