@@ -141,7 +141,10 @@ def test_a_hand_without_motors_says_what_it_lacks(tmp_path):
 
     assert "the hand has no [motor] whose torque" in complaint(*words, "torque")
     assert "--motors hydraulic is none" in complaint(*words, "hydraulic")
-    assert complaint("export", "urdf", "--motors", "force") == "--motors force: URDF has no motors to choose; expected mjcf"
+    assert (
+        complaint("export", "urdf", "--motors", "force")
+        == "--motors force: URDF has no motors to choose; expected mjcf"
+    )
     assert not list(tmp_path.iterdir())
 
 

@@ -80,8 +80,8 @@ def test_a_finger_that_nothing_drives_keeps_its_energy_between_its_stops(lib):
     assert (np.abs(fingers.energy() / before - 1) < 0.01).all()
 
 
-def test_stops_hold_every_joint_and_give_no_energy(lib):
-    fingers = moving(lib, FREE, speed=15.0)
+def test_stops_hold_every_joint_and_give_neither_energy_nor_speed_beyond_the_limit(lib):
+    fingers = moving(lib, FREE, speed=20.0)
     hits = 0
     for _ in range(300):
         fingers.q += fingers.physics.period * fingers.qd
@@ -94,6 +94,7 @@ def test_stops_hold_every_joint_and_give_no_energy(lib):
             M = lib.index_mass_matrix(place.T)
             before, after = (np.einsum("jn,njk,kn->n", v, M, v) for v in (speed, fingers.qd))
             assert (after[which] <= before[which] * (1 + 1e-9)).all()
+            assert (np.abs(fingers.qd) <= 20 * (1 + 1e-12)).all()
         assert (fingers.q >= fingers.low).all()
         assert (fingers.q <= fingers.high).all()
 
