@@ -49,8 +49,9 @@ COMMENT = re.compile(r'/\*.*?\*/|"[^"\n]*"', re.DOTALL)
 TAKEN_PORTS = {*keyword.kwlist, "self", "out", "status", GUARDS}
 # Kernels are attributes of `library.Library`, beside these, and name the types of their results.
 TAKEN_KERNELS = {
-    *keyword.kwlist, "c", "digest", "dtype", "ffi", "get", "items", "keys", "manifest", "origin", "params", "pointer",
-    "threads", "values", "vectorise_after", "vectorised", "with_numbers",
+    *keyword.kwlist, "c", "change_numbers", "default_numbers", "digest", "dtype", "ffi", "finger", "get", "items", "keys",
+    "manifest", "names", "origin", "params", "part", "pointer", "threads", "values", "vectorise_after", "vectorised",
+    "with_numbers",
 }  # fmt: skip
 
 
