@@ -121,16 +121,16 @@ void awiwi_lengths(const awiwi_context *now, const awiwi_finger *finger, awiwi_r
 int awiwi_set_filter(const awiwi_hand *hand, const awiwi_hand_gains *gains, awiwi_hand_state *state)
 {
     static const awiwi_real still[5];
-    awiwi_real columns[5][5], motion[5] = {0}, moved[5] = {0}, ahead[2];
+    awiwi_real columns[5][5], ahead[2] = {0};
     int status = AWIWI_OK;
     for (int i = 0; i < 5; i++) {
+        awiwi_real motion[5] = {0}, moved[5] = {0};
         motion[i] = 1;
         status |= hand->reference_filter(motion, still, &gains->delay, &gains->period, columns[i]);
         if (i == 1 || i == 2) { /* a motion that follows what it wants moves as that does */
             status |= hand->reference_filter(motion, motion, &gains->delay, &gains->period, moved);
             ahead[i - 1] = moved[0];
         }
-        motion[i] = 0;
     }
     for (int i = 0; i < 5 && status == AWIWI_OK; i++)
         for (int k = 0; k < 5; k++)
