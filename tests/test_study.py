@@ -128,18 +128,12 @@ def test_a_full_disk_is_one_sentence_and_leaves_no_half_of_a_chunk(tmp_path):
 
 
 def test_an_interrupted_study_says_how_far_it_got_and_goes_on(tmp_path):
-    words = [
-        sys.executable,
-        "-m",
-        "awiwi_gen",
-        "study",
-        "workspace",
-        "--hand",
-        str(ONE_FINGER),
-        "-o",
-        str(tmp_path / "w"),
-    ]
-    with subprocess.Popen([*words, "--samples", "900000000"], stderr=subprocess.PIPE, text=True) as running:
+    code = (
+        "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"  # programs in the background ignore it
+        "from awiwi_gen.__main__ import main; main()"
+    )
+    words = ["study", "workspace", "--hand", ONE_FINGER, "-o", tmp_path / "w", "--samples", 900000000]
+    with subprocess.Popen([sys.executable, "-c", code, *map(str, words)], stderr=subprocess.PIPE, text=True) as running:
         while running.poll() is None and not [*tmp_path.glob("w/chunks/*/*.npz")]:
             time.sleep(0.05)
         running.send_signal(signal.SIGINT)
