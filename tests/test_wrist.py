@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 import sympy
+from matplotlib.figure import Figure
 
 from awiwi_gen.derive import Deriver
 from awiwi_gen.hand.wrist import Linkage
@@ -276,27 +277,16 @@ def test_palm_abduction_pulls_tendons_in_proportion_to_their_distance_from_the_m
 
 
 def test_the_figures_hold_and_can_be_drawn(lib, hand):
-    class Axes:
-        def __init__(self):
-            self.shapes = []
-
-        def plot(self, *curve, **_):
-            self.shapes.append(np.shape(curve[0] if len(curve) == 1 else curve[1]))
-
-        def axvline(self, x, **_):
-            assert 0 < x < self.shapes[0][0]
-
-        def set(self, **labels):
-            assert labels["xlabel"]
-            assert labels["ylabel"]
-
     drawn = figures(lib, hand)
     assert [figure.number for figure in drawn] == ["6.9", "6.10"]
-    for figure, curves in zip(drawn, [(804,), (804, 38)], strict=True):
-        axes = Axes()
+    for figure, curves in zip(drawn, [1, 38], strict=True):
+        axes = Figure().subplots()
         figure.draw(axes)
         assert figure.holds, figure.claim
-        assert axes.shapes == [curves]
+        assert [len(line.get_xdata()) for line in axes.lines[:curves]] == [804] * curves
+        assert axes.get_xlabel()
+        assert axes.get_ylabel()
+    assert 0 < axes.lines[curves].get_xdata()[0] < 804  # where flexion ends
 
 
 # -- the domain -------------------------------------------------------------------------------------------
