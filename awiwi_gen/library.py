@@ -9,7 +9,7 @@ import os
 import textwrap
 import warnings
 from collections import namedtuple
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache, partial
 from itertools import combinations
@@ -22,7 +22,7 @@ from awiwi_gen.arrays import Samples, as_numbers, as_samples, direct_call, packe
 from awiwi_gen.docstrings import docstring
 from awiwi_gen.errors import BuildError, InputError, OutputError, unknown
 from awiwi_gen.ir.cost import SINCOS
-from awiwi_gen.views import FingerView, Names, PartView
+from awiwi_gen.views import FingerView, Kernels, Names, PartView
 
 Array = np.ndarray[Any, Any]
 Place = tuple[Any, int, tuple[int, ...]]  # pointer to the samples, step between them, steps that a loop is given
@@ -254,7 +254,7 @@ def _described(arrays: list[tuple[tuple[int, ...], Any]]) -> str:
     return ", ".join(f"{shape} of {dtype}" for shape, dtype in arrays)
 
 
-class Library(Mapping[str, KernelFunction]):
+class Library(Kernels):
     """All kernels of a compiled hand, by name as attributes or items.
 
     Two numbers may be changed at any time. Batches that are large enough are shared by ``threads``, as many as there
@@ -350,30 +350,9 @@ class Library(Mapping[str, KernelFunction]):
         numbers = None if self._own_numbers is None else list(self._own_numbers)
         return _restored, (self.origin, self.threads, self.vectorise_after, numbers)
 
-    def __getattr__(self, name: str) -> KernelFunction:
-        try:
-            return self.__dict__["_kernels"][name]  # type: ignore[no-any-return]
-        except KeyError:
-            raise AttributeError(self._unknown(name)) from None
-
-    def __getitem__(self, name: str) -> KernelFunction:
-        try:
-            return self._kernels[name]
-        except KeyError:
-            raise KeyError(self._unknown(name)) from None
-
     def _unknown(self, name: str) -> str:
         hint = did_you_mean(name, self.__dict__.get("_kernels", ()))
         return f"this hand has no kernel {name!r}" + f"; {hint}" * bool(hint)
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._kernels)
-
-    def __len__(self) -> int:
-        return len(self._kernels)
-
-    def __dir__(self) -> list[str]:
-        return [*super().__dir__(), *self._kernels]
 
 
 def _restored(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import operator
 import re
+from abc import abstractmethod
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -37,19 +38,10 @@ def names_in(header: str, prefix: str) -> dict[str, Names]:
     return {finger: Names(listed(joints), listed(tendons)) for finger, (joints, tendons) in tables.items()}
 
 
-class PartView(Mapping[str, "KernelFunction"]):
-    """The kernels of a library whose names begin with that of a part, by the rest of their names: attributes or items."""
+class Kernels(Mapping[str, "KernelFunction"]):
+    """Kernels by their names, as attributes or items; what has them says in ``_unknown`` that one is missing."""
 
-    def __init__(self, library: Library, name: str) -> None:
-        self.library, self.name = library, name
-        before = f"{name}_"
-        self._kernels = {key.removeprefix(before): library[key] for key in library if key.startswith(before)}
-
-    def __repr__(self) -> str:
-        return f"<part {self.name}: {len(self)} kernels>"
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return operator.methodcaller("part", self.name), (self.library,)
+    _kernels: dict[str, KernelFunction]
 
     def __getattr__(self, name: str) -> KernelFunction:
         try:
@@ -63,9 +55,9 @@ class PartView(Mapping[str, "KernelFunction"]):
         except KeyError:
             raise KeyError(self._unknown(name)) from None
 
+    @abstractmethod
     def _unknown(self, name: str) -> str:
-        known = self.__dict__.get("_kernels", ())
-        return str(unknown(f"kernel of {self.__dict__.get('name')}", name, known, "see its keys()"))
+        """The message for a name that is none."""
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._kernels)
@@ -75,6 +67,25 @@ class PartView(Mapping[str, "KernelFunction"]):
 
     def __dir__(self) -> list[str]:
         return [*super().__dir__(), *self._kernels]
+
+
+class PartView(Kernels):
+    """The kernels of a library whose names begin with that of a part, by the rest of their names: attributes or items."""
+
+    def __init__(self, library: Library, name: str) -> None:
+        self.library, self.name = library, name
+        before = f"{name}_"
+        self._kernels = {key.removeprefix(before): library[key] for key in library if key.startswith(before)}
+
+    def __repr__(self) -> str:
+        return f"<part {self.name}: {len(self)} kernels>"
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return operator.methodcaller("part", self.name), (self.library,)
+
+    def _unknown(self, name: str) -> str:
+        known = self.__dict__.get("_kernels", ())
+        return str(unknown(f"kernel of {self.__dict__.get('name')}", name, known, "see its keys()"))
 
 
 class FingerView(PartView):

@@ -32,7 +32,7 @@ COMPILER = [
 ]
 ROOMS = ("reproduce", "compare", "tune")
 TOP = [
-    ["patterns", "writing", "tables", "derive", "records", "budget", "parameters"],
+    ["patterns", "reading", "writing", "tables", "derive", "records", "budget", "parameters"],
     ["judge", "golden", "hand_header"],
     ["hand_model"],
     ["parallel", "tasks"],

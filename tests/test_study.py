@@ -22,7 +22,7 @@ from awiwi_gen.loops.hand_joint import joint_of
 from awiwi_gen.loops.laws import LAWS
 from awiwi_gen.parallel import silent
 from awiwi_gen.study import gains, stiffness, workspace
-from awiwi_gen.study.base import Study
+from awiwi_gen.study.base import Study, random_of
 from awiwi_gen.study.folder import Chunks
 from awiwi_gen.study.prepare import ranges_of, without_zeros
 from awiwi_gen.study.run import Place, computed
@@ -100,7 +100,10 @@ class Dying(Study):
             open(self.flag, "w").close()
             time.sleep(0.3)
             os.kill(os.getpid(), signal.SIGKILL)
-        return {"index": np.array([index])}
+        return super().at(library, index)
+
+    def chunk(self, library, random):
+        return {"draw": random.uniform(size=1)}
 
 
 def test_a_killed_process_loses_nothing_that_was_done(kernels, tmp_path):
@@ -111,7 +114,7 @@ def test_a_killed_process_loses_nothing_that_was_done(kernels, tmp_path):
     chunks = computed(study, kernels, 6, Place(tmp_path, workers=2), lambda *words: stages.append(words))
 
     assert stages[0][1] >= 2
-    assert [int(each["index"][0]) for each in chunks.all(6)] == list(range(6))
+    assert [each["draw"] for each in chunks.all(6)] == [random_of(0, i, "dying").uniform(size=1) for i in range(6)]
     assert sorted(path.suffix for path in chunks.folder.iterdir()) == [".npz"] * 6
 
 

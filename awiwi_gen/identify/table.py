@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import csv
-import re
 from pathlib import Path
 
 import numpy as np
 
 from awiwi_gen.errors import Fault, InputError, unknown
 from awiwi_gen.identify.recording import Array
+from awiwi_gen.reading import read_table
 from awiwi_gen.units import parse_quantity
 
 # Column and the unit that it is kept in.
@@ -20,26 +19,19 @@ COLUMNS = {
 
 def read(path: Path) -> dict[str, Array]:
     """The columns of a table in SI, by name. Raises InputError with the line of what cannot be read."""
-    try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        reason = (error.strerror if isinstance(error, OSError) else None) or "is not UTF-8 text"
-        raise InputError(Fault(file=str(path), message=f"cannot be read: {reason}")) from None
-    reader = csv.reader(lines)
-    scales = [_scale(path, head) for head in next(reader, [])]
+    columns, cells = read_table(path)
+    scales = [_scale(path, *column) for column in columns]
     names = [name for name, _ in scales]
     if len(set(names)) < len(names) or not names:
         raise InputError(Fault(file=str(path), line=1, message="names a column twice, or none at all"))
-    rows = [_row(path, reader.line_num, cells, names) for cells in reader if any(cells)]
+    rows = [_row(path, line, row, names) for line, row in cells]
     values = np.array(rows, float).reshape(-1, len(names)) * [scale for _, scale in scales]
     return dict(zip(names, values.T, strict=True))
 
 
-def _scale(path: Path, head: str) -> tuple[str, float]:
+def _scale(path: Path, name: str, stated: str) -> tuple[str, float]:
     """A column's name, and its unit in SI."""
-    found = re.fullmatch(r"\s*(\w+)\s*(?:\[(.*)\])?\s*", head)
-    name = found[1] if found else head.strip()
-    if not found or name not in COLUMNS:
+    if name not in COLUMNS:
         raise InputError(
             Fault(
                 file=str(path),
@@ -47,13 +39,13 @@ def _scale(path: Path, head: str) -> tuple[str, float]:
                 message=str(unknown("column", name, COLUMNS, f"columns are {', '.join(COLUMNS)}")),
             )
         )
-    written, wanted = found[2] or "1", parse_quantity(f"1 {COLUMNS[name]}" if COLUMNS[name] != "1" else "1")
+    written, wanted = stated or "1", parse_quantity(f"1 {COLUMNS[name]}" if COLUMNS[name] != "1" else "1")
     try:
         unit = parse_quantity("1" if written.strip() == "1" else f"1 {written}")
     except InputError as error:
         raise InputError(Fault(file=str(path), line=1, key=name, message=error.faults[0].message)) from None
     if unit.unit != wanted.unit:
-        message = f"is in {written if found[2] else 'no unit'}; expected a unit such as {name} [{COLUMNS[name]}]"
+        message = f"is in {stated or 'no unit'}; expected a unit such as {name} [{COLUMNS[name]}]"
         raise InputError(Fault(file=str(path), line=1, key=name, message=message))
     return name, float(unit)
 

@@ -10,7 +10,6 @@ unit, or the head of its column has it: `mass [g]`. `frame` says what the number
 
 from __future__ import annotations
 
-import csv
 import re
 import tomllib
 from collections.abc import Mapping
@@ -26,6 +25,7 @@ from awiwi_gen.hand.file import HandFile
 from awiwi_gen.interchange.export import Part, parts, value, vector
 from awiwi_gen.interchange.model import Array
 from awiwi_gen.interchange.toml import cite, mass_and_inertia
+from awiwi_gen.reading import read_table
 from awiwi_gen.units import parse_quantity
 
 _COM, _INERTIA = ("com_x", "com_y", "com_z"), ("xx", "yy", "zz", "xy", "xz", "yz")
@@ -72,14 +72,8 @@ def updated(hand_path: Path, table: Path) -> tuple[str, list[str]]:
 
 
 def _rows(table: Path) -> list[Row]:
-    try:
-        lines = table.read_text(encoding="utf-8-sig").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        reason = (error.strerror if isinstance(error, OSError) else None) or "is not UTF-8 text"
-        raise InputError(Fault(file=str(table), message=f"cannot be read: {reason}")) from None
-    reader = csv.reader(lines)
-    heads = [re.fullmatch(r"\s*(\w+)\s*(?:\[(.*)\])?\s*", head) for head in next(reader, [])]
-    names = [head[1] if head else "" for head in heads]
+    columns, rows = read_table(table)
+    names = [name for name, _ in columns]
     for name in names:
         if name not in ("link", "frame", *_UNITS):
             raise InputError(
@@ -89,10 +83,7 @@ def _rows(table: Path) -> list[Row]:
         raise InputError(
             Fault(file=str(table), line=1, message='has no column "link"; expected rows such as index.pip')
         )
-    units = {head[1]: head[2] or "" for head in heads if head}
-    return [
-        _row(table, reader.line_num, dict(zip(names, cells, strict=False)), units) for cells in reader if any(cells)
-    ]
+    return [_row(table, line, dict(zip(names, cells, strict=False)), dict(columns)) for line, cells in rows]
 
 
 def _row(table: Path, line: int, cells: dict[str, str], units: Mapping[str, str]) -> Row:

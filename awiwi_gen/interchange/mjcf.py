@@ -30,6 +30,7 @@ from awiwi_gen.interchange.published import (
 from awiwi_gen.interchange.quarter import quarter_angle, quarter_axis, quarter_rotation
 from awiwi_gen.interchange.urdf import require_tree
 from awiwi_gen.interchange.wraps import tendons_of
+from awiwi_gen.reading import read_text
 
 KINDS = ("free", "ball", "slide", "hinge")
 _RPY = re.compile(r'(\brpy\s*=\s*")([^"]*)(")')
@@ -128,11 +129,7 @@ def _without_forgotten(path: Path, text: str, error: Exception) -> tuple[Any, li
 
 def urdf_text(path: Path, exact: bool) -> tuple[str, list[str]]:
     """The text of a file; in a URDF with rotations by quarter turns where they are meant, and notes about these."""
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = (error.strerror if isinstance(error, OSError) else None) or "is not UTF-8 text"
-        raise InputError(Fault(file=str(path), message=f"cannot be read: {reason}")) from None
+    text = read_text(path)
     notes: list[str] = []
     if exact or re.search(r"<robot\b", text) is None:
         return text, notes

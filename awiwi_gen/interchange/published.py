@@ -13,6 +13,7 @@ import numpy as np
 
 from awiwi_gen.interchange.model import Loss
 from awiwi_gen.interchange.urdf import without_leader
+from awiwi_gen.reading import read_text
 
 __all__ = ["forgotten", "give_moments", "is_lock", "join_locked", "left_out", "meshed", "sources", "warnings_kept"]
 
@@ -86,7 +87,7 @@ def warnings_kept() -> Iterator[list[str]]:
 
 def left_out(path: Path, warned: list[str]) -> list[Loss]:
     """What MuJoCo warned of, and mimic joints of a URDF that have no leader, by name: it only says that it ignores them."""
-    text = path.read_text(encoding="utf-8-sig")
+    text = read_text(path)
     lost = without_leader(text) if re.search(r"<robot\b", text) else {}
     others = [each for each in warned if not any(f"'{joint}'" in each for joint in lost)]
     losses = [

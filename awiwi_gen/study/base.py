@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from typing import Any, ClassVar
@@ -18,16 +19,16 @@ POSES_STREAM = 1 << 20  # of random numbers: beyond all indices of chunks
 
 
 @dataclass(frozen=True, eq=False)
-class Study:
+class Study(ABC):
     """The part of a study that a worker needs. Its fields decide every chunk, with kernels, seed and index."""
 
     SIZE: ClassVar[int]  # samples of a chunk
     seed: int
     stage: str  # a folder of chunks
 
+    @abstractmethod
     def chunk(self, library: Any, random: np.random.Generator) -> dict[str, Array]:
         """The results of ``SIZE`` samples."""
-        raise NotImplementedError
 
     def at(self, library: Any, index: int) -> dict[str, Array]:
         """The results of the chunk with an index."""
