@@ -45,6 +45,7 @@ OF_FINGER = (
     Slot("dynamics", "dynamics", ("q", "qd", "g"), 3),
     Slot("tip", "pose_and_jacobian", ("q",), 2),
     Slot("distribution", "tendon_distribution", ("q", "tau", "K", "f_min", "f_max"), 1),
+    Slot("update", "tendon_distribution_update", ("q", "tau", "K", "f_min", "f_max", "f_last"), 1, optional=True),
 )
 OF_HAND = (
     Slot("sensors", "calibration_readings", ("readings",), 3),

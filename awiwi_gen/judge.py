@@ -63,8 +63,9 @@ def judge_record(
         observed = partial(problem.observed, record.inputs)
         other = partial(problem.other_reference, record.inputs)
         units = {name: port.units for name, port in kernel.outputs.items()}
+        run = partial(problem.run, function)
         return judge_solver(
-            kernel.name, record.reference, mirror, observed, other, record.inputs, function, tolerance, SEED, units
+            kernel.name, record.reference, mirror, observed, other, record.inputs, run, tolerance, SEED, units
         )
     inputs = draw(kernel.inputs, kernel.path, options.dtype)
     examine = partial(

@@ -12,6 +12,7 @@ enum {
     AWIWI_MOST_INVERSIONS = 64,      /* rounds that invert k(f) + k(f + d); smooth springs take 4 */
     AWIWI_MOST_TORQUE_STEPS = 64,    /* of the search for forces that give the torque */
     AWIWI_MOST_STIFFNESS_STEPS = 96, /* and of that for the stiffness, from each of 4 starts */
+    AWIWI_MOST_UPDATE_STEPS = 6,     /* of an update, for the torque and what is left for the stiffness */
     AWIWI_MOST_CURVES = 4 + AWIWI_MOST_INVERSIONS + 4 * (1 + AWIWI_MOST_STIFFNESS_STEPS)
 };
 
@@ -52,13 +53,20 @@ typedef struct awiwi_tendons {
    upper limit. The curve is evaluated at most AWIWI_MOST_CURVES times.
    Returns an awiwi_status. After AWIWI_OUT_OF_DOMAIN (a limit is outside the curve, or low > high) and AWIWI_NOT_FINITE
    all forces are equal: in the middle of the limits if both are on the curve, at the lower limit if only that is, else
-   zero. Otherwise they are within the limits. */
+   zero. Otherwise they are within the limits.
+   With `last` forces, as those of the last tick, the search goes on from these, in at most AWIWI_MOST_UPDATE_STEPS steps,
+   first for the torque, then for the stiffness: AWIWI_NOT_CONVERGED where more are left for the next update. A minimum
+   that is not the least is kept. `last` may be null. */
 int awiwi_distribute(const awiwi_tendons *tendons, const awiwi_real *torque, const awiwi_real *stiffness,
-                     awiwi_real tolerance, awiwi_real *forces);
+                     awiwi_real tolerance, const awiwi_real *last, awiwi_real *forces);
 
 /* The search for the tendons in no pair alone; the forces of the others stay. */
 int awiwi_search_forces(const awiwi_tendons *tendons, const awiwi_real *torque, const awiwi_real *stiffness,
                         awiwi_real tolerance, awiwi_real *forces);
+
+/* The same, on from the last forces [tendons]. */
+int awiwi_update_forces(const awiwi_tendons *tendons, const awiwi_real *torque, const awiwi_real *stiffness,
+                        awiwi_real tolerance, const awiwi_real *last, awiwi_real *forces);
 
 /* Algorithm 2, corrected, for all tendons and for comparison: exactly `rounds` trials in the null space of P', first
    of length `step` times the gradient of |K_q - K|^2 + weight (force outside the limits)^2. The torque is exact, the

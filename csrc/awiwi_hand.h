@@ -36,6 +36,9 @@ typedef struct awiwi_finger {
     int (*tip)(const awiwi_real *q, awiwi_real *T, awiwi_real *J);
     int (*distribution)(const awiwi_real *q, const awiwi_real *tau, const awiwi_real *K, const awiwi_real *f_min,
                         const awiwi_real *f_max, awiwi_real *f);
+    /* the same on from the last forces, with little work; null where the distribution has little */
+    int (*update)(const awiwi_real *q, const awiwi_real *tau, const awiwi_real *K, const awiwi_real *f_min,
+                  const awiwi_real *f_max, const awiwi_real *f_last, awiwi_real *f);
 } awiwi_finger;
 
 /* A hand: its fingers, limits by joint and by tendon, sensors, the motor, and kernels that all its parts share. */

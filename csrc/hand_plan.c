@@ -106,20 +106,24 @@ unsigned awiwi_torques(const awiwi_context *now, int index, awiwi_real *tau)
     return status;
 }
 
-/* Forces of the wanted torque and stiffness, from the solver. */
+/* Forces of the wanted torque and stiffness. A search goes on from those of the last turn, so that none is long. */
 static unsigned solve(const awiwi_context *now, int index, const awiwi_real *pose)
 {
     const awiwi_finger *finger = now->hand->finger + index;
     awiwi_hand_state *state = now->state;
+    const awiwi_real *low = &now->gains->force_low, *high = &now->gains->force_high;
     const int n = finger->joints, j = finger->first_joint;
-    awiwi_real K[JOINTS * JOINTS];
+    awiwi_real K[JOINTS * JOINTS], last[TENDONS], *f = state->planned_f + finger->first_tendon;
+    const awiwi_real *tau = state->planned_tau + j;
     unsigned status = awiwi_torques(now, index, state->planned_tau + j);
     for (int i = 0; i < n * n; i++)
         K[i] = 0;
     for (int i = 0; i < n; i++)
         K[i * n + i] = awiwi_given(now->input->stiffness[j + i], 0, &status);
-    const int found = finger->distribution(pose, state->planned_tau + j, K, &now->gains->force_low,
-                                           &now->gains->force_high, state->planned_f + finger->first_tendon);
+    for (int i = 0; i < finger->tendons; i++)
+        last[i] = f[i];
+    const int found = finger->update && state->ready ? finger->update(pose, tau, K, low, high, last, f)
+                                                     : finger->distribution(pose, tau, K, low, high, f);
     if (found == AWIWI_INFEASIBLE)
         return status | AWIWI_UNREACHABLE;
     return found == AWIWI_OK || found == AWIWI_NOT_CONVERGED ? status : status | AWIWI_NO_LAW;

@@ -274,16 +274,25 @@ static int end(const awiwi_tendons *t, int status, const awiwi_real *tau, awiwi_
     return status == AWIWI_OK && !gives(t, f, tau) ? AWIWI_INFEASIBLE : status;
 }
 
+/* The tendons in no pair, with the last forces or without any. */
+static int search(const awiwi_tendons *t, const awiwi_real *tau, const awiwi_real *K, awiwi_real tolerance,
+                  const awiwi_real *last, awiwi_real *f)
+{
+    if (!last)
+        return awiwi_search_forces(t, tau, K, tolerance, f);
+    return awiwi_all_finite(last, t->tendons) ? awiwi_update_forces(t, tau, K, tolerance, last, f) : AWIWI_NOT_FINITE;
+}
+
 int awiwi_distribute_others(const awiwi_tendons *t, const awiwi_real *tau, const awiwi_real *K, awiwi_real tolerance,
-                            awiwi_real *f)
+                            const awiwi_real *last, awiwi_real *f)
 {
     for (int i = 0; i < t->searched; i++)
         f[t->searched_tendons[i]] = t->low + (t->high - t->low) / 2;
-    return end(t, awiwi_search_forces(t, tau, K, tolerance, f), tau, f);
+    return end(t, search(t, tau, K, tolerance, last, f), tau, f);
 }
 
 int awiwi_distribute(const awiwi_tendons *t, const awiwi_real *tau, const awiwi_real *K, awiwi_real tolerance,
-                     awiwi_real *f)
+                     const awiwi_real *last, awiwi_real *f)
 {
     int status = AWIWI_OK;
     if (t->joints > AWIWI_MOST_JOINTS || t->tendons > AWIWI_MOST_TENDONS) /* objects of a smaller hand */
@@ -298,6 +307,6 @@ int awiwi_distribute(const awiwi_tendons *t, const awiwi_real *tau, const awiwi_
     if (t->pairs > 0)
         status = distribute_pairs(t, tau, K, tolerance, f);
     if (t->searched > 0 && status == AWIWI_OK)
-        status = awiwi_search_forces(t, tau, K, tolerance, f);
+        status = search(t, tau, K, tolerance, last, f);
     return end(t, status, tau, f);
 }

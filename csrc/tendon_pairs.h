@@ -61,6 +61,6 @@ AWIWI_INLINED int awiwi_is_rounding(awiwi_real missing, awiwi_real wanted, awiwi
 
 /* What awiwi_distribute does after the pairs, whose forces are there. */
 int awiwi_distribute_others(const awiwi_tendons *tendons, const awiwi_real *torque, const awiwi_real *stiffness,
-                            awiwi_real tolerance, awiwi_real *forces);
+                            awiwi_real tolerance, const awiwi_real *last, awiwi_real *forces);
 
 #endif

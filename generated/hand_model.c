@@ -258,6 +258,7 @@ static const awiwi_finger fingers[] = {
         run_thumb_dynamics,
         run_thumb_pose_and_jacobian,
         awiwi_thumb_tendon_distribution,
+        awiwi_thumb_tendon_distribution_update,
     },
     {
         4, 4, 8, 8, 0,
@@ -272,6 +273,7 @@ static const awiwi_finger fingers[] = {
         run_index_dynamics,
         run_index_pose_and_jacobian,
         awiwi_index_tendon_distribution,
+        0,
     },
     {
         8, 4, 16, 8, 0,
@@ -286,6 +288,7 @@ static const awiwi_finger fingers[] = {
         run_middle_dynamics,
         run_middle_pose_and_jacobian,
         awiwi_middle_tendon_distribution,
+        0,
     },
     {
         12, 3, 24, 6, 0,
@@ -300,6 +303,7 @@ static const awiwi_finger fingers[] = {
         run_ring_dynamics,
         run_ring_pose_and_jacobian,
         awiwi_ring_tendon_distribution,
+        0,
     },
     {
         15, 4, 30, 8, 0,
@@ -314,6 +318,7 @@ static const awiwi_finger fingers[] = {
         awiwi_fifth_dynamics,
         awiwi_fifth_pose_and_jacobian,
         awiwi_fifth_tendon_distribution,
+        0,
     },
 };
 

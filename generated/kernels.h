@@ -19,6 +19,7 @@
 #define awiwi_thumb_inverse_dynamics_derivatives awiwi_thumb_inverse_dy_c9173c4f
 #define awiwi_thumb_joint_torque_and_stiffness awiwi_thumb_joint_torq_9ffb34a1
 #define awiwi_thumb_joint_estimate_error awiwi_thumb_joint_esti_4bc2145a
+#define awiwi_thumb_tendon_distribution_update awiwi_thumb_tendon_dis_52c94e67
 #define awiwi_thumb_base_estimate_by_gradient awiwi_thumb_base_estim_11900aea
 #define awiwi_index_inverse_dynamics_derivatives awiwi_index_inverse_dy_1f4e9d81
 #define awiwi_index_joint_torque_and_stiffness awiwi_index_joint_torq_beede771
@@ -350,6 +351,25 @@ void awiwi_thumb_joint_estimate_error(const double q_in[4], const double noise_i
  * Cost: the solver's own work and calls, at most: 1 of thumb_coupling, 66 of thumb_tendon_stiffness, 390 of thumb_searched_tendon_stiffness, 1 of thumb_coupling_derivative.
  */
 AWIWI_MUST_CHECK int awiwi_thumb_tendon_distribution(const double q_in[4], const double tau_in[4], const double K_in[16], const double f_min_in[1], const double f_max_in[1], double f_out[8]);
+
+/*
+ * Tendon forces as those of the distribution, in bounded time, for a demand that changes little from
+ * tick to tick. The search begins at the forces f_last and takes few steps: where they do not suffice,
+ * the status is AWIWI_NOT_CONVERGED, and the next update goes on from the result. The torque comes
+ * first. It does not look for nearer minima of the stiffness' error elsewhere.
+ * Source: eq. 7.2, 7.6, mended.
+ *   in   q[4] in rad, from [-0.6109, -0.6109, -0.08727, -0.08727] to [0.6109, 0.6109, 1.396, 1.396]
+ *   in   tau[4] in N m, -1 to 1
+ *   in   K[4][4] in N m/rad, -50 to 50
+ *   in   f_min[1] in N, 3.87595 to 27.9443
+ *   in   f_max[1] in N, 76.0811 to 100.149
+ *   in   f_last[8] in N, 3.87595 to 100.149
+ *   out  f[8] in N
+ * Returns an awiwi_status, see awiwi_solvers.h, never 0 if an input is not finite; the outputs are
+ * always defined.
+ * Cost: the solver's own work and calls, at most: 1 of thumb_coupling, 66 of thumb_tendon_stiffness, 8 of thumb_searched_tendon_stiffness, 1 of thumb_coupling_derivative.
+ */
+AWIWI_MUST_CHECK int awiwi_thumb_tendon_distribution_update(const double q_in[4], const double tau_in[4], const double K_in[16], const double f_min_in[1], const double f_max_in[1], const double f_last_in[8], double f_out[8]);
 
 /*
  * Base joint angles whose span lengths are nearest to the measured h, by gradient search from start.

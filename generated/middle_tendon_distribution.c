@@ -161,7 +161,7 @@ int awiwi_middle_tendon_distribution(const double q_in[restrict 4], const double
         4, 8, P, 0, curve, curve, context, f_min_in[0], f_max_in[0],
         4, pairs, 0, 0,
     };
-    const int status = awiwi_distribute(&tendons, tau_in, K_in, tolerance, f_out);
+    const int status = awiwi_distribute(&tendons, tau_in, K_in, tolerance, 0, f_out);
     /* the solver looks at all other inputs */
     return status == AWIWI_OK && !awiwi_all_finite(q_in, 4) ? AWIWI_NOT_FINITE : status;
 }

@@ -149,8 +149,8 @@ int awiwi_thumb_tendon_distribution(const double q_in[restrict 4], const double 
         2, pairs, 4, searched,
     };
     if (place_pairs(P, q_in, tau_in, K_in, f_min_in[0], f_max_in[0], f_out))
-        return awiwi_distribute_others(&tendons, tau_in, K_in, tolerance, f_out);
-    const int status = awiwi_distribute(&tendons, tau_in, K_in, tolerance, f_out);
+        return awiwi_distribute_others(&tendons, tau_in, K_in, tolerance, 0, f_out);
+    const int status = awiwi_distribute(&tendons, tau_in, K_in, tolerance, 0, f_out);
     /* the solver looks at all other inputs */
     return status == AWIWI_OK && !awiwi_all_finite(q_in, 4) ? AWIWI_NOT_FINITE : status;
 }

@@ -80,9 +80,10 @@ class Finger:
             k[i], slope[i], curvature[i] = found
         return 0
 
-    def distribute(self, tau: Any, K: Any, tolerance: float = TOLERANCE) -> tuple[int, Any]:
-        """Status and forces of the solver for pairs and others."""
-        return self._call("awiwi_distribute", tau, K, ctypes.c_double(tolerance))
+    def distribute(self, tau: Any, K: Any, tolerance: float = TOLERANCE, last: Any = None) -> tuple[int, Any]:
+        """Status and forces of the solver for pairs and others, on from the last forces if there are any."""
+        start = None if last is None else numbers(np.ascontiguousarray(last, float))
+        return self._call("awiwi_distribute", tau, K, ctypes.c_double(tolerance), start)
 
     def by_gradient(self, tau: Any, K: Any, rounds: int, step: float, weight: float) -> tuple[int, Any]:
         """Status and forces of algorithm 2, mended."""

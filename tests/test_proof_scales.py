@@ -92,7 +92,7 @@ def alike():
 def judged(alike, change):
     problem, record, function = alike
 
-    def call(**inputs):
+    def call(inputs):
         found = function(**inputs)
         return found._replace(f=change(found.f, inputs))
 

@@ -18,10 +18,11 @@ PAIRED = ["index", "ring", "fifth"]
 UNIT = '[[spring.units]]\ntendon = 27\nrate = "6.8 N/mm"\nfree_length = "35.06 mm"\nsource = "bench"\n\n[tendon]\n'
 COUNTED = """#include "awiwi_distribution.h"
 int calls = 0;
-int counted(const awiwi_tendons *t, const awiwi_real *tau, const awiwi_real *K, awiwi_real tolerance, awiwi_real *f)
+int counted(const awiwi_tendons *t, const awiwi_real *tau, const awiwi_real *K, awiwi_real tolerance,
+            const awiwi_real *last, awiwi_real *f)
 {
     calls++;
-    return awiwi_distribute(t, tau, K, tolerance, f);
+    return awiwi_distribute(t, tau, K, tolerance, last, f);
 }
 """
 

@@ -22,7 +22,7 @@ from tendon_solvers import (
 
 import awiwi_gen
 from awiwi_gen.emit.files import room_of
-from awiwi_gen.kernels.fingers_control import INVERSIONS, SEARCHES, antagonists, distribution
+from awiwi_gen.kernels.fingers_control import INVERSIONS, SEARCHES, UPDATES, antagonists, distribution
 from awiwi_gen.pipeline import Job
 from awiwi_gen.resources import CSRC
 from awiwi_gen.structure import groups
@@ -52,6 +52,8 @@ def test_the_bounds_told_are_those_of_the_header():
 
     assert most["INVERSIONS"] + 2 == INVERSIONS
     assert 2 + 4 * (1 + most["STIFFNESS_STEPS"]) == SEARCHES
+    assert 2 + most["UPDATE_STEPS"] == UPDATES
+    assert f"| {most['UPDATE_STEPS']} steps, {UPDATES} evaluations" in (DOCS / "solvers.md").read_text()
     assert f"| {INVERSIONS} evaluations" in (DOCS / "solvers.md").read_text()
     assert f"| {most['TORQUE_STEPS']} steps" in (DOCS / "solvers.md").read_text()
     assert f"2 + 4 x {SEARCHES // 4} evaluations" in (DOCS / "solvers.md").read_text()
@@ -250,3 +252,40 @@ def test_tendons_that_are_no_independent_pairs_are_searched(root):
 
     assert distribution(finger).strings["searched"] == "0, 1, 2"
     assert distribution(twice).strings["searched"] == "0, 1"
+
+
+def test_updates_from_any_forces_are_short_and_end_where_the_forces_give_the_torque(library):
+    random, rounds = np.random.default_rng(8), []
+
+    for _ in range(60):
+        for finger in fingers(library, random):
+            tau, K = demand(finger, random, random.choice([0.0, 1.0, 10.0]))
+            whole, best = finger.distribute(tau, K)
+            f, status, count = random.uniform(-20, 120, len(finger.P)), NOT_CONVERGED, 0
+            while status == NOT_CONVERGED and count < 30:
+                status, f = finger.distribute(tau, K, last=f)
+                assert finger.calls <= INVERSIONS + UPDATES
+                assert finger.low <= f.min() <= f.max() <= finger.high
+                count += 1
+            assert status == whole
+            if whole == OK:
+                assert np.abs(finger.P.T @ f + tau).max() < 1e-13
+            assert np.abs(finger.P.T @ (f - best)).max() < 1e-9
+            again = finger.distribute(tau, K, last=f)
+            assert again[0] == status
+            assert np.abs(again[1] - f).max() < 1e-6
+            rounds.append(count)
+
+    assert np.median(rounds) <= 2
+
+
+def test_an_update_refuses_forces_that_are_no_numbers(library):
+    finger = next(iter(fingers(library, np.random.default_rng(8))))
+    finger.pairs = []
+
+    status, f = finger.distribute(
+        np.zeros(finger.P.shape[1]), np.eye(finger.P.shape[1]), last=np.full(len(finger.P), np.nan)
+    )
+
+    assert status == NOT_FINITE
+    assert finger.low <= f.min() <= f.max() <= finger.high

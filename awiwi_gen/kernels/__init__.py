@@ -13,7 +13,7 @@ from awiwi_gen.kernels.control_linear import linear_laws
 from awiwi_gen.kernels.control_optimal import optimal_laws
 from awiwi_gen.kernels.fibres import fibre_kernels
 from awiwi_gen.kernels.fingers import finger_kernels
-from awiwi_gen.kernels.fingers_control import elastic_kernels
+from awiwi_gen.kernels.fingers_control import elastic_kernels, search_kernels
 from awiwi_gen.kernels.four_bars import four_bar_kernels
 from awiwi_gen.kernels.joints import documented, optional_kernels
 from awiwi_gen.kernels.measured import measured_kernels
@@ -38,7 +38,14 @@ def declared(hand: Hand) -> list[Kernel]:
         for name, finger in hand.fingers.items()
         for kernel in [
             *elastic_kernels(hand, name, finger),
-            *documented(finger, [*finger_kernels(hand, name, finger), *optional_kernels(hand, name, finger)]),
+            *documented(
+                finger,
+                [
+                    *finger_kernels(hand, name, finger),
+                    *search_kernels(hand, name, finger),
+                    *optional_kernels(hand, name, finger),
+                ],
+            ),
             *base_kernels(hand, name, finger),
             *four_bar_kernels(name, finger),
         ]

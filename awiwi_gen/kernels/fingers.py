@@ -97,6 +97,7 @@ def input_ports(hand: Hand, finger: Finger, size: Size) -> dict[str, Port]:
         "K": replace(stiffness(size), low=-STIFFEST, high=STIFFEST),
         "f_min": Port((), N, slack, slack + (taut - slack) / 4),
         "f_max": Port((), N, taut - (taut - slack) / 4, taut),
+        "f_last": Port((size.tendons,), N, slack, taut),
     }
 
 

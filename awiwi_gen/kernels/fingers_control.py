@@ -13,10 +13,12 @@ from awiwi_gen.hand.lever import Lever
 from awiwi_gen.hand.parts import Tendon
 from awiwi_gen.kernel import Kernel, Port, Solver
 from awiwi_gen.kernels.declare import Family
-from awiwi_gen.kernels.fingers import force_range, per_finger
+from awiwi_gen.kernels.fingers import force_range, input_ports, per_finger
+from awiwi_gen.kernels.sizes import Size
 from awiwi_gen.structure import geared, groups, is_curved, senses
 from awiwi_gen.units import N, m, one
 
+UPDATES = 2 + 6  # evaluations of the curve by an update in the worst case, see csrc/awiwi_distribution.h
 SEARCHES, INVERSIONS = 2 + 4 * 97, 66  # evaluations of the curve in the worst case, see csrc/awiwi_distribution.h
 
 
@@ -154,6 +156,21 @@ def by_pairs_and_search(finger: Finger) -> tuple[list[tuple[int, int, int]], lis
     return pairs, sorted(searched)
 
 
+def distribution_update(finger: Finger) -> Solver:
+    """The same with a search of few steps, from the last forces."""
+    solver = distribution(finger)
+    calls = {family: UPDATES if count == SEARCHES else count for family, count in solver.calls.items()}
+    return replace(
+        solver,
+        problem="distribution update",
+        strings=solver.strings | {"last": "f_last_in"},
+        iterations=solver.iterations - SEARCHES + UPDATES,
+        calls=calls,
+        tolerance={"f64": 2e-8, "f32": solver.tolerance["f32"]},
+        stop={"f64": "1e-8", "f32": solver.stop["f32"]},
+    )
+
+
 def distribution(finger: Finger) -> Solver:
     """Closed forms for antagonistic pairs of tendons, a search for all others."""
     pairs, searched = by_pairs_and_search(finger)
@@ -175,6 +192,7 @@ def distribution(finger: Finger) -> Solver:
             "pair_count": str(len(pairs)),
             "searched": ", ".join(map(str, searched)),
             "searched_count": str(len(searched)),
+            "last": "",
         },
         iterations=(INVERSIONS if pairs else 0) + (SEARCHES if searched else 0),
         tolerance={"f64": 1e-11, "f32": 1e-4},
@@ -194,4 +212,25 @@ def tendon_distribution(finger: Any, q: Any, tau: Any, K: Any, f_min: Any, f_max
     The torque is exact if the limits allow it, otherwise the nearest possible one (status AWIWI_INFEASIBLE). Of all
     forces with that torque, the result has the least error of the stiffness in the Frobenius norm: of pairs surely, of
     others as far as a search from four starts finds it.
+    """
+
+
+of_search: Family[Size] = Family()
+
+
+def search_kernels(hand: Hand, name: str, finger: Finger) -> list[Kernel]:
+    """The kernels of fingers with tendons in no pair, if these can choose their forces."""
+    path, size = f"fingers.{name}", Size.of(finger)
+    if not by_pairs_and_search(finger)[1] or (path, "tendon_distribution") in left_out(hand):
+        return []
+    return of_search.kernels(name, finger, path, finger.structure(), input_ports(hand, finger, size), size)
+
+
+@of_search(lambda z: {"f": Port((z.tendons,), N)}, "eq. 7.2, 7.6, mended", solver=distribution_update)
+def tendon_distribution_update(finger: Any, q: Any, tau: Any, K: Any, f_min: Any, f_max: Any, f_last: Any) -> Any:
+    """Tendon forces as those of the distribution, in bounded time, for a demand that changes little from tick to tick.
+
+    The search begins at the forces f_last and takes few steps: where they do not suffice, the status is
+    AWIWI_NOT_CONVERGED, and the next update goes on from the result. The torque comes first. It does not look for
+    nearer minima of the stiffness' error elsewhere.
     """

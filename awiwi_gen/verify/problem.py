@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -32,6 +32,10 @@ class Problem(ABC):
     @abstractmethod
     def solve(self, inputs: Mapping[str, Array]) -> Reference:
         """Exact outputs; `status` is the status that must be returned, which is otherwise 0."""
+
+    def run(self, call: Callable[..., Any], inputs: Mapping[str, Array]) -> Any:
+        """The kernel's outputs, at the end of as many calls as it needs: one by default."""
+        return call(**inputs)
 
     def mirror(self, inputs: Mapping[str, Array], own: bool) -> Mapping[str, Array]:
         """What the solver computes in floats, by output, where that is known to the last bit; nothing by default."""

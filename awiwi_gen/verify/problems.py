@@ -15,7 +15,7 @@ from awiwi_gen.ir.graph import Graph, Node
 from awiwi_gen.ir.interpret import evaluate
 from awiwi_gen.kernel import Solver
 from awiwi_gen.verify.problem import Problem
-from awiwi_gen.verify.problems_distribution import Distribution
+from awiwi_gen.verify.problems_distribution import Distribution, DistributionUpdate
 from awiwi_gen.verify.problems_gains import GainMatching
 from awiwi_gen.verify.problems_resting import Resting
 from awiwi_gen.verify.problems_riccati import JointRegulator, Riccati
@@ -230,6 +230,7 @@ PROBLEMS: Mapping[str, Callable[[Solver, Mapping[str, Graph], Mapping[str, Fract
     "gradient search": GradientSearch,
     "resting": Resting,
     "distribution": Distribution,
+    "distribution update": DistributionUpdate,
     "riccati": Riccati,
     "joint regulator": JointRegulator,
     "gain matching": GainMatching,

@@ -116,7 +116,7 @@ def judge_solver(
     observed: Callable[[Any], Mapping[str, Array]],
     other: Callable[[Any, Reference], tuple[Reference, list[str]]],
     inputs: Mapping[str, Array],
-    call: Callable[..., Any],
+    run: Callable[[Mapping[str, Array]], Any],
     tolerance: float,
     seed: int,
     units: Mapping[str, Sequence[Unit]] | None = None,
@@ -128,7 +128,7 @@ def judge_solver(
     of another right answer, and for what is wrong with it. Elements of an output in ``units`` are compared with the
     largest one of their own unit.
     """
-    raw = call(**inputs)
+    raw = run(inputs)
     samples, reasons = len(raw.status), []
     wrong = raw.status != reference.high.get(STATUS, np.zeros((samples, 1)))[:, 0]
     if np.any(wrong):

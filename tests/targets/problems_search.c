@@ -90,7 +90,7 @@ static void try_large_fingers(const awiwi_tendons *fitting, const double *tau, c
         awiwi_tendons t = *fitting;
         t.joints = more ? AWIWI_MOST_JOINTS + 1 : t.joints;
         t.tendons = more ? t.tendons : AWIWI_MOST_TENDONS + 1;
-        print("large", awiwi_distribute(&t, tau, K, 1e-12, f), f, 0);
+        print("large", awiwi_distribute(&t, tau, K, 1e-12, 0, f), f, 0);
         print("large", awiwi_gradient_forces(&t, tau, K, 1, 1, 1, f), f, 0);
     }
 }
@@ -149,7 +149,7 @@ void try_tendons(int number)
         P[m * n - 1] = INFINITY;
     const double tolerance = number % 9 && s.kind < 4 ? 1e-11 : number % 2 ? 0 : 1e-3;
     double *f = output(m);
-    int status = awiwi_distribute(&t, tau, K, tolerance, f);
+    int status = awiwi_distribute(&t, tau, K, tolerance, 0, f);
     print("distribute", status, f, m);
     print_calls(&s.calls);
     if (number % 23 && (number + 11) % 23 && number % 19 != 6) {
@@ -157,6 +157,14 @@ void try_tendons(int number)
         status = awiwi_search_forces(&t, tau, K, tolerance, f);
         print("search", status, f, m);
         print_calls(&s.calls);
+    }
+    double *last = random_array(m, -5, 100);
+    for (int again = 0; again < 3; again++) {
+        f = output(m);
+        status = awiwi_distribute(&t, tau, K, tolerance, last, f);
+        print("update", status, f, m);
+        print_calls(&s.calls);
+        last = f;
     }
     f = output(m);
     status = awiwi_gradient_forces(&t, tau, K, number % 40, pow(10, -number % 5), random_in(0, 1), f);
