@@ -6,9 +6,11 @@
 >>> lib.index_mass_matrix([0.1, 0.2, 0.3, 0.4]).shape
 (4, 4)
 
-What is generated already needs neither the hand file nor the libraries that derive, only NumPy, cffi and a C compiler:
+What is generated already needs neither the hand file nor the libraries that derive, only NumPy, cffi and a C compiler.
+The Awiwi hand comes compiled with the package and needs no compiler either:
 
 >>> lib = awiwi_gen.load("generated")
+>>> lib = awiwi_gen.load()
 """
 
 from __future__ import annotations
@@ -64,7 +66,8 @@ def build(
     """The hand as compiled NumPy functions.
 
     Generated and compiled at the first call for these numbers, which can take minutes, and loaded from the cache
-    afterwards. ``only`` chooses kernels by patterns such as ``"index_*,spring_*"``, together with those they call.
+    afterwards. The hand that this package carries compiled is loaded as it is, if hand, generator and options agree.
+    ``only`` chooses kernels by patterns such as ``"index_*,spring_*"``, together with those they call.
     ``progress(stage, done, total)`` is called as the work proceeds; without it, progress is shown on standard error
     if that is a terminal.
 
@@ -76,6 +79,7 @@ def build(
     from awiwi_gen.hand import Hand
     from awiwi_gen.parallel import silent
     from awiwi_gen.pipeline import Job, cached_tree
+    from awiwi_gen.shipped import default_made_from
 
     if not isinstance(hand, Hand):
         raise InputError(f"build: {hand!r} is not a hand; expected one from Hand.load(path)")
@@ -89,6 +93,8 @@ def build(
 
             progress = Progress()
     job = Job(hand, Options(scalar, params), only, progress=progress)
+    if (shipped := default_made_from(job.inputs)) is not None:
+        return shipped
     directory = cached_tree(job)
     progress("compile", 0, 1)
     library = load(directory, job.store)

@@ -22,7 +22,7 @@ from awiwi_gen.arrays import Samples, as_numbers, as_samples, direct_call, packe
 from awiwi_gen.docstrings import docstring
 from awiwi_gen.errors import BuildError, InputError, OutputError, unknown
 from awiwi_gen.ir.cost import SINCOS
-from awiwi_gen.views import FingerView, Kernels, Names, PartView
+from awiwi_gen.views import FingerView, Kernels, Names, OnDemand, PartView
 
 Array = np.ndarray[Any, Any]
 Place = tuple[Any, int, tuple[int, ...]]  # pointer to the samples, step between them, steps that a loop is given
@@ -286,17 +286,18 @@ class Library(Kernels):
         self.origin = origin  # a function and its arguments that load this library in another process
         self.names = dict(names or {})
         self._vectorised = vectorised
-        self._kernels = {}
         self._own_numbers, self.params = numbers, None
         if manifest.get("params"):
             own = numbers and ffi.new(f"{prefix}_numbers *", numbers)
             given = own or ffi.addressof(getattr(lib, f"{prefix}_default_numbers"))
             self.params = ffi.new(f"{prefix}_params *") if own else ffi.addressof(lib, "FlatParams")
             getattr(lib, f"{prefix}_params_derive")(given, self.params)
-        for place, entry in enumerate(manifest["kernels"]):
-            params = self.params if entry["params"] else None
-            loop = getattr(lib, f"Batch_{entry['name']}")
-            self._kernels[entry["name"]] = KernelFunction(entry, self, loop, lib.FlatKernels[place], params)
+        places = enumerate(manifest["kernels"])
+        self._kernels = OnDemand({entry["name"]: partial(self._kernel, place, entry) for place, entry in places})
+
+    def _kernel(self, place: int, entry: Mapping[str, Any]) -> KernelFunction:
+        params = self.params if entry["params"] else None
+        return KernelFunction(entry, self, getattr(self.c, f"Batch_{entry['name']}"), self.c.FlatKernels[place], params)
 
     def finger(self, name: str) -> FingerView:
         """One finger: its kernels without its name, its joints and tendons. Raises InputError for a name it lacks."""
