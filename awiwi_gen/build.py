@@ -28,7 +28,7 @@ from awiwi_gen.emit.options import GCC_FLAGS, VECTOR_FLAGS
 from awiwi_gen.emit.tree import read_manifest
 from awiwi_gen.errors import BuildError, InputError, NoCompilerError, OutputError
 from awiwi_gen.resources import CSRC
-from awiwi_gen.shipped import batch_of, default_library, import_extension
+from awiwi_gen.shipped import batch_of, import_extension
 
 if TYPE_CHECKING:
     from awiwi_gen.library import Library
@@ -145,11 +145,10 @@ def compiled(directory: Path, store: Cache) -> Compiled:
     return Compiled(manifest, name, data, digest, tuple(objects))
 
 
-def load(directory: str | Path | None = None, store: Cache | None = None) -> Library:
+def load(directory: str | Path, store: Cache | None = None) -> Library:
     """Compile a generated directory and load it as NumPy functions; compiled objects are kept in a cache.
 
-    Needs NumPy, cffi, a C compiler and Python's headers, but no library that derives kernels. Without a directory,
-    load the Awiwi hand that wheels of this package carry compiled, which needs no compiler; a checkout compiles its own.
+    Needs NumPy, cffi, a C compiler and Python's headers, but no library that derives kernels.
 
     Raises InputError where nothing was generated, NoCompilerError where there is no C compiler that works or no Python.h,
     BuildError where it refuses the code.
@@ -157,8 +156,6 @@ def load(directory: str | Path | None = None, store: Cache | None = None) -> Lib
     from awiwi_gen.library import Library
     from awiwi_gen.views import names_in
 
-    if directory is None:
-        return default_library(store)
     directory, store = Path(directory), store or Cache()
     found = compiled(directory, store)
     manifest = found.manifest

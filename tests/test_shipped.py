@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import os
 import pickle
 import re
 import shutil
 import subprocess
+import sys
 import zipfile
 from pathlib import Path
 
@@ -175,6 +177,30 @@ def test_a_kernel_is_made_when_it_is_first_asked_for_and_only_once(package):
     assert lib.jaw_mass_matrix is lib["jaw_mass_matrix"]
     assert lib.finger("jaw").mass_matrix is lib.jaw_mass_matrix
     assert set(lib._kernels._made) == {"jaw_mass_matrix"}
+
+
+def test_loading_a_hand_and_calling_a_kernel_imports_nothing_that_derives_compiles_or_is_slow(package, tmp_path):
+    package("light_hand")
+    code = """
+import sys, numpy
+before = set(sys.modules)
+from awiwi_gen.shipped import load_shipped
+load_shipped("light_hand").jaw_tendon_lengths([0.1, 0.2])
+print(*sorted(name for name in set(sys.modules) - before if name.startswith("awiwi_gen") or "." not in name))
+"""
+    env = os.environ | {"PYTHONPATH": str(tmp_path)}
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=env, check=True)
+    ours = {name for name in done.stdout.split() if name.startswith("awiwi_gen")} - {"awiwi_gen"}
+
+    assert {name.removeprefix("awiwi_gen.") for name in ours} == {
+        "arrays", "docstrings", "errors", "extras", "library", "resources", "shipped", "views"
+    }  # fmt: skip
+    assert not {"subprocess", "email", "logging", "zipfile", "cffi", "pycparser"} & {*done.stdout.split()}
+
+
+def test_the_function_build_stays_when_the_module_of_its_name_is_imported():
+    assert callable(sys.modules["awiwi_gen.build"].load)
+    assert callable(awiwi_gen.build)
 
 
 def test_wheels_in_single_precision_with_numbers_read_at_run_time_have_those_numbers(tmp_path, monkeypatch):
