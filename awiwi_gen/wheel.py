@@ -28,6 +28,7 @@ from awiwi_gen.cache import Cache, code_digest, key
 from awiwi_gen.compiler import compiler
 from awiwi_gen.emit import batch
 from awiwi_gen.emit.options import GCC_FLAGS
+from awiwi_gen.emit.tree import OWN_DIGEST
 from awiwi_gen.errors import NoCompilerError
 from awiwi_gen.parallel import Progress, silent
 from awiwi_gen.shipped import BATCHES, FORMAT, HAS_WIDER, RECORD, WIDER
@@ -74,6 +75,7 @@ def run(job: Job, output: Path, as_json: bool) -> None:
     from awiwi_gen.pipeline import cached_tree
     from awiwi_gen.report import print_json
 
+    _require_portable()  # an error before anything is derived
     path = write_wheel(cached_tree(job), output, metadata.version("awiwi_gen"), job.store, job.progress)
     package = f"{job.hand.prefix}_hand"
     if as_json:
@@ -85,13 +87,13 @@ def run(job: Job, output: Path, as_json: bool) -> None:
 def write_wheel(directory: Path, output: Path, version: str, store: Cache, progress: Progress = silent) -> Path:
     """Write a wheel of a generated directory, PREFIX_hand, into a folder; ``version`` is that of awiwi_gen.
 
-    The model's digest is part of the wheel's version, so that pip replaces one model by another. Raises NoCompilerError
-    where there is no compiler, or none for other machines, OutputError where the file cannot be written.
+    The manifest's digest is part of the wheel's version, so that pip replaces one revision by another. Raises
+    NoCompilerError where there is no compiler, or none for other machines, OutputError where the file cannot be written.
     """
     files = package_files(directory, store, progress)
     record = json.loads(files[RECORD])
     manifest, tag = record["manifest"], wheel_tag(files)
-    package, full = f"{manifest['prefix']}_hand", f"{version}+{manifest['digest'][:12]}"
+    package, full = f"{manifest['prefix']}_hand", f"{version}+{manifest[OWN_DIGEST][:12]}"
     info = f"{package}-{full}.dist-info"
     summary = f"{' '.join(manifest['hand'].split())}: {len(manifest['kernels'])} compiled kernels"
     content = {f"{package}/{name}": data for name, data in files.items()}

@@ -74,11 +74,11 @@ def disassembled(library: Path) -> str:
 # ------------------------------------------------------------------------------------------------- what is inside
 
 
-def test_the_name_of_a_wheel_tells_the_model_the_stable_abi_and_the_platform(made, alone):
+def test_the_name_of_a_wheel_tells_the_revision_the_stable_abi_and_the_platform(made, alone):
     name, version, python, abi, platform = made.name.removesuffix(".whl").split("-")
 
     assert (name, python, abi) == ("claw_hand", "cp311", "abi3")
-    assert version.endswith(f"+{alone.digest[:12]}")
+    assert version.endswith(f"+{alone.manifest['manifest_digest'][:12]}")
     assert re.fullmatch(r"manylinux_2_\d+_\w+|(?!linux)\w+", platform)
 
 
