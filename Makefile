@@ -8,6 +8,7 @@
 # make analysis  gcc -fanalyzer, clang-tidy and cppcheck: no finding without a reason
 # make mutants  change one operator or constant of csrc/ at a time (COUNT=60: some of them); half an hour for all
 # make test-hands  published hands: imported, one finger of each proved, compared with MuJoCo and Pinocchio (ACCEPT=1: new table)
+# make wheel  the wheel with the compiled hand, and the sdist, in dist/: minutes the first time, for all batches
 # make clean  remove what make made (generated/ stays: it is checked in)
 
 PYTHON ?= python3
@@ -81,8 +82,11 @@ test-hands: .venv/installed .venv-hands/installed
 	  || echo "bench: $$peer cannot be installed here"; done
 	@touch $@
 
+wheel: .venv/installed
+	@$(BIN)/python -m hatchling build
+
 clean:
 	rm -rf .venv .venv-bench .venv-hands .venv-docs .cache build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
-.PHONY: all docs test test-hands lint torture check report bench firmware analysis mutants clean
+.PHONY: all docs wheel test test-hands lint torture check report bench firmware analysis mutants clean

@@ -188,6 +188,18 @@ def amalgamate(
     run(directory, output, as_json)
 
 
+@command(*GENERATE)
+def wheel(
+    hand: HandFile = None, scalar: ScalarOption = Scalar.f64, params: ParamsOption = Params.baked,
+    math: MathOption = Math.own, only: Only = "*", as_json: Json = False,
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder for the wheel.")] = Path("dist"),
+) -> None:  # fmt: skip
+    """Write a wheel with the compiled hand: Python loads it without a compiler."""
+    from awiwi_gen.wheel import run
+
+    run(make_job(hand, scalar, params, only, math), output, as_json)
+
+
 @command()
 def build(hand: HandFile = None, output: Output = GENERATED, as_json: Json = False) -> int:
     """Compile a generated directory and load it, as Python does."""
@@ -225,6 +237,9 @@ def list_(
 
     if output is not None and hand is None and not assumed:
         (print_json if as_json else print_kernels)(terminal.require(output)["kernels"])
+        return 0
+    if hand is None and not assumed and (carried := terminal.carried_hand(*HAND)):
+        (print_json if as_json else print_kernels)(carried["manifest"]["kernels"])
         return 0
     extras.require("list without -o", *HAND)
     from awiwi_gen.hand import Hand

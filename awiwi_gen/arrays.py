@@ -30,7 +30,8 @@ TEST = "type({0}) is ndarray and {0}.shape == {1} and {0}.dtype is dtype and {0}
 
 def as_numbers(value: Any) -> Array:
     """An array of real numbers. Raises TypeError or ValueError for all that NumPy would silently make numbers of."""
-    if isinstance(value, np.ma.MaskedArray):
+    derived = isinstance(value, np.ndarray) and type(value) is not np.ndarray  # np.ma is slow to import
+    if derived and isinstance(value, np.ma.MaskedArray):
         raise TypeError("it is masked; fill it, or choose the samples that are not")
     array = np.asarray(value)
     kind = array.dtype.kind

@@ -8,8 +8,6 @@ depends on prototypes only.
 from __future__ import annotations
 
 import ctypes
-import importlib.machinery
-import importlib.util
 import json
 import os
 import re
@@ -17,6 +15,7 @@ import sysconfig
 import tempfile
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from functools import cache, partial
 from math import prod
 from pathlib import Path
@@ -29,6 +28,7 @@ from awiwi_gen.emit.options import GCC_FLAGS, VECTOR_FLAGS
 from awiwi_gen.emit.tree import read_manifest
 from awiwi_gen.errors import BuildError, InputError, NoCompilerError, OutputError
 from awiwi_gen.resources import CSRC
+from awiwi_gen.shipped import batch_of, import_extension
 
 if TYPE_CHECKING:
     from awiwi_gen.library import Library
@@ -112,18 +112,22 @@ def declarations(directory: Path, store: Cache, shared: Headers) -> str:
     return store.memo("declarations", key(shared, compiler().identity), preprocess)
 
 
-def load(directory: str | Path, store: Cache | None = None) -> Library:
-    """Compile a generated directory and load it as NumPy functions; compiled objects are kept in a cache.
+@dataclass(frozen=True)
+class Compiled:
+    """A generated directory as a shared library: its manifest, the name of its Python module, its bytes.
 
-    Needs NumPy, cffi, a C compiler and Python's headers, but no library that derives kernels.
-
-    Raises InputError where nothing was generated, NoCompilerError where there is no C compiler that works or no Python.h,
-    BuildError where it refuses the code.
+    ``digest`` is that of all that decides the bytes, ``objects`` are those of the objects.
     """
-    from awiwi_gen.library import Library
-    from awiwi_gen.views import names_in
 
-    directory, store = Path(directory), store or Cache()
+    manifest: dict[str, Any]
+    name: str
+    data: bytes
+    digest: str
+    objects: tuple[str, ...]
+
+
+def compiled(directory: Path, store: Cache) -> Compiled:
+    """The library of a generated directory, from the cache where it is there. Raises what `load` raises."""
     manifest = read_manifest(directory)
     if manifest is None:
         raise InputError(f"{directory}: nothing generated here; run awiwi-gen generate -o {directory}")
@@ -138,15 +142,32 @@ def load(directory: str | Path, store: Cache | None = None) -> Library:
         with tempfile.TemporaryDirectory() as scratch:
             data = _linked(name, glue, directory, store, Path(scratch))
         store.write("libraries", digest, data)
-    if digest not in _MODULES:
-        _MODULES[digest] = open_copy(data, store, partial(_import, name))
-    module = _MODULES[digest]
+    return Compiled(manifest, name, data, digest, tuple(objects))
+
+
+def load(directory: str | Path, store: Cache | None = None) -> Library:
+    """Compile a generated directory and load it as NumPy functions; compiled objects are kept in a cache.
+
+    Needs NumPy, cffi, a C compiler and Python's headers, but no library that derives kernels.
+
+    Raises InputError where nothing was generated, NoCompilerError where there is no C compiler that works or no Python.h,
+    BuildError where it refuses the code.
+    """
+    from awiwi_gen.library import Library
+    from awiwi_gen.views import names_in
+
+    directory, store = Path(directory), store or Cache()
+    found = compiled(directory, store)
+    manifest = found.manifest
+    if found.digest not in _MODULES:
+        _MODULES[found.digest] = open_copy(found.data, store, partial(import_extension, found.name))
+    module = _MODULES[found.digest]
 
     def vectorised(entry: Mapping[str, Any]) -> Any:
-        return batch_function(entry, manifest, directory, store, frozenset(objects), module.ffi)
+        return batch_function(entry, manifest, directory, store, frozenset(found.objects), module.ffi)
 
-    origin = (load_again, (str(directory.resolve()), str(store.directory.resolve()), digest))
-    names = names_in(_text(directory / "hand.h"), manifest["prefix"])
+    origin = (load_again, (str(directory.resolve()), str(store.directory.resolve()), found.digest))
+    names = names_in(text_of(directory / "hand.h"), manifest["prefix"])
     return Library(manifest, module.lib, module.ffi, vectorised, origin, names=names)
 
 
@@ -162,7 +183,7 @@ def load_again(directory: str, cached: str, digest: str) -> Library:
     return library
 
 
-def _text(path: Path) -> str:
+def text_of(path: Path) -> str:
     """What a file holds, or nothing where there is none."""
     return path.read_text(encoding="utf-8") if path.is_file() else ""
 
@@ -212,7 +233,7 @@ def batch_function(
 
     Raises BuildError when that fails, and when the directory is no longer what the library was ``loaded`` from.
     """
-    from awiwi_gen.emit.batch import BATCHES, prototype, worthwhile
+    from awiwi_gen.emit.batch import BATCHES, worthwhile
 
     source = directory / f"{entry['name']}.c"
     text = source.read_text(encoding="utf-8")
@@ -229,26 +250,30 @@ def batch_function(
         with tempfile.TemporaryDirectory() as scratch:
             data = _compile_batch(looped, Path(scratch)).read_bytes()
         store.write("batches", digest, data)
-    head = prototype(entry, manifest["prefix"], manifest["c_type"])
-    result, name = head.split("(")[0].split()
-    function = getattr(open_copy(data, store, ctypes.CDLL), name)
-    return ffi.cast(head.replace(f"{result} {name}", f"{result} (*)", 1), ctypes.cast(function, ctypes.c_void_p).value)
+    return batch_of(open_copy(data, store, ctypes.CDLL), entry, manifest, ffi)
 
 
 def _compile_batch(source: Path, scratch: Path) -> Path:
-    """A loop over samples as a library for this machine, without fused multiply-add instructions.
-
-    gcc 12 fuses where it finds a sum beside a difference, against its flags; then the instruction set is withheld.
-    """
+    """A loop over samples as a library for this machine."""
     assembly, made = scratch / "batch.s", scratch / "batch.so"
     flags, machine = native()
+    assemble_batch(source, assembly, flags, UNFUSED if "__x86_64__" in machine else ((),))
+    compiler().run("-shared", str(assembly), "-o", str(made), "-lm")
+    return made
+
+
+def assemble_batch(source: Path, into: Path, flags: tuple[str, ...], ways: tuple[tuple[str, ...], ...]) -> None:
+    """Assembly of a loop over samples, without fused multiply-add instructions: the first of several ways without any.
+
+    gcc 12 fuses where it finds a sum beside a difference, against its flags; then the instruction set is withheld.
+    Raises BuildError where every way fuses.
+    """
     flags += () if "clang" in compiler().version else GCC_FLAGS
-    for without in UNFUSED if "__x86_64__" in machine else ((),):
-        includes = (f"-I{source.parent.parent}", f"-I{CSRC}")
-        compiler().run(*BATCH_FLAGS, *flags, *without, *includes, "-S", str(source), "-o", str(assembly))
-        if not FUSED.search(assembly.read_text(encoding="utf-8")):
-            compiler().run("-shared", str(assembly), "-o", str(made), "-lm")
-            return made
+    includes = (f"-I{source.parent.parent}", f"-I{CSRC}")
+    for without in ways:
+        compiler().run(*BATCH_FLAGS, *flags, *without, *includes, "-S", str(source), "-o", str(into))
+        if not FUSED.search(into.read_text(encoding="utf-8")):
+            return
     raise BuildError(f"{compiler().version} fuses multiplications with additions against its flags")
 
 
@@ -326,16 +351,7 @@ def _glue_object(name: str, glue: str, directory: Path, store: Cache, scratch: P
     preamble = f'#include "awiwi.h"\n{own}' + OPTIMISED.format("\n".join(parts["loops"]))
     source = scratch / f"{name}.c"
     cffi.recompiler.make_c_source(ffi, name, preamble, str(source))
-    compiler().run(*GLUE_FLAGS, f"-I{python}", f"-I{directory}", f"-I{CSRC}", "-c", str(source), "-o", str(made))
+    here = (f"-fmacro-prefix-map={scratch}/=", f"-I{python}", f"-I{directory}", f"-I{CSRC}")  # no path in the bytes
+    compiler().run(*GLUE_FLAGS, *here, "-c", str(source), "-o", str(made))
     store.write("objects", digest, made.read_bytes())
     return made
-
-
-def _import(name: str, path: str) -> Any:
-    loader = importlib.machinery.ExtensionFileLoader(name, path)
-    spec = importlib.util.spec_from_file_location(name, path, loader=loader)
-    if spec is None:
-        raise BuildError(f"{path} cannot be loaded")
-    module = importlib.util.module_from_spec(spec)
-    loader.exec_module(module)
-    return module

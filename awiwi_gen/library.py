@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import inspect
 import operator
 import os
@@ -10,8 +9,7 @@ import textwrap
 import warnings
 from collections import namedtuple
 from collections.abc import Callable, Iterable, Mapping
-from concurrent.futures import ThreadPoolExecutor
-from functools import cache, partial
+from functools import cache, cached_property, partial
 from itertools import combinations
 from math import prod
 from typing import Any
@@ -21,8 +19,7 @@ import numpy as np
 from awiwi_gen.arrays import Samples, as_numbers, as_samples, direct_call, packed, rolled
 from awiwi_gen.docstrings import docstring
 from awiwi_gen.errors import BuildError, InputError, OutputError, unknown
-from awiwi_gen.ir.cost import SINCOS
-from awiwi_gen.views import FingerView, Kernels, Names, PartView
+from awiwi_gen.views import FingerView, Kernels, Names, OnDemand, PartView
 
 Array = np.ndarray[Any, Any]
 Place = tuple[Any, int, tuple[int, ...]]  # pointer to the samples, step between them, steps that a loop is given
@@ -82,7 +79,6 @@ class KernelFunction:
         self._names = [port["name"] for port in self.inputs]
         self._shapes = [tuple(port["shape"]) for port in self.inputs]
         self._results = [(tuple(port["shape"]), prod(port["shape"]), self.dtype) for port in self.outputs]
-        self._work = self.cost["operations"] + SINCOS * self.cost["sincos"] + CALL
         fields = [o["name"] for o in self.outputs]
         if entry["status"]:
             self._results.append(((), 1, np.dtype(np.intc)))
@@ -102,6 +98,13 @@ class KernelFunction:
         kinds = inspect.Parameter
         parameters = [kinds(name, kinds.POSITIONAL_OR_KEYWORD) for name in self._names]
         self.__signature__ = inspect.Signature([*parameters, kinds("out", kinds.KEYWORD_ONLY, default=None)])
+
+    @cached_property
+    def _work(self) -> int:
+        """The operations that a sample is worth."""
+        from awiwi_gen.ir.cost import SINCOS  # here, because it takes its time
+
+        return self.cost["operations"] + SINCOS * self.cost["sincos"] + CALL
 
     @property
     def signature(self) -> str:
@@ -191,10 +194,12 @@ class KernelFunction:
             moved = [x for pointer, step, steps in places for x in (pointer + first * step, *steps)]
             loop(last - first, *self._params, *moved)
 
-        parts = min(self._library.threads, n * self._work // WORTH_A_THREAD)
+        parts = min(self._library.threads, n * self._work // WORTH_A_THREAD) if n > 1 else 1
         if parts <= 1:
             part(0, n)
             return
+        from concurrent.futures import ThreadPoolExecutor  # here, because it takes its time
+
         bounds = [n * k // parts for k in range(parts + 1)]
         with ThreadPoolExecutor(parts) as pool:
             list(pool.map(part, bounds[:-1], bounds[1:]))
@@ -246,6 +251,8 @@ class KernelFunction:
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
     """A hint at the names that look like one, or nothing."""
+    import difflib  # here, because it takes its time
+
     near = difflib.get_close_matches(name, list(known), 3)
     return f"did you mean {', '.join(near)}?" if near else ""
 
@@ -286,17 +293,18 @@ class Library(Kernels):
         self.origin = origin  # a function and its arguments that load this library in another process
         self.names = dict(names or {})
         self._vectorised = vectorised
-        self._kernels = {}
         self._own_numbers, self.params = numbers, None
         if manifest.get("params"):
             own = numbers and ffi.new(f"{prefix}_numbers *", numbers)
             given = own or ffi.addressof(getattr(lib, f"{prefix}_default_numbers"))
             self.params = ffi.new(f"{prefix}_params *") if own else ffi.addressof(lib, "FlatParams")
             getattr(lib, f"{prefix}_params_derive")(given, self.params)
-        for place, entry in enumerate(manifest["kernels"]):
-            params = self.params if entry["params"] else None
-            loop = getattr(lib, f"Batch_{entry['name']}")
-            self._kernels[entry["name"]] = KernelFunction(entry, self, loop, lib.FlatKernels[place], params)
+        places = enumerate(manifest["kernels"])
+        self._kernels = OnDemand({entry["name"]: partial(self._kernel, place, entry) for place, entry in places})
+
+    def _kernel(self, place: int, entry: Mapping[str, Any]) -> KernelFunction:
+        params = self.params if entry["params"] else None
+        return KernelFunction(entry, self, getattr(self.c, f"Batch_{entry['name']}"), self.c.FlatKernels[place], params)
 
     def finger(self, name: str) -> FingerView:
         """One finger: its kernels without its name, its joints and tendons. Raises InputError for a name it lacks."""

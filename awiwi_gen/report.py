@@ -125,15 +125,16 @@ def state_lines(state: State, directory: str, fix: str) -> list[str]:
 def kernel_entries(hand: Hand, directory: Path) -> list[dict[str, Any]]:
     """The kernels of a hand as plain data, those that its tendons make impossible last, with the reason.
 
-    Costs are known where the directory was generated from this hand; elsewhere they are None.
+    Costs are known where the directory was generated from this hand, and of the hand that came with this package;
+    elsewhere they are None.
     """
     from awiwi_gen.emit.tree import read_manifest
     from awiwi_gen.hand.capability import left_out
     from awiwi_gen.kernels import declared
+    from awiwi_gen.shipped import default_manifest
 
-    manifest = read_manifest(directory)
-    generated = manifest["kernels"] if manifest and manifest["digest"] == hand.digest() else []
-    known = {entry["name"]: entry for entry in generated}
+    made = [found for found in (default_manifest(), read_manifest(directory)) if found]  # that of the directory decides
+    known = {entry["name"]: entry for found in made if found["digest"] == hand.digest() for entry in found["kernels"]}
     reasons = left_out(hand)
     entries = [
         known.get(kernel.name) or _entry(kernel, reasons.get((kernel.path, kernel.family), ""))
@@ -170,9 +171,9 @@ def print_kernels(entries: Sequence[Mapping[str, Any]]) -> None:
     for entry in entries:
         if "left_out" not in entry:
             given, found = (", ".join(port["name"] for port in entry[side]) for side in ("inputs", "outputs"))
-            count = f"{operations_text(entry)} operations" if entry["cost"] else "? operations"
+            count = f"{operations_text(entry)} operations; " if entry["cost"] else ""
             print(wrapped(f"{entry['name']}({given}) -> {found}", ""))
-            print(wrapped(f"{count}; {entry['source']}", "    "))
+            print(wrapped(f"{count}{entry['source']}", "    "))
     print_left_out({entry["name"]: entry["left_out"] for entry in entries if "left_out" in entry})
 
 

@@ -53,11 +53,22 @@ def no_kernel(hand: Any, file: Path | None, name: str, known: Any) -> InputError
     return InputError(reason) if reason else unknown("kernel", name, known, f"see {listing(file)}")
 
 
+def carried_hand(*needs: str) -> Any:
+    """The record of the hand that this package carries compiled, for installs without some modules; else None."""
+    from awiwi_gen.shipped import default_record
+
+    return default_record() if extras.missing("", *needs) else None
+
+
 def find_kernel(name: str, file: Path | None, output: Path | None) -> Any:
     """A compiled kernel of a hand file, or of a generated directory. Raises InputError where it does not exist."""
     import awiwi_gen
 
-    if output is None:
+    if output is None and file is None and carried_hand(*extras.GENERATE):
+        library = awiwi_gen.load()
+        if name not in library:
+            raise unknown("kernel", name, library, "see awiwi-gen list")
+    elif output is None:
         extras.require("call without -o", *extras.GENERATE)
         hand = awiwi_gen.Hand.load(file)
         library = awiwi_gen.build(hand)

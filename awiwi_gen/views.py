@@ -5,8 +5,9 @@ from __future__ import annotations
 import operator
 import re
 from abc import abstractmethod
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -38,10 +39,26 @@ def names_in(header: str, prefix: str) -> dict[str, Names]:
     return {finger: Names(listed(joints), listed(tendons)) for finger, (joints, tendons) in tables.items()}
 
 
+class OnDemand(Mapping[str, "KernelFunction"]):
+    """Kernels by their names, each made when it is first asked for: to make hundreds takes longer than to load NumPy."""
+
+    def __init__(self, makers: Mapping[str, Callable[[], KernelFunction]]) -> None:
+        self._makers, self._made = makers, dict[str, "KernelFunction"]()
+
+    def __getitem__(self, name: str) -> KernelFunction:
+        return self._made.get(name) or self._made.setdefault(name, self._makers[name]())
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._makers)
+
+    def __len__(self) -> int:
+        return len(self._makers)
+
+
 class Kernels(Mapping[str, "KernelFunction"]):
     """Kernels by their names, as attributes or items; what has them says in ``_unknown`` that one is missing."""
 
-    _kernels: dict[str, KernelFunction]
+    _kernels: Mapping[str, KernelFunction]
 
     def __getattr__(self, name: str) -> KernelFunction:
         try:
@@ -75,7 +92,8 @@ class PartView(Kernels):
     def __init__(self, library: Library, name: str) -> None:
         self.library, self.name = library, name
         before = f"{name}_"
-        self._kernels = {key.removeprefix(before): library[key] for key in library if key.startswith(before)}
+        own = (key for key in library if key.startswith(before))
+        self._kernels = OnDemand({key.removeprefix(before): partial(library.__getitem__, key) for key in own})
 
     def __repr__(self) -> str:
         return f"<part {self.name}: {len(self)} kernels>"

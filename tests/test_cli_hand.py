@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import pty
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -23,6 +24,15 @@ def test_the_list_of_a_hand_file_needs_nothing_generated(tmp_path, monkeypatch):
     assert entries["jaw_joint_torque"]["cost"] is None
     assert not any(name.startswith("index_") for name in entries)
     assert "index_mass_matrix" in told("list")
+
+
+def test_the_list_needs_nothing_generated_and_tells_costs_where_they_are_known(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    known, unknown = told("list"), told("list", "--hand", ONE_FINGER)
+
+    assert re.search(r"^index_joint_torque\(q, f\) -> tau\n    \d+ operations; eq\. 5\.8$", known, re.MULTILINE)
+    assert re.search(r"^jaw_joint_torque\(q, f\) -> tau\n    eq\. 5\.8$", unknown, re.MULTILINE)
+    assert "operations" not in unknown
 
 
 def test_the_list_of_a_hand_file_has_the_costs_of_what_was_generated_from_it(small, tmp_path):

@@ -27,7 +27,7 @@ COMPILER = [
     ["ir"],
     ["emit"],
     ["library", "arrays", "compiler", "docstrings", "views"],
-    ["build"],
+    ["build", "shipped"],
     ["verify"],
 ]
 ROOMS = ("reproduce", "compare", "tune")
@@ -52,6 +52,7 @@ TOP = [
         "drawing",
         "diff",
         "certificates",
+        "wheel",
     ],
     ["loops", "identify", "tick", "interchange", "gym"],
     [*ROOMS],
