@@ -2,5 +2,6 @@
 
 from awiwi_gen.compare.command import benchmark, one_run
 from awiwi_gen.compare.comparison import comparison
+from awiwi_gen.compare.finger import whole_fingers
 
-__all__ = ["benchmark", "comparison", "one_run"]
+__all__ = ["benchmark", "comparison", "one_run", "whole_fingers"]
