@@ -9,6 +9,7 @@ import numpy as np
 
 import awiwi_gen
 from awiwi_gen.compare import comparison
+from awiwi_gen.compare.budget import BASELINES, by_budget
 from awiwi_gen.compare.shown import Shown
 from awiwi_gen.errors import InputError, unknown
 from awiwi_gen.hand import Hand
@@ -17,6 +18,7 @@ from awiwi_gen.loops.clock import require_clocked
 from awiwi_gen.loops.hand_joint import FINGER, JOINT, SENSING, joint_of
 from awiwi_gen.loops.laws import LAWS, law_of
 from awiwi_gen.loops.scenarios import BEFORE, FAMILY, FORCES, LAST, PLANTS, load_of, motions, run
+from awiwi_gen.report import Progress
 from awiwi_gen.results import Table
 from awiwi_gen.simulate import Array
 from awiwi_gen.writing import whole_file
@@ -67,6 +69,13 @@ def benchmark(hand_file: Path | None, name: str, gains: str, where: str) -> Show
         },
         [*comparison.tables(clocked, rows), comparison.summary(rows)],
     )
+
+
+def by_tries(hand_file: Path | None, name: str, where: str, tries: int) -> Shown:
+    """One law, or the baselines beside the adaptive law, each with the best gains of so many tries."""
+    names = [law_of(name).name] if name else BASELINES
+    hand = Hand.load(hand_file)
+    return by_budget(hand, names, named_joint(hand, where), tries, Progress())
 
 
 def named_joint(hand: Hand, where: str) -> tuple[str, str]:

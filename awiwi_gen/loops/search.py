@@ -85,13 +85,14 @@ def judged(
     return scores
 
 
-def cost_of(scores: Mapping[str, Score], joint: Joint, force: float) -> float:
-    """What the search makes small; with more plants it only grows."""
+def cost_of(scores: Mapping[str, Score], joint: Joint, force: float, yields: bool = True) -> float:
+    """What the search makes small; with more plants it only grows. A law that does not yield has no stiffness to err in."""
     if any(each.failed for each in scores.values()):
         return FAILED
     noisy = CHATTER * joint.limit
     shares = [(*each.shares(GOALS[name != "as known"]), each.chatter / noisy) for name, each in scores.items()]
     worst = np.minimum(np.array(shares).max(axis=0), FAILED)
+    worst[2] *= yields
     missed = np.log1p(np.maximum(worst - GENTLE, 0)).sum()
     return float(missed + SPARED * (np.log(max(worst[0], 1e-3)) + np.log(force / FORCES[0])))
 
@@ -111,18 +112,18 @@ def search(
         gains, force = gains_at(at)
 
         def hopeless(scores: Mapping[str, Score]) -> bool:
-            return cost_of(scores, joint, force) > bound
+            return cost_of(scores, joint, force, law.yields) > bound
 
         try:
             found = judged(library, law, joint, gains, force, plants, ticks=SHORT, enough=hopeless)
         except InputError:  # the law's design has no solution
             return 2 * FAILED
-        return cost_of(found, joint, force)
+        return cost_of(found, joint, force, law.yields)
 
     def on_family(at: Array) -> Found:
         gains, force = gains_at(at)
         scores = judged(library, law, joint, gains, force, FAMILY)
-        return Found(law.name, gains, force, cost_of(scores, joint, force), scores, fastest(joint, STEP))
+        return Found(law.name, gains, force, cost_of(scores, joint, force, law.yields), scores, fastest(joint, STEP))
 
     starts = [
         np.log([*law.gains_for(joint, bandwidth).values(), force]) for bandwidth in BANDWIDTHS for force in STARTED
