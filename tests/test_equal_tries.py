@@ -13,7 +13,7 @@ pytest.importorskip("scipy")
 from awiwi_gen.compare.budget import BASELINES, COLUMNS, row
 from awiwi_gen.errors import InputError
 from awiwi_gen.loops import hand_joint, search
-from awiwi_gen.loops.hand_joint import joint_of
+from awiwi_gen.loops.hand_joint import Joint, joint_of
 from awiwi_gen.loops.laws import LAWS
 
 INTEGRAL = LAWS["inverse_dynamics"]
@@ -52,6 +52,21 @@ def test_a_search_of_a_baseline_improves_on_its_start_and_makes_a_row(lib, joint
     assert len(row(found)) == len(COLUMNS)
     assert row(found)[0] == "inverse_dynamics"
     assert row(found)[5] == "none"
+
+
+def test_a_link_so_light_that_its_inertia_says_nothing_starts_as_stiff_as_its_tendons(lib):
+    law, known = LAWS["backstepping_adaptive"], {"as known": {}}
+    twist = Joint(
+        inertias=np.array([1.52e-6, 1.744e-2, 1.744e-2]), tendons=np.array([[1.16, -0.143, 0.281]] * 2), damping=2e-4,
+        friction=np.array([12.7, 0.444, 0.0537]), known=0.8, arm=0.011, limit=10.58, encoder=2e-5,
+    )  # fmt: skip
+
+    def cost(gains):
+        return search.cost_of(search.judged(lib, law, twist, gains, 45.0, known, ticks=search.SHORT), twist, 45.0)
+
+    stiff = search._as_stiff_as_tendons(law, twist, 45.0)
+    assert stiff["K_p"] == pytest.approx(2.5 * twist.slopes(45.0 * twist.arm).mean())
+    assert cost(stiff) < 1.0 < 3.0 < min(cost(law.gains_for(twist, each)) for each in search.BANDWIDTHS)
 
 
 @pytest.mark.parametrize("tries", ["3", "-1", "1000000"])

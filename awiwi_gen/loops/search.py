@@ -28,6 +28,7 @@ DRAWN, KEPT = 12, 4  # of a generation
 SPREAD, NARROWEST, WIDEST = 0.25, 0.02, 0.6  # of the logarithm of a factor
 BANDWIDTHS = (1.0, 0.7, 0.5, 0.35, 0.25)  # of the defaults, that a search may start from
 STARTED = (*FORCES, 45.0)  # N, likewise
+HOPELESS = 20.0  # cost of the best start from which on a light link's gains are taken from its tendons instead
 PRETENSIONS = (4.0, 50.0)  # N
 CHATTER = 0.2  # of the motors' limit: r.m.s. change of torque from tick to tick
 SHORT = 900  # ticks of a run
@@ -129,6 +130,9 @@ def search(
         np.log([*law.gains_for(joint, bandwidth).values(), force]) for bandwidth in BANDWIDTHS for force in STARTED
     ]
     costs = [cost(start) for start in starts]
+    if min(costs) > HOPELESS and {"K_p", "K_3", "K_4", "C_t", "C_s"} <= law.gains.keys():
+        stiff = [np.log([*_as_stiff_as_tendons(law, joint, force).values(), force]) for force in STARTED]
+        starts, costs = starts + stiff, costs + [cost(start) for start in stiff]
     mean, spread = starts[int(np.argmin(costs))], np.full(len(names) + 1, SPREAD)
     records, lowest = [mean], min(costs)
     random, done = np.random.default_rng(seed), len(starts)
@@ -160,6 +164,14 @@ def search(
             f"bounds, with motors of at most {joint.limit:.3g} N m"
         )
     return chosen
+
+
+def _as_stiff_as_tendons(law: Law, joint: Joint, force: float) -> dict[str, float]:
+    """Gains for a link so light that those for its inertia are far softer than its tendons under a force [N]."""
+    gains, stiffness = law.gains_for(joint), 2.5 * float(joint.slopes(force * joint.arm).mean())
+    softer = gains["K_p"] / stiffness
+    factors = {"K_p": 1 / softer, "K_3": 0.5, "K_4": 0.5, "C_t": softer, "C_s": softer}
+    return {name: value * factors.get(name, 1.0) for name, value in gains.items()}
 
 
 def worst_plants(scores: Mapping[str, Score]) -> list[str]:
