@@ -331,12 +331,24 @@ def simulate(
     plant: Annotated[str, typer.Option("--plant", help="Plant of that run.")] = "as known",
     joint: Annotated[str, typer.Option("--joint", help="A joint such as index_pip, or all.")] = "index_pip",
     sensing: Annotated[str, typer.Option("--sensing", help="Of that run: force sensor, or lever.")] = "force sensor",
+    finger: Annotated[str, typer.Option("--finger", help="A whole finger under a law of the tick, or all.")] = "",
+    tries: Annotated[int, typer.Option("--tries", help="Search the gains of each law first, by so many tries.")] = 0,
     plot: Annotated[Path | None, typer.Option("--plot", help="PNG or SVG file for a plot of that run.")] = None,
     hand: HandFile = None, as_json: Json = False,
 ) -> int:  # fmt: skip
     """Simulate control laws on a joint between two tendons, at the hand's clock rate, and compare the results."""
-    from awiwi_gen.compare import benchmark, one_run
+    from awiwi_gen.compare import benchmark, by_tries, one_run, whole_fingers
 
+    if finger:
+        if gains or scenario or plot is not None:
+            raise InputError(
+                "--finger runs all scenarios with the gains of the tick; --gains, --scenario and --plot are for one joint"
+            )
+        whole_fingers(hand, law, finger).show(as_json)
+        return 0
+    if tries:
+        by_tries(hand, law, joint, tries).show(as_json)
+        return 0
     if plot is not None:
         extras.require("simulate --plot", "matplotlib")
         if not scenario:

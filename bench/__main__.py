@@ -1,8 +1,8 @@
 """`make bench`: everything that is measured, one section after another, and all numbers in build/bench.json.
 
 python -m bench                 all sections
-python -m bench peers           one of them: peers, passes, skew, sizes, tick, batches, whole_hands,
-                                generation
+python -m bench peers           one of them: peers, passes, skew, sizes, tick, simulator, batches,
+                                whole_hands, generation
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ PROGRAMS = (
     "skew",
     "sizes",
     "tick",
+    "simulator",
     "batches",
     "whole_hands",
     "generation",

@@ -51,8 +51,8 @@ def test_the_counts_are_those_of_the_hand(hand):
     assert hand.tendons == 38
     assert "at 3 kHz in firmware" in README
     assert round(1 / PERIOD) == 3000
-    assert "runs eight laws on a joint" in README
-    assert len(LAWS) == 8
+    assert "runs nine laws on a joint" in README
+    assert len(LAWS) == 9
     assert f"{len(catalog(hand))} kernels of the Awiwi hand" in (ROOT / "docs/quick_start.md").read_text()
 
 

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 import awiwi_gen
 from awiwi_gen.compare import comparison
+from awiwi_gen.compare.budget import BASELINES, by_budget
+from awiwi_gen.compare.shown import Shown
 from awiwi_gen.errors import InputError, unknown
 from awiwi_gen.hand import Hand
 from awiwi_gen.loops import clock
@@ -18,34 +18,15 @@ from awiwi_gen.loops.clock import require_clocked
 from awiwi_gen.loops.hand_joint import FINGER, JOINT, SENSING, joint_of
 from awiwi_gen.loops.laws import LAWS, law_of
 from awiwi_gen.loops.scenarios import BEFORE, FAMILY, FORCES, LAST, PLANTS, load_of, motions, run
-from awiwi_gen.report import print_json
+from awiwi_gen.report import Progress
 from awiwi_gen.results import Table
 from awiwi_gen.simulate import Array
-from awiwi_gen.tables import print_table
 from awiwi_gen.writing import whole_file
 
 DEFAULT = f"{FINGER}_{JOINT}"
 MOST_FORCE = 60.0  # N
 SUFFIXES = (".png", ".svg")
 SHOWN = 30  # ticks between two printed rows of a run
-
-
-@dataclass(frozen=True)
-class Shown:
-    """A result as plain data for JSON, and as tables and lines."""
-
-    data: Any
-    tables: Sequence[Table]
-    lines: Sequence[str] = ()
-
-    def show(self, as_json: bool) -> None:
-        """Print the data, or tables and lines."""
-        if as_json:
-            print_json(self.data)
-            return
-        for table in self.tables:
-            print_table(table.columns, table.rows, table.title)
-        print("".join(f"{line}\n" for line in self.lines), end="")
 
 
 def read_gains(text: str) -> dict[str, float]:
@@ -88,6 +69,13 @@ def benchmark(hand_file: Path | None, name: str, gains: str, where: str) -> Show
         },
         [*comparison.tables(clocked, rows), comparison.summary(rows)],
     )
+
+
+def by_tries(hand_file: Path | None, name: str, where: str, tries: int) -> Shown:
+    """One law, or the baselines beside the adaptive law, each with the best gains of so many tries."""
+    names = [law_of(name).name] if name else BASELINES
+    hand = Hand.load(hand_file)
+    return by_budget(hand, names, named_joint(hand, where), tries, Progress())
 
 
 def named_joint(hand: Hand, where: str) -> tuple[str, str]:

@@ -15,11 +15,19 @@ import numpy as np
 
 from awiwi_gen.errors import InputError, unknown
 from awiwi_gen.hand.gains import TendonGains
+from awiwi_gen.loops.designs import (
+    Values,
+    backstepped,
+    inverse,
+    motor_pd,
+    placed,
+    regulated,
+    scheduled,
+    state_dependent,
+)
 from awiwi_gen.loops.hand_joint import TORQUE_NOISE, Joint
-from awiwi_gen.loops.joint import Plant
-from awiwi_gen.simulate import Array, Block, Element, Sum, Wire
+from awiwi_gen.simulate import Block, Element, Sum, Wire
 
-Values = dict[str, Any]
 Wires = dict[str, Wire]
 
 
@@ -45,6 +53,7 @@ class Law:
     design: Callable[[Any, Joint, float, Mapping[str, float]], Values]
     body: int = 0  # whose inertia gains are proportional to: 0 the link's, 1 the motors'
     frozen: tuple[Element, ...] | None = None  # the blocks without what learns, for a linear analysis
+    yields: bool = True  # whether it lets a load deflect the link for ever
 
     @property
     def constant(self) -> list[Element]:
@@ -109,102 +118,6 @@ COMPENSATED = Block(  # adds friction compensation to a law without it
     },
 )  # fmt: skip
 PAIR: Wires = {"desired": "motion", "external": ("load_seen", "nothing"), "inertias": "known_inertias"}
-
-
-def rest(believed: Joint, force: float) -> Values:
-    """Known elongations and stiffness of the springs at rest."""
-    p, k = (of(force * believed.arm) for of in (believed.elongations, believed.slopes))
-    return {"elongations": p, "slopes": k, "no_feedback": np.zeros((2, 6))}
-
-
-def of_modes(link: Array, pull: Array) -> Array:
-    """Feedback (2, 6) from that of the link's mode, (q, q', psi, psi'), and of the pretension's, (sigma, sigma')."""
-    against = np.concatenate([link[:2] / 2, link[2:] / 4, -link[2:] / 4])
-    together = np.concatenate([[0, 0], pull / 2, pull / 2])
-    return np.array([against + together, together - against])
-
-
-def answered(result: Any, law: str) -> Any:
-    """A kernel's result. Raises InputError where the kernel fails."""
-    if result.status:
-        raise InputError(f"{law}: the design has no solution for these gains")
-    return result
-
-
-# -- designs ------------------------------------------------------------------------------------------------
-
-
-def motor_pd(_: Any, believed: Joint, force: float, gains: Mapping[str, float]) -> Values:
-    """A PD controller for each motor; the link hangs between the tendons' springs."""
-    feedback = np.zeros((2, 6))
-    for motor in (0, 1):
-        feedback[motor, 2 * motor + 2 : 2 * motor + 4] = gains["kp"], gains["kd"]
-    return rest(believed, force) | {"feedback": feedback}
-
-
-def modes_of(believed: Joint, force: float) -> tuple[Plant, Plant]:
-    """The link's mode, of both motors behind both springs; and one motor on its spring, the mode of the pretension."""
-    m, b, _ = map(float, believed.inertias)
-    k = float(believed.slopes(force * believed.arm).mean())
-    return Plant(m, 2 * b, 2 * k, dq=believed.damping), Plant(m, b, k)
-
-
-def pretension_gains(library: Any, motor: Plant, omega: float) -> Array:
-    """Gains (2,) on the common motion of both motors."""
-    placed = library.pole_placement_motor(b=motor.b, dtheta=0.0, k=motor.k, omega0=omega, xi0=1.0)
-    gains: Array = 2 * answered(placed, "pole_placement_motor").K
-    return gains
-
-
-def placed(library: Any, believed: Joint, force: float, gains: Mapping[str, float]) -> Values:
-    """Poles of the link's mode and of the pretension's."""
-    link, motor = modes_of(believed, force)
-    found = library.pole_placement(**link.ports, omega=[gains["slow"], gains["fast"]], xi=[1.0, 1.0])
-    pull = pretension_gains(library, motor, gains["pull"])
-    return rest(believed, force) | {"feedback": of_modes(answered(found, "pole_placement").K, pull)}
-
-
-def regulated(library: Any, believed: Joint, force: float, gains: Mapping[str, float]) -> Values:
-    """The optimum for costs of the link's error, of the motors' speed and of their torque."""
-    link, motor = modes_of(believed, force)
-    found = library.lqr(A=link.A, B=link.B, Q=np.diag([gains["error"] ** 2, 0, 0, gains["speed"] ** 2]), R=1.0)
-    pull = pretension_gains(library, motor, gains["pull"])
-    return rest(believed, force) | {"feedback": of_modes(answered(found, "lqr").K, pull)}
-
-
-def scheduled(_: Any, believed: Joint, force: float, gains: Mapping[str, float]) -> Values:
-    """Impedance of the link over force loops of both tendons; three of the law's four joints stand still."""
-
-    def first(value: float) -> Array:
-        return np.diag([value, 1.0, 1.0, 1.0])
-
-    return rest(believed, force) | {
-        "mass": first(float(believed.inertias[0])), "coriolis": np.diag([believed.damping, 0, 0, 0]),
-        "three": np.zeros(3), "four": np.zeros(4), "stiff": first(gains["K_p"]), "damp": first(gains["K_d"]),
-        "omega0": gains["omega"], "xi0": gains["xi"], "force_gains": np.zeros(4), "wound": np.zeros(2),
-    }  # fmt: skip
-
-
-def backstepped(_: Any, believed: Joint, force: float, gains: Mapping[str, float]) -> Values:
-    """Gains of all backstepping laws of a pair."""
-    tuning = [gains[name] for name in ("K_3", "K_4", "C_t", "C_s")]
-    impedance = [gains["K_p"], gains["K_d"]]
-    return rest(believed, force) | {"impedance": impedance, "tunings": [tuning] * 2, "torques_wanted": np.zeros(2)}
-
-
-def state_dependent(_: Any, believed: Joint, force: float, gains: Mapping[str, float]) -> Values:
-    """Two optima for the springs' secants: of the link's mode, of inertia 2 b, and of either motor's pull."""
-    p = believed.elongations(force * believed.arm)
-    k3 = believed.tendons[:, 2].mean()
-    slope = believed.slopes(force * believed.arm).mean()
-    weight = gains["error"] ** 2
-    return rest(believed, force) | {
-        "both": 2 * believed.inertias[1], "no_drag": 0.0,
-        "difference": [2 * slope, 0.0, 2 * k3],  # phi(p + d) - phi(p - d)
-        "spring": believed.tendons.mean(axis=0), "R": 1.0, "K_kept": np.zeros(4), "K_pull": np.zeros(2),
-        "weights": [weight, 1e-6, 1e-6, gains["speed"] ** 2], "pull_weights": [weight, gains["speed"] ** 2],
-        "sum_wanted": force * believed.arm, "together_wanted": [p.mean(), 0.0],
-    }  # fmt: skip
 
 
 STIFFNESS = {"K_p": Gain(0.5, "N m/rad", 2, 1), "K_d": Gain(0.003, "N m s/rad", 1, 1)}
@@ -276,6 +189,23 @@ MODES = (
         {"torque": "difference_wanted", "pretension": ("sum_wanted", "nothing", "nothing"), "shares": "torques_wanted"},
     ),
 )  # fmt: skip
+
+INVERSE = (
+    Block("antagonistic_modes"),
+    Sum("error", (1.0, "motion[0]"), (-1.0, "joint[0]")),
+    Sum("integral", (1.0, "integral"), ("period", "error")),
+    Sum("apart", (1.0, "motion[0:2]"), (-1.0, "against")),
+    Sum(
+        "asked", (1.0, "motion[2]"), ("shaping[0]", "apart[0]"), ("shaping[1]", "apart[1]"), ("shaping[2]", "integral")
+    ),
+    Sum("turning", ("whole", "asked"), ("known_damping", "motion[1]")),
+    Sum("loose", (1.0, "together[0]"), (-1.0, "together_rest")),
+    Sum("pulling", (1.0, "pretension[0]"), ("holding[0]", "loose"), ("holding[1]", "together[1]")),
+    Block(
+        "antagonistic_sharing",
+        {"torque": "turning", "pretension": ("pulling", "nothing", "nothing"), "shares": "torques_wanted"},
+    ),
+)
 
 LEARNING = {
     "inertia_rate": Gain(100.0, "1/s", 0), "balance_rate": Gain(10.0, "1/s", 0), "memory_rate": Gain(20.0, "1/s", 0),
@@ -373,6 +303,12 @@ LAWS = {
             STIFFNESS | {"K_d": Gain(0.006, "N m s/rad", 1, 1), "omega": Gain(100.0, "rad/s"), "xi": Gain(1.0, "1", 0)}
             | SHARED,
             (*OBSERVED, IMPEDANCE, SHARING, *FORCES), scheduled,
+        ),
+        Law(
+            "inverse_dynamics", "eq. 2.17, with integral action",
+            "link and motors as one body that follows, and an integral of the link's error",
+            {"kp": Gain(13000.0, "1/s^2", 2), "kd": Gain(160.0, "1/s"), "ki": Gain(2e5, "1/s^3", 3)} | SHARED,
+            (*OBSERVED, *INVERSE, COMPENSATED), inverse, yields=False,
         ),
         pair_law(
             "backstepping_decoupled", "backstepping_antagonistic_decoupled", "eq. 15.84 to 15.88, as printed",

@@ -28,6 +28,7 @@ DRAWN, KEPT = 12, 4  # of a generation
 SPREAD, NARROWEST, WIDEST = 0.25, 0.02, 0.6  # of the logarithm of a factor
 BANDWIDTHS = (1.0, 0.7, 0.5, 0.35, 0.25)  # of the defaults, that a search may start from
 STARTED = (*FORCES, 45.0)  # N, likewise
+HOPELESS = 20.0  # cost of the best start from which on a light link's gains are taken from its tendons instead
 PRETENSIONS = (4.0, 50.0)  # N
 CHATTER = 0.2  # of the motors' limit: r.m.s. change of torque from tick to tick
 SHORT = 900  # ticks of a run
@@ -85,13 +86,14 @@ def judged(
     return scores
 
 
-def cost_of(scores: Mapping[str, Score], joint: Joint, force: float) -> float:
-    """What the search makes small; with more plants it only grows."""
+def cost_of(scores: Mapping[str, Score], joint: Joint, force: float, yields: bool = True) -> float:
+    """What the search makes small; with more plants it only grows. A law that does not yield has no stiffness to err in."""
     if any(each.failed for each in scores.values()):
         return FAILED
     noisy = CHATTER * joint.limit
     shares = [(*each.shares(GOALS[name != "as known"]), each.chatter / noisy) for name, each in scores.items()]
     worst = np.minimum(np.array(shares).max(axis=0), FAILED)
+    worst[2] *= yields
     missed = np.log1p(np.maximum(worst - GENTLE, 0)).sum()
     return float(missed + SPARED * (np.log(max(worst[0], 1e-3)) + np.log(force / FORCES[0])))
 
@@ -111,23 +113,26 @@ def search(
         gains, force = gains_at(at)
 
         def hopeless(scores: Mapping[str, Score]) -> bool:
-            return cost_of(scores, joint, force) > bound
+            return cost_of(scores, joint, force, law.yields) > bound
 
         try:
             found = judged(library, law, joint, gains, force, plants, ticks=SHORT, enough=hopeless)
         except InputError:  # the law's design has no solution
             return 2 * FAILED
-        return cost_of(found, joint, force)
+        return cost_of(found, joint, force, law.yields)
 
     def on_family(at: Array) -> Found:
         gains, force = gains_at(at)
         scores = judged(library, law, joint, gains, force, FAMILY)
-        return Found(law.name, gains, force, cost_of(scores, joint, force), scores, fastest(joint, STEP))
+        return Found(law.name, gains, force, cost_of(scores, joint, force, law.yields), scores, fastest(joint, STEP))
 
     starts = [
         np.log([*law.gains_for(joint, bandwidth).values(), force]) for bandwidth in BANDWIDTHS for force in STARTED
     ]
     costs = [cost(start) for start in starts]
+    if min(costs) > HOPELESS and {"K_p", "K_3", "K_4", "C_t", "C_s"} <= law.gains.keys():
+        stiff = [np.log([*_as_stiff_as_tendons(law, joint, force).values(), force]) for force in STARTED]
+        starts, costs = starts + stiff, costs + [cost(start) for start in stiff]
     mean, spread = starts[int(np.argmin(costs))], np.full(len(names) + 1, SPREAD)
     records, lowest = [mean], min(costs)
     random, done = np.random.default_rng(seed), len(starts)
@@ -159,6 +164,14 @@ def search(
             f"bounds, with motors of at most {joint.limit:.3g} N m"
         )
     return chosen
+
+
+def _as_stiff_as_tendons(law: Law, joint: Joint, force: float) -> dict[str, float]:
+    """Gains for a link so light that those for its inertia are far softer than its tendons under a force [N]."""
+    gains, stiffness = law.gains_for(joint), 2.5 * float(joint.slopes(force * joint.arm).mean())
+    softer = gains["K_p"] / stiffness
+    factors = {"K_p": 1 / softer, "K_3": 0.5, "K_4": 0.5, "C_t": softer, "C_s": softer}
+    return {name: value * factors.get(name, 1.0) for name, value in gains.items()}
 
 
 def worst_plants(scores: Mapping[str, Score]) -> list[str]:

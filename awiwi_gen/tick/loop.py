@@ -112,11 +112,15 @@ class SimulatedHand:
 class ClosedLoop:
     """The tick and the simulated hand, begun in a pose (joints,) [rad], by default in the middle of the joints' ranges.
 
-    ``force`` [N] is the pretension at the start.
+    ``force`` [N] is the pretension at the start; ``prepare`` may change gains and world before the hand is placed.
     """
 
-    def __init__(self, library: Library, q: ArrayLike | None = None, seed: int = 0, force: float = 0.0) -> None:
+    def __init__(
+        self, library: Library, q: ArrayLike | None = None, seed: int = 0, force: float = 0.0,
+        prepare: Callable[[ClosedLoop], None] = lambda loop: None,
+    ) -> None:  # fmt: skip
         self.step, self.hand = HandStep(library), SimulatedHand(library, seed)
+        prepare(self)
         low, high = self.step.limits()
         self.start: Array = np.array((low + high) / 2 if q is None else q, library.dtype)
         motors = np.random.default_rng(seed).uniform(-0.3, 0.3, self.step.tendons)
