@@ -53,7 +53,7 @@ TOP = [
         "diff",
         "certificates",
     ],
-    ["loops", "identify", "tick", "interchange", "gym"],
+    ["loops", "identify", "tick", "interchange", "gym", "web"],
     [*ROOMS],
     ["study"],
     ["__init__"],
