@@ -45,21 +45,21 @@ class ThisHand:
         return sum(source == "guess" for *_, source in self.numbers)
 
     @property
-    def capability(self) -> list[tuple[str, Row, list[Row]]]:
-        """Of each finger: columns and rows of a table of its joints."""
-        found = []
-        for name, joints in self.joints.items():
-            values = {each.name: _text(each) for each in self.fingers[name]}
-            rows = [[values.get(_of_joint(kind, joint), NONE) for kind in OF_JOINTS] for joint in joints]
-            found.append((name, *_without_empty("joint", joints, OF_JOINTS, rows)))
-        return found
+    def capability(self) -> tuple[Row, list[Row]]:
+        """Columns and rows of a table of all joints."""
+        heads, rows = [], []
+        for finger, joints in self.joints.items():
+            values = {each.name: _text(each) for each in self.fingers[finger]}
+            heads += [(finger, joint) for joint in joints]
+            rows += [[values.get(_of_joint(kind, joint), NONE) for kind in OF_JOINTS] for joint in joints]
+        return _without_empty(("finger", "joint"), heads, OF_JOINTS, rows)
 
     @property
     def workspace(self) -> tuple[Row, list[Row]]:
         """Columns and rows of a table of the fingers."""
         values = [{each.name: _text(each) for each in found} for found in self.fingers.values()]
         rows = [[each.get(kind, NONE) for kind in OF_FINGERS] for each in values]
-        return _without_empty("finger", list(self.fingers), OF_FINGERS, rows)
+        return _without_empty(("finger",), [(name,) for name in self.fingers], OF_FINGERS, rows)
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data for JSON: figures of the fingers, and how many numbers are guesses."""
@@ -103,13 +103,12 @@ def _of_joint(kind: str, joint: str) -> str:
 
 
 def _without_empty(
-    head: str, names: Sequence[str], columns: Sequence[str], rows: Sequence[Sequence[str]]
+    head: Row, heads: Sequence[Row], columns: Sequence[str], rows: Sequence[Sequence[str]]
 ) -> tuple[Row, list[Row]]:
-    """A table without the columns that have no value."""
+    """A table without the columns that have no value; each row begins with what names it."""
     kept = [place for place, _ in enumerate(columns) if any(row[place] != NONE for row in rows)]
-    return (head, *(columns[place] for place in kept)), [
-        (name, *(row[place] for place in kept)) for name, row in zip(names, rows, strict=True)
-    ]
+    shown = [(*names, *(row[place] for place in kept)) for names, row in zip(heads, rows, strict=True)]
+    return (*head, *(columns[place] for place in kept)), shown
 
 
 def _numbers(hand: Hand) -> Iterator[Row]:

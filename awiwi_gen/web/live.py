@@ -51,6 +51,11 @@ class Live:
         return float(self.scene["force"])
 
     @property
+    def slides(self) -> bool:
+        """Whether any joint slides."""
+        return any(joint["slides"] for finger in self.scene["fingers"] for joint in finger["joints"])
+
+    @property
     def placed(self) -> bool:
         """Whether the hand file says where the fingers stand in the palm."""
         return bool(self.scene["placed"])
