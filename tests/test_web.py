@@ -26,6 +26,22 @@ from awiwi_gen.web.module import runnable
 from awiwi_gen.web.scene import scene
 
 SAMPLES = 4
+PALM = """
+[fingers.jaw.base]
+position = ["40 mm", "5 mm", "-3 mm"]
+rpy = ["10 deg", "0 deg", "90 deg"]
+source = "drawing 9"
+
+[palm]
+source = "drawing 9"
+
+[[palm.joints]]
+joint = "bend"
+low = "-1 rad"
+high = "1 rad"
+offset = ["50 mm", "0 mm", "0 mm"]
+source = "drawing 9"
+"""
 HEX = "const bits = xs => Array.from(new BigUint64Array(Float64Array.from(xs).buffer));"
 HEX += " const hex = xs => bits(xs).map(x => x.toString(16).padStart(16, '0'));"
 
@@ -216,26 +232,50 @@ def test_the_picture_turns_by_keys(opened):
     assert opened.ask("hand.view.turn") == before
 
 
-def test_a_hand_of_one_finger_without_wrist_has_a_page_with_and_without_tendons(browser, tmp_path):
-    text = Path(ONE_FINGER).read_text(encoding="utf-8")
+def test_a_hand_of_one_finger_without_wrist_has_a_page(browser, tmp_path):
     only = (
         "jaw_link_poses,jaw_pose_and_jacobian,jaw_tendon_lengths,jaw_tendon_stiffness,jaw_coupling,jaw_joint_stiffness"
     )
-    bare = re.sub(r"^tendons = \[.*?^\]\n", "", text, flags=re.MULTILINE | re.DOTALL)
-    for name, each in (("pulled", text), ("bare", bare)):
-        (tmp_path / name).mkdir()
-        place, library = written(tmp_path / name, Hand.parse(each), only)
-        browser.errors.clear()
-        browser.open(place)
-        browser.ask("ready")
-        browser.ask("hand.set('jaw', 1, 1.0)")
-        q, tip = browser.ask("[hand.q.jaw, hand.points(hand.finger()).at(-1)]")
-        base = np.array(browser.ask("hand.base(hand.finger())"))
+    place, library = written(tmp_path, Hand.load(ONE_FINGER), only)
+    found = moved(browser, place)
 
-        np.testing.assert_allclose(tip, (base @ library.jaw_pose_and_jacobian(q).T)[:3, 3], atol=1e-12)
-        assert browser.ask("document.getElementById('tendons').rows.length") == (3 if name == "pulled" else 0)
-        assert browser.ask("document.getElementById('drop').disabled")  # no kernels of dynamics were generated
-        assert browser.errors == []
+    np.testing.assert_allclose(found["tip"], library.jaw_pose_and_jacobian(found["q"]["jaw"]).T[:3, 3], atol=1e-12)
+    assert found["tendons"] == 3
+    assert list(found["q"]) == ["jaw"]
+
+
+def test_a_hand_without_tendons_has_a_page_and_stands_on_its_palm(browser, tmp_path):
+    text = Path(ONE_FINGER).read_text(encoding="utf-8")
+    bare = re.sub(r"^tendons = \[.*?^\]\n", "", text, flags=re.MULTILINE | re.DOTALL)
+    place, library = written(
+        tmp_path,
+        Hand.parse(bare + PALM),
+        "jaw_link_poses,jaw_pose_and_jacobian,jaw_palm_pose,palm_pose",
+    )
+    found = moved(browser, place)
+    tip = library.palm_pose(found["q"]["wrist"]) @ library.jaw_palm_pose(found["q"]["jaw"]).T
+
+    np.testing.assert_allclose(found["tip"], tip[:3, 3], atol=1e-12)
+    assert found["tendons"] == 0
+    assert found["q"]["wrist"] == [0.4]
+
+
+def moved(browser, place):
+    """A page of the small hand after its joints were moved: where its tip is, its angles, how many tendons have rows."""
+    browser.errors.clear()
+    browser.open(place)
+    browser.ask("ready")
+    browser.ask("hand.set('jaw', 1, 1.0); if (hand.scene.wrist) hand.set('wrist', 0, 0.4)")
+    asked = (
+        "({tip: hand.points(hand.finger()).at(-1), q: hand.q, tendons: document.getElementById('tendons').rows.length})"
+    )
+    found = browser.ask(asked)
+    if len(found["q"]) == 1:  # the file does not say where the finger stands
+        base = np.array(browser.ask("hand.base(hand.finger())"))
+        found["tip"] = base[:3, :3].T @ (found["tip"] - base[:3, 3])
+    assert browser.ask("document.getElementById('drop').disabled")  # no kernels of dynamics were generated
+    assert browser.errors == []
+    return found
 
 
 def test_without_the_compiler_the_page_says_what_to_install(monkeypatch, tmp_path, hand):

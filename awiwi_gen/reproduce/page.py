@@ -106,7 +106,8 @@ def write_page(path: Path, hand: Hand, results: Results, manifest: Mapping[str, 
         "report.html.j2",
         hand=escape(hand.name),
         digest=hand.digest(),
-        summary=escape(summary(results)),
+        proofs=escape(proofs(results)),
+        claims=escape(claims(results)),
         style=style(),
         script=script(),
         live=results.hand.live if isinstance(results.hand.live, Live) else None,
@@ -140,15 +141,24 @@ def chapter(reference: str) -> int:
 
 def summary(results: Results) -> str:
     """Counts of kernels that are proved and, with figures, of claims that hold and numbers that agree."""
+    return " ".join(filter(None, (proofs(results), claims(results))))
+
+
+def proofs(results: Results) -> str:
+    """How many kernels are proved."""
+    proved = sum(verdict.passed for verdict in results.proof.verdicts)
+    return f"{proved} of {len(results.proof.verdicts)} kernels proved."
+
+
+def claims(results: Results) -> str:
+    """How many claims of figures hold, and printed numbers agree; nothing without figures."""
+    if not results.figures:
+        return ""
     verdicts = Counter(number.verdict for number in results.numbers)
     counts = ", ".join(f"{verdicts[name]} {word}" for name, word in COUNTED.items() if verdicts[name])
     holding = sum(bool(figure.holds) for figure in results.figures)
-    proved = sum(verdict.passed for verdict in results.proof.verdicts)
-    proofs = f"{proved} of {len(results.proof.verdicts)} kernels proved."
-    if not results.figures:
-        return proofs
-    claims = f"{holding} of {len(results.figures)} claims of figures hold."
-    return f"{claims} Printed numbers: {counts or 'none compared'}. {proofs}"
+    held = f"{holding} of {len(results.figures)} claims of figures hold."
+    return f"{held} Printed numbers: {counts or 'none compared'}."
 
 
 def verdict(figure: Figure) -> str:

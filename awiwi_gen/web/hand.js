@@ -253,10 +253,12 @@ class Hand {
     const used = sizes.slice(0, finger.joints.length);
     const most = this.compliance?.[0].value;
     const stiff = this.compliance?.map(({ value }) => (value > FREE * most ? `${(1e-3 / value).toPrecision(3)}\u00a0N/mm` : "none moves it"));
+    const slides = finger.joints.some((joint) => joint.slides);
+    const [per, product] = slides ? ["", " SI units"] : ["/rad", `\u00a0(m/rad)${["", "", "²", "³"][used.length]}`];
     return [
       ["place of the tip, x, y, z", place.map((x) => `${fixed(1e3 * x, 2)}\u00a0mm`).join(", ")],
-      ["speed of the tip per speed of the joints", used.map((size) => `${(1e3 * size).toFixed(1)}\u00a0mm/rad`).join(", ")],
-      ["manipulability, their product", `${used.reduce((a, b) => a * b, 1).toExponential(3)}\u00a0(m/rad)${["", "", "²", "³"][used.length]}`],
+      ["speed of the tip per speed of the joints", used.map((size) => `${(1e3 * size).toFixed(1)}\u00a0mm${per}`).join(", ")],
+      ["manipulability, their product", `${used.reduce((a, b) => a * b, 1).toExponential(3)}${product}`],
       ["stiffness of the tip, along its principal axes", stiff ? stiff.join(", ") : "none: the tendons leave a joint free"],
     ];
   }
