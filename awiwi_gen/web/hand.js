@@ -106,10 +106,10 @@ class Hand {
         this.q[fall.finger.name] = fall.q.map((x, i) => Math.min(Math.max(x, fall.finger.joints[i].low), fall.finger.joints[i].high));
       }
       this.refresh();
-      $("told").textContent = `fallen for ${time.toFixed(2)} s, shown ${SLOWER} times slower`;
       if (time > FALLING) this.stop();
       else requestAnimationFrame(frame);
     };
+    $("told").textContent = `falling, shown ${SLOWER} times slower`;
     requestAnimationFrame(frame);
   }
 
@@ -184,7 +184,7 @@ class Hand {
       }
     }
     view.text(this.above(points[points.length - 1]), finger.name, view.colour("text"));
-    if (chosen && this.compliance) this.drawCompliance(finger, points[points.length - 1]);
+    if (chosen && this.compliance?.[0].value > 0) this.drawCompliance(finger, points[points.length - 1]);
   }
 
   above(place) {
