@@ -285,6 +285,8 @@ def test_without_the_compiler_the_page_says_what_to_install(monkeypatch, tmp_pat
     page.write_page(tmp_path / "page.html", hand, page.Results([], [], Proof([], []), (), shown), {"kernels": []})
     text = (tmp_path / "page.html").read_text(encoding="utf-8")
 
+    assert not shown.as_dict()["moves"]
+    assert shown.lacking.endswith("install it: pip install 'awiwi_gen[browser]'.")
     assert "needs ziglang; install it: pip install &#x27;awiwi_gen[browser]&#x27;" in text
     assert "<canvas" not in text
 

@@ -40,6 +40,11 @@ class ThisHand:
     costs: tuple[Row, Sequence[Row]] = ((), ())
 
     @property
+    def lacking(self) -> str:
+        """Why the hand does not move; nothing where it does."""
+        return self.live if isinstance(self.live, str) else ""
+
+    @property
     def guesses(self) -> int:
         """How many numbers are guesses."""
         return sum(source == "guess" for *_, source in self.numbers)
@@ -62,13 +67,14 @@ class ThisHand:
         return _without_empty(("finger",), [(name,) for name in self.fingers], OF_FINGERS, rows)
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain data for JSON: figures of the fingers, and how many numbers are guesses."""
+        """Plain data for JSON: figures of the fingers, how many numbers are guesses, whether the hand moves on the page."""
         return {
             "fingers": {
                 name: [{"figure": each.name, "value": f"{each.value:.4g}", "unit": each.unit} for each in found]
                 for name, found in self.fingers.items()
             },
             "guesses": self.guesses,
+            "moves": not isinstance(self.live, str),
         }
 
 

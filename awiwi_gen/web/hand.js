@@ -134,11 +134,15 @@ class Hand {
     return [...poses.map((pose) => posed(pose, [0, 0, 0])), posed(poses[poses.length - 1], finger.tip)];
   }
 
-  /* The same in the middle and at both ends of all ranges. */
+  /* The same in the middle, and with each joint and all joints at both ends of their ranges. */
   extremes() {
     return this.scene.fingers.flatMap((finger) => {
-      const poses = ["low", "high"].map((end) => finger.joints.map((joint) => joint[end]));
-      return [finger.middle, ...poses].flatMap((q) => this.points(finger, q));
+      const { joints, middle } = finger;
+      const poses = ["low", "high"].flatMap((end) => [
+        joints.map((joint) => joint[end]),
+        ...joints.map((_, moved) => middle.map((x, i) => (i === moved ? joints[i][end] : x))),
+      ]);
+      return [middle, ...poses].flatMap((q) => this.points(finger, q));
     });
   }
 
@@ -254,11 +258,12 @@ class Hand {
     const most = this.compliance?.[0].value;
     const stiff = this.compliance?.map(({ value }) => (value > FREE * most ? `${(1e-3 / value).toPrecision(3)}\u00a0N/mm` : "none moves it"));
     const slides = finger.joints.some((joint) => joint.slides);
-    const [per, product] = slides ? ["", " SI units"] : ["/rad", `\u00a0(m/rad)${["", "", "²", "³"][used.length]}`];
+    const speed = (size) => (slides ? size.toPrecision(3) : `${(1e3 * size).toFixed(1)}\u00a0mm/rad`);
+    const unit = slides ? "in SI units" : `(m/rad)${["", "", "²", "³"][used.length]}`;
     return [
       ["place of the tip, x, y, z", place.map((x) => `${fixed(1e3 * x, 2)}\u00a0mm`).join(", ")],
-      ["speed of the tip per speed of the joints", used.map((size) => `${(1e3 * size).toFixed(1)}\u00a0mm${per}`).join(", ")],
-      ["manipulability, their product", `${used.reduce((a, b) => a * b, 1).toExponential(3)}${product}`],
+      [`speed of the tip per speed of the joints${slides ? ", in SI units" : ""}`, used.map(speed).join(", ")],
+      ["manipulability, their product", `${used.reduce((a, b) => a * b, 1).toExponential(3)}\u00a0${unit}`],
       ["stiffness of the tip, along its principal axes", stiff ? stiff.join(", ") : "none: the tendons leave a joint free"],
     ];
   }
@@ -280,7 +285,7 @@ class Hand {
     if (!finger.pulled.length || !this.has(finger, "coupling")) return [];
     const P = rowsOf(this.call(finger, "coupling", q).P, q.length);
     const lengths = this.lengths(finger, q);
-    return P.map((row, i) => [String(i), `${fixed(1e3 * lengths[i], 3)}\u00a0mm`, ...row.map((arm) => fixed(1e3 * arm, 2))]);
+    return P.map((row, i) => [String(i), `${fixed(1e3 * lengths[i], 3)}\u00a0mm`, ...row.map((arm, j) => fixed((finger.joints[j].slides ? 1 : 1e3) * arm, 2))]);
   }
 
   /* Lengths of a finger's tendons [m], with their way through the wrist. */
