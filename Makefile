@@ -1,7 +1,7 @@
 # make        set up .venv, then derive, emit, compile and verify the default hand
 # make test   all tests              make lint   ruff, mypy, layers
 # make check  is generated/ fresh?   make bench  us and the peers, side by side
-# make report the hand in figures, those of the source computed again, all proofs: build/report/index.html
+# make report a page with the hand, which moves, its figures, those of the source computed again, all proofs: build/report/index.html
 # make docs   the documentation site with its gallery: build/site/index.html
 # make torture  hours: 10 000 mutated hand files, 200 random hands, 10 000 damaged caches, 200 kills
 # make firmware  every kernel on every target: equal bits, committed figures (ACCEPT=1 writes them, ALL=1: more, QUICK=1: what CI runs)
@@ -25,8 +25,8 @@ all: .venv/installed
 	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
 	@touch $@
 
-test: .venv/installed
-	$(BIN)/python -m pytest
+test: .venv/installed .venv-web/installed
+	PYTHONPATH=$(CURDIR)/.venv-web $(BIN)/python -m pytest
 
 lint: .venv/installed
 	$(BIN)/ruff check .
@@ -42,8 +42,8 @@ torture: .venv/installed
 check: .venv/installed
 	@$(BIN)/awiwi-gen check
 
-report: .venv/installed
-	@$(BIN)/awiwi-gen report
+report: .venv/installed .venv-web/installed
+	@PYTHONPATH=$(CURDIR)/.venv-web $(BIN)/awiwi-gen report
 
 docs: all .venv-docs/installed
 	@PYTHONPATH=.venv-docs $(BIN)/python docs/site/build.py
@@ -74,6 +74,11 @@ test-hands: .venv/installed .venv-hands/installed
 	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --upgrade --target .venv-docs --requirement $<
 	@touch $@
 
+# The compiler to WebAssembly beside .venv, as only the report and its tests need it.
+.venv-web/installed: tests/browser/requirements.lock .venv/installed
+	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --upgrade --target .venv-web --requirement $<
+	@touch $@
+
 # The peers live in an environment of their own. Where one cannot be installed, the others are compared.
 .venv-bench/installed: bench/requirements.lock
 	$(PYTHON) -m venv .venv-bench
@@ -86,7 +91,7 @@ wheel: .venv/installed
 	@$(BIN)/python -m hatchling build
 
 clean:
-	rm -rf .venv .venv-bench .venv-hands .venv-docs .cache build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf .venv .venv-bench .venv-hands .venv-docs .venv-web .cache build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 .PHONY: all docs wheel test test-hands lint torture check report bench firmware analysis mutants clean

@@ -308,7 +308,7 @@ def report(
     hand: HandFile = None, as_json: Json = False,
     page: Annotated[Path, typer.Option("--page", "-o", help="HTML file to write.")] = PAGE,
 ) -> int:  # fmt: skip
-    """Reproduce the source's figures and numbers on one page, with the proof of every kernel."""
+    """Write a page: the hand, which moves, with its numbers and proofs; of the packaged hand the source's figures."""
     from awiwi_gen.compare import comparison
     from awiwi_gen.report import print_json
     from awiwi_gen.reproduce import publish, summary, verdict
@@ -319,6 +319,7 @@ def report(
     else:
         print("\n".join(f"figure {figure.number}: the claim {verdict(figure)}" for figure in results.figures))
         print(f"{page}: {summary(results)}")
+        print(results.hand.lacking, end="\n" if results.hand.lacking else "")
     return 0 if results.proof.passed else 1
 
 

@@ -11,6 +11,7 @@ from awiwi_gen.errors import MissingExtraError
 
 ORDER = ("cli", "generate", "studies", "cluster")  # each includes those before it
 INTERCHANGE = "interchange"  # beside studies, includes generate
+BROWSER = "browser"  # beside cluster, includes studies
 LEARN = "learn"  # beside all others
 # The module, the package that has it, and the extra that installs it.
 EXTRAS = {
@@ -24,6 +25,7 @@ EXTRAS = {
     "tree_sitter": ("tree-sitter", "generate"),
     "tree_sitter_toml": ("tree-sitter-toml", "generate"),
     "typer": ("typer", "cli"),
+    "ziglang": ("ziglang", BROWSER),
     "distributed": ("distributed", "cluster"),
     "matplotlib": ("matplotlib", "studies"),
     "mujoco": ("mujoco", INTERCHANGE),
@@ -44,7 +46,7 @@ def missing(purpose: str, *modules: str) -> str:
     """The sentence about those modules that are not installed, or nothing."""
     absent = [EXTRAS[module] for module in modules if find_spec(module) is None]
     packages = [package for package, _ in absent]
-    extra = max((extra for _, extra in absent), key=(*ORDER, INTERCHANGE, LEARN).index, default="")
+    extra = max((extra for _, extra in absent), key=(*ORDER, INTERCHANGE, BROWSER, LEARN).index, default="")
     listed = " and ".join([", ".join(packages[:-1])] * (len(packages) > 1) + packages[-1:])
     them = "it" if len(packages) == 1 else "them"
     return f"{purpose} needs {listed}; install {them}: pip install 'awiwi_gen[{extra}]'" if absent else ""

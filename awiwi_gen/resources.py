@@ -14,6 +14,7 @@ def _find(name: str) -> Path:
 
 TEMPLATES = _find("templates")
 CSRC = _find("csrc")
+WEB = PACKAGE / "web"
 DEFAULT_HAND = PACKAGE / "hand.toml"
 STARTER_HAND = PACKAGE / "starter.toml"
 SOURCES = (PACKAGE, TEMPLATES, CSRC)

@@ -107,3 +107,15 @@ def curves(x: Any, lines: Any, xlabel: str, ylabel: str, *styles: str, markersiz
             axes.legend(**beside)
 
     return draw
+
+
+def shaded(axes: Any, x: Any, lines: Any, numbers: Any, label: str, linewidth: float = 0.6) -> None:
+    """Draw one line over x for each row of ``lines``, coloured by a number of its own, with a bar of the colours."""
+    from matplotlib import colormaps
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+
+    colours, scale = colormaps["viridis"], Normalize(min(numbers), max(numbers))
+    for line, number in zip(lines, numbers, strict=True):
+        axes.plot(x, line, "-", linewidth=linewidth, color=colours(scale(number)))
+    axes.figure.colorbar(ScalarMappable(scale, colours), ax=axes, label=label)

@@ -54,7 +54,7 @@ TOP = [
         "certificates",
         "wheel",
     ],
-    ["loops", "identify", "tick", "interchange", "gym"],
+    ["loops", "identify", "tick", "interchange", "gym", "web"],
     [*ROOMS],
     ["study"],
     ["__init__"],

@@ -110,7 +110,7 @@ def test_an_installation_has_the_size_that_is_written(extra, megabytes):
 
 
 def test_the_table_of_installations_is_read():
-    assert len(COLUMN.findall(README)) == 6  # of the seventh, libraries are missing in the environment of make
+    assert len(COLUMN.findall(README)) == 6  # of two, libraries are missing in the environment of make
 
 
 @pytest.mark.skipif(Path(sys.prefix) != ROOT / ".venv", reason="runs in another environment than that of make")

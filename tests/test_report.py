@@ -9,12 +9,15 @@ from dataclasses import replace
 from html import escape
 from html.parser import HTMLParser
 
+import numpy as np
 import pytest
+from matplotlib.figure import Figure as Canvas
 from typer.testing import CliRunner
 
 from awiwi_gen import reproduce
 from awiwi_gen.__main__ import app
 from awiwi_gen.build import load
+from awiwi_gen.diff.figures import Figure as DiffFigure
 from awiwi_gen.emit.tree import read_manifest
 from awiwi_gen.hand import Hand
 from awiwi_gen.pipeline import Job, Proof, cached_tree, verify
@@ -22,8 +25,8 @@ from awiwi_gen.reproduce import page
 from awiwi_gen.reproduce.figures import all_figures
 from awiwi_gen.reproduce.figures import fingers as figures_fingers
 from awiwi_gen.reproduce.figures.fingers import coriolis, released
-from awiwi_gen.reproduce.this_hand import this_hand
-from awiwi_gen.results import Table, compared
+from awiwi_gen.reproduce.this_hand import ThisHand, this_hand
+from awiwi_gen.results import Table, compared, shaded
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +36,10 @@ def figures(lib, hand):
 
 @pytest.fixture(scope="module")
 def results(figures, some_proof, hand, lib):
-    return page.Results(figures, NUMBERS, some_proof[0], COMPARED, this_hand(Job(hand)))
+    job = Job(hand)
+    directory = cached_tree(job)
+    own = this_hand(job, directory, read_manifest(directory))
+    return page.Results(figures, NUMBERS, some_proof[0], COMPARED, own)
 
 
 @pytest.fixture(scope="module")
@@ -71,7 +77,7 @@ class Tags(HTMLParser):
         self.ids += [given["id"]] if "id" in given else []
         addresses = [given[k] for k in ("src", "href", "xlink:href") if k in given]
         self.loaded += [each for each in addresses if not each.startswith(("#", "data:"))]
-        if tag not in ("meta", "img"):
+        if tag not in ("meta", "img", "input"):
             self.open.append(tag)
 
     def handle_endtag(self, tag):
@@ -110,14 +116,39 @@ def test_the_page_is_whole_and_needs_no_other_file(text, figures):
 def test_the_page_shows_the_hand_first(text, results, hand):
     before = text[: text.index("<article>")]
     image = re.search(r'<img class="hand" src="data:image/svg\+xml;base64,([^"]+)"', before)
+    places = [
+        before.index(f'<h2 id="{each}">') for each in ("own-numbers", "capability", "workspace", "costs", "kernels")
+    ]
 
     assert f"<title>{hand.name}: fingers with their tendons</title>" in b64decode(image[1]).decode()
-    for name in hand.fingers:
-        assert f"<h4>{name}</h4>" in before
-    assert "<tr><td>torque +pip</td><td>1.2</td><td>N m</td></tr>" in before
+    assert places == sorted(places)
+    assert before.index(image[0]) < places[0]
     assert f"{results.hand.guesses} of {len(hand.quantities())} numbers are guesses" in before
-    assert '<td>fingers.index.pulleys[2].radius</td><td>6 mm</td><td class="guess">guess</td>' in before
+    assert '<td>fingers.index.pulleys[2].radius</td><td>6\xa0mm</td><td class="guess">guess</td>' in before
     assert results.hand.guesses == len(hand.assumed())
+
+
+def test_the_page_says_what_the_fingers_can_do_and_what_that_costs(text):
+    torques = "<tr><td>index</td><td>pip</td><td>-1.2\xa0N\xa0m</td><td>1.2\xa0N\xa0m</td>"
+    assert torques in text[text.index('<h2 id="capability">') : text.index('<h2 id="workspace">')]
+    assert re.search(r"<tr><td>index</td>.*<td>21\.5\xa0g</td></tr>", text)
+    assert "<tr><td>mass_matrix</td><td>" in text[text.index('<h2 id="costs">') :]
+
+
+def test_a_hand_without_motors_has_no_column_for_them():
+    shown = ThisHand(fingers={"jaw": [DiffFigure("torque +root", "N m", 1.2, {})]}, joints={"jaw": ("root", "end")})
+
+    assert shown.capability == (("finger", "joint", "torque +"), [("jaw", "root", "1.2 N m"), ("jaw", "end", "-")])
+    assert shown.workspace == (("finger",), [("jaw",)])
+
+
+@pytest.mark.parametrize(
+    ("words", "joined"),
+    [("a step of 5 N m/rad in 3 ms", "a step of 5~N~m/rad in 3~ms"), ("9.81 m/s^2, 4 %", "9.81~m/s^2, 4~%"),
+     ("2 kHz of 2 motors", "2~kHz of 2 motors"), ("table 5.2 and 7 joints", "table 5.2 and 7 joints")],
+)  # fmt: skip
+def test_no_number_is_parted_from_its_unit(words, joined):
+    assert page.text_of(words) == joined.replace("~", "\xa0")
 
 
 def test_the_figures_of_the_hand_are_data_too(results):
@@ -159,11 +190,11 @@ def test_equal_results_give_equal_bytes_without_dates(tmp_path, hand, some_resul
 
 
 def test_text_of_a_figure_cannot_become_markup(tmp_path, hand, figures):
-    bad = replace(figures[0], title="<script>", claim="a < b & c", holds=False)
+    bad = replace(figures[0], title="<script>alert", claim="a < b & c", holds=False)
     page.write_page(tmp_path / "bad.html", hand, page.Results([bad], [], Proof([], [])), {"kernels": []})
     written = (tmp_path / "bad.html").read_text(encoding="utf-8")
 
-    assert "<script>" not in written
+    assert "<script>alert" not in written
     assert "a &lt; b &amp; c" in written
 
 
@@ -204,3 +235,12 @@ def test_coriolis_terms_matter_as_far_as_figure_5_7_can_be_read(lib, hand):
     assert 0.05 < worst["0.1 % of each mode"] < 0.2
     assert worst["1e-3 N m s/rad in each joint"] < 5e-4
     assert not coriolis(lib, hand, hand.spring).holds
+
+
+def test_many_lines_have_colours_of_their_own_and_a_bar_that_explains_them():
+    axes = Canvas().add_subplot()
+    shaded(axes, [0, 1], np.arange(24.0).reshape(12, 2), range(12), "gain")
+    bar = next(each for each in axes.figure.axes if each is not axes)
+
+    assert len({line.get_color() for line in axes.lines}) == 12
+    assert bar.get_ylabel() == "gain"

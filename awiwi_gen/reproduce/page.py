@@ -6,7 +6,7 @@ import io
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,9 +18,9 @@ from awiwi_gen.report import COLUMNS, proof_rows
 from awiwi_gen.reproduce.figures import all_figures, in_order
 from awiwi_gen.reproduce.figures.absent import ABSENT
 from awiwi_gen.reproduce.printed import all_numbers
-from awiwi_gen.reproduce.this_hand import COLUMNS as FIGURE_COLUMNS
 from awiwi_gen.reproduce.this_hand import ThisHand, this_hand
 from awiwi_gen.results import Figure, Printed, Table, Verdict
+from awiwi_gen.web import Live, script, style
 
 if TYPE_CHECKING:
     from awiwi_gen.pipeline import Job, Proof
@@ -30,6 +30,8 @@ STYLE = {
     "svg.fonttype": "path", "font.size": 9.0, "axes.grid": True, "grid.alpha": 0.3, "grid.linewidth": 0.5,
     "axes.spines.top": False, "axes.spines.right": False, "legend.frameon": False,
 }  # fmt: skip
+UNIT = r"(?:[munkM]?(?:m|N|s|g|rad|Hz|J|W|V|A)|deg|%|turn)(?:\^[\d/]+)?"
+UNITS = re.compile(rf"(?<=[\d)]) {UNIT}(?:(?: |/\(?){UNIT}\)?)*(?!\w)")  # behind a number
 FIRST_OF_PART_II = 7  # chapter
 COUNTED: dict[Verdict, str] = {
     "agrees": "agree",
@@ -69,16 +71,20 @@ Comparison = Callable[[Any, Hand], tuple[list[Figure], list[Table]]]
 def publish(job: Job, path: Path, comparison: Comparison) -> Results:
     """Compute figures and numbers of a hand, verify its kernels, write the page.
 
-    ``comparison`` gives the figures and tables of compared laws.
+    ``comparison`` gives the figures and tables of compared laws. The source's figures and numbers are those of the packaged
+    hand, and no other hand has them.
     """
     from awiwi_gen.build import load
     from awiwi_gen.pipeline import cached_tree, verify
 
     directory = cached_tree(job)
     library = load(directory, job.store)
+    proof, hand = verify(job, directory), this_hand(job, directory, library.manifest)
     compared_figures, tables = comparison(library, job.hand)
-    figures = in_order([*all_figures(library, job.hand), *compared_figures])
-    results = Results(figures, all_numbers(library, job.hand), verify(job, directory), tables, this_hand(job))
+    results = Results([], [], proof, tables, hand)
+    if job.hand.digest() == Hand.load().digest():
+        figures = in_order([*all_figures(library, job.hand), *compared_figures])
+        results = replace(results, figures=figures, numbers=all_numbers(library, job.hand))
     write_page(path, job.hand, results, library.manifest)
     return results
 
@@ -100,10 +106,16 @@ def write_page(path: Path, hand: Hand, results: Results, manifest: Mapping[str, 
         "report.html.j2",
         hand=escape(hand.name),
         digest=hand.digest(),
-        summary=escape(summary(results)),
+        proofs=escape(proofs(results)),
+        claims=escape(claims(results)),
+        style=style(),
+        script=script(),
+        live=results.hand.live if isinstance(results.hand.live, Live) else None,
+        lacking=text_of(results.hand.lacking),
         image=results.hand.image,
-        fingers=[(escape(name), _escaped(rows)) for name, rows in results.hand.fingers.items()],
-        figure_columns=FIGURE_COLUMNS,
+        capability=(results.hand.capability[0], _escaped(results.hand.capability[1])),
+        workspace=(results.hand.workspace[0], _escaped(results.hand.workspace[1])),
+        costs=(results.hand.costs[0], _escaped(results.hand.costs[1])),
         poses=POSES,
         own_numbers=_escaped(results.hand.numbers),
         guesses=results.hand.guesses,
@@ -128,15 +140,25 @@ def chapter(reference: str) -> int:
 
 
 def summary(results: Results) -> str:
-    """Counts of claims that hold, numbers that agree, kernels that are proved."""
+    """Counts of kernels that are proved and, with figures, of claims that hold and numbers that agree."""
+    return " ".join(filter(None, (proofs(results), claims(results))))
+
+
+def proofs(results: Results) -> str:
+    """How many kernels are proved."""
+    proved = sum(verdict.passed for verdict in results.proof.verdicts)
+    return f"{proved} of {len(results.proof.verdicts)} kernels proved."
+
+
+def claims(results: Results) -> str:
+    """How many claims of figures hold, and printed numbers agree; nothing without figures."""
+    if not results.figures:
+        return ""
     verdicts = Counter(number.verdict for number in results.numbers)
     counts = ", ".join(f"{verdicts[name]} {word}" for name, word in COUNTED.items() if verdicts[name])
     holding = sum(bool(figure.holds) for figure in results.figures)
-    proved = sum(verdict.passed for verdict in results.proof.verdicts)
-    return (
-        f"{holding} of {len(results.figures)} claims of figures hold. Printed numbers: {counts or 'none compared'}. "
-        f"{proved} of {len(results.proof.verdicts)} kernels proved."
-    )
+    held = f"{holding} of {len(results.figures)} claims of figures hold."
+    return f"{held} Printed numbers: {counts or 'none compared'}."
 
 
 def verdict(figure: Figure) -> str:
@@ -149,8 +171,8 @@ def _shown(figure: Figure) -> dict[str, str]:
         "anchor": f"figure-{re.sub(r'[^0-9a-z]+', '-', figure.number.lower()).strip('-')}",
         "number": escape(figure.number),
         "title": escape(figure.title),
-        "claim": escape(figure.claim),
-        "found": escape(figure.found),
+        "claim": text_of(figure.claim),
+        "found": text_of(figure.found),
         "verdict": verdict(figure),
         "drawing": drawing(figure),
     }
@@ -175,4 +197,9 @@ def drawing(figure: Figure) -> str:
 
 
 def _escaped(rows: Iterable[Sequence[str]]) -> list[list[str]]:
-    return [[escape(cell) for cell in row] for row in rows]
+    return [[text_of(cell) for cell in row] for row in rows]
+
+
+def text_of(words: str) -> str:
+    """Text of the page, in which no number is parted from its unit."""
+    return UNITS.sub(lambda found: found[0].replace(" ", "\N{NO-BREAK SPACE}"), escape(words))

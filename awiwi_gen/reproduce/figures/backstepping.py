@@ -14,7 +14,7 @@ import numpy as np
 from awiwi_gen.hand import Hand
 from awiwi_gen.loops.joint import TABLE_15_1, TABLE_16_1, Plant, normalised_loop, position_loop, state_gains
 from awiwi_gen.loops.joint import Loop as LinearLoop
-from awiwi_gen.results import Figure, curves
+from awiwi_gen.results import Figure, curves, shaded
 from awiwi_gen.simulate import Actuator, Array, Block, Element, Loop, Scenario, Sum, Trace, simulate
 
 STEP = 0.8  # rad, as captioned
@@ -66,11 +66,16 @@ def convergence(library: Any) -> Figure:
     first, second = FIGURE_15_1
     k = np.stack(np.meshgrid(first, second, indexing="ij"), axis=-1).reshape(-1, 2)
     trace, falling, left = run_example(library, np.ones_like(k), k)
+
+    def draw(axes: Any) -> None:
+        shaded(axes, np.linspace(0, 10, 501), trace[:501, :, 0].T, k.min(axis=1), "the smaller one of k1 and k2")
+        axes.set(xlabel="t", ylabel="x1")
+
     return Figure(
         "15.1", "The example for 50 pairs of gains",
         "Every pair of positive gains brings the state to the origin.",
         f"All runs end within {left:.0e} after 60 s, and V falls all the way (eq. 15.10, corrected).",
-        falling and left < 0.1, curves(np.linspace(0, 10, 501), trace[:501, :, 0], "t", "x1"),
+        falling and left < 0.1, draw,
     )  # fmt: skip
 
 
@@ -81,9 +86,12 @@ def phases(library: Any, number: str, gains: tuple[float, float]) -> Figure:
     trace, falling, left = run_example(library, start, np.array(gains))
 
     def draw(axes: Any) -> None:
-        for states, style in ((trace, "-"), (start[None], "x")):
-            axes.plot(states[..., 0], states[..., 0] ** 2 - states[..., 0] ** 3 + states[..., 1], style, linewidth=0.6)
+        for states, style, label in ((trace, "C0-", "runs"), (start[None], "C1x", "initial states")):
+            slopes = states[..., 0] ** 2 - states[..., 0] ** 3 + states[..., 1]
+            first, *_ = axes.plot(states[..., 0], slopes, style, linewidth=0.8)
+            first.set_label(label)
         axes.set(xlabel="x1", ylabel="x1'")
+        axes.legend()
 
     return Figure(
         number, f"The example's phases for k1 = {gains[0]:g}, k2 = {gains[1]:g}",

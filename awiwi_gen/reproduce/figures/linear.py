@@ -101,6 +101,8 @@ def optimal(library: Any) -> list[Figure]:
             axes.plot(times, states[:, 0], ":", linewidth=0.8, color=f"C{index}")
             if R in clocked:
                 axes.plot(times[::20], clocked[R][::20, 2], "x", markersize=3, color=f"C{index}")
+        axes.plot([], [], ":", linewidth=0.8, color="gray", label="link")
+        axes.plot([], [], "x", markersize=3, color="gray", label="motor on the clock")
         axes.set(xlabel="t [s]", ylabel="angle [rad]")
         axes.legend()
 
@@ -164,7 +166,7 @@ def state_dependent(library: Any) -> list[Figure]:
         Figure(
             "14.4", "State-dependent and fixed optimal gains, free and under a load",
             "No difference in free motion, a visible one under a load.",
-            f"They are {apart * 1e3:.2g} mrad apart in free motion and {loaded * 1e3:.2g} mrad under {LOAD} N m. "
+            f"They are {apart * 1e3:.2g} mrad apart in free motion and {loaded * 1e3:.0f} mrad under {LOAD} N m. "
             f"With R = {COST_14:g} the fixed gains are {runs.reason}; those of table 14.2 are {table.reason}.",
             bool(apart < 0.05 * STEP < 5 * loaded and runs.implementable),
             curves(times, angles, "t [s]", "link angle [rad]", "-", "--"),

@@ -45,7 +45,7 @@ def draws(library: Any, number: str, title: str, R: float, box: Box, runs: int, 
     return Figure(
         f"{number} ({title})", f"Steps of drawn gains, {title}",
         "All drawn gains move the link alike.", "The curves are up to "
-        f"{apart:.0%} of the step apart, have slowest poles from {min(slowest):.2g} to {max(slowest):.2g} 1/s, "
+        f"{apart:.0%} of the step apart, have slowest poles from {min(slowest):.3g} to {max(slowest):.3g} 1/s, "
         f"and cover at least {arrived:.0%} of the step in {END * 1e3:.0f} ms.", apart < ALIKE and arrived > 0.95,
         curves(times * 1e3, lines, "t [ms]", "q [rad]"),
     )  # fmt: skip

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from awiwi_gen.hand import Hand, Wrist
-from awiwi_gen.results import Figure, curves
+from awiwi_gen.results import Figure, curves, shaded
 from awiwi_gen.simulate import Array
 
 FLEXION, ABDUCTION = np.radians(30.0), np.radians(20.0)
@@ -49,16 +49,8 @@ def displacements(library: Any, wrist: Wrist) -> Figure:
     ratio = np.abs(abducting).max() / np.abs(flexing).max()
 
     def draw(axes: Any) -> None:
-        from matplotlib import colormaps
-        from matplotlib.cm import ScalarMappable
-        from matplotlib.colors import Normalize
-
-        across = 1e3 * np.array([float(tendon.forearm[1]) for tendon in wrist.tendons])
-        colours = colormaps["viridis"]
-        scale = Normalize(across.min(), across.max())
-        for line, place in zip(moved.T, across, strict=True):
-            axes.plot(line * 1e3, linewidth=0.6, color=colours(scale(place)))
-        axes.figure.colorbar(ScalarMappable(scale, colours), ax=axes, label="place across the forearm [mm]")
+        across = [1e3 * float(tendon.forearm[1]) for tendon in wrist.tendons]
+        shaded(axes, np.arange(len(moved)), moved.T * 1e3, across, "place across the forearm [mm]")
         axes.axvline(2 * STEPS, color="black", linewidth=0.6)
         axes.set(xlabel="step of the motion: flexion, then abduction", ylabel="tendon displacement [mm]")
 
