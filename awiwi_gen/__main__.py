@@ -10,7 +10,7 @@ import os
 import sys
 from collections.abc import Callable
 from dataclasses import replace
-from functools import wraps
+from functools import cache, partial, wraps
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -43,11 +43,11 @@ from awiwi_gen.arguments import (
     Version,
 )
 from awiwi_gen.diff.command import diff
-from awiwi_gen.drawing import show
 from awiwi_gen.editing import init, schema, set_
 from awiwi_gen.explain import explain
 from awiwi_gen.identify.command import identify
 from awiwi_gen.interchange.command import export, import_
+from awiwi_gen.show import show
 from awiwi_gen.study.command import study
 from awiwi_gen.tick.command import replay, tick
 from awiwi_gen.tune.command import tune
@@ -97,18 +97,24 @@ def command(*needs: str, **settings: Any) -> Callable[[Callable[..., int | None]
 
 
 def make_job(
-    hand: Path | None, scalar: Scalar = Scalar.f64, params: Params = Params.baked, only: str = "*", math: Math = Math.own,
-    read: Any = None,
-) -> Any:  # fmt: skip
-    """A job from options and the hand, if it was read before. Raises InputError where the pattern matches no kernel."""
+    hand: Path | None,
+    scalar: Scalar = Scalar.f64,
+    params: Params = Params.baked,
+    only: str = "*",
+    math: Math = Math.own,
+) -> Any:
+    """A job from options and a hand file. Raises InputError for a bad file, and where the pattern matches no kernel."""
+    from awiwi_gen.cache import Cache
     from awiwi_gen.emit.options import Options
-    from awiwi_gen.hand import Hand
+    from awiwi_gen.facts import facts
     from awiwi_gen.pipeline import Job
     from awiwi_gen.report import Progress
 
-    job = Job(read or Hand.load(hand), Options(scalar.value, params.value, math.value), only, progress=Progress())
-    if not any(matches(kernel.name, only) for kernel in job.catalog):
-        why = terminal.why_absent(job.hand, only) or f"no kernel has such a name; see {terminal.listing(hand)}"
+    store, options = Cache(), Options(scalar.value, params.value, math.value)
+    known = facts(hand, store)
+    job = Job(cache(partial(terminal.load_hand, hand)), options, only, store, progress=Progress(), facts=known)
+    if not any(matches(name, only) for name in known.kernels):
+        why = terminal.why_absent(known.left_out, only) or f"no kernel has such a name; see {terminal.listing(hand)}"
         raise InputError(f"--only {only}: {why}")
     return job
 
@@ -129,16 +135,20 @@ def generate(
         from awiwi_gen.compiler import compiler
 
         compiler()  # without one nothing can be verified: an error before anything is replaced
-    if job.hand.gains:
-        extras.require("the check of the hand's gains", "scipy")
-        from awiwi_gen.tune.hand_gains import require_running_gains
+    if job.facts.certificate:
+        from awiwi_gen.certificates import kept_certificate
 
-        require_running_gains(job.hand, job.store, (hand or DEFAULT_HAND).parent)
+        beside = (hand or DEFAULT_HAND).parent
+        if kept_certificate(job.facts.certificate, job.store, beside) is None:
+            extras.require("the check of the hand's gains", "scipy")
+            from awiwi_gen.tune.hand_gains import require_running_gains
+
+            require_running_gains(job.hand, job.store, beside)
     changed = generate(job, output)
     if verify:
         return terminal.prove(job, hand, output, as_json)
     if as_json:
-        print_json({"directory": str(output), "changed": changed, "digest": job.hand.digest()})
+        print_json({"directory": str(output), "changed": changed, "digest": job.facts.digest})
     else:
         print(f"{output}: {'generated' if changed else 'already up to date'}")
     return 0
@@ -151,28 +161,21 @@ def check(
 ) -> int:  # fmt: skip
     """Check the hand file, and whether the generated C is fresh and unedited."""
     from awiwi_gen.certificates import certificate_lines
-    from awiwi_gen.hand import Hand
-    from awiwi_gen.hand.capability import estimate_lines, estimate_sources, left_out_names
-    from awiwi_gen.hand.tick import tick_lines, tick_values
     from awiwi_gen.pipeline import state
     from awiwi_gen.report import counted, print_json, print_left_out, state_lines
 
-    read, warnings = Hand.review(hand)
-    job = make_job(hand, scalar, params, only, math, read)
-    absent = left_out_names(job.hand)
-    found = state(job, output)
+    job = make_job(hand, scalar, params, only, math)
+    known, found = job.facts, state(job, output)
     if as_json:
-        extra = {"warnings": [each.as_dict() for each in warnings], "tick": tick_values(read),
-                 "estimates": estimate_sources(read),
-                 "left_out": [{"name": name, "reason": reason} for name, reason in absent.items()]}  # fmt: skip
-        print_json({"hand": job.hand.name, "fresh": found.fresh, **vars(found), **extra})
+        extra = {"warnings": [each.as_dict() for each in known.warnings], "tick": known.tick, "estimates": known.estimates,
+                 "left_out": [{"name": name, "reason": reason} for name, reason in known.left_out.items()]}  # fmt: skip
+        print_json({"hand": known.name, "fresh": found.fresh, **vars(found), **extra})
     else:
-        more = f", {counted(len(warnings), 'warning')}" if warnings else ""
-        print(printable(f"{hand or 'hand.toml'}: {counted(len(job.hand.fingers), 'finger')}, no faults{more}"))
-        print("".join(fitted(f"warning: {each}\n", sys.stdout) for each in warnings), end="")
-        print_left_out(absent)
-        gained = certificate_lines(read, job.store, (hand or DEFAULT_HAND).parent)
-        lines = (*estimate_lines(read), *tick_lines(read), *gained)
+        more = f", {counted(len(known.warnings), 'warning')}" if known.warnings else ""
+        print(printable(f"{hand or 'hand.toml'}: {counted(known.fingers, 'finger')}, no faults{more}"))
+        print("".join(fitted(f"warning: {each}\n", sys.stdout) for each in known.warnings), end="")
+        print_left_out(known.left_out)
+        lines = (*known.lines, *certificate_lines(known.certificate, job.store, (hand or DEFAULT_HAND).parent))
         print(printable("".join(f"{line}\n" for line in lines)), end="")
         print("\n".join(state_lines(found, str(output), terminal.fix(job, hand, output))))
     return 0 if found.fresh or (found.missing and not found.foreign) else 1

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from enum import StrEnum
-from importlib import metadata
 from pathlib import Path
 from typing import Annotated
 
@@ -66,6 +65,8 @@ KernelName = Annotated[str, typer.Argument(help="Name of a kernel, see list.", a
 def show_version(wanted: bool) -> None:
     """Print the version of the generator and that of the C interface, and end."""
     if wanted:
+        from importlib import metadata
+
         header = (CSRC / "awiwi_version.h").read_text(encoding="utf-8")
         numbers = re.findall(r"define AWIWI_API_(?:MAJOR|MINOR|PATCH) (\d+)", header)
         print(f"awiwi-gen {metadata.version('awiwi_gen')}, C interface {'.'.join(numbers)}")

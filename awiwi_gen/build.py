@@ -7,14 +7,12 @@ depends on prototypes only.
 
 from __future__ import annotations
 
-import ctypes
 import json
 import os
 import re
 import sysconfig
 import tempfile
 from collections.abc import Callable, Mapping
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache, partial
 from math import prod
@@ -23,7 +21,6 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from awiwi_gen.cache import Cache, key
 from awiwi_gen.compiler import bindings, compiler, native
-from awiwi_gen.emit.names import input_name, output_name
 from awiwi_gen.emit.options import GCC_FLAGS, VECTOR_FLAGS
 from awiwi_gen.emit.tree import read_manifest
 from awiwi_gen.errors import BuildError, InputError, NoCompilerError, OutputError
@@ -98,6 +95,8 @@ def compile_objects(directory: Path, store: Cache, into: Path) -> list[Path]:
         else:
             target.write_bytes(found)
         return target
+
+    from concurrent.futures import ThreadPoolExecutor
 
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         return list(pool.map(compile_one, sources(directory)))
@@ -190,6 +189,8 @@ def text_of(path: Path) -> str:
 
 def _linked(name: str, glue: str, directory: Path, store: Cache, scratch: Path) -> bytes:
     """A library of all objects and the wrapper."""
+    from concurrent.futures import ThreadPoolExecutor
+
     with ThreadPoolExecutor(1) as aside:  # the wrapper takes longest: the kernels are compiled meanwhile
         wrapping = aside.submit(_glue_object, name, glue, directory, store, scratch)
         (scratch / "objects").mkdir()
@@ -233,6 +234,8 @@ def batch_function(
 
     Raises BuildError when that fails, and when the directory is no longer what the library was ``loaded`` from.
     """
+    import ctypes
+
     from awiwi_gen.emit.batch import BATCHES, worthwhile
 
     source = directory / f"{entry['name']}.c"
@@ -279,6 +282,8 @@ def assemble_batch(source: Path, into: Path, flags: tuple[str, ...], ways: tuple
 
 def _glue_source(manifest: dict[str, Any], declared: str) -> str:
     """JSON of what the wrapper is made from: declarations, loops over samples, and the kernels in a uniform shape."""
+    from awiwi_gen.emit.names import input_name, output_name
+
     loops, prototypes = [], []
     scalar, prefix = manifest["c_type"], manifest["prefix"]
     if manifest.get("params"):

@@ -19,7 +19,6 @@ import tempfile
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from functools import cache, cached_property
-from importlib.metadata import version
 from pathlib import Path
 from typing import TypeVar
 
@@ -74,6 +73,8 @@ def libraries() -> str:
 
     ``-OO`` drops the docstrings, from which the comments of the C are made.
     """
+    from importlib.metadata import version  # which parses e-mail: slow
+
     names = [f"{name} {version(name)}" for name in ("sympy", "casadi", "python-flint")]
     return ", ".join(names + ["without docstrings"] * (sys.flags.optimize > 1))
 

@@ -10,10 +10,12 @@ import json
 from collections.abc import Iterator
 from operator import itemgetter
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from awiwi_gen.cache import Cache, key
-from awiwi_gen.hand import Hand
+
+if TYPE_CHECKING:
+    from awiwi_gen.hand import Hand
 
 VERSION = 1  # raise it where the laws, the clock test or the family of plants change
 SUFFIX = ".certificate.json"
@@ -26,9 +28,8 @@ def digest_of(hand: Hand) -> str:
     return key(VERSION, *(part.digest() for part in parts if part is not None))
 
 
-def kept_certificate(hand: Hand, store: Cache, beside: Path | None = None) -> list[Row] | None:
-    """The rows of the certificate that is kept in the cache or in a file of the folder ``beside``; None without one."""
-    digest = digest_of(hand)
+def kept_certificate(digest: str, store: Cache, beside: Path | None = None) -> list[Row] | None:
+    """The rows of the certificate of these numbers that is kept in the cache or in a file of the folder ``beside``."""
     texts = [store.read("certificates", digest)]
     files = sorted(beside.glob(f"*{SUFFIX}")) if beside is not None else []
     texts += [file.read_bytes() for file in files if file.is_file()]
@@ -48,11 +49,11 @@ def certificate_text(hand: Hand, rows: list[Row]) -> str:
     return json.dumps({"digest": digest_of(hand), "joints": rows}, indent=1) + "\n"
 
 
-def certificate_lines(hand: Hand, store: Cache, beside: Path | None) -> Iterator[str]:
-    """What `check` says of the gains of a hand."""
-    if not hand.gains:
+def certificate_lines(digest: str | None, store: Cache, beside: Path | None) -> Iterator[str]:
+    """What `check` says of the gains of a hand, by the digest of the numbers that decide; None for a hand without."""
+    if digest is None:
         return
-    rows = kept_certificate(hand, store, beside)
+    rows = kept_certificate(digest, store, beside)
     if rows is None:
         yield "gains: no certificate is kept for these numbers; awiwi-gen generate makes one"
         return

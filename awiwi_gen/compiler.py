@@ -13,7 +13,6 @@ import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache, partial
-from importlib.metadata import version as installed
 from pathlib import Path
 
 from awiwi_gen.cache import Cache, key
@@ -89,7 +88,9 @@ def machine() -> str:
 
 def bindings() -> tuple[object, ...]:
     """What decides the wrapper of a library besides the compiler."""
-    return installed("cffi"), installed("numpy"), sys.version, sys.flags.optimize, platform.machine()
+    from importlib.metadata import version  # which parses e-mail: slow
+
+    return version("cffi"), version("numpy"), sys.version, sys.flags.optimize, platform.machine()
 
 
 @cache

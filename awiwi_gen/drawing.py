@@ -1,19 +1,13 @@
-"""`awiwi-gen show`: a drawing of the hand as SVG, true to scale, each finger seen along and across its last joint's axis."""
+"""A drawing of the hand as SVG, true to scale, each finger seen along and across its last joint's axis."""
 
 from __future__ import annotations
 
-import json
-import webbrowser
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
 import numpy as np
-import typer
-
-from awiwi_gen.arguments import HandFile, Json
-from awiwi_gen.errors import printable
 
 if TYPE_CHECKING:
     from awiwi_gen.hand import Finger, Hand
@@ -51,31 +45,6 @@ class Drawing(str):
         from awiwi_gen.writing import write_whole
 
         write_whole(Path(path), str(self))
-
-
-def show(
-    hand: HandFile = None,
-    output: Annotated[Path, typer.Option("--output", "-o", help="SVG file to write.")] = Path("hand.svg"),
-    open_: Annotated[bool, typer.Option("--open", help="Open the drawing in a browser.")] = False,
-    as_json: Json = False,
-) -> int:
-    """Draw the hand: links in the middle of their ranges and at both ends, joints, pulleys, tendons, wrist."""
-    from awiwi_gen.hand import Hand
-    from awiwi_gen.report import counted
-    from awiwi_gen.writing import write_whole
-
-    drawn = Hand.load(hand)
-    write_whole(output, drawing(drawn))
-    joints = sum(len(finger.links) for finger in drawn.fingers.values())
-    tendons = sum(len(finger.tendons) for finger in drawn.fingers.values())
-    if as_json:
-        print(json.dumps({"file": str(output), "fingers": list(drawn.fingers), "joints": joints, "tendons": tendons}))
-    else:
-        counts = [counted(len(drawn.fingers), "finger"), counted(joints, "joint"), counted(tendons, "tendon")]
-        print(printable(f"{output}: {', '.join(counts)}"))
-    if open_:
-        webbrowser.open(output.resolve().as_uri())
-    return 0
 
 
 def drawing(hand: Hand, before: Hand | None = None) -> Drawing:

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 import signal
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from math import ceil
-from multiprocessing.connection import Connection
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from awiwi_gen.errors import OutputError
+
+if TYPE_CHECKING:
+    from concurrent.futures import Future
+    from multiprocessing.connection import Connection
 
 T = TypeVar("T")
 Progress = Callable[[str, int, int], None]  # stage, pieces done, pieces in all
@@ -56,6 +56,10 @@ def running(
     if len(items) <= 1:
         yield lambda: [function(item) for item in items].clear()
         return
+    import multiprocessing
+    from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
+    from concurrent.futures.process import BrokenProcessPool
+
     waiting = dict(enumerate(after or [set() for _ in items]))
     active: dict[Future[Any], int] = {}
     alive, parent = multiprocessing.Pipe(duplex=False)

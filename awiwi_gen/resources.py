@@ -18,3 +18,8 @@ WEB = PACKAGE / "web"
 DEFAULT_HAND = PACKAGE / "hand.toml"
 STARTER_HAND = PACKAGE / "starter.toml"
 SOURCES = (PACKAGE, TEMPLATES, CSRC)
+
+
+def gains_beside(path: Path) -> Path:
+    """The file of gains that belongs to a hand file without naming it: hand.gains.toml to hand.toml."""
+    return path.with_suffix(".gains.toml")

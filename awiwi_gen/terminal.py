@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shlex
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -37,19 +38,23 @@ def listing(hand: Path | None) -> str:
     return shlex.join(["awiwi-gen", "list", *(["--hand", str(hand)] if hand else [])])
 
 
-def why_absent(hand: Any, pattern: str) -> str:
-    """Why a hand does not have the kernels of a pattern, if its tendons make them impossible."""
-    from awiwi_gen.hand.capability import left_out_names
+def load_hand(file: Path | None) -> Any:
+    """The hand of a file, or the packaged one."""
+    from awiwi_gen.hand import Hand
 
-    return next(
-        (f"{name} is left out: {why}" for name, why in left_out_names(hand).items() if matches(name, pattern)),
-        "",
-    )
+    return Hand.load(file)
+
+
+def why_absent(left_out: Mapping[str, str], pattern: str) -> str:
+    """Why a hand does not have the kernels of a pattern, if its tendons make them impossible."""
+    return next((f"{name} is left out: {why}" for name, why in left_out.items() if matches(name, pattern)), "")
 
 
 def no_kernel(hand: Any, file: Path | None, name: str, known: Any) -> InputError:
     """The exception for a kernel that a hand does not have."""
-    reason = why_absent(hand, name)
+    from awiwi_gen.hand.capability import left_out_names
+
+    reason = why_absent(left_out_names(hand), name)
     return InputError(reason) if reason else unknown("kernel", name, known, f"see {listing(file)}")
 
 

@@ -32,10 +32,11 @@ COMPILER = [
 ]
 ROOMS = ("reproduce", "compare", "tune")
 TOP = [
-    ["patterns", "reading", "writing", "tables", "derive", "records", "budget", "parameters"],
+    ["patterns", "reading", "writing", "tables", "derive", "records", "budget", "parameters", "certificates"],
     ["judge", "golden", "hand_header"],
     ["hand_model"],
     ["parallel", "tasks"],
+    ["facts"],
     ["pipeline"],
     [
         "report",
@@ -50,8 +51,8 @@ TOP = [
         "arguments",
         "editing",
         "drawing",
+        "show",
         "diff",
-        "certificates",
         "wheel",
     ],
     ["loops", "identify", "tick", "interchange", "gym", "web"],

@@ -14,7 +14,7 @@ from test_cli import answer, complaint, told
 pytest.importorskip("scipy")
 
 from awiwi_gen.cache import Cache
-from awiwi_gen.certificates import certificate_lines, kept_certificate
+from awiwi_gen.certificates import certificate_lines, digest_of, kept_certificate
 from awiwi_gen.hand import Hand
 from awiwi_gen.hand.gains import OPTIONAL, REQUIRED
 from awiwi_gen.loops.hand_joint import Drive, gains_of, joint_of, pair_of
@@ -121,7 +121,11 @@ def packaged(hand):
 def test_the_packaged_gains_are_accepted_and_their_certificate_says_what_the_check_finds(lib, hand, packaged, tmp_path):
     store = Cache(tmp_path)
     own = Hand.parse(AWIWI + tables(packaged))
-    rows = {tendon: row for row in kept_certificate(hand, store, DEFAULT_HAND.parent) for tendon in row["tendons"]}
+    rows = {
+        tendon: row
+        for row in kept_certificate(digest_of(hand), store, DEFAULT_HAND.parent)
+        for tendon in row["tendons"]
+    }
 
     assert failing(lib, own, store) == []
     ((found,), kept) = certificate(lib, own, store), rows[TENDON]
@@ -174,11 +178,11 @@ def test_a_joint_without_a_tendon_for_each_direction_has_no_pair():
 
 
 def test_check_says_what_the_certificate_says_and_when_there_is_none(hand, tmp_path):
-    said = " ".join(certificate_lines(hand, Cache(tmp_path), DEFAULT_HAND.parent))
+    said = " ".join(certificate_lines(digest_of(hand), Cache(tmp_path), DEFAULT_HAND.parent))
 
     assert f"certified on {len(FAMILY)} plants of each of 19 joints: spectral radius at most 0." in said
-    assert "gains: no certificate is kept" in " ".join(certificate_lines(hand, Cache(tmp_path), tmp_path))
-    assert list(certificate_lines(Hand.parse(AWIWI), Cache(tmp_path), None)) == []
+    assert "gains: no certificate is kept" in " ".join(certificate_lines(digest_of(hand), Cache(tmp_path), tmp_path))
+    assert list(certificate_lines(None, Cache(tmp_path), None)) == []
 
 
 def test_a_hand_with_such_gains_is_not_generated(tmp_path):

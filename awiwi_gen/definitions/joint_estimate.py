@@ -11,9 +11,9 @@ from typing import Any
 import sympy
 from sympy import Matrix
 
-from awiwi_gen.definitions.dynamics.lagrange import cofactor_matrix
 from awiwi_gen.definitions.joints import spring_energy
 from awiwi_gen.definitions.naming import Derivation
+from awiwi_gen.definitions.symmetric_matrix import cofactor_matrix
 from awiwi_gen.definitions.tendons import coupling, coupling_derivative, resting_balance, tendon_lengths
 from awiwi_gen.structure import Finger, determined, independent, resting, resting_parts, rests_in_a_bend, straight
 

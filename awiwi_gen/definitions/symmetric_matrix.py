@@ -1,4 +1,4 @@
-"""Symmetric matrices, and whether they are positive definite, by Cholesky's factorisation."""
+"""Symmetric matrices: Cholesky's factorisation, which tells whether they are positive definite, and cofactors."""
 
 from __future__ import annotations
 
@@ -44,3 +44,26 @@ def solve_lower(lower: Matrix, right: Matrix, derivation: Derivation) -> Matrix:
 def least(values: list[Expr], derivation: Derivation) -> Expr:
     """The smallest of several values."""
     return reduce(lambda a, b: derivation.name((a + b - sympy.Abs(a - b)) / 2), values)
+
+
+def cofactor_matrix(matrix: Matrix, derivation: Derivation) -> Matrix:
+    """The cofactors (n x n) of a symmetric matrix; each minor is expanded along its first row and computed once."""
+    known: dict[tuple[tuple[int, ...], tuple[int, ...]], Expr] = {((), ()): sympy.S.One}
+
+    def minor(rows: tuple[int, ...], columns: tuple[int, ...]) -> Expr:
+        if (rows, columns) not in known:
+            known[rows, columns] = derivation.name(
+                sympy.Add(
+                    *(
+                        (-1) ** k * matrix[rows[0], column] * minor(rows[1:], columns[:k] + columns[k + 1 :])
+                        for k, column in enumerate(columns)
+                    )
+                )
+            )
+        return known[rows, columns]
+
+    def cofactor(i: int, j: int) -> Expr:
+        rows, columns = (tuple(k for k in range(matrix.rows) if k != out) for out in sorted((i, j)))
+        return (-1) ** (i + j) * minor(rows, columns)
+
+    return Matrix(matrix.rows, matrix.rows, cofactor)

@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 
 from awiwi_gen.errors import InputError
 from awiwi_gen.hand import Hand
-from awiwi_gen.hand.gains import gains_beside
+from awiwi_gen.resources import gains_beside
 
 _SECONDS = 60  # for git to answer
 

@@ -20,7 +20,7 @@ from pydantic import Field
 from awiwi_gen.errors import Fault
 from awiwi_gen.hand.actuation import Fibre, Motor, Spring
 from awiwi_gen.hand.file import HandFile
-from awiwi_gen.hand.gains import Gains, gains_beside, gains_complaints, with_gains
+from awiwi_gen.hand.gains import Gains, gains_complaints, with_gains
 from awiwi_gen.hand.lint import Complaint, below, complaints, sources
 from awiwi_gen.hand.lint_actuation import actuator_complaints
 from awiwi_gen.hand.lint_motors import across_complaints
@@ -31,7 +31,7 @@ from awiwi_gen.hand.parts import MOST, Finger, Limits, Link, Part
 from awiwi_gen.hand.plausibility import remarks
 from awiwi_gen.hand.tick import Clock
 from awiwi_gen.hand.wrist import Wrist
-from awiwi_gen.resources import DEFAULT_HAND
+from awiwi_gen.resources import DEFAULT_HAND, gains_beside
 
 __all__ = ["Fibre", "Finger", "Hand", "Limits", "Link", "Motor", "Palm", "Spring", "Wrist"]
 

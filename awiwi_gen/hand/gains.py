@@ -85,11 +85,6 @@ class GainsFile(Part):
     gains: Gains
 
 
-def gains_beside(path: Path) -> Path:
-    """The file of gains that belongs to a hand file without naming it: hand.gains.toml to hand.toml."""
-    return path.with_suffix(".gains.toml")
-
-
 def with_gains(file: HandFile, folder: Path | None = None, beside: Path | None = None) -> HandFile:
     """A hand file with the gains of the file it names in place of that name, or of the file `beside` it.
 

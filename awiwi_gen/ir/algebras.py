@@ -8,7 +8,8 @@ from __future__ import annotations
 import ctypes
 import ctypes.util
 import operator
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from fractions import Fraction
 from functools import cache
 from typing import Any
@@ -235,3 +236,13 @@ class Dimensions:
                 if unit is not None and unit != one:
                     raise DimensionError(f"takes {operation} of {unit}")
         return one
+
+
+@contextmanager
+def precision_restored() -> Iterator[None]:
+    """Set python-flint's precision, which is global, back to what the caller had."""
+    precision = ctx.prec
+    try:
+        yield
+    finally:
+        ctx.prec = precision

@@ -40,7 +40,7 @@ def require_running_gains(
     """
     if not hand.gains:
         return []
-    rows = kept_certificate(hand, store, beside)
+    rows = kept_certificate(digest_of(hand), store, beside)
     if rows is None:
         library = awiwi_gen.build(hand, only=NEEDED)
         faults = failing(library, hand, store, progress)

@@ -15,6 +15,7 @@ from sympy import Expr, Matrix
 from awiwi_gen.definitions.joints import dissipation, rotor_energy, spring_energy
 from awiwi_gen.definitions.kinematics import axial, frames
 from awiwi_gen.definitions.naming import Derivation, jacobian
+from awiwi_gen.definitions.symmetric_matrix import factors, solve_lower
 from awiwi_gen.structure import Finger
 
 _NO_GRAVITY = sympy.zeros(3, 1)
@@ -79,13 +80,15 @@ def bias(finger: Finger, q: Matrix, qd: Matrix, g: Matrix) -> Matrix:
 
 
 def forward_dynamics(finger: Finger, q: Matrix, qd: Matrix, tau: Matrix, g: Matrix) -> Matrix:
-    """Joint accelerations (n) [rad/s^2] that torques tau cause: M qdd = tau - bias (eq. 2.1), by Cramer's rule."""
-    lagrangian = _lagrangian(finger, q, qd, g)
+    """Joint accelerations (n) [rad/s^2] that torques tau cause: M qdd = tau - bias (eq. 2.1), by M = L diag(d) L'."""
+    lagrangian, last = _lagrangian(finger, q, qd, g), len(q) - 1
     derive = lagrangian.derive
-    mass = lagrangian.mass_matrix()
-    free = derive.name_all(tau - lagrangian.torques(sympy.zeros(len(q), 1)))
-    cofactors = derive.name_all(cofactor_matrix(mass, derive))
-    return cofactors * free * derive.name(1 / mass.row(0).dot(cofactors.row(0)))
+    lower, pivots = factors(lagrangian.mass_matrix(), derive)
+    free = solve_lower(lower, tau - lagrangian.torques(sympy.zeros(len(q), 1)), derive)
+    scaled = Matrix([derive.name(each / pivot) for each, pivot in zip(free, pivots, strict=True)])
+    # L' with its rows and columns in reverse order is a lower triangle, too.
+    reverse = list(range(last, -1, -1))
+    return solve_lower(lower.T.extract(reverse, reverse), scaled.extract(reverse, [0]), derive).extract(reverse, [0])
 
 
 @dataclass(frozen=True)
@@ -159,26 +162,3 @@ def _tensor(inertia: Any) -> Matrix:
             [inertia.xz, inertia.yz, inertia.zz],
         ]
     )
-
-
-def cofactor_matrix(matrix: Matrix, derive: Derivation) -> Matrix:
-    """The cofactors (n x n) of a symmetric matrix; each minor is expanded along its first row and computed once."""
-    known: dict[tuple[tuple[int, ...], tuple[int, ...]], Expr] = {((), ()): sympy.S.One}
-
-    def minor(rows: tuple[int, ...], columns: tuple[int, ...]) -> Expr:
-        if (rows, columns) not in known:
-            known[rows, columns] = derive.name(
-                sympy.Add(
-                    *(
-                        (-1) ** k * matrix[rows[0], column] * minor(rows[1:], columns[:k] + columns[k + 1 :])
-                        for k, column in enumerate(columns)
-                    )
-                )
-            )
-        return known[rows, columns]
-
-    def cofactor(i: int, j: int) -> Expr:
-        rows, columns = (tuple(k for k in range(matrix.rows) if k != out) for out in sorted((i, j)))
-        return (-1) ** (i + j) * minor(rows, columns)
-
-    return Matrix(matrix.rows, matrix.rows, cofactor)
