@@ -341,29 +341,9 @@ def simulate(
     hand: HandFile = None, as_json: Json = False,
 ) -> int:  # fmt: skip
     """Simulate control laws on a joint between two tendons, at the hand's clock rate, and compare the results."""
-    from awiwi_gen.compare import benchmark, by_tries, one_run, whole_fingers
+    from awiwi_gen.compare import simulated
 
-    if finger:
-        if gains or scenario or plot is not None:
-            raise InputError(
-                "--finger runs all scenarios with the gains of the tick; --gains, --scenario and --plot are for one joint"
-            )
-        whole_fingers(hand, law, finger).show(as_json)
-        return 0
-    if tries:
-        by_tries(hand, law, joint, tries).show(as_json)
-        return 0
-    if plot is not None:
-        extras.require("simulate --plot", "matplotlib")
-        if not scenario:
-            raise InputError("--plot shows one run; choose it with --scenario step, load or sine")
-    one = scenario != ""
-    shown = (
-        one_run(hand, law, gains, scenario, force, plant, joint, sensing, plot)
-        if one
-        else benchmark(hand, law, gains, joint)
-    )
-    shown.show(as_json)
+    simulated(hand, law, gains, scenario, force, plant, joint, sensing, finger, tries, plot).show(as_json)
     return 0
 
 

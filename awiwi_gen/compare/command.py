@@ -8,8 +8,10 @@ from pathlib import Path
 import numpy as np
 
 import awiwi_gen
+from awiwi_gen import extras
 from awiwi_gen.compare import comparison
 from awiwi_gen.compare.budget import BASELINES, by_budget
+from awiwi_gen.compare.finger import whole_fingers
 from awiwi_gen.compare.shown import Shown
 from awiwi_gen.errors import InputError, unknown
 from awiwi_gen.hand import Hand
@@ -39,6 +41,26 @@ def read_gains(text: str) -> dict[str, float]:
         except ValueError:
             raise InputError(f"--gains: {part!r} is not name=number, such as K_p=0.5,K_d=0.003") from None
     return found
+
+
+def simulated(
+    hand: Path | None, law: str, gains: str, scenario: str, force: float, plant: str, joint: str, sensing: str,
+    finger: str, tries: int, plot: Path | None,
+) -> Shown:  # fmt: skip
+    """What the options ask for. Raises InputError for options that do not go together, and for bad values."""
+    if finger:
+        if gains or scenario or plot is not None:
+            raise InputError(
+                "--finger runs all scenarios with the gains of the tick; --gains, --scenario and --plot are for one joint"
+            )
+        return whole_fingers(hand, law, finger)
+    if tries:
+        return by_tries(hand, law, joint, tries)
+    if scenario:
+        return one_run(hand, law, gains, scenario, force, plant, joint, sensing, plot)
+    if plot is not None:
+        raise InputError("--plot shows one run; choose it with --scenario step, load or sine")
+    return benchmark(hand, law, gains, joint)
 
 
 def benchmark(hand_file: Path | None, name: str, gains: str, where: str) -> Shown:
@@ -95,6 +117,8 @@ def one_run(
     """One run of one law, with a plot if asked. Raises InputError for an unknown law, scenario or plant, and for gains
     that cannot run.
     """
+    if plot is not None:
+        extras.require("simulate --plot", "matplotlib")
     law = law_of(name)
     chosen = read_gains(gains)
     law.gains_with(chosen)

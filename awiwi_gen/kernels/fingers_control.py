@@ -163,7 +163,7 @@ def distribution_update(finger: Finger) -> Solver:
     return replace(
         solver,
         problem="distribution update",
-        strings=solver.strings | {"last": "f_last_in"},
+        strings={**solver.strings, "last": "f_last_in"},
         iterations=solver.iterations - SEARCHES + UPDATES,
         calls=calls,
         tolerance={"f64": 2e-8, "f32": solver.tolerance["f32"]},

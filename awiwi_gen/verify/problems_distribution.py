@@ -315,7 +315,7 @@ class DistributionUpdate(Distribution):
         """Some updates, each on from the forces of the one before: they end at the answer, and then stay."""
         found = call(**inputs)
         for _ in range(UPDATES - 1):
-            found = call(**inputs | {"f_last": found.f})
+            found = call(**{**inputs, "f_last": found.f})
         return found
 
 
