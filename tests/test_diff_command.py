@@ -121,7 +121,9 @@ def test_tables_fit_a_terminal_and_markdown_is_regular(tmp_path):
     text = edited(AWIWI, "fingers.fifth.links[0].four_bar.crank", "10.1 mm")
     new.write_text(edited(text, "fingers.thumb.pulleys[0].radius", "8.1 mm"), encoding="utf-8")
     lines = told("diff", old, new, "--finger", "fifth").splitlines()
-    tables = [line for line in told("diff", old, new, "--markdown").splitlines() if line.startswith("|")]
+    tables = [
+        line for line in told("diff", old, new, "--finger", "fifth", "--markdown").splitlines() if line.startswith("|")
+    ]
 
     assert len(lines) > 60
     assert [line for line in lines[1:] if len(line) > 80] == []

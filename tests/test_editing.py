@@ -99,12 +99,12 @@ def test_what_cannot_be_set_leaves_the_file_as_it_is(started, key, value, messag
     assert started.read_bytes() == before
 
 
-@pytest.mark.parametrize("path", [DEFAULT_HAND, STARTER_HAND], ids=lambda path: path.stem)
-def test_every_value_can_be_set_to_what_it_is(path):
+@pytest.mark.parametrize(("path", "every"), [(DEFAULT_HAND, 7), (STARTER_HAND, 1)], ids=["hand", "starter"])
+def test_values_can_be_set_to_what_they_are(path, every):
     file = HandFile.read(path)
     raw, places = file.text.encode(), values_of_keys(file.text)
 
     assert len(places) > 50
-    for keys, place in places.items():
+    for keys, place in [*places.items()][::every]:
         if b"\n" not in raw[place] and b"{" not in raw[place]:
             assert changed(file, written(keys), raw[place].decode())[0] == file.text

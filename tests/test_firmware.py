@@ -141,7 +141,7 @@ def single(request, hand, tmp_path_factory) -> tuple[Path, list[Path]]:
     from awiwi_gen.cache import Cache
 
     directory = tmp_path_factory.mktemp("single") / "generated"
-    pattern = {"libm": "thumb_*", "own": "[msw][opr]*"}[request.param]
+    pattern = {"libm": "ring_*", "own": "[msw][opr]*"}[request.param]
     generate(Job(hand, Options("f32", math=request.param), only=pattern), directory)
     return directory, compile_objects(directory, Cache(), tmp_path_factory.mktemp("objects"))
 
