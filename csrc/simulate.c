@@ -153,11 +153,11 @@ static int integrate_alone(const awiwi_loop *loop, awiwi_real h, awiwi_real *sig
     const awiwi_block *plant = loop->plant;
     const int n = loop->states;
     awiwi_real in[AWIWI_MOST_ARGUMENTS], out[AWIWI_MOST_ARGUMENTS], sum[AWIWI_MOST_RATES];
-    int place[AWIWI_MOST_ARGUMENTS], state[AWIWI_MOST_ARGUMENTS], moving = 0;
+    int port[AWIWI_MOST_ARGUMENTS], state[AWIWI_MOST_ARGUMENTS], moving = 0;
     for (int i = 0; i < plant->inputs; i++) {
         in[i] = signals[plant->from[i]];
         if (plant->from[i] < n) {
-            place[moving] = i;
+            port[moving] = i;
             state[moving++] = plant->from[i];
         }
     }
@@ -167,7 +167,7 @@ static int integrate_alone(const awiwi_loop *loop, awiwi_real h, awiwi_real *sig
         for (int stage = 0; stage < 4; stage++) {
             const awiwi_real ahead = h * (awiwi_real)reach[stage] / 2, weight = (awiwi_real)share[stage];
             for (int i = 0; i < moving; i++)
-                in[place[i]] = stage ? signals[state[i]] + ahead * out[state[i]] : signals[state[i]];
+                in[port[i]] = stage ? signals[state[i]] + ahead * out[state[i]] : signals[state[i]];
             if (plant->kernel(in, out))
                 return AWIWI_OUT_OF_DOMAIN;
             for (int i = 0; i < n; i++)

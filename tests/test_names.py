@@ -60,7 +60,7 @@ LOCALS = """
 
 
 def identifiers(directory: Path, pattern: str) -> set[str]:
-    texts = (path.read_text() for path in directory.glob(pattern))
+    texts = (re.sub(r"/\*.*?\*/|{#.*?#}", "", path.read_text(), flags=re.DOTALL) for path in directory.glob(pattern))
     return {word for text in texts for word in re.findall(r"[A-Za-z_]\w*", text)}
 
 

@@ -73,7 +73,7 @@ def test_a_part_is_refused_where_the_rest_is_of_another_hand(whole, part, tmp_pa
     before = files(whole)
 
     with pytest.raises(OutputError, match=r"holds all kernels and more of it is out of date \(hand\)"):
-        generate(replace(part, hand=Hand.load(other)), whole)
+        generate(replace(part, source=Hand.load(other)), whole)
     assert files(whole) == before
 
 
