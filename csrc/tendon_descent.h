@@ -217,6 +217,7 @@ static int descend(const task *s, const moves *m, int *held, int *steps, vector 
             }
             held[left] = FREE;
             changed = 1;
+            *steps += m->count == 0; /* nothing moved: tendons that are all held leave one by one */
             continue;
         }
         if (share > 0) {
