@@ -36,7 +36,8 @@ lint: .venv/installed
 
 torture: .venv/installed
 	$(BIN)/python tests/mutations.py 10000
-	AWIWI_TORTURE=25 $(BIN)/python -m pytest tests/test_cache.py tests/test_system_errors.py
+	AWIWI_TORTURE=25 $(BIN)/python -m pytest tests/test_cache.py tests/test_system_errors.py tests/test_editing.py \
+	  tests/test_batches.py
 	$(BIN)/python tests/torture_hands.py
 
 check: .venv/installed

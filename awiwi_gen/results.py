@@ -37,6 +37,11 @@ class Table:
     rows: list[tuple[str, ...]]
 
 
+def milliseconds(time: float, digits: int = 0) -> str:
+    """A time [s] as text; never, if it is infinite."""
+    return f"{time * 1e3:.{digits}f} ms" if time < float("inf") else "never"
+
+
 @dataclass(frozen=True)
 class Printed:
     """A number or formula that the source prints: where, what is printed, what we compute, and why they differ."""

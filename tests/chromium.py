@@ -5,14 +5,13 @@ from __future__ import annotations
 import fcntl
 import json
 import os
-import shutil
 import subprocess
 import time
 from base64 import b64decode
 from pathlib import Path
 from typing import Any
 
-import pytest
+from tools import need
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 LIMIT = 60  # s, until a page must have answered
@@ -23,22 +22,13 @@ OPTIONS = ("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm
 KEYS = {"ArrowRight": 39, "ArrowLeft": 37, "ArrowUp": 38, "ArrowDown": 40, "Home": 36, "End": 35, "Tab": 9, "Enter": 13}
 
 
-def browser() -> str:
-    """The browser's path. Without one a test is skipped on a machine of ours, and fails in CI."""
-    found = next(filter(None, map(shutil.which, NAMES)), None)
-    if found is None:
-        missing = f"no browser: none of {', '.join(NAMES)} (Debian: apt-get install chromium)"
-        (pytest.fail if os.environ.get("CI") else pytest.skip)(missing)
-    return found
-
-
 class Browser:
     """One page in a browser; ``errors`` has what its console and its scripts complained of."""
 
     def __init__(self, profile: Path) -> None:
         (receive, self._write), (self._read, send) = _pipe(), _pipe()
         script = f'exec 3<&{receive} 4>&{send}; exec "$@"'  # the browser reads from its descriptor 3 and writes to 4
-        command = ["bash", "-c", script, "bash", browser(), *OPTIONS, f"--user-data-dir={profile}", "about:blank"]
+        command = ["bash", "-c", script, "bash", need(*NAMES), *OPTIONS, f"--user-data-dir={profile}", "about:blank"]
         self._process = subprocess.Popen(command, pass_fds=(receive, send), stderr=subprocess.DEVNULL)
         os.close(receive)
         os.close(send)

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from samples import ODD, RANDOM, VARIANTS, fields, points, same_bits, tree, vectorised
+from tools import LONG
 
 from awiwi_gen import library as library_module
 from awiwi_gen.build import BATCH_FLAGS, FUSED, GCC_FLAGS, UNFUSED, WARNINGS, compile_objects, compiler, load, native
@@ -92,7 +93,7 @@ def test_each_sample_has_a_status_of_its_own(hand):
 def test_whole_vectors_alone_are_computed_with(options, tmp_path):
     if native()[0] != ("-march=native",) or "__AVX__" not in native()[1] or "clang" in compiler().version:
         pytest.skip("reads the assembly of gcc for x86 with AVX")
-    for name in worth_compiling(tree(options))[::4]:
+    for name in worth_compiling(tree(options))[:: 1 if LONG > 1 else 4]:
         flags = (*BATCH_FLAGS, *GCC_FLAGS, *native()[0], *UNFUSED[0], "-S")
         loop = body("block", compiled(name, tree(options), tmp_path, *flags).read_text())
         found = re.findall(r"\bv?(?:add|sub|mul|div|sqrt)([ps][sd])\b.*%([xyz]mm)", loop)

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tools import LONG
 
 import awiwi_gen
 from awiwi_gen.build import _MODULES, load
@@ -22,7 +23,6 @@ from awiwi_gen.errors import AwiwiError, InputError, OutputError
 from awiwi_gen.pipeline import Job, cached_tree, verify
 
 ONE_FINGER = Path(__file__).with_name("one_finger.toml")
-LONG = int(os.environ.get("AWIWI_TORTURE", "1"))  # times as many corruptions
 NOBODY = 65534
 as_root = pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only root can change users")
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 import re
-import shutil
 import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
+from tools import need
 
 from awiwi_gen.build import compile_objects
 from awiwi_gen.emit.options import Options
@@ -41,12 +41,6 @@ def run(*words: object, **options: object) -> str:
     done = subprocess.run([str(word) for word in words], capture_output=True, text=True, check=False, **options)
     assert done.returncode == 0, done.stderr[:4000]
     return done.stdout
-
-
-def need(tool: str) -> str:
-    if not shutil.which(tool):
-        pytest.skip(f"there is no {tool} here")
-    return tool
 
 
 # ------------------------------------------------------------------------------------------------- text

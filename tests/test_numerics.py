@@ -9,6 +9,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from tools import need
 
 from awiwi_gen.build import WARNINGS, compiler
 from awiwi_gen.emit.files import csrc_headers
@@ -154,8 +155,7 @@ CROSS = {
 @pytest.mark.parametrize("target", CROSS)
 def test_other_compilers_fuse_nothing_either_unless_it_is_allowed(target, name, tree):
     command, instruction = CROSS[target]
-    if not shutil.which(command[0]):
-        pytest.skip(f"there is no {command[0]} here")
+    need(command[0])
     folder = tree if (tree / f"{name}.c").exists() else CSRC
     for allowed in ([], ["-DAWIWI_ALLOW_CONTRACTION"]):
         words = [

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import shutil
 import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
+from tools import need
 
 from awiwi_gen.build import compile_objects
 from awiwi_gen.cache import Cache
@@ -56,8 +56,7 @@ def run(*words, cwd):
 @pytest.fixture(scope="module")
 def folder(root, hand, tmp_path_factory) -> Path:
     """Where the gateway is: made by the example's Makefile from objects that are compiled already."""
-    if not shutil.which("mkoctfile"):
-        pytest.skip("there is no mkoctfile here; Debian has it in octave-dev, which .ci/run installs")
+    need("mkoctfile")  # Debian has it in octave-dev
     build = tmp_path_factory.mktemp("octave")
     (build / "awiwi").mkdir()
     tree = cached_tree(Job(hand))

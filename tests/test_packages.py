@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import shutil
 import subprocess
 from pathlib import Path
 
@@ -13,6 +12,7 @@ from commands import ONE_FINGER
 from targets.driver import golden_inputs, python_digests, write_driver
 from targets.programs import run_tool
 from targets.toolchains import HERE
+from tools import need
 
 import awiwi_gen
 from awiwi_gen.amalgamate import BANNER, amalgamate, write
@@ -53,12 +53,6 @@ def driver(job, tree, tmp_path_factory) -> tuple[Path, dict[str, str]]:
     folder = tmp_path_factory.mktemp("driver")
     write_driver(folder, manifest, inputs)
     return folder, python_digests(load(tree), inputs)
-
-
-def need(tool: str) -> str:
-    if not shutil.which(tool):
-        pytest.skip(f"there is no {tool} here")
-    return tool
 
 
 def digests(program: Path) -> dict[str, str]:

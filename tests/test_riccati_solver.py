@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ctypes
 import platform
-import shutil
 import subprocess
 from functools import partial
 
@@ -12,6 +11,7 @@ import numpy as np
 import pytest
 from tendon_solvers import write_headers
 from test_riccati import random_plants
+from tools import need
 
 from awiwi_gen.build import FLAGS, compiler
 from awiwi_gen.emit.options import Options
@@ -141,8 +141,7 @@ def test_what_starts_do_not_reach_depends_on_no_unwritten_memory(root, tmp_path)
 @pytest.mark.parametrize("program", ["gcc", "clang"])
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
 def test_fused_operations_change_no_gain_and_lose_no_plant(solve, dtype, program, tmp_path):
-    if not shutil.which(program):
-        pytest.skip(f"there is no {program} here")
+    need(program)
     fused = {dtype: compiled(tmp_path, dtype, [program], [*FLAGS, *FUSED, "-w"])}
     random = np.random.default_rng(5)
     for _ in range(500):

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tools import need
 
 from awiwi_gen.build import FLAGS, compiler
 from awiwi_gen.emit.options import Options
@@ -46,8 +47,7 @@ def tree_of(hand, only="*", **options) -> Path:
 
 def outcome(tree: Path, place: Path, command: list[str], flags: list[str], *before: str) -> tuple[int, str]:
     """What the self-test says, compiled with these flags."""
-    if not shutil.which(command[0]):
-        pytest.skip(f"there is no {command[0]} here")
+    need(command[0])
     (place / "main.c").write_text(MAIN % "".join(before))
     files = [*map(str, [place / "main.c", *sorted(tree.glob("*.c")), *sorted(CSRC.glob("*.c"))])]
     words = [*command, "-std=c99", *flags, "-w", f"-I{tree}", f"-I{CSRC}", *files, "-lm", "-o", str(place / "program")]

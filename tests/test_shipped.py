@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 from commands import ONE_FINGER, answer, complaint
 from samples import fields, points, same_bits
+from tools import need
 
 import awiwi_gen
 from awiwi_gen.build import FUSED
@@ -126,9 +127,9 @@ def test_no_library_fuses_operations_and_only_one_has_wider_vectors(package):
 
 @pytest.mark.parametrize(("processor", "wider"), [("Nehalem", 0), ("max", 1)])
 def test_the_processor_is_asked_for_its_vectors(processor, wider, package, tmp_path):
-    folder, emulator = package(f"{processor}_hand".lower()), shutil.which("qemu-x86_64")
-    if not emulator or not (folder / "batches_avx2.so").is_file():
-        pytest.skip("needs x86 and qemu-user")
+    folder, emulator = package(f"{processor}_hand".lower()), need("qemu-x86_64")
+    if not (folder / "batches_avx2.so").is_file():
+        pytest.skip("there is one set of vector instructions")
     (tmp_path / "main.c").write_text(f"int {HAS_WIDER}(void);\nint main(void) {{ return {HAS_WIDER}(); }}\n")
     program = str(tmp_path / "main")
     compiler().run(str(tmp_path / "main.c"), str(folder / "batches.so"), f"-Wl,-rpath,{folder}", "-o", program)

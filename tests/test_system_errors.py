@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tools import LONG
 
 import awiwi_gen
 from awiwi_gen import parallel
@@ -23,7 +24,6 @@ from awiwi_gen.pipeline import Job, cached_tree, generate, state
 
 ONE_FINGER = Path(__file__).with_name("one_finger.toml")
 SMALL = ("--hand", str(ONE_FINGER), "--only", "jaw_tendon_lengths")
-LONG = int(os.environ.get("AWIWI_TORTURE", "1"))  # times as many kills
 linux = pytest.mark.skipif(sys.platform != "linux", reason="/proc, mounts and devices are those of Linux")
 
 

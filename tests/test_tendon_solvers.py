@@ -279,6 +279,21 @@ def test_updates_from_any_forces_are_short_and_end_where_the_forces_give_the_tor
     assert np.median(rounds) <= 2
 
 
+def test_an_update_at_a_corner_of_the_limits_ends_although_each_tendon_has_to_be_looked_at(library):
+    random, corners = np.random.default_rng(3), 0
+    for _ in range(20):
+        finger = solvers.Finger(library, random.uniform(-0.01, 0.01, (8, 2)), quadratic)
+        tau, K = random.normal(size=2) * 100, np.diag(random.uniform(1, 5, 2))  # far out of reach
+        f = finger.distribute(tau, K)[1]
+
+        status, again = finger.distribute(tau, K, last=f)
+        assert status == INFEASIBLE
+        assert np.abs(again - f).max() < 1e-9
+        corners += np.isin(f, [finger.low, finger.high]).all()
+
+    assert corners > 10
+
+
 def test_an_update_refuses_forces_that_are_no_numbers(library):
     finger = next(iter(fingers(library, np.random.default_rng(8))))
     finger.pairs = []

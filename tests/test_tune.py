@@ -237,9 +237,11 @@ def test_a_family_that_no_gain_can_hold_is_refused_with_the_plant(lib, hand, mon
         search(lib, LAWS["motor_pd"], joint_of(lib, hand), 1, 20)
 
 
-@pytest.mark.parametrize(("option", "value"), [("--tries", "3"), ("--seed", "-1")])
-def test_a_search_needs_tries_and_a_seed(option, value):
+@pytest.mark.parametrize(
+    ("option", "value", "reason"), [("--tries", "3", "20 to 100000 tries"), ("--seed", "-1", "a seed of 0 or more")]
+)
+def test_a_search_needs_tries_and_a_seed(option, value, reason):
     done = CliRunner().invoke(app, ["tune", option, value])
 
     assert done.exit_code == 2
-    assert "a search has 20 to 100000 tries, and a seed of 0 or more" in done.stderr
+    assert done.stderr == f"{option} {value}: a search has {reason}\n"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 from importlib.util import find_spec
 from itertools import product
@@ -13,6 +12,7 @@ import numpy as np
 import pytest
 from chromium import Browser
 from commands import ONE_FINGER
+from tools import without
 
 from awiwi_gen import extras
 from awiwi_gen.build import load
@@ -53,8 +53,7 @@ def bits(values) -> list[str]:
 def written(folder, hand: Hand, only: str = "*"):
     """A page with nothing but the moving hand, and what was generated."""
     if find_spec("ziglang") is None:
-        missing = "no ziglang: make .venv-web/installed, and PYTHONPATH=$PWD/.venv-web"
-        (pytest.fail if os.environ.get("CI") else pytest.skip)(missing)
+        without("ziglang (make .venv-web/installed; PYTHONPATH=$PWD/.venv-web)")
     job = Job(hand, only=only)
     directory = cached_tree(job)
     manifest = read_manifest(directory)

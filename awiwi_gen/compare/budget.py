@@ -15,24 +15,22 @@ from awiwi_gen.hand import Hand
 from awiwi_gen.loops.hand_joint import joint_of
 from awiwi_gen.loops.laws import LAWS
 from awiwi_gen.loops.scenarios import GOALS, Score
-from awiwi_gen.loops.search import SEED, Found, search
+from awiwi_gen.loops.search import SEED, Found, require_tries, search
 from awiwi_gen.parallel import Progress, silent
-from awiwi_gen.results import Table
+from awiwi_gen.results import Table, milliseconds
 
 BASELINES = ("motor_pd", "cascade", "inverse_dynamics", "backstepping_adaptive")
 COLUMNS = (
     "law", "settling", "family", "overshoot", "family", "stiffness", "family", "slack", "cycle", "steady", "pretension",
     "goal",
 )  # fmt: skip
-FEWEST, MOST = 20, 100_000
 SEARCHED = ("awiwi_gen/loops", "awiwi_gen/definitions", "awiwi_gen/simulate.py", "csrc")
 Where = tuple[str, str]
 
 
 def by_budget(hand: Hand, names: Iterable[str], where: Where, tries: int, progress: Progress = silent) -> Shown:
-    """The best gains of each law of so many tries on the family of plants. Raises InputError for an odd number of them."""
-    if not FEWEST <= tries <= MOST:
-        raise InputError(f"--tries {tries}: a search has {FEWEST} to {MOST} tries")
+    """The best gains of each law of so many tries on the family of plants. Raises InputError for too few or too many."""
+    require_tries(tries)
     found, reasons = tuned(hand, list(names), where, tries, Cache(), progress)
     return Shown(
         {
@@ -79,7 +77,7 @@ def row(found: Found) -> tuple[str, ...]:
     reached = known.within(GOALS[0]) and all(score.good for score in found.scores.values())
     return (
         found.law,
-        *(_settled(score) for score in (known, worst)),
+        *(milliseconds(score.settling, 1) for score in (known, worst)),
         *(f"{score.overshoot:.1%}" for score in (known, worst)),
         *(_stiffness(score) for score in (known, worst)),
         f"{worst.slack * 1e3:.0f} ms",
@@ -88,10 +86,6 @@ def row(found: Found) -> tuple[str, ...]:
         f"{found.force:.1f} N",
         "reached" if reached else "missed",
     )
-
-
-def _settled(score: Score) -> str:
-    return f"{score.settling * 1e3:.1f} ms" if score.settling < float("inf") else "never"
 
 
 def _stiffness(score: Score) -> str:

@@ -15,7 +15,7 @@ from awiwi_gen.loops.clock import KNOWN, Clocked, clocked
 from awiwi_gen.loops.hand_joint import FINGER, JOINT, SENSING, Joint, gains_of, joint_of
 from awiwi_gen.loops.laws import LAWS, Law
 from awiwi_gen.loops.scenarios import BEFORE, FAMILY, FORCES, PLANTS, Score, load_of, run, score
-from awiwi_gen.results import Figure, Table, curves
+from awiwi_gen.results import Figure, Table, curves, milliseconds
 from awiwi_gen.simulate import Trace
 
 Where = tuple[str, str]  # finger and joint
@@ -53,7 +53,7 @@ class Row:
             return (*head, *("-",) * 8, "failed")
         return (
             *head,
-            f"{s.settling * 1e3:.1f} ms" if s.settling < float("inf") else "never",
+            milliseconds(s.settling, 1),
             f"{s.overshoot:.1%}",
             f"{s.steady * 1e3:.3f} mrad",
             f"{s.stiffness:+.1%}",
@@ -129,9 +129,6 @@ def summary(rows: Iterable[Row]) -> Table:
     groups: dict[tuple[str, str, float], list[Row]] = {}
     for row in rows:
         groups.setdefault((row.law, row.sensing, row.force), []).append(row)
-
-    def milliseconds(settling: float) -> str:
-        return f"{settling * 1e3:.0f} ms" if settling < float("inf") else "never"
 
     cells: list[tuple[str, ...]] = []
     for (law, sensing, force), members in groups.items():

@@ -11,7 +11,7 @@ from awiwi_gen.compare.shown import Shown
 from awiwi_gen.errors import unknown
 from awiwi_gen.hand import Hand
 from awiwi_gen.loops.scenarios import GOALS
-from awiwi_gen.results import Table
+from awiwi_gen.results import Table, milliseconds
 from awiwi_gen.tick.finger_scores import (
     FLING,
     OVERSHOOT,
@@ -79,18 +79,14 @@ def _rows(found: Found, most: float) -> Iterator[tuple[str, ...]]:
 def cells(score: FingerScore) -> tuple[str, ...]:
     """The numbers of a score as text."""
     return (
-        _milliseconds(score.settling),
+        milliseconds(score.settling),
         f"{score.overshoot:.1%}",
         f"{score.stiffness:.1%}",
-        _milliseconds(score.touching),
+        milliseconds(score.touching),
         f"{score.pressing:.1%}",
-        _milliseconds(score.release),
+        milliseconds(score.release),
         f"{score.fling:.0%}",
         f"{score.turning * 1e3:.1f} mrad",
         f"{score.slack * 1e3:.0f} ms",
         f"{score.force:.1f} N",
     )
-
-
-def _milliseconds(time: float) -> str:
-    return f"{time * 1e3:.0f} ms" if time < float("inf") else "never"

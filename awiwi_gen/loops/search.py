@@ -24,6 +24,7 @@ from awiwi_gen.loops.scenarios import FAMILY, FORCES, GOALS, JUDGED, STEP, TICKS
 from awiwi_gen.simulate import Array
 
 TRIES, SEED = 400, 1
+FEWEST, MOST = 20, 100_000  # tries
 DRAWN, KEPT = 12, 4  # of a generation
 SPREAD, NARROWEST, WIDEST = 0.25, 0.02, 0.6  # of the logarithm of a factor
 BANDWIDTHS = (1.0, 0.7, 0.5, 0.35, 0.25)  # of the defaults, that a search may start from
@@ -37,6 +38,12 @@ REJUDGED = 6  # of the last records, on the whole family
 GENTLE = 0.95  # share of a goal from which on it costs something
 SPARED = 0.02  # what a factor of e in speed or pretension counts
 FAILED = 1e3
+
+
+def require_tries(tries: int) -> None:
+    """Raise InputError for a number of tries that no search can have."""
+    if not FEWEST <= tries <= MOST:
+        raise InputError(f"--tries {tries}: a search has {FEWEST} to {MOST} tries")
 
 
 @dataclass(frozen=True)

@@ -31,11 +31,13 @@ def tune(
     read = Hand.load(hand)
     if costs is not None:
         return _from_costs(read, costs, output, as_json)
-    if not 20 <= tries <= 100_000 or seed < 0:
-        raise InputError(f"--tries {tries}, --seed {seed}: a search has 20 to 100000 tries, and a seed of 0 or more")
+    if seed < 0:
+        raise InputError(f"--seed {seed}: a search has a seed of 0 or more")
     from awiwi_gen.cache import Cache
+    from awiwi_gen.loops.search import require_tries
     from awiwi_gen.tune import family, hand_gains
 
+    require_tries(tries)
     store, progress = Cache(), Progress()
     found, without = family.tune_family(read, store, seed, tries, lambda name: matches(name, only), progress)
     own, refused = hand_gains.holding(read, found, store, progress)

@@ -27,10 +27,7 @@ FAMILIES = (
 )  # fmt: skip
 OF_HAND = ("wrist_points", "wrist_palm_pose", "hand_tendon_lengths", "palm_pose")
 BACK = 0.3  # of the longest reach: how far tendons are drawn behind the first joint
-APART, AHEAD = (
-    0.24,
-    0.5,
-)  # of the longest reach: where fingers are drawn in the palm whose places the file does not give
+APART, AHEAD = 0.24, 0.5  # of the longest reach: where fingers without a place in the file are drawn in the palm
 SLIM, WIDE = 0.03, 0.07  # of a finger's reach: the radius of links without and at most with a pulley
 
 
