@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from test_cli import complaint
+from commands import complaint
 
 pytest.importorskip("scipy")
 

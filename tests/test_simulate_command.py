@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from actuators import AWIWI
-from test_cli import answer, complaint, told
+from commands import answer, complaint, told
 
 pytest.importorskip("scipy")
 
