@@ -48,7 +48,7 @@ OF_FINGER = (
     Slot("update", "tendon_distribution_update", ("q", "tau", "K", "f_min", "f_max", "f_last"), 1, optional=True),
 )
 OF_HAND = (
-    Slot("sensors", "calibration_readings", ("readings",), 3),
+    Slot("sensors", "calibration_tensions", ("readings",), 2),
     Slot("wrist_lengths", "wrist_tendon_lengths", ("q71,q73",), 1, optional=True),
     Slot("spring_elongation", "spring_elongation", ("f",), 1),
     Slot("tendon_stretch", "tendon_stretch", ("f",), 1, optional=True),

@@ -13,6 +13,7 @@ extern "C" {
 
 /* Kernels of one input or several in a uniform shape; each returns an awiwi_status. */
 typedef int (*awiwi_of_one)(const awiwi_real *in, awiwi_real *out);
+typedef int (*awiwi_of_one_to_two)(const awiwi_real *in, awiwi_real *first, awiwi_real *second);
 typedef int (*awiwi_of_two)(const awiwi_real *a, const awiwi_real *b, awiwi_real *out);
 typedef int (*awiwi_of_three)(const awiwi_real *a, const awiwi_real *b, const awiwi_real *c, awiwi_real *out);
 
@@ -33,7 +34,7 @@ typedef struct awiwi_finger {
     int (*tendon_stiffness)(const awiwi_real *f, awiwi_real *k, awiwi_real *slope, awiwi_real *curvature);
     int (*dynamics)(const awiwi_real *q, const awiwi_real *qd, const awiwi_real *g, awiwi_real *M, awiwi_real *C,
                     awiwi_real *gravity);
-    int (*tip)(const awiwi_real *q, awiwi_real *T, awiwi_real *J);
+    awiwi_of_one_to_two tip;         /* q -> T, J */
     int (*distribution)(const awiwi_real *q, const awiwi_real *tau, const awiwi_real *K, const awiwi_real *f_min,
                         const awiwi_real *f_max, awiwi_real *f);
     /* the same on from the last forces, with little work; null where the distribution has little */
@@ -60,7 +61,7 @@ typedef struct awiwi_hand {
     awiwi_real motor_torque;
     awiwi_real motor_travel;
     awiwi_real motor_velocity;
-    int (*sensors)(const awiwi_real *reading, awiwi_real *travel, awiwi_real *f, awiwi_real *k);
+    awiwi_of_one_to_two sensors; /* readings -> travel of the levers, forces */
     awiwi_of_one wrist_lengths; /* two wrist angles -> length of every tendon in the wrist; null without a wrist */
     awiwi_of_one spring_elongation;
     awiwi_of_one tendon_stretch; /* null for tendons that do not stretch */

@@ -83,7 +83,7 @@ static unsigned estimate(const awiwi_context *now, finger_now *own)
         return AWIWI_NO_ESTIMATE;
     for (int j = 0; j < finger->joints; j++) {
         const awiwi_real last = qd[j];
-        qd[j] = awiwi_rate(now, last, found[j] - q[j]);
+        qd[j] = awiwi_follow(last, (found[j] - q[j]) * now->per_period, now->pace);
         own->gained[j] = qd[j] - last;
         q[j] = found[j];
     }

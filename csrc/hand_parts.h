@@ -25,15 +25,15 @@ awiwi_context awiwi_context_of(const awiwi_hand *hand, const awiwi_hand_gains *g
    is not good keeps its last value. */
 unsigned awiwi_sense(const awiwi_context *now);
 
-/* A rate of motors, elongations or joints by their filtered change since the last tick. */
-static inline awiwi_real awiwi_rate(const awiwi_context *now, awiwi_real rate, awiwi_real change)
+/* A filtered value a tick later, which takes a share `pace` of its change. */
+static inline awiwi_real awiwi_follow(awiwi_real value, awiwi_real now, awiwi_real pace)
 {
-    return rate + now->pace * (change * now->per_period - rate);
+    return value + pace * (now - value);
 }
 
 static inline int awiwi_is_number(awiwi_real x)
 {
-    return x >= -AWIWI_REAL_MAX && x <= AWIWI_REAL_MAX;
+    return x * 0 >= 0;
 }
 
 /* Whether a tendon of this status has an unknown length. */

@@ -15,8 +15,7 @@ static const awiwi_real BESIDE = (awiwi_real)1 / 4096;  /* of a sensor's span: w
 static int at_levers(const awiwi_hand_plant *plant, const awiwi_hand_world *world, const awiwi_real *lever,
                      awiwi_real *force, awiwi_real *elongation)
 {
-    awiwi_real stiffness[ALL];
-    const int status = plant->hand->sensors(lever, elongation, force, stiffness);
+    const int status = plant->hand->sensors(lever, elongation, force);
     for (int k = 0; k < plant->hand->tendons; k++) {
         awiwi_real stretch = 0;
         force[k] *= world->spring[k];
@@ -136,8 +135,8 @@ int awiwi_hand_place(const awiwi_hand_plant *plant, const awiwi_real *q, const a
                      awiwi_hand_world *world)
 {
     const awiwi_hand *hand = plant->hand;
-    awiwi_real path[ALL], elongation[ALL], ignored_force[ALL], ignored_stiffness[ALL], x, stretch = 0;
-    int status = hand->sensors(hand->sensor_slack, world->slack, ignored_force, ignored_stiffness);
+    awiwi_real path[ALL], elongation[ALL], ignored[ALL], x, stretch = 0;
+    int status = hand->sensors(hand->sensor_slack, world->slack, ignored);
     status |= hand->spring_elongation(&force, &x);
     if (hand->tendon_stretch)
         status |= hand->tendon_stretch(&force, &stretch);

@@ -27,30 +27,47 @@ static unsigned take_reading(const awiwi_context *now, int i)
     return AWIWI_SLACK | (now->state->slack_for[i] > now->gains->slack_ticks ? AWIWI_BROKEN : 0u);
 }
 
-static unsigned take_theta(const awiwi_context *now, int i)
+static void take_readings(const awiwi_context *now)
 {
-    const awiwi_real theta = now->input->theta[i], change = awiwi_size(theta - now->state->theta[i]);
-    const awiwi_real fastest = FASTEST * now->hand->motor_velocity * now->gains->period;
-    if (!now->input->theta_valid[i] || !awiwi_is_number(theta) || awiwi_size(theta) > BEYOND * now->hand->motor_travel)
-        return AWIWI_ANGLE_LOST;
-    if (now->state->ready && change > fastest * (1 + now->state->lost[i]))
-        return AWIWI_ANGLE_LOST;
-    now->state->theta[i] = theta;
-    return 0;
+    for (int i = 0; i < now->hand->tendons; i++)
+        now->state->tendon_status[i] = take_reading(now, i);
+}
+
+/* A motor is believed within its travel, and where it can have turned since it was last seen. */
+static void take_angles(const awiwi_context *now)
+{
+    const awiwi_hand_input *input = now->input;
+    awiwi_hand_state *state = now->state;
+    const awiwi_real pace = now->pace, per_period = now->per_period, most = BEYOND * now->hand->motor_travel;
+    const awiwi_real fastest = state->ready ? FASTEST * now->hand->motor_velocity * now->gains->period : AWIWI_REAL_MAX;
+    for (int i = 0; i < now->hand->tendons; i++) {
+        const awiwi_real theta = input->theta[i], change = theta - state->theta[i], ticks = 1 + state->lost[i];
+        awiwi_real *rate = state->thd + i;
+        if (input->theta_valid[i] && awiwi_size(theta) <= most && awiwi_size(change) <= fastest * ticks) {
+            *rate = awiwi_follow(*rate, change / ticks * per_period, pace);
+            state->theta[i] = theta;
+            state->lost[i] = 0;
+        } else {
+            *rate = awiwi_follow(*rate, 0, pace);
+            state->lost[i] = ticks;
+            state->tendon_status[i] |= AWIWI_ANGLE_LOST;
+        }
+    }
 }
 
 static void elongate(const awiwi_context *now)
 {
-    const int n = now->hand->tendons;
-    awiwi_real travel[AWIWI_ALL_TENDONS], stiffness[AWIWI_ALL_TENDONS], stretch;
-    (void)now->hand->sensors(now->state->reading, travel, now->state->f, stiffness);
-    for (int i = 0; i < n; i++) {
-        const awiwi_real last = now->state->x[i];
-        stretch = 0;
-        if (now->hand->tendon_stretch)
-            (void)now->hand->tendon_stretch(now->state->f + i, &stretch);
-        now->state->x[i] = now->state->slack[i] - travel[i] + stretch;
-        now->state->xd[i] = awiwi_rate(now, now->state->xd[i], now->state->x[i] - last);
+    awiwi_hand_state *state = now->state;
+    const awiwi_of_one tendon_stretch = now->hand->tendon_stretch;
+    const awiwi_real pace = now->pace, per_period = now->per_period;
+    awiwi_real travel[AWIWI_ALL_TENDONS], stretch = 0;
+    (void)now->hand->sensors(state->reading, travel, state->f);
+    for (int i = 0; i < now->hand->tendons; i++) {
+        const awiwi_real last = state->x[i];
+        if (tendon_stretch)
+            (void)tendon_stretch(state->f + i, &stretch);
+        state->x[i] = state->slack[i] - travel[i] + stretch;
+        state->xd[i] = awiwi_follow(state->xd[i], (state->x[i] - last) * per_period, pace);
     }
 }
 
@@ -86,13 +103,8 @@ awiwi_context awiwi_context_of(const awiwi_hand *hand, const awiwi_hand_gains *g
 
 unsigned awiwi_sense(const awiwi_context *now)
 {
-    for (int i = 0; i < now->hand->tendons; i++) {
-        const awiwi_real last = now->state->theta[i], ticks = 1 + now->state->lost[i];
-        const unsigned motor = take_theta(now, i);
-        now->state->lost[i] = motor ? ticks : 0;
-        now->state->tendon_status[i] = take_reading(now, i) | motor;
-        now->state->thd[i] = awiwi_rate(now, now->state->thd[i], (now->state->theta[i] - last) / ticks);
-    }
+    take_readings(now);
+    take_angles(now);
     elongate(now);
     return wrist(now);
 }

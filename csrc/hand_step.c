@@ -200,11 +200,11 @@ static unsigned adopt(const awiwi_hand *hand, const awiwi_hand_gains *gains, con
 unsigned awiwi_hand_init(const awiwi_hand *hand, const awiwi_hand_gains *gains, const awiwi_hand_input *input,
                          const awiwi_real *q, awiwi_hand_state *state)
 {
-    awiwi_real ignored_force[AWIWI_ALL_TENDONS], ignored_stiffness[AWIWI_ALL_TENDONS];
+    awiwi_real ignored[AWIWI_ALL_TENDONS];
     const awiwi_context now = awiwi_context_of(hand, gains, input, state);
     memset(state, 0, sizeof *state);
     if (!take_gains(hand, gains, state)
-        || hand->sensors(hand->sensor_slack, state->slack, ignored_force, ignored_stiffness) != AWIWI_OK)
+        || hand->sensors(hand->sensor_slack, state->slack, ignored) != AWIWI_OK)
         return state->status = AWIWI_NO_LAW;
     (void)adopt(hand, gains, input, state);
     state->changed = 0;

@@ -10,8 +10,8 @@
 #define AWIWI_PARAMS "baked"
 
 /* SHA-256 of the hand's numbers, the options and the generated C; and its first digits as a number. */
-#define AWIWI_BUILD_DIGEST "2218f22f86a6b68343f347409b9162039f18fb4e1e0885c05d221d96e1081c6f"
-#define AWIWI_BUILD_ID 0x2218f22fu
+#define AWIWI_BUILD_DIGEST "072c049769727f4e546f187b58feeaf993eb1c0e341b2b5ffd5f11e6c7a61981"
+#define AWIWI_BUILD_ID 0x072c0497u
 
 /* -- counts and names ------------------------------------------------------------------------------------------------ */
 

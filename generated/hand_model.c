@@ -340,7 +340,7 @@ const awiwi_hand awiwi_hand_model = {
     AWIWI_MOTOR_TORQUE,
     AWIWI_MOTOR_TRAVEL,
     AWIWI_MOTOR_VELOCITY,
-    awiwi_calibration_readings,
+    awiwi_calibration_tensions,
     run_wrist_tendon_lengths,
     awiwi_spring_elongation,
     run_tendon_stretch,

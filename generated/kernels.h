@@ -1833,6 +1833,19 @@ AWIWI_MUST_CHECK int awiwi_spring_elongation(const double f_in[1], double x_out[
 AWIWI_MUST_CHECK int awiwi_calibration_readings(const double readings_in[38], double dL_out[38], double force_out[38], double stiffness_out[38]);
 
 /*
+ * dL and force of every tendon from its sensor: what a tick of the hand needs of
+ * `calibration_readings`.
+ * Source: section 4.1.
+ *   in   readings[38] in 1, 410 to 3685
+ *   out  dL[38] in m
+ *   out  force[38] in N
+ * Returns 0 where all inputs and outputs are finite and the argument is within the lever's travel,
+ * with a margin of 0.4 %; else 1, and outputs without a value are NaN.
+ * Cost: 758 add, 758 mul, 37 calls.
+ */
+AWIWI_MUST_CHECK int awiwi_calibration_tensions(const double readings_in[38], double dL_out[38], double force_out[38]);
+
+/*
  * dL, force and stiffness at one sensor's counts by polynomials from the bench, constant coefficient
  * first. The argument is (2 counts - ends[0] - ends[1]) / (ends[1] - ends[0]): -1 at the slack end, 1
  * at the taut end.

@@ -38,6 +38,18 @@ def elongation(spring: Any, f: Matrix) -> tuple[Expr, list[Expr]]:
 
 def readings(spring: Any, readings: Matrix) -> tuple[Matrix, Matrix, Matrix, list[Expr]]:
     """dL [m], force [N] and stiffness [N/m] of each tendon (m) from its sensor's readings (m), linear in the angle."""
+    table, guards = _of_readings(spring, readings, 3)
+    return table[:, 0], table[:, 1], table[:, 2], guards
+
+
+def tensions(spring: Any, readings: Matrix) -> tuple[Matrix, Matrix, list[Expr]]:
+    """dL [m] and force [N] of each tendon (m) from its sensor's readings (m), linear in the angle."""
+    table, guards = _of_readings(spring, readings, 2)
+    return table[:, 0], table[:, 1], guards
+
+
+def _of_readings(spring: Any, readings: Matrix, quantities: int) -> tuple[Matrix, list[Expr]]:
+    """The first of dL, force and stiffness of each tendon, in columns, and the guards."""
     derivation = Derivation("c")
     calibrated = spring.calibrated
     powers = {tendon: _powers_of_readings(each, derivation) for tendon, each in {None: spring, **calibrated}.items()}
@@ -45,10 +57,9 @@ def readings(spring: Any, readings: Matrix) -> tuple[Matrix, Matrix, Matrix, lis
     for tendon, count in enumerate(readings):
         sensor = calibrated.get(tendon, spring).sensor
         x = _normalised(count, sensor.slack, sensor.taut, derivation)
-        rows.append([horner(each, x, derivation) for each in powers.get(tendon, powers[None])])
+        rows.append([horner(each, x, derivation) for each in powers.get(tendon, powers[None])[:quantities]])
         farthest = derivation.name((farthest + x**2 + Abs(farthest - x**2)) / 2)  # the larger of the two
-    table = Matrix(rows)
-    return table[:, 0], table[:, 1], table[:, 2], [BEYOND - farthest]
+    return Matrix(rows), [BEYOND - farthest]
 
 
 def _powers_of_readings(spring: Any, derivation: Derivation) -> list[list[Expr]]:

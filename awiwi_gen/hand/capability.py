@@ -63,7 +63,7 @@ def _of_all_tendons(hand: Hand) -> list[tuple[str, str]]:
     """(Path of a part, kernel family) of every kernel with an array over the tendons of the whole hand."""
     found = [("", f"hand_{family}") for family in ("tendon_lengths", "coupling", "joint_torque", "joint_stiffness")]
     found += [("wrist", f"wrist_{family}") for family in ("tendon_lengths", "coupling") if hand.wrist]
-    return found + [("spring", "calibration_readings")] * bool(hand.spring)
+    return found + [("spring", f"calibration_{family}") for family in ("readings", "tensions") if hand.spring]
 
 
 def left_out_names(hand: Hand) -> dict[str, str]:

@@ -106,6 +106,13 @@ def readings(spring: Any, readings: Any) -> Any:
     """dL, force and stiffness of every tendon from its sensor, by the design or by the tendon's own calibration."""
 
 
+@of_sensors(
+    lambda tendons: {"dL": Port((tendons,), m), "force": Port((tendons,), N)}, "section 4.1", guards=WITHIN
+)
+def tensions(spring: Any, readings: Any) -> Any:
+    """dL and force of every tendon from its sensor: what a tick of the hand needs of `calibration_readings`."""
+
+
 @of_bench(lambda _: tendon_state(()), "section 4.1", guards=WITHIN)
 def polynomials(_: Any, counts: Any, ends: Any, length_powers: Any, force_powers: Any, stiffness_powers: Any) -> Any:
     """dL, force and stiffness at one sensor's counts by polynomials from the bench, constant coefficient first.

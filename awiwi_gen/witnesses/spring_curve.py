@@ -30,24 +30,35 @@ def elongation(spring: Any, f: SX) -> tuple[SX, list[SX]]:
 
 def readings(spring: Any, readings: SX) -> tuple[SX, SX, SX, list[SX]]:
     """dL [m], force [N] and stiffness [N/m] of each tendon (m) from its sensor's readings (m)."""
+    (length, force, stiffness), guards = _of_readings(spring, readings, 3)
+    return length, force, stiffness, guards
+
+
+def tensions(spring: Any, readings: SX) -> tuple[SX, SX, list[SX]]:
+    """dL [m] and force [N] of each tendon (m) from its sensor's readings (m)."""
+    (length, force), guards = _of_readings(spring, readings, 2)
+    return length, force, guards
+
+
+def _of_readings(spring: Any, readings: SX, quantities: int) -> tuple[list[SX], list[SX]]:
+    """The first of dL, force and stiffness of all tendons, and the guards."""
     shares = [SX(float(share)) for share in chebyshev(READING_NODES)]
     calibrated = spring.calibrated
     samples = {
         tendon: [_pose(each, share) for share in shares] for tendon, each in {None: spring, **calibrated}.items()
     }
-    columns: list[list[SX]] = [[], [], []]
+    columns: list[list[SX]] = [[] for _ in range(quantities)]
     farthest = SX(0)
     for tendon, count in enumerate(ca.vertsplit(readings)):
         sensor = calibrated.get(tendon, spring).sensor
         share = (count - sensor.slack) / (sensor.taut - sensor.slack)
         poses = samples.get(tendon, samples[None])
         curves = ([pose.length for pose in poses], [pose.force for pose in poses], [pose.stiffness for pose in poses])
-        for column, curve in zip(columns, curves, strict=True):
+        for column, curve in zip(columns, curves[:quantities], strict=True):
             column.append(interpolate(shares, curve, share))
         distance = (2 * share - 1) ** 2
         farthest = (farthest + distance + ca.fabs(farthest - distance)) / 2  # the larger of the two
-    length, force, stiffness = (ca.vertcat(*column) for column in columns)
-    return length, force, stiffness, [float(BEYOND) - farthest]
+    return [ca.vertcat(*column) for column in columns], [float(BEYOND) - farthest]
 
 
 def _curve(spring: Any, argument: SX, over: Quantity, of: Quantity) -> tuple[SX, list[SX]]:

@@ -211,26 +211,24 @@ static const double slack_ends[] = {0, 900, 120, 100, 110, 980}, taut_ends[] = {
 static const double many_zeros[AWIWI_ALL_TENDONS];
 static const double many_ends[] = {9e2, 9e2, 9e2, 9e2, 9e2, 9e2, 9e2, 9e2, 9e2, 9e2, 9e2, 9e2, 9e2, 9e2, 9e2, 9e2};
 
-static int sensors_of(int n, const double *reading, const double *slack, const double *taut, double *travel, double *f,
-                      double *k)
+static int sensors_of(int n, const double *reading, const double *slack, const double *taut, double *travel, double *f)
 {
     for (int i = 0; i < n; i++) {
         const double x = LEVER * (reading[i] - slack[i]) / (taut[i] - slack[i]);
         travel[i] = LEVER * (1 + 0.1 * i) - x;
         f[i] = SPRING * x * (1 + BEND * x);
-        k[i] = SPRING * (1 + 2 * BEND * x);
     }
     return answer(SENSORS, f);
 }
 
-static int sensors(const double *reading, double *travel, double *f, double *k)
+static int sensors(const double *reading, double *travel, double *f)
 {
-    return sensors_of(HAND_TENDONS, reading, slack_ends, taut_ends, travel, f, k);
+    return sensors_of(HAND_TENDONS, reading, slack_ends, taut_ends, travel, f);
 }
 
-static int many_sensors(const double *reading, double *travel, double *f, double *k)
+static int many_sensors(const double *reading, double *travel, double *f)
 {
-    return sensors_of(AWIWI_ALL_TENDONS, reading, many_zeros, many_ends, travel, f, k);
+    return sensors_of(AWIWI_ALL_TENDONS, reading, many_zeros, many_ends, travel, f);
 }
 
 static int elongation(const double *f, double *x)
