@@ -10,25 +10,34 @@ static const awiwi_real HOT = (awiwi_real)0.9; /* heat from which on a motor's l
 
 /* -- motors -------------------------------------------------------------------------------------------------------- */
 
-/* The largest torque of a motor as hot as this. */
-static awiwi_real limit_of(const awiwi_context *now, int k)
+/* The largest torque of a motor with so much heat. */
+static awiwi_real limit_of(const awiwi_context *now, awiwi_real heat)
 {
     const awiwi_real most = now->hand->motor_torque, lasting = now->gains->continuous_torque;
-    if (now->state->heat[k] <= HOT || lasting >= most)
+    const awiwi_real share = (heat - HOT) / (1 - HOT);
+    if (share <= 0 || lasting >= most)
         return most;
-    const awiwi_real share = (now->state->heat[k] - HOT) / (1 - HOT);
     return share < 1 ? most + share * (lasting - most) : lasting;
 }
 
 /* A motor's torque within its limit; its heat follows the square of the torque. */
 static unsigned drive(const awiwi_context *now, int k, awiwi_real wanted)
 {
-    const awiwi_real limit = limit_of(now, k), torque = awiwi_clamp(wanted, -limit, limit);
+    awiwi_real *heat = now->state->heat + k, most = now->hand->motor_torque, torque = wanted;
+    unsigned status = 0;
+    if (*heat > HOT) {
+        const awiwi_real limit = limit_of(now, *heat);
+        status = limit < most ? AWIWI_HOT : 0u;
+        most = limit;
+    }
+    if (!(awiwi_size(wanted) <= most)) {
+        torque = wanted < 0 ? -most : most;
+        status |= AWIWI_SATURATED;
+    }
     const awiwi_real load = torque * now->per_lasting;
-    now->state->heat[k] += now->heating * (load * load - now->state->heat[k]);
+    *heat = awiwi_follow(*heat, load * load, now->heating);
     now->state->torque[k] = torque;
-    return (torque < wanted || torque > wanted ? AWIWI_SATURATED : 0u)
-           | (limit < now->hand->motor_torque ? AWIWI_HOT : 0u);
+    return status;
 }
 
 /* -- modes --------------------------------------------------------------------------------------------------------- */
@@ -96,25 +105,30 @@ static unsigned place(const awiwi_context *now, const awiwi_finger *finger, cons
     return 0;
 }
 
+/* Torques begin with the last ones: what they differ by is faded out. */
+static void begin(const awiwi_context *now, const awiwi_finger *finger, awiwi_real share, const awiwi_real *torque)
+{
+    awiwi_hand_state *state = now->state;
+    const awiwi_real most = now->hand->motor_torque / share; /* what was wanted beyond it did not act */
+    for (int i = 0, k = finger->first_tendon; i < finger->tendons; i++, k++)
+        state->jump[k] = share > 0 ? awiwi_clamp(state->wanted[k], -most, most) - torque[i] : 0;
+}
+
 /* Torques of a finger's motors: those of its law, where it has a result, else the last ones. After a pause or a change
    they begin with the last ones. */
 static unsigned give(const awiwi_context *now, int index, const awiwi_real *torque)
 {
     const awiwi_finger *finger = now->hand->finger + index;
     awiwi_hand_state *state = now->state;
-    const int begins = torque && (!state->alive[index] || state->changed > 0);
-    const awiwi_real share = state->share[index];
+    const awiwi_real share = state->share[index], fade = now->fade;
     unsigned status = 0;
+    if (torque && (!state->alive[index] || state->changed > 0))
+        begin(now, finger, share, torque);
     for (int i = 0, k = finger->first_tendon; i < finger->tendons; i++, k++) {
-        if (begins && share > 0) {
-            const awiwi_real most = now->hand->motor_torque / share; /* what was wanted beyond it did not act */
-            state->jump[k] = awiwi_clamp(state->wanted[k], -most, most) - torque[i];
-        } else if (begins) {
-            state->jump[k] = 0;
-        }
-        state->jump[k] -= state->jump[k] * now->fade;
+        const awiwi_real jump = state->jump[k] - state->jump[k] * fade;
+        state->jump[k] = jump;
         if (torque)
-            state->wanted[k] = torque[i] + state->jump[k];
+            state->wanted[k] = torque[i] + jump;
         const unsigned found = drive(now, k, share > 0 ? share * state->wanted[k] : 0);
         state->tendon_status[k] |= found;
         status |= found;
@@ -165,11 +179,14 @@ static int usable(const awiwi_hand_gains *gains)
            && gains->ramp_ticks > 0;
 }
 
-/* Whether gains have other bits. */
+/* Whether gains are others; those that are no numbers are. */
 static int differ(const awiwi_hand_gains *a, const awiwi_hand_gains *b)
 {
-    return memcmp(a, b, offsetof(awiwi_hand_gains, hold_ticks)) != 0 || a->hold_ticks != b->hold_ticks
-           || a->slack_ticks != b->slack_ticks || a->ramp_ticks != b->ramp_ticks;
+    const awiwi_real *number = &a->period, *other = &b->period;
+    for (int i = 0; i < REALS_OF_GAINS; i++)
+        if (!(number[i] - other[i] == 0))
+            return 1;
+    return a->hold_ticks != b->hold_ticks || a->slack_ticks != b->slack_ticks || a->ramp_ticks != b->ramp_ticks;
 }
 
 /* Take over gains that a law can take, and what follows from them. */
