@@ -21,6 +21,13 @@
 #define awiwi_ldexp ldexpf
 #endif
 
+/* A loop of a few rounds, whose number the compiler knows, becomes as many statements. */
+#if defined(__GNUC__) && !defined(__clang__)
+#define AWIWI_UNROLLED _Pragma("GCC unroll 8")
+#else
+#define AWIWI_UNROLLED
+#endif
+
 static inline awiwi_real awiwi_clamp(awiwi_real x, awiwi_real low, awiwi_real high)
 {
     return x < low ? low : x > high ? high : x;

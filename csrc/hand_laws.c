@@ -15,34 +15,45 @@ enum { JOINTS = AWIWI_MOST_JOINTS, TENDONS = AWIWI_MOST_TENDONS };
 typedef struct finger_now {
     const awiwi_finger *finger;
     int index;
+    int seen;                     /* whether the lengths of all tendons are known */
     awiwi_real measured[TENDONS]; /* lengths as measured, */
     awiwi_real h[TENDONS];        /* and with those of the last estimate where they are unknown */
     awiwi_real gained[JOINTS];    /* by how much the joints' rates have changed */
 } finger_now;
 
+/* a'b of all joints that a finger may have; those that it lacks are 0 in both. */
+static awiwi_real dot(const awiwi_real *a, const awiwi_real *b)
+{
+    awiwi_real sum = 0;
+    AWIWI_UNROLLED for (int j = 0; j < JOINTS; j++)
+        sum += a[j] * b[j];
+    return sum;
+}
+
 /* -- where the finger is ------------------------------------------------------------------------------------------- */
 
-/* Tendons of unknown length have that of the last estimate. */
-static void fill_in(const awiwi_context *now, finger_now *own)
+/* Lengths of the tendons; those that are unknown have that of the last estimate. */
+static void measure(const awiwi_context *now, finger_now *own)
 {
     const awiwi_finger *finger = own->finger;
+    awiwi_lengths(now, finger, own->measured);
     for (int i = 0, k = finger->first_tendon; i < finger->tendons; i++, k++)
-        own->h[i] = awiwi_unseen(now->state->tendon_status[k]) ? now->state->length[k] : own->measured[i];
+        own->h[i] = !own->seen && awiwi_unseen(now->state->tendon_status[k]) ? now->state->length[k] : own->measured[i];
 }
 
 /* Lengths of the tendons at the estimated joints; which of the measured ones disagree. */
 static unsigned compare(const awiwi_context *now, const finger_now *own)
 {
     const awiwi_finger *finger = own->finger;
+    const awiwi_real residual = now->gains->residual;
     awiwi_real expected[TENDONS];
     unsigned status = 0;
     if (finger->tendon_lengths(now->state->q + finger->first_joint, expected) != AWIWI_OK)
         return AWIWI_NO_ESTIMATE;
     for (int i = 0, k = finger->first_tendon; i < finger->tendons; i++, k++) {
-        unsigned *known = now->state->tendon_status + k;
         now->state->length[k] = expected[i];
-        if (!awiwi_unseen(*known) && awiwi_size(own->h[i] - expected[i]) > now->gains->residual) {
-            *known |= AWIWI_INCONSISTENT;
+        if (awiwi_size(own->h[i] - expected[i]) > residual && !awiwi_unseen(now->state->tendon_status[k])) {
+            now->state->tendon_status[k] |= AWIWI_INCONSISTENT;
             status = AWIWI_INCONSISTENT;
         }
     }
@@ -56,18 +67,17 @@ static int correct(const awiwi_context *now, const finger_now *own, awiwi_real *
 {
     const awiwi_finger *finger = own->finger;
     const awiwi_hand_state *state = now->state;
+    awiwi_real step[JOINTS] = {0};
     int near = !state->spread_status[own->index];
-    for (int j = 0; j < finger->joints; j++)
-        found[j] = 0;
     for (int i = 0, k = finger->first_tendon; i < finger->tendons; i++, k++) {
         const awiwi_real longer = own->h[i] - state->length[k];
-        for (int j = 0; j < finger->joints; j++)
-            found[j] += state->spread[k][j] * longer;
+        AWIWI_UNROLLED for (int j = 0; j < JOINTS; j++)
+            step[j] += state->spread[k][j] * longer;
     }
     for (int i = 0, j = finger->first_joint; i < finger->joints; i++, j++) {
-        near = near && awiwi_size(found[i]) <= NEARBY;
-        found[i] += state->q[j];
-        near = near && found[i] >= now->hand->joint_low[j] - NEARBY && found[i] <= now->hand->joint_high[j] + NEARBY;
+        found[i] = state->q[j] + step[i];
+        near = near && awiwi_size(step[i]) <= NEARBY && found[i] >= now->hand->joint_low[j] - NEARBY
+               && found[i] <= now->hand->joint_high[j] + NEARBY;
     }
     return near;
 }
@@ -76,8 +86,7 @@ static unsigned estimate(const awiwi_context *now, finger_now *own)
 {
     const awiwi_finger *finger = own->finger;
     awiwi_real *q = now->state->q + finger->first_joint, *qd = now->state->qd + finger->first_joint, found[JOINTS];
-    awiwi_lengths(now, finger, own->measured);
-    fill_in(now, own);
+    measure(now, own);
     if (!(finger->bent && correct(now, own, found))
         && (finger->joint_estimate(own->h, q, found) != AWIWI_OK || !awiwi_all_finite(found, finger->joints)))
         return AWIWI_NO_ESTIMATE;
@@ -96,17 +105,19 @@ static unsigned estimate(const awiwi_context *now, finger_now *own)
 static int filter(const awiwi_hand_state *state, awiwi_real *motion, const awiwi_real *goal)
 {
     const awiwi_real e[5] = {motion[0] - goal[0], motion[1] - goal[1], motion[2] - goal[2], motion[3], motion[4]};
-    awiwi_real next[5];
-    for (int k = 0; k < 5; k++) {
+    awiwi_real next[5], sum;
+    AWIWI_UNROLLED for (int k = 0; k < 5; k++) {
         const awiwi_real *row = state->filter[k];
         next[k] = row[0] * e[0] + row[1] * e[1] + row[2] * e[2] + row[3] * e[3] + row[4] * e[4];
     }
     next[0] += goal[0] + state->ahead[0] * goal[1] + state->ahead[1] * goal[2];
     next[1] += goal[1] + state->ahead[0] * goal[2];
     next[2] += goal[2];
-    if (!((next[0] + next[1] + next[2] + next[3] + next[4]) * 0 >= 0))
+    sum = next[0] + next[1] + next[2] + next[3] + next[4];
+    if (!awiwi_is_number(sum))
         return 0;
-    memcpy(motion, next, sizeof next);
+    AWIWI_UNROLLED for (int k = 0; k < 5; k++)
+        motion[k] = next[k];
     return 1;
 }
 
@@ -114,21 +125,22 @@ static unsigned refer(const awiwi_context *now, const awiwi_finger *finger)
 {
     const awiwi_hand_input *input = now->input;
     awiwi_hand_state *state = now->state;
+    const awiwi_real margin = now->gains->stop_margin;
     unsigned status = 0;
     for (int i = 0, j = finger->first_joint; i < finger->joints; i++, j++) {
+        const awiwi_real low = now->hand->joint_low[j] + margin, high = now->hand->joint_high[j] - margin;
         awiwi_real goal[3] = {input->q_des[j], input->qd_des[j], input->qdd_des[j]};
-        if (!(goal[0] * 0 + goal[1] * 0 + goal[2] * 0 >= 0)) {
+        if (!awiwi_is_number(goal[0] + goal[1] + goal[2])) {
             goal[0] = awiwi_given(goal[0], state->demand[j], &status);
             goal[1] = awiwi_given(goal[1], 0, &status);
             goal[2] = awiwi_given(goal[2], 0, &status);
         }
-        const awiwi_real within = awiwi_clamp(goal[0], now->hand->joint_low[j] + now->gains->stop_margin,
-                                              now->hand->joint_high[j] - now->gains->stop_margin);
-        if (within < goal[0] || within > goal[0]) {
+        if (goal[0] < low || goal[0] > high) {
             status |= AWIWI_REFERENCE;
+            goal[0] = awiwi_clamp(goal[0], low, high);
             goal[1] = goal[2] = 0;
         }
-        state->demand[j] = goal[0] = within;
+        state->demand[j] = goal[0];
         if (!filter(state, state->motion[j], goal))
             return status | AWIWI_NO_LAW;
     }
@@ -141,12 +153,12 @@ static unsigned follow(const awiwi_context *now, const finger_now *own)
     const awiwi_finger *finger = own->finger;
     awiwi_hand_state *state = now->state;
     const int n = finger->joints, first = finger->first_joint;
-    awiwi_real change[JOINTS];
+    awiwi_real change[JOINTS] = {0};
     const unsigned status = awiwi_torques(now, own->index, state->tau + first) | state->spread_status[own->index];
     for (int i = 0; i < n; i++)
         change[i] = state->planned_tau[first + i] - state->tau[first + i];
     for (int i = 0, k = finger->first_tendon; i < finger->tendons; i++, k++)
-        state->f_des[k] = awiwi_clamp(state->planned_f[k] + awiwi_dot(state->spread[k], change, n),
+        state->f_des[k] = awiwi_clamp(state->planned_f[k] + dot(state->spread[k], change),
                                       now->gains->force_low, now->gains->force_high);
     return status;
 }
@@ -242,7 +254,7 @@ static unsigned backstepping(const awiwi_context *now, const finger_now *own, aw
     const awiwi_finger *finger = own->finger;
     awiwi_hand_state *state = now->state;
     const int n = finger->joints, first = finger->first_joint, t = finger->first_tendon;
-    awiwi_real fd[TENDONS], bend[TENDONS], tau[JOINTS], taud[JOINTS], wanted[JOINTS], change[JOINTS];
+    awiwi_real fd[TENDONS], bend[TENDONS], tau[JOINTS], taud[JOINTS], wanted[JOINTS], change[JOINTS] = {0};
     const unsigned status = follow(now, own);
     for (int i = 0, k = t; i < finger->tendons; i++, k++) {
         fd[i] = state->stiffness[k] * state->xd[k];
@@ -258,7 +270,7 @@ static unsigned backstepping(const awiwi_context *now, const finger_now *own, aw
                     - backstep(now, j, gains->tunings[own->index], wanted[i], tau[i], taud[i]);
     }
     for (int i = 0, k = t; i < finger->tendons; i++, k++)
-        bend[i] += awiwi_dot(state->spread[k], change, n);
+        bend[i] += dot(state->spread[k], change);
     bend_forces(now, finger, bend, torque);
     return status;
 }
@@ -269,9 +281,9 @@ static unsigned hold_back(const awiwi_context *now, const awiwi_finger *finger, 
     const awiwi_real end = MOST_TRAVEL * now->hand->motor_travel;
     unsigned status = 0;
     for (int i = 0, k = finger->first_tendon; i < finger->tendons; i++, k++) {
-        const awiwi_real theta = now->state->theta[k], beyond = theta - awiwi_clamp(theta, -end, end);
-        if (beyond < 0 || beyond > 0) {
-            torque[i] -= now->gains->motor_kp * beyond;
+        const awiwi_real theta = now->state->theta[k];
+        if (awiwi_size(theta) > end) {
+            torque[i] -= now->gains->motor_kp * (theta < 0 ? theta + end : theta - end);
             now->state->tendon_status[k] |= AWIWI_TRAVEL;
             status = AWIWI_TRAVEL;
         }
@@ -279,11 +291,12 @@ static unsigned hold_back(const awiwi_context *now, const awiwi_finger *finger, 
     return status;
 }
 
-unsigned awiwi_finger_law(const awiwi_context *now, int index, awiwi_real *torque)
+unsigned awiwi_finger_law(const awiwi_context *now, int index, unsigned of_tendons, awiwi_real *torque)
 {
     finger_now own;
     own.finger = now->hand->finger + index;
     own.index = index;
+    own.seen = !awiwi_unseen(of_tendons);
     unsigned status = estimate(now, &own);
     status |= refer(now, own.finger);
     if ((now->state->turn + now->hand->fingers / 2) % now->hand->fingers == index && !(status & AWIWI_FAULTS))

@@ -66,7 +66,7 @@ unsigned awiwi_plan(const awiwi_context *now, int finger);
    coupling changes the forces per torque; returns its status. */
 unsigned awiwi_prepare(const awiwi_context *now, int finger);
 
-/* A finger's motor torques [tendons]; returns its status. */
-unsigned awiwi_finger_law(const awiwi_context *now, int finger, awiwi_real *torque);
+/* A finger's motor torques [tendons], where its tendons together have this status; returns the finger's status. */
+unsigned awiwi_finger_law(const awiwi_context *now, int finger, unsigned of_tendons, awiwi_real *torque);
 
 #endif

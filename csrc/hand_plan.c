@@ -42,11 +42,10 @@ static awiwi_real end_stop(const awiwi_context *now, int j, unsigned *status)
 {
     const awiwi_real low = now->hand->joint_low[j] + now->gains->stop_margin, q = now->state->q[j];
     const awiwi_real high = now->hand->joint_high[j] - now->gains->stop_margin;
-    const awiwi_real back = awiwi_clamp(q, low, high) - q;
-    if (low >= high || !(back < 0 || back > 0))
+    if ((q >= low && q <= high) || low >= high)
         return 0;
     *status |= AWIWI_END_STOP;
-    return now->gains->stop_stiffness * back;
+    return now->gains->stop_stiffness * (awiwi_clamp(q, low, high) - q);
 }
 
 /* The fingertip as a point between springs and dampers; nothing where its stiffness is 0. */
@@ -98,10 +97,11 @@ unsigned awiwi_torques(const awiwi_context *now, int index, awiwi_real *tau)
     if (now->state->law != AWIWI_LAW_MOTOR_IMPEDANCE)
         status |= impedance(now, index, tau);
     for (int i = 0, j = finger->first_joint; i < finger->joints; i++, j++) {
-        const awiwi_real within = awiwi_clamp(tau[i], -now->hand->joint_effort[j], now->hand->joint_effort[j]);
-        if (within < tau[i] || within > tau[i])
+        const awiwi_real most = now->hand->joint_effort[j];
+        if (awiwi_size(tau[i]) > most) {
             status |= AWIWI_TORQUE_LIMIT;
-        tau[i] = within;
+            tau[i] = tau[i] < 0 ? -most : most;
+        }
     }
     return status;
 }

@@ -144,7 +144,7 @@ static unsigned step_finger(const awiwi_context *now, int index, unsigned status
     awiwi_real torque[AWIWI_MOST_TENDONS];
     for (int i = 0; i < finger->tendons; i++)
         status |= state->tendon_status[finger->first_tendon + i];
-    status |= awiwi_finger_law(now, index, torque);
+    status |= awiwi_finger_law(now, index, status, torque);
     if (!(status & AWIWI_FAULTS) && !awiwi_all_finite(torque, finger->tendons))
         status |= AWIWI_NO_LAW;
     const int faulty = (status & AWIWI_FAULTS) != 0;
