@@ -17,7 +17,8 @@ typedef struct finger_now {
     int index;
     int seen;                     /* whether the lengths of all tendons are known */
     awiwi_real measured[TENDONS]; /* lengths as measured, */
-    awiwi_real h[TENDONS];        /* and with those of the last estimate where they are unknown */
+    awiwi_real filled[TENDONS];   /* with those of the last estimate where they are unknown, */
+    const awiwi_real *h;          /* and of both what the estimate takes */
     awiwi_real gained[JOINTS];    /* by how much the joints' rates have changed */
 } finger_now;
 
@@ -37,8 +38,9 @@ static void measure(const awiwi_context *now, finger_now *own)
 {
     const awiwi_finger *finger = own->finger;
     awiwi_lengths(now, finger, own->measured);
-    for (int i = 0, k = finger->first_tendon; i < finger->tendons; i++, k++)
-        own->h[i] = !own->seen && awiwi_unseen(now->state->tendon_status[k]) ? now->state->length[k] : own->measured[i];
+    own->h = own->seen ? own->measured : own->filled;
+    for (int i = 0, k = finger->first_tendon; i < finger->tendons && !own->seen; i++, k++)
+        own->filled[i] = awiwi_unseen(now->state->tendon_status[k]) ? now->state->length[k] : own->measured[i];
 }
 
 /* Lengths of the tendons at the estimated joints; which of the measured ones disagree. */
@@ -153,10 +155,10 @@ static unsigned follow(const awiwi_context *now, const finger_now *own)
     const awiwi_finger *finger = own->finger;
     awiwi_hand_state *state = now->state;
     const int n = finger->joints, first = finger->first_joint;
-    awiwi_real change[JOINTS] = {0};
+    awiwi_real change[JOINTS];
     const unsigned status = awiwi_torques(now, own->index, state->tau + first) | state->spread_status[own->index];
-    for (int i = 0; i < n; i++)
-        change[i] = state->planned_tau[first + i] - state->tau[first + i];
+    AWIWI_UNROLLED for (int i = 0; i < JOINTS; i++)
+        change[i] = i < n ? state->planned_tau[first + i] - state->tau[first + i] : 0;
     for (int i = 0, k = finger->first_tendon; i < finger->tendons; i++, k++)
         state->f_des[k] = awiwi_clamp(state->planned_f[k] + dot(state->spread[k], change),
                                       now->gains->force_low, now->gains->force_high);
@@ -190,29 +192,30 @@ static unsigned motor_impedance(const awiwi_context *now, const finger_now *own,
     return 0;
 }
 
-/* Torques of the motors that give the forces of a finger's tendons these second derivatives, for joints at rest
-   (eq. 11.16, mended). */
-static void bend_forces(const awiwi_context *now, const awiwi_finger *finger, const awiwi_real *bend,
-                        awiwi_real *torque)
+/* The second derivative of a tendon's force with which its error decays as e'' + kd e' + kp e = 0, where fd is its
+   rate. */
+static awiwi_real decay(const awiwi_context *now, int k, awiwi_real fd)
+{
+    const awiwi_hand_state *state = now->state;
+    return now->gains->force_kp * (state->f_des[k] - state->f[k]) - now->gains->force_kd * fd;
+}
+
+/* Torque of the motor that gives a tendon's force this second derivative, for joints at rest (eq. 11.16, mended). */
+static awiwi_real bend_force(const awiwi_context *now, int k, awiwi_real bend)
 {
     const awiwi_hand_state *state = now->state;
     const awiwi_real r = now->hand->motor_pulley, turned = now->hand->motor_inertia / r;
-    for (int i = 0, k = finger->first_tendon; i < finger->tendons; i++, k++)
-        torque[i] = state->friction[k] + r * state->f[k]
-                    + turned * (bend[i] / state->stiffness[k] - state->slope[k] * (state->xd[k] * state->xd[k]));
+    return state->friction[k] + r * state->f[k]
+           + turned * (bend / state->stiffness[k] - state->slope[k] * (state->xd[k] * state->xd[k]));
 }
 
-/* Every tendon's force is controlled: its error decays as e'' + kd e' + kp e = 0. */
+/* Every tendon's force is controlled. */
 static unsigned cascade(const awiwi_context *now, const finger_now *own, awiwi_real *torque)
 {
-    const awiwi_finger *finger = own->finger;
     const awiwi_hand_state *state = now->state;
-    awiwi_real bend[TENDONS];
     const unsigned status = follow(now, own);
-    for (int i = 0, k = finger->first_tendon; i < finger->tendons; i++, k++)
-        bend[i] = now->gains->force_kp * (state->f_des[k] - state->f[k])
-                  - now->gains->force_kd * (state->stiffness[k] * state->xd[k]);
-    bend_forces(now, finger, bend, torque);
+    for (int i = 0, k = own->finger->first_tendon; i < own->finger->tendons; i++, k++)
+        torque[i] = bend_force(now, k, decay(now, k, state->stiffness[k] * state->xd[k]));
     return status;
 }
 
@@ -254,24 +257,24 @@ static unsigned backstepping(const awiwi_context *now, const finger_now *own, aw
     const awiwi_finger *finger = own->finger;
     awiwi_hand_state *state = now->state;
     const int n = finger->joints, first = finger->first_joint, t = finger->first_tendon;
-    awiwi_real fd[TENDONS], bend[TENDONS], tau[JOINTS], taud[JOINTS], wanted[JOINTS], change[JOINTS] = {0};
+    awiwi_real fd[TENDONS], tau[JOINTS], taud[JOINTS], wanted[JOINTS], change[JOINTS];
     const unsigned status = follow(now, own);
-    for (int i = 0, k = t; i < finger->tendons; i++, k++) {
-        fd[i] = state->stiffness[k] * state->xd[k];
-        bend[i] = gains->force_kp * (state->f_des[k] - state->f[k]) - gains->force_kd * fd[i];
-    }
+    for (int i = 0; i < finger->tendons; i++)
+        fd[i] = state->stiffness[t + i] * state->xd[t + i];
     if (finger->joint_torque(state->q + first, state->f + t, tau) != AWIWI_OK
         || finger->joint_torque(state->q + first, fd, taud) != AWIWI_OK
         || finger->joint_torque(state->q + first, state->f_des + t, wanted) != AWIWI_OK)
         return status | AWIWI_NO_LAW;
-    for (int i = 0, j = first; i < n; i++, j++) {
+    for (int i = 0, j = first; i < JOINTS; i++, j++) {
+        change[i] = 0;
+        if (i >= n)
+            continue;
         observe(now, j, tau[i], own->gained[i]);
         change[i] = gains->force_kp * (wanted[i] - tau[i]) - gains->force_kd * taud[i]
                     - backstep(now, j, gains->tunings[own->index], wanted[i], tau[i], taud[i]);
     }
-    for (int i = 0, k = t; i < finger->tendons; i++, k++)
-        bend[i] += dot(state->spread[k], change);
-    bend_forces(now, finger, bend, torque);
+    for (int i = 0; i < finger->tendons; i++)
+        torque[i] = bend_force(now, t + i, decay(now, t + i, fd[i]) + dot(state->spread[t + i], change));
     return status;
 }
 

@@ -16,6 +16,11 @@ static unsigned take_reading(const awiwi_context *now, int i)
     const awiwi_real reading = now->input->reading[i], share = (reading - slack) / (taut - slack);
     if (!now->input->reading_valid[i] || !awiwi_is_number(reading))
         return AWIWI_READING_LOST;
+    if (share > LOOSE && share <= 1) { /* as nearly always */
+        now->state->reading[i] = reading;
+        now->state->slack_for[i] = 0;
+        return 0;
+    }
     if (share < -WITHIN || share > 1 + WITHIN)
         return AWIWI_READING_RANGE;
     now->state->reading[i] = share < 0 ? slack : share > 1 ? taut : reading;
