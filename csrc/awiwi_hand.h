@@ -64,7 +64,7 @@ typedef struct awiwi_hand {
     awiwi_of_one_to_two sensors; /* readings -> travel of the levers, forces */
     awiwi_of_one wrist_lengths; /* two wrist angles -> length of every tendon in the wrist; null without a wrist */
     awiwi_of_one spring_elongation;
-    awiwi_of_one tendon_stretch; /* null for tendons that do not stretch */
+    awiwi_of_one tendon_stretch; /* in proportion to the force; null for tendons that do not stretch */
     awiwi_of_one motor_friction; /* thd -> tau; null where none is known */
     int (*stiffness_correction)(const awiwi_real *k_eff, const awiwi_real *k_mech, awiwi_real *k_imp,
                                 awiwi_real *sensitivity);
@@ -167,6 +167,7 @@ enum {
 typedef struct awiwi_hand_state {
     awiwi_real offset[AWIWI_ALL_TENDONS]; /* of motor angles, to those of the straight finger */
     awiwi_real slack[AWIWI_ALL_TENDONS];  /* travel of the levers at their slack ends [m] */
+    awiwi_real compliance;                /* of the tendons themselves [m/N]; 0 where they do not stretch */
     awiwi_real wrist[AWIWI_ALL_TENDONS];  /* lengths in the wrist, and those at the start [m] */
     awiwi_real wrist_start[AWIWI_ALL_TENDONS];
     awiwi_real reading[AWIWI_ALL_TENDONS]; /* the last good ones */

@@ -5,7 +5,6 @@
 
 #include <string.h>
 
-static const awiwi_real MOST_TRAVEL = (awiwi_real)0.98; /* of the motors' travel is used */
 static const unsigned LIMITED = AWIWI_UNREACHABLE | AWIWI_TORQUE_LIMIT; /* torques do not follow the impedance then */
 static const awiwi_real NEARBY = (awiwi_real)0.05; /* angle for which the coupling of the last round holds [rad] */
 
@@ -155,13 +154,13 @@ static unsigned follow(const awiwi_context *now, const finger_now *own)
     const awiwi_finger *finger = own->finger;
     awiwi_hand_state *state = now->state;
     const int n = finger->joints, first = finger->first_joint;
+    const awiwi_real low = now->gains->force_low, high = now->gains->force_high;
     awiwi_real change[JOINTS];
     const unsigned status = awiwi_torques(now, own->index, state->tau + first) | state->spread_status[own->index];
     AWIWI_UNROLLED for (int i = 0; i < JOINTS; i++)
         change[i] = i < n ? state->planned_tau[first + i] - state->tau[first + i] : 0;
     for (int i = 0, k = finger->first_tendon; i < finger->tendons; i++, k++)
-        state->f_des[k] = awiwi_clamp(state->planned_f[k] + dot(state->spread[k], change),
-                                      now->gains->force_low, now->gains->force_high);
+        state->f_des[k] = awiwi_clamp(state->planned_f[k] + dot(state->spread[k], change), low, high);
     return status;
 }
 
@@ -175,7 +174,7 @@ static unsigned motor_impedance(const awiwi_context *now, const finger_now *own,
     const awiwi_finger *finger = own->finger;
     awiwi_hand_state *state = now->state;
     const int first = finger->first_joint;
-    const awiwi_real end = MOST_TRAVEL * hand->motor_travel, r = hand->motor_pulley, per_r = 1 / r;
+    const awiwi_real end = AWIWI_MOST_TRAVEL * hand->motor_travel, r = hand->motor_pulley, per_r = 1 / r;
     awiwi_real q[JOINTS], h[TENDONS];
     for (int i = 0; i < finger->joints; i++)
         q[i] = awiwi_clamp(state->motion[first + i][0] + state->yield[first + i], hand->joint_low[first + i],
@@ -204,9 +203,8 @@ static awiwi_real decay(const awiwi_context *now, int k, awiwi_real fd)
 static awiwi_real bend_force(const awiwi_context *now, int k, awiwi_real bend)
 {
     const awiwi_hand_state *state = now->state;
-    const awiwi_real r = now->hand->motor_pulley, turned = now->hand->motor_inertia / r;
-    return state->friction[k] + r * state->f[k]
-           + turned * (bend / state->stiffness[k] - state->slope[k] * (state->xd[k] * state->xd[k]));
+    return state->friction[k] + now->hand->motor_pulley * state->f[k]
+           + now->geared * (bend / state->stiffness[k] - state->slope[k] * (state->xd[k] * state->xd[k]));
 }
 
 /* Every tendon's force is controlled. */
@@ -279,19 +277,14 @@ static unsigned backstepping(const awiwi_context *now, const finger_now *own, aw
 }
 
 /* Motors are held back before the ends of their travel. */
-static unsigned hold_back(const awiwi_context *now, const awiwi_finger *finger, awiwi_real *torque)
+static void hold_back(const awiwi_context *now, const awiwi_finger *finger, awiwi_real *torque)
 {
-    const awiwi_real end = MOST_TRAVEL * now->hand->motor_travel;
-    unsigned status = 0;
+    const awiwi_real end = AWIWI_MOST_TRAVEL * now->hand->motor_travel;
     for (int i = 0, k = finger->first_tendon; i < finger->tendons; i++, k++) {
         const awiwi_real theta = now->state->theta[k];
-        if (awiwi_size(theta) > end) {
+        if (now->state->tendon_status[k] & AWIWI_TRAVEL)
             torque[i] -= now->gains->motor_kp * (theta < 0 ? theta + end : theta - end);
-            now->state->tendon_status[k] |= AWIWI_TRAVEL;
-            status = AWIWI_TRAVEL;
-        }
     }
-    return status;
 }
 
 unsigned awiwi_finger_law(const awiwi_context *now, int index, unsigned of_tendons, awiwi_real *torque)
@@ -315,5 +308,7 @@ unsigned awiwi_finger_law(const awiwi_context *now, int index, unsigned of_tendo
         status |= cascade(now, &own, torque);
     else
         status |= backstepping(now, &own, torque);
-    return status | hold_back(now, own.finger, torque);
+    if (of_tendons & AWIWI_TRAVEL)
+        hold_back(now, own.finger, torque);
+    return status;
 }

@@ -4,6 +4,8 @@
 
 #include "awiwi_hand.h"
 
+#define AWIWI_MOST_TRAVEL ((awiwi_real)0.98) /* of the motors' travel is used */
+
 /* What a tick works on. */
 typedef struct awiwi_context {
     const awiwi_hand *hand;
@@ -15,6 +17,7 @@ typedef struct awiwi_context {
     awiwi_real fade;       /* share of the torque after a change that a tick takes away */
     awiwi_real heating;    /* share of the load that becomes heat in a tick */
     awiwi_real per_lasting; /* 1/continuous_torque [1/(N m)] */
+    awiwi_real geared;     /* inertia of a motor over the radius of its pulley [kg m] */
 } awiwi_context;
 
 /* The context of a tick with these gains. */

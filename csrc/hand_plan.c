@@ -164,12 +164,10 @@ static unsigned elongate(const awiwi_context *now, const awiwi_finger *finger)
     if (finger->tendon_stiffness(state->planned_f + t, state->stiffness + t, state->slope + t, curvature) != AWIWI_OK)
         return AWIWI_NO_LAW;
     for (int k = t; k < t + finger->tendons; k++) {
-        awiwi_real x, stretch = 0;
+        awiwi_real x;
         if (!(state->stiffness[k] > 0) || now->hand->spring_elongation(state->planned_f + k, &x) != AWIWI_OK)
             return AWIWI_NO_LAW;
-        if (now->hand->tendon_stretch)
-            (void)now->hand->tendon_stretch(state->planned_f + k, &stretch);
-        state->planned_x[k] = x + stretch;
+        state->planned_x[k] = x + state->compliance * state->planned_f[k];
     }
     return 0;
 }

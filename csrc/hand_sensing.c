@@ -44,6 +44,7 @@ static void take_angles(const awiwi_context *now)
     const awiwi_hand_input *input = now->input;
     awiwi_hand_state *state = now->state;
     const awiwi_real pace = now->pace, per_period = now->per_period, most = BEYOND * now->hand->motor_travel;
+    const awiwi_real end = AWIWI_MOST_TRAVEL * now->hand->motor_travel;
     const awiwi_real fastest = state->ready ? FASTEST * now->hand->motor_velocity * now->gains->period : AWIWI_REAL_MAX;
     for (int i = 0; i < now->hand->tendons; i++) {
         const awiwi_real theta = input->theta[i], change = theta - state->theta[i], ticks = 1 + state->lost[i];
@@ -52,6 +53,8 @@ static void take_angles(const awiwi_context *now)
             *rate = awiwi_follow(*rate, change / ticks * per_period, pace);
             state->theta[i] = theta;
             state->lost[i] = 0;
+            if (awiwi_size(theta) > end)
+                state->tendon_status[i] |= AWIWI_TRAVEL;
         } else {
             *rate = awiwi_follow(*rate, 0, pace);
             state->lost[i] = ticks;
@@ -63,16 +66,13 @@ static void take_angles(const awiwi_context *now)
 static void elongate(const awiwi_context *now)
 {
     awiwi_hand_state *state = now->state;
-    const awiwi_of_one tendon_stretch = now->hand->tendon_stretch;
-    const awiwi_real pace = now->pace, per_period = now->per_period;
-    awiwi_real travel[AWIWI_ALL_TENDONS], stretch = 0;
+    const awiwi_real pace = now->pace, per_period = now->per_period, compliance = state->compliance;
+    awiwi_real travel[AWIWI_ALL_TENDONS];
     (void)now->hand->sensors(state->reading, travel, state->f);
     for (int i = 0; i < now->hand->tendons; i++) {
-        const awiwi_real last = state->x[i];
-        if (tendon_stretch)
-            (void)tendon_stretch(state->f + i, &stretch);
-        state->x[i] = state->slack[i] - travel[i] + stretch;
-        state->xd[i] = awiwi_follow(state->xd[i], (state->x[i] - last) * per_period, pace);
+        const awiwi_real x = state->slack[i] - travel[i] + compliance * state->f[i];
+        state->xd[i] = awiwi_follow(state->xd[i], (x - state->x[i]) * per_period, pace);
+        state->x[i] = x;
     }
 }
 
@@ -102,6 +102,7 @@ awiwi_context awiwi_context_of(const awiwi_hand *hand, const awiwi_hand_gains *g
         1 / (awiwi_real)gains->ramp_ticks,
         gains->period / gains->heating_time,
         1 / gains->continuous_torque,
+        hand->motor_inertia / hand->motor_pulley,
     };
     return now;
 }

@@ -217,11 +217,13 @@ static unsigned adopt(const awiwi_hand *hand, const awiwi_hand_gains *gains, con
 unsigned awiwi_hand_init(const awiwi_hand *hand, const awiwi_hand_gains *gains, const awiwi_hand_input *input,
                          const awiwi_real *q, awiwi_hand_state *state)
 {
+    static const awiwi_real one = 1;
     awiwi_real ignored[AWIWI_ALL_TENDONS];
     const awiwi_context now = awiwi_context_of(hand, gains, input, state);
     memset(state, 0, sizeof *state);
     if (!take_gains(hand, gains, state)
-        || hand->sensors(hand->sensor_slack, state->slack, ignored) != AWIWI_OK)
+        || hand->sensors(hand->sensor_slack, state->slack, ignored) != AWIWI_OK
+        || (hand->tendon_stretch && hand->tendon_stretch(&one, &state->compliance) != AWIWI_OK))
         return state->status = AWIWI_NO_LAW;
     (void)adopt(hand, gains, input, state);
     state->changed = 0;
