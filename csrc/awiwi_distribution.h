@@ -12,7 +12,7 @@ enum {
     AWIWI_MOST_INVERSIONS = 64,      /* rounds that invert k(f) + k(f + d); smooth springs take 4 */
     AWIWI_MOST_TORQUE_STEPS = 64,    /* of the search for forces that give the torque */
     AWIWI_MOST_STIFFNESS_STEPS = 96, /* and of that for the stiffness, from each of 4 starts */
-    AWIWI_MOST_UPDATE_STEPS = 6,     /* of an update, for the torque and what is left for the stiffness */
+    AWIWI_MOST_UPDATE_STEPS = 4,     /* of an update, for the torque and what is left for the stiffness */
     AWIWI_MOST_CURVES = 4 + AWIWI_MOST_INVERSIONS + 4 * (1 + AWIWI_MOST_STIFFNESS_STEPS)
 };
 

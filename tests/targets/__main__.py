@@ -73,7 +73,7 @@ def main() -> int:
                 if result.figures:
                     table[column], compilers[column] = result.figures, version(target.compiler)
         if chosen.hand is None:
-            faults += run_board(hand) + run_whole_hands(hand)
+            faults += run_board(hand) + run_whole_hands(hand, ["f64"] if chosen.quick else ["f64", "f32"])
             faults += judge(compilers, table, chosen.accept)
     except (AwiwiError, TargetError) as error:
         print(f"make firmware: {error}", file=sys.stderr)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 import subprocess
+from collections.abc import Sequence
+from pathlib import Path
 
 from awiwi_gen.build import compile_objects
 from awiwi_gen.cache import Cache
@@ -35,25 +37,34 @@ def run_board(hand: Hand) -> list[str]:
     return faults
 
 
-WHOLE = (("cortex-m7", "run-hand"), ("cortex-m7", "run-guide"))
+def run_whole_hands(hand: Hand, scalars: Sequence[str]) -> list[str]:
+    """Build and run hand.c and the guide's firmware, on this machine and on bare metal; returns what went wrong."""
+    return [
+        fault
+        for cpu, scalar in CASES
+        if scalar in scalars
+        for program, bare in (("run", "run-hand"), ("run-guide", "run-guide"))
+        for fault in _run_whole_hand(cached_tree(Job(hand, Options(scalar))), cpu, program, bare)
+    ]
 
 
-def run_whole_hands(hand: Hand) -> list[str]:
-    """Build and run hand.c and the guide's firmware, in double precision, on bare metal; returns what went wrong."""
-    generated, faults, expected = cached_tree(Job(hand)), [], {}
-    for cpu, goal in (("posix", "run"), ("posix", "run-guide"), *WHOLE):
-        build = ROOT / "build" / "targets" / "hand" / f"{cpu}-{generated.name}"
-        if cpu == "posix":
+def _run_whole_hand(generated: Path, cpu: str, program: str, bare: str) -> list[str]:
+    """One program on both; its digests of all torques have to be equal."""
+    digests, outputs = set(), []
+    for place in ("posix", cpu):
+        build = ROOT / "build" / "targets" / "hand" / f"{place}-{generated.name}"
+        settings = [bare, f"CPU={cpu}"]
+        if place == "posix":
             (build / "awiwi").mkdir(parents=True, exist_ok=True)
             compile_objects(generated, Cache(), build / "awiwi")
-        settings = [f"AWIWI_GENERATED={generated}", f"BUILD={build}"]
-        settings += ["-f", "posix.mk"] if cpu == "posix" else [f"CPU={cpu}"]
-        command = ["make", "--no-print-directory", "-s", "-j2", "-C", str(BOARD), goal, *settings]
+            settings = [program, "-f", "posix.mk"]
+        settings += [f"AWIWI_GENERATED={generated}", f"BUILD={build}"]
+        command = ["make", "--no-print-directory", "-s", "-j2", "-C", str(BOARD), *settings]
         done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=4 * PATIENCE)
         digest = re.search(r"^digest: \d+$", done.stdout, re.MULTILINE)
-        program = goal.replace("run-hand", "run")
-        if done.returncode or not digest or expected.setdefault(program, digest[0]) != digest[0]:
-            faults.append(f"{' '.join(command)} ended with {done.returncode}:\n{done.stdout}{done.stderr}")
-        else:
-            print(f"examples/firmware {cpu} {goal}: {digest[0]}", flush=True)
-    return faults
+        if done.returncode or not digest:
+            return [f"{' '.join(command)} ended with {done.returncode}:\n{done.stdout}{done.stderr}"]
+        print(f"examples/firmware {place} {settings[0]}: {digest[0]}", flush=True)
+        digests.add(digest[0])
+        outputs.append(done.stdout)
+    return [] if len(digests) == 1 else [f"{cpu} {bare} has other torques than this machine:\n" + "\n".join(outputs)]
