@@ -367,7 +367,7 @@ AWIWI_MUST_CHECK int awiwi_thumb_tendon_distribution(const double q_in[4], const
  *   out  f[8] in N
  * Returns an awiwi_status, see awiwi_solvers.h, never 0 if an input is not finite; the outputs are
  * always defined.
- * Cost: the solver's own work and calls, at most: 1 of thumb_coupling, 66 of thumb_tendon_stiffness, 8 of thumb_searched_tendon_stiffness, 1 of thumb_coupling_derivative.
+ * Cost: the solver's own work and calls, at most: 1 of thumb_coupling, 66 of thumb_tendon_stiffness, 6 of thumb_searched_tendon_stiffness, 1 of thumb_coupling_derivative.
  */
 AWIWI_MUST_CHECK int awiwi_thumb_tendon_distribution_update(const double q_in[4], const double tau_in[4], const double K_in[16], const double f_min_in[1], const double f_max_in[1], const double f_last_in[8], double f_out[8]);
 

@@ -14,7 +14,7 @@
  *   out  f[8] in N
  * Returns an awiwi_status, see awiwi_solvers.h, never 0 if an input is not finite; the outputs are
  * always defined.
- * Cost: the solver's own work and calls, at most: 1 of thumb_coupling, 66 of thumb_tendon_stiffness, 8 of thumb_searched_tendon_stiffness, 1 of thumb_coupling_derivative.
+ * Cost: the solver's own work and calls, at most: 1 of thumb_coupling, 66 of thumb_tendon_stiffness, 6 of thumb_searched_tendon_stiffness, 1 of thumb_coupling_derivative.
  */
 #include "numerics.h"
 #include "awiwi_distribution.h"

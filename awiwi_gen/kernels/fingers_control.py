@@ -18,7 +18,7 @@ from awiwi_gen.kernels.sizes import Size
 from awiwi_gen.structure import geared, groups, is_curved, senses
 from awiwi_gen.units import N, m, one
 
-UPDATES = 2 + 6  # evaluations of the curve by an update in the worst case, see csrc/awiwi_distribution.h
+UPDATES = 2 + 4  # evaluations of the curve by an update in the worst case, see csrc/awiwi_distribution.h
 SEARCHES, INVERSIONS = 2 + 4 * 97, 66  # evaluations of the curve in the worst case, see csrc/awiwi_distribution.h
 
 
