@@ -7,7 +7,7 @@
 # make firmware  every kernel on every target: equal bits, committed figures (ACCEPT=1 writes them, ALL=1: more, QUICK=1: what CI runs)
 # make analysis  gcc -fanalyzer, clang-tidy and cppcheck: no finding without a reason
 # make mutants  change one operator or constant of csrc/ at a time (COUNT=60: some of them); half an hour for all
-# make test-hands  published hands: imported, one finger of each proved, compared with MuJoCo and Pinocchio (ACCEPT=1: new table)
+# make test-hands  published hands: imported, one finger of each proved, compared with MuJoCo and Pinocchio (ACCEPT=1: new table, QUICK=1: what CI runs)
 # make wheel  the wheel with the compiled hand, and the sdist, in dist/: minutes the first time, for all batches
 # make clean  remove what make made (generated/ stays: it is checked in)
 
@@ -63,7 +63,7 @@ mutants: .venv/installed
 
 test-hands: .venv/installed .venv-hands/installed
 	@PYTHONPATH="$$(echo .venv-hands .venv-hands/cmeel.prefix/lib/python3*/site-packages | tr ' ' :)" \
-	  $(BIN)/python -m tests.hands $(if $(ONLY),--only "$(ONLY)") $(if $(ACCEPT),--accept)
+	  $(BIN)/python -m tests.hands $(if $(ONLY),--only "$(ONLY)") $(if $(QUICK),--quick) $(if $(ACCEPT),--accept)
 
 # MuJoCo and Pinocchio beside .venv, whose NumPy they use; Pinocchio lies in a prefix of its own.
 .venv-hands/installed: tests/hands/requirements.lock .venv/installed
