@@ -140,7 +140,9 @@ def judge(compilers: dict[str, str], table: dict[str, dict[str, Figures]], accep
     """Compare figures with the committed table, or write it; returns what grew under the table's own compilers."""
     known, old = read_table()
     if accept:
-        kept = {column: {} if "self_test" in table[column] else old.get(column, {}) for column in table}  # of a selection
+        kept = {
+            column: {} if "self_test" in table[column] else old.get(column, {}) for column in table
+        }  # of a selection
         write_table(known | compilers, old | {column: kept[column] | table[column] for column in table})
         return []
     faults = []
