@@ -37,7 +37,6 @@ static void measure(const awiwi_context *now, finger_now *own)
 {
     const awiwi_finger *finger = own->finger;
     awiwi_lengths(now, finger, own->measured);
-    own->h = own->seen ? own->measured : own->filled;
     for (int i = 0, k = finger->first_tendon; i < finger->tendons && !own->seen; i++, k++)
         own->filled[i] = awiwi_unseen(now->state->tendon_status[k]) ? now->state->length[k] : own->measured[i];
 }
@@ -293,6 +292,7 @@ unsigned awiwi_finger_law(const awiwi_context *now, int index, unsigned of_tendo
     own.finger = now->hand->finger + index;
     own.index = index;
     own.seen = !awiwi_unseen(of_tendons);
+    own.h = own.seen ? own.measured : own.filled;
     unsigned status = estimate(now, &own);
     status |= refer(now, own.finger);
     if ((now->state->turn + now->hand->fingers / 2) % now->hand->fingers == index && !(status & AWIWI_FAULTS))
