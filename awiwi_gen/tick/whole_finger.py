@@ -38,19 +38,22 @@ TURNING, FREQUENCY = 10.0, 2.0  # rad/s^2, Hz: of the palm about an axis that is
 AXIS = np.full(3, 1 / np.sqrt(3))
 SUBSTEPS = 10  # of a period in contact
 ROUNDS = 30  # of Newton's method
+CONTRACTIONS, RAISED, SLOWLY = 2, 2.0, 2000  # how often and by what the pretension rises, ticks until the hand rests
 CLOSE = 1e-3  # m: from here on the wall is looked at in every substep
 
 
 @dataclass(frozen=True)
 class Plant:
     """A wrong hand: factors on the springs (the tick has their calibration), the motors' friction, the links' damping, and
-    the inertia of all links, as of grasped objects, whose weight would be a load.
+    the inertia of all links, as of grasped objects, whose weight would be a load. Springs of neighbours are ``apart`` by a
+    share: then the tick is told, as torques of the joints, what a co-contraction tells of it.
     """
 
     springs: float = 1.0
     friction: float = 1.0
     damping: float = 1.0
     links: float = 1.0
+    apart: float = 0.0
 
 
 PLANTS: Mapping[str, Plant] = {
@@ -64,6 +67,7 @@ PLANTS: Mapping[str, Plant] = {
     "links x0.7": Plant(links=0.7),
     "links x3": Plant(links=3.0),
     "links x3, friction x0.7, damping x0.5": Plant(1.0, 0.7, 0.5, 3.0),
+    "springs 10 % apart": Plant(apart=0.1),
     "springs x0.7": Plant(0.7),
     "springs x1.3": Plant(1.3),
 }
@@ -76,7 +80,7 @@ class Setting:
     factors on K_3 and K_4 and on the suggested stiffness and damping.
     """
 
-    pretension: float = 0.2
+    pretension: float = 0.22
     delay: float = 0.03
     rates: float = 600.0
     load: float = 350.0
@@ -126,6 +130,8 @@ class Run:
         while setting.pretension > LESS and self._wound_up():
             setting = replace(setting, pretension=setting.pretension - LESS)
             self._rest(setting)
+        for _ in range(CONTRACTIONS if plant.apart else 0):
+            self._contract()
         self._begin = len(self._q)
 
     def _rest(self, setting: Setting) -> None:
@@ -136,7 +142,8 @@ class Run:
             world = loop.hand.world
             world.friction[:] *= self.plant.friction
             world.damping[:] *= self.plant.damping
-            world.spring[:] = self.plant.springs
+            unequal = self.plant.apart / 2 * (-1.0) ** np.arange(loop.step.tendons)
+            world.spring[: loop.step.tendons] = self.plant.springs * (1 + unequal)
             world.heavier = self.plant.links - 1
 
         self.loop = ClosedLoop(self.library, seed=self.seed, prepare=prepare)
@@ -151,6 +158,20 @@ class Run:
         self._f: list[Array] = []
         self._contact: list[Array] = []
         while len(self._q) < BEFORE or (len(self._q) < LONGEST and self._moved() > MOVED):
+            self.tick()
+
+    def _contract(self) -> None:
+        """Tell the tick what springs that differ do to joints at rest: this grows with the forces, as no load does."""
+        gains, given, state = self.loop.step.gains, self.loop.step.input, self.loop.step.state
+        low, seen = float(gains.force_low[0]), []
+        for factor in (RAISED, 1.0):
+            seen.append((np.mean(self._q[-LATELY:], axis=0), float(np.mean(state.f[: self.loop.step.tendons]))))
+            gains.force_low = low * factor
+            for _ in range(SLOWLY):
+                self.tick()
+        (rest, least), (moved, most) = seen
+        given.torque = given.stiffness * (rest - moved) / (most / least - 1)
+        for _ in range(SLOWLY):
             self.tick()
 
     def _wound_up(self) -> bool:
