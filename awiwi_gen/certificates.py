@@ -17,7 +17,7 @@ from awiwi_gen.cache import Cache, key
 if TYPE_CHECKING:
     from awiwi_gen.hand import Hand
 
-VERSION = 1  # raise it where the laws, the clock test or the family of plants change
+VERSION = 2  # raise it where the laws, the clock test, the simulator or the family of plants change
 SUFFIX = ".certificate.json"
 Row = dict[str, Any]
 

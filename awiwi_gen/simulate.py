@@ -34,6 +34,7 @@ Wire = str | tuple[str, ...]
 Element = Union["Block", "Sum"]
 
 PERIOD = 1 / 3000  # s, of the hand's clock
+TOLERANCE = 2e-3  # rad/s: of a step's estimated error; a fifteenth of what one step of an encoder is in a period
 REACH = 0.25  # largest step of integration, in time constants of the plant's fastest mode
 
 
@@ -121,22 +122,20 @@ class Trace:
 
 
 def simulate(
-    library: Library,
-    loop: Loop,
-    scenarios: Sequence[Scenario],
-    watch: Iterable[str],
-    every: int = 1,
+    library: Library, loop: Loop, scenarios: Sequence[Scenario], watch: Iterable[str], every: int = 1,
     substeps: int | None = None,
-) -> list[Trace]:
+) -> list[Trace]:  # fmt: skip
     """Run every scenario, on all cores. Every ``every``-th tick records the signals to ``watch``, as at its beginning.
 
-    Without ``substeps`` the plant's fastest mode at the start decides how many steps of integration a period has. Raises
-    InputError where signals and kernels do not fit.
+    Without ``substeps`` the plant's fastest mode at the start decides how many steps of integration a period has, and fewer
+    are taken where these keep TOLERANCE. Raises InputError where signals and kernels do not fit.
     """
     watched = list(watch)
 
     def run(scenario: Scenario) -> Trace:
-        return Machine(library, loop, scenario, substeps).run(scenario, watched, every)
+        machine = Machine(library, loop, scenario, substeps)
+        machine.c.tolerance = 0 if substeps else TOLERANCE
+        return machine.run(scenario, watched, every)
 
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         return list(pool.map(run, scenarios))
@@ -258,7 +257,7 @@ class Machine:
         tables = [ffi.new("awiwi_sensor[]", sensors), ffi.new("awiwi_actuator[]", actuators)]
         self._alive += [*blocks, *tables]
         counts = (self.states, len(loop.plant), len(loop.law), len(sensors), len(actuators))
-        return ffi.new("awiwi_loop *", (*counts, *blocks, *tables, loop.period, 1, seed))
+        return ffi.new("awiwi_loop *", (*counts, *blocks, *tables, loop.period, 1, 0.0, seed))
 
     def _row(self, element: Element) -> tuple[Any, ...]:
         """A block or a sum as C has it: its function, and the indices of what it reads and writes."""

@@ -53,9 +53,10 @@ typedef struct awiwi_loop {
     const awiwi_block *law;
     const awiwi_sensor *sensor;
     const awiwi_actuator *actuator;
-    awiwi_real period; /* s */
-    int substeps;      /* steps of integration in a period */
-    unsigned seed;     /* of the noise */
+    awiwi_real period;    /* s */
+    int substeps;         /* steps of integration in a period */
+    awiwi_real tolerance; /* of every state in a step; with one, a period has fewer steps where these keep it */
+    unsigned seed;        /* of the noise */
 } awiwi_loop;
 
 /* Inputs and record of a run: in tick i the signals `input` take the values of row i of values[ticks][inputs], and in
@@ -75,7 +76,7 @@ typedef struct awiwi_run {
 int awiwi_rates(const awiwi_loop *loop, awiwi_real *signals);
 
 /* One period: read sensors, apply delayed commands, run the law, apply the other commands, and integrate by Runge and
-   Kutta's method. Where a block of the law fails, its outputs stay as they were and all commands are 0. Returns
+   Kutta's method of fourth order. Where a block of the law fails, its outputs stay as they were and all commands are 0. Returns
    AWIWI_OK             success;
    AWIWI_NOT_CONVERGED  a block of the law failed;
    AWIWI_OUT_OF_DOMAIN  a block of the plant failed;

@@ -85,14 +85,16 @@ static int move_finger(const awiwi_hand_plant *plant, int index, awiwi_real h, a
 {
     const awiwi_finger *finger = plant->hand->finger + index;
     const int first = finger->first_joint;
+    const awiwi_real share = 1 / (1 + world->heavier); /* of torque and weight, for links with their own inertia */
     awiwi_real tau[JOINTS], qdd[JOINTS], g[3];
     for (int i = 0; i < 3; i++) {
         const awiwi_real axis[3] = {finger->base[i], finger->base[3 + i], finger->base[6 + i]};
-        g[i] = awiwi_dot(axis, world->gravity, 3);
+        g[i] = share * awiwi_dot(axis, world->gravity, 3);
     }
     int status = finger->joint_torque(world->q + first, world->f + finger->first_tendon, tau);
     for (int i = 0, j = first; i < finger->joints; i++, j++)
-        tau[i] += world->load[j] + hard_end(plant->hand, j, world->q[j]) - world->damping[j] * world->qd[j];
+        tau[i] = share * (tau[i] + (world->load[j] + hard_end(plant->hand, j, world->q[j])
+                                    - world->damping[j] * world->qd[j]));
     status |= plant->forward_dynamics[index](world->q + first, world->qd + first, tau, g, qdd);
     for (int i = 0, j = first; i < finger->joints; i++, j++) {
         world->qd[j] += h * qdd[i];

@@ -10,77 +10,114 @@ static int finite(awiwi_real x)
     return x >= -AWIWI_REAL_MAX && x <= AWIWI_REAL_MAX;
 }
 
+/* Loops over a block's arguments take four at a time: they are a third of what a tick executes. */
 static int all_finite(const awiwi_real *x, int n)
 {
     awiwi_real sum = 0; /* of zeros; infinity and NaN times zero are NaN */
-    for (int i = 0; i < n; i++)
+    int i = 0;
+    for (; i + 4 <= n; i += 4)
+        sum += (x[i] + x[i + 1] + (x[i + 2] + x[i + 3])) * 0;
+    for (; i < n; i++)
         sum += x[i] * 0;
     return sum >= 0;
 }
 
-/* Output i is the sum of in[i] * in[n + i], in[2 n + i] * in[3 n + i] and so on, for n outputs. */
-static int sum_of_products(const awiwi_block *block, const awiwi_real *in, awiwi_real *out)
+static void take(const awiwi_real *signals, const int *from, int n, awiwi_real *in)
+{
+    int i = 0;
+    for (; i + 4 <= n; i += 4) {
+        in[i] = signals[from[i]];
+        in[i + 1] = signals[from[i + 1]];
+        in[i + 2] = signals[from[i + 2]];
+        in[i + 3] = signals[from[i + 3]];
+    }
+    for (; i < n; i++)
+        in[i] = signals[from[i]];
+}
+
+static void put(const awiwi_real *out, const int *to, int n, awiwi_real *signals)
+{
+    int i = 0;
+    for (; i + 4 <= n; i += 4) {
+        signals[to[i]] = out[i];
+        signals[to[i + 1]] = out[i + 1];
+        signals[to[i + 2]] = out[i + 2];
+        signals[to[i + 3]] = out[i + 3];
+    }
+    for (; i < n; i++)
+        signals[to[i]] = out[i];
+}
+
+/* Without a kernel a block adds products of its inputs: see awiwi_block. */
+static void add_products(const awiwi_block *block, const awiwi_real *signals, awiwi_real *out)
 {
     const int n = block->outputs;
     for (int i = 0; i < n; i++) {
         out[i] = 0;
-        for (int j = i; j + n < block->inputs; j += 2 * n)
-            out[i] += in[j] * in[j + n];
+        for (const int *from = block->from + i; from + n < block->from + block->inputs; from += 2 * n)
+            out[i] += signals[from[0]] * signals[from[n]];
     }
-    return AWIWI_OK;
 }
 
 /* Run a block on its signals; `out` receives its outputs. */
 static int call(const awiwi_block *block, const awiwi_real *signals, awiwi_real *out)
 {
     awiwi_real in[AWIWI_MOST_ARGUMENTS];
-    for (int i = 0; i < block->inputs; i++)
-        in[i] = signals[block->from[i]];
-    return block->kernel ? block->kernel(in, out) : sum_of_products(block, in, out);
+    if (!block->kernel) {
+        add_products(block, signals, out);
+        return AWIWI_OK;
+    }
+    take(signals, block->from, block->inputs, in);
+    return block->kernel(in, out);
 }
 
-static void put(const awiwi_block *block, const awiwi_real *out, awiwi_real *signals)
-{
-    for (int i = 0; i < block->outputs; i++)
-        signals[block->to[i]] = out[i];
-}
-
-int awiwi_rates(const awiwi_loop *loop, awiwi_real *signals)
+static int rates(const awiwi_loop *loop, awiwi_real *signals)
 {
     awiwi_real out[AWIWI_MOST_ARGUMENTS];
     for (int i = 0; i < loop->plant_blocks; i++) {
-        const int status = call(loop->plant + i, signals, out);
-        if (status)
+        const awiwi_block *block = loop->plant + i;
+        if (call(block, signals, out))
             return AWIWI_OUT_OF_DOMAIN;
-        put(loop->plant + i, out, signals);
+        put(out, block->to, block->outputs, signals);
     }
     return AWIWI_OK;
 }
 
-/* One step of Runge and Kutta's method of fourth order. */
-static int advance(const awiwi_loop *loop, awiwi_real h, awiwi_real *signals)
+int awiwi_rates(const awiwi_loop *loop, awiwi_real *signals)
 {
-    static const int reach[4] = {0, 1, 1, 2}, share[4] = {1, 2, 2, 1}; /* in halves, in sixths */
+    return rates(loop, signals);
+}
+
+/* One step of Runge and Kutta's method of fourth order, from states and rates at its start to those at its end. `error`
+ * is how far, in any state, it is from the method of third order that has the last rates for those of the fourth stage. */
+static int advance(const awiwi_loop *loop, awiwi_real h, const awiwi_real *start, awiwi_real *signals, awiwi_real *error)
+{
+    static const awiwi_real reach[3] = {(awiwi_real)0.5, (awiwi_real)0.5, 1}, share[3] = {2, 2, 1};
     const int n = loop->states;
-    awiwi_real start[AWIWI_MOST_RATES], sum[AWIWI_MOST_RATES];
+    awiwi_real sum[AWIWI_MOST_RATES], fourth[AWIWI_MOST_RATES], most = 0;
     awiwi_real *x = signals;
     const awiwi_real *rate = signals + n;
-    for (int i = 0; i < n; i++) {
-        start[i] = x[i];
-        sum[i] = 0;
-    }
-    for (int stage = 0; stage < 4; stage++) {
-        const awiwi_real ahead = h * (awiwi_real)reach[stage] / 2, weight = (awiwi_real)share[stage];
-        for (int i = 0; stage && i < n; i++)
+    memcpy(sum, start + n, sizeof(awiwi_real) * (size_t)n);
+    for (int stage = 0; stage < 3; stage++) {
+        const awiwi_real ahead = h * reach[stage], weight = share[stage];
+        for (int i = 0; i < n; i++)
             x[i] = start[i] + ahead * rate[i];
-        const int status = awiwi_rates(loop, signals);
-        if (status)
-            return status;
+        if (rates(loop, signals))
+            return AWIWI_OUT_OF_DOMAIN;
         for (int i = 0; i < n; i++)
             sum[i] += weight * rate[i];
     }
-    for (int i = 0; i < n; i++)
+    for (int i = 0; i < n; i++) {
+        fourth[i] = rate[i];
         x[i] = start[i] + h / 6 * sum[i];
+    }
+    if (rates(loop, signals))
+        return AWIWI_OUT_OF_DOMAIN;
+    for (int i = 0; i < n; i++) {
+        const awiwi_real apart = rate[i] - fourth[i], size = apart < 0 ? -apart : apart;
+        most = size > most ? size : most;
+    }
+    *error = h / 6 * most;
     return AWIWI_OK;
 }
 
@@ -113,7 +150,7 @@ static int run_law(const awiwi_loop *loop, awiwi_real *signals)
         const awiwi_block *block = loop->law + i;
         const int status = call(block, signals, out);
         if ((status == AWIWI_OK || status == AWIWI_NOT_CONVERGED) && all_finite(out, block->outputs))
-            put(block, out, signals);
+            put(out, block->to, block->outputs, signals);
         else
             refused = 1;
     }
@@ -122,10 +159,10 @@ static int run_law(const awiwi_loop *loop, awiwi_real *signals)
     return refused;
 }
 
-/* Everything in a tick but the motion of the plant. */
-static int control(const awiwi_loop *loop, unsigned tick, awiwi_real *signals)
+/* Everything in a tick but the motion of the plant. Sensors see its present outputs, computed anew if they are old. */
+static int control(const awiwi_loop *loop, unsigned tick, int old, awiwi_real *signals)
 {
-    if (awiwi_rates(loop, signals)) /* so that sensors see the present state */
+    if (old && rates(loop, signals))
         return AWIWI_OUT_OF_DOMAIN;
     sense(loop, tick, signals);
     act(loop, 1, signals);
@@ -134,88 +171,58 @@ static int control(const awiwi_loop *loop, unsigned tick, awiwi_real *signals)
     return refused ? AWIWI_NOT_CONVERGED : AWIWI_OK;
 }
 
-/* Whether a plant is one kernel whose first outputs are the rates, in their order. */
-static int is_alone(const awiwi_loop *loop)
+/* Move the plant for a period: in equal steps, or with a tolerance in as few as keep it, by halves. */
+static int integrate(const awiwi_loop *loop, awiwi_real *signals)
 {
-    int alone = loop->plant_blocks == 1 && loop->plant->kernel && loop->plant->outputs >= loop->states;
-    for (int i = 0; alone && i < loop->states; i++)
-        alone = loop->plant->to[i] == loop->states + i;
-    for (int i = 0; alone && i < loop->plant->inputs; i++) /* none reads what it writes */
-        for (int k = 0; alone && k < loop->plant->outputs; k++)
-            alone = loop->plant->from[i] != loop->plant->to[k];
-    return alone;
-}
-
-/* The same steps with the same bits for such a plant: of its inputs only the states change in a period. */
-static int integrate_alone(const awiwi_loop *loop, awiwi_real h, awiwi_real *signals)
-{
-    static const int reach[4] = {0, 1, 1, 2}, share[4] = {1, 2, 2, 1}; /* in halves, in sixths */
-    const awiwi_block *plant = loop->plant;
-    const int n = loop->states;
-    awiwi_real in[AWIWI_MOST_ARGUMENTS], out[AWIWI_MOST_ARGUMENTS], sum[AWIWI_MOST_RATES];
-    int port[AWIWI_MOST_ARGUMENTS], state[AWIWI_MOST_ARGUMENTS], moving = 0;
-    for (int i = 0; i < plant->inputs; i++) {
-        in[i] = signals[plant->from[i]];
-        if (plant->from[i] < n) {
-            port[moving] = i;
-            state[moving++] = plant->from[i];
-        }
-    }
-    for (int step = 0; step < loop->substeps; step++) {
-        for (int i = 0; i < n; i++)
-            sum[i] = 0;
-        for (int stage = 0; stage < 4; stage++) {
-            const awiwi_real ahead = h * (awiwi_real)reach[stage] / 2, weight = (awiwi_real)share[stage];
-            for (int i = 0; i < moving; i++)
-                in[port[i]] = stage ? signals[state[i]] + ahead * out[state[i]] : signals[state[i]];
-            if (plant->kernel(in, out))
-                return AWIWI_OUT_OF_DOMAIN;
-            for (int i = 0; i < n; i++)
-                sum[i] += weight * out[i];
-        }
-        for (int i = 0; i < n; i++)
-            signals[i] += h / 6 * sum[i];
-    }
-    put(plant, out, signals);
-    return AWIWI_OK;
-}
-
-static int integrate(const awiwi_loop *loop, int alone, awiwi_real *signals)
-{
-    const awiwi_real h = loop->period / (awiwi_real)loop->substeps;
-    if (alone && integrate_alone(loop, h, signals))
+    const size_t size = sizeof(awiwi_real) * 2 * (size_t)loop->states;
+    awiwi_real before[2 * AWIWI_MOST_RATES], error = 0;
+    int parts = loop->tolerance > 0 ? 1 : loop->substeps;
+    if (rates(loop, signals))
         return AWIWI_OUT_OF_DOMAIN;
-    for (int i = 0; !alone && i < loop->substeps; i++)
-        if (advance(loop, h, signals))
-            return AWIWI_OUT_OF_DOMAIN;
+    for (int done = 0; done < parts;) {
+        memcpy(before, signals, size);
+        const int status = advance(loop, loop->period / (awiwi_real)parts, before, signals, &error);
+        if (parts < loop->substeps && (status || error > loop->tolerance)) {
+            memcpy(signals, before, size);
+            parts *= 2;
+            done *= 2;
+        } else if (status) {
+            return status;
+        } else {
+            done++;
+        }
+    }
     return all_finite(signals, loop->states) ? AWIWI_OK : AWIWI_NOT_FINITE;
 }
 
 int awiwi_tick(const awiwi_loop *loop, unsigned tick, awiwi_real *signals)
 {
-    const int controlled = control(loop, tick, signals);
+    const int controlled = control(loop, tick, 1, signals);
     if (controlled == AWIWI_OUT_OF_DOMAIN)
         return controlled;
-    const int moved = integrate(loop, is_alone(loop), signals);
+    const int moved = integrate(loop, signals);
     return moved ? moved : controlled;
 }
 
 int awiwi_simulate(const awiwi_loop *loop, const awiwi_run *run, awiwi_real *signals, int *refused, int *status)
 {
-    const int alone = is_alone(loop);
     awiwi_real *row = run->record;
     *refused = 0;
     *status = all_finite(signals, loop->states) ? AWIWI_OK : AWIWI_NOT_FINITE;
     for (int tick = 0; tick < run->ticks; tick++) {
         if (*status == AWIWI_OUT_OF_DOMAIN || *status == AWIWI_NOT_FINITE)
             return tick;
-        for (int i = 0; i < run->inputs; i++)
-            signals[run->input[i]] = run->values[tick * run->inputs + i];
-        const int controlled = control(loop, (unsigned)tick, signals);
+        int old = !tick;
+        for (int i = 0; i < run->inputs; i++) {
+            const awiwi_real value = run->values[tick * run->inputs + i];
+            old |= !(signals[run->input[i]] == value);
+            signals[run->input[i]] = value;
+        }
+        const int controlled = control(loop, (unsigned)tick, old, signals);
         for (int i = 0; tick % run->every == 0 && i < run->watched; i++)
             *row++ = signals[run->watch[i]];
         *refused += controlled == AWIWI_NOT_CONVERGED;
-        const int moved = controlled == AWIWI_OUT_OF_DOMAIN ? controlled : integrate(loop, alone, signals);
+        const int moved = controlled == AWIWI_OUT_OF_DOMAIN ? controlled : integrate(loop, signals);
         *status = moved ? moved : controlled;
     }
     return run->ticks;

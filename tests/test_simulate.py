@@ -83,6 +83,41 @@ def test_half_the_step_leaves_a_sixteenth_of_the_error(lib):
     assert 10 < coarse / fine < 25
 
 
+def test_a_period_is_one_step_where_that_keeps_the_tolerance_and_all_steps_where_none_does(lib):
+    loop, scenario = joint(), Scenario(JOINT | {"u": 0.0}, 60)
+
+    def end(steps, tolerance=0.0):
+        machine = Machine(lib, loop, scenario, steps)
+        machine.c.tolerance = tolerance
+        return machine.run(scenario, ["x"])["x"][-1]
+
+    assert np.array_equal(end(4, tolerance=1e9), end(1))
+    assert np.array_equal(end(4, tolerance=1e-30), end(4))
+    assert not np.array_equal(end(1), end(4))
+
+
+@pytest.mark.parametrize(
+    ("finger", "name", "plant"), [("index", "pip", {}), ("index", "pip", {"friction": 1.3}), ("ring", "abduction", {})]
+)
+def test_steps_that_keep_the_tolerance_move_the_link_as_much_finer_ones_do(lib, hand, finger, name, plant):
+    """In closed loop, with sensors that neither count nor have noise: to a tenth of the step of an encoder."""
+    joints, laws = (pytest.importorskip(f"awiwi_gen.loops.{name}") for name in ("hand_joint", "laws"))
+    known, law = joints.joint_of(lib, hand, finger, name), laws.LAWS["backstepping_adaptive"]
+    true, believed = known.perturbed(**plant), known.believed()
+    gains = law.gains_from(known, joints.gains_of(lib, hand, finger, name))
+    values = joints.values_of(true, believed, 20.0) | law.values(lib, believed, 20.0, gains)
+    goal, load = np.zeros((900, 5)), np.zeros(900)
+    goal[150:, 0], load[500:] = 0.2, 0.5 * known.arm
+    given = {key: value for key, value in values.items() if key not in ("goal", "load")}
+    scenario = Scenario(given, 900, {"goal": goal, "load": load})
+    loop = joints.loop_around(true, list(law.blocks)).exact()
+
+    found, fine = (simulate(lib, loop, [scenario], ["x"], substeps=n)[0]["x"] for n in (None, 64))
+
+    assert np.abs(found - fine)[:, 0].max() < known.encoder / 10
+    assert np.abs(found - fine)[:, 2::2].max() < known.encoder
+
+
 def test_sums_of_products_make_a_plant_of_signals(lib):
     """A pendulum without gravity on a spring: the rate of the angle is the speed, that of the speed -k / m times x."""
     loop = Loop([Sum("xd[0]", (1.0, "x[1]")), Sum("xd[1]", ("k", "x[0]"), (-0.5, ("x[1]",)))], [], {"x": "xd"})

@@ -10,34 +10,42 @@ pytest.importorskip("scipy")
 
 from awiwi_gen.compare import finger as command
 from awiwi_gen.tick.moving_base import Points
-from awiwi_gen.tick.whole_finger import PLANTS, STEP
+from awiwi_gen.tick.status import LAWS
+from awiwi_gen.tick.whole_finger import BEFORE, PLANTS, SETTING, STEP, Plant, Run
 
-WORST = "friction x0.7, damping x0.5"
+WORST, HEAVY = "friction x0.7, damping x0.5", "links x3"
 
 
 @pytest.fixture(scope="module")
 def shown(lib):
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(command, "PLANTS", {WORST: PLANTS[WORST]})
+        patch.setattr(command, "PLANTS", {name: PLANTS[name] for name in (WORST, HEAVY)})
         return command.whole_fingers(None, "", "all")
 
 
-def test_every_finger_reaches_the_goal_with_less_friction_and_damping(shown, hand):
-    found = {name: each[WORST] for name, each in shown.data["fingers"].items()}
+def test_every_finger_reaches_the_goal_with_less_friction_and_damping_and_with_heavy_links(shown, hand):
+    assert list(shown.data["fingers"]) == list(hand.fingers)
+    for each in shown.data["fingers"].values():
+        assert all(score["goal"] and score["slack"] == 0 and not score["faults"] for score in each.values())
+        assert all(25 < score["force"] < shown.data["force_limit"] for score in each.values())
+        assert 0 < each[WORST]["turning"] < 0.02 * STEP < 3 * each[HEAVY]["turning"]
+        assert each[HEAVY]["settling"] > each[WORST]["settling"]
+        assert max(score["pressing"] for score in each.values()) < 0.02
 
-    assert list(found) == list(hand.fingers)
-    assert all(each["goal"] and each["slack"] == 0 and not each["faults"] for each in found.values())
-    assert all(30 < each["force"] < shown.data["force_limit"] for each in found.values())
-    assert all(0 < each["turning"] < 0.02 * STEP for each in found.values())
-    assert max(each["pressing"] for each in found.values()) < 0.02
 
-
-def test_the_table_has_a_row_for_each_finger_and_the_worst_of_all(shown, hand):
+def test_the_table_has_a_row_for_each_finger_and_plant_and_the_worst_of_all(shown, hand):
     rows = shown.tables[0].rows
 
-    assert [row[0] for row in rows] == [*hand.fingers, "worst"]
+    assert [row[0] for row in rows] == [*(name for name in hand.fingers for _ in range(2)), "worst"]
     assert all(row[-1] == "reached" for row in rows[:-1])
     assert len(rows[0]) == len(shown.tables[0].columns)
+
+
+def test_co_contractions_tell_what_springs_that_differ_do_to_joints(lib, hand):
+    run = Run(lib, hand, LAWS.index("backstepping"), SETTING, Plant(apart=0.1))
+
+    assert np.abs(run._q[BEFORE] - run.goal).max() > 0.2
+    assert np.abs(run.loop.hand.world.q - run.goal).max() < 0.02
 
 
 @pytest.mark.parametrize("finger", ["thumb", "index", "middle", "ring"])

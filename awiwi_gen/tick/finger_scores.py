@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, fields
+from math import sqrt
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -59,16 +60,21 @@ class FingerScore:
     force: float
     faults: bool
 
-    def within(self, goal: Goal, most: float) -> bool:
-        """Whether a goal for one joint is reached, by the factors, with no slack tendon and none above `most` [N]."""
+    def within(self, goal: Goal, most: float, links: float = 1.0) -> bool:
+        """Whether a goal for one joint is reached, by the factors, with no slack tendon and none above `most` [N].
+
+        On springs of the wanted stiffness, links with ``links`` times the inertia are slower by the root of it, and a palm
+        that turns deflects them so many times as far.
+        """
         times = (self.settling, self.touching, self.release)
+        heavier = max(links, 1.0)
         return (
             not self.faults
-            and max(times) <= SETTLING * goal.settling
+            and max(times) <= SETTLING * sqrt(heavier) * goal.settling
             and self.overshoot <= OVERSHOOT * goal.overshoot
             and max(self.stiffness, self.pressing) <= STIFFNESS * goal.stiffness
             and self.fling <= FLING
-            and self.turning <= BAND * STEP
+            and self.turning <= BAND * heavier * STEP
             and self.slack == 0
             and self.force <= most
         )

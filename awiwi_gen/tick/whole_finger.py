@@ -7,7 +7,7 @@ friction and damping that the tick does not know. All fingers of the hand run at
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,25 +21,39 @@ if TYPE_CHECKING:
 
 Array = np.ndarray[Any, Any]
 BEFORE, EVENT = 900, 900  # ticks at rest at first, and from an event on
-AWAY, LONGEST = 0.05, 6000  # rad: farther off than this a hand is not at rest yet; ticks until when it must be
+MOVED, LATELY, LONGEST = (
+    1e-3,
+    300,
+    6000,
+)  # a hand rests that has not moved so far [rad] in so many ticks, or after the last
 STEP = 0.2  # rad, of all joints at once, but not more than this share of the motors' travel winds up
 WOUND = 0.5
+MOST_WOUND, LESS = (
+    0.95,
+    0.07,
+)  # share of that travel, and of the range of forces: a pretension that takes more is less by it
 DEFLEXION = 0.05  # rad, by which a load step deflects joints of the wanted stiffness
 WALL, WALL_DAMPING = 1e4, 5.0  # N/m, N s/m: of a wall that only pushes, half-way on the fingertip's path
 TURNING, FREQUENCY = 10.0, 2.0  # rad/s^2, Hz: of the palm about an axis that is askew to all joints, through its origin
 AXIS = np.full(3, 1 / np.sqrt(3))
 SUBSTEPS = 10  # of a period in contact
 ROUNDS = 30  # of Newton's method
+CONTRACTIONS, RAISED, SLOWLY = 2, 2.0, 2000  # how often and by what the pretension rises, ticks until the hand rests
 CLOSE = 1e-3  # m: from here on the wall is looked at in every substep
 
 
 @dataclass(frozen=True)
 class Plant:
-    """A wrong hand: factors on the springs (the tick has their calibration), the motors' friction, the links' damping."""
+    """A wrong hand: factors on the springs (the tick has their calibration), the motors' friction, the links' damping, and
+    the inertia of all links, as of grasped objects, whose weight would be a load. Springs of neighbours are ``apart`` by a
+    share: then the tick is told, as torques of the joints, what a co-contraction tells of it.
+    """
 
     springs: float = 1.0
     friction: float = 1.0
     damping: float = 1.0
+    links: float = 1.0
+    apart: float = 0.0
 
 
 PLANTS: Mapping[str, Plant] = {
@@ -50,6 +64,10 @@ PLANTS: Mapping[str, Plant] = {
     "damping x2": Plant(damping=2.0),
     "friction x0.7, damping x0.5": Plant(friction=0.7, damping=0.5),
     "friction x1.3, damping x2": Plant(friction=1.3, damping=2.0),
+    "links x0.7": Plant(links=0.7),
+    "links x3": Plant(links=3.0),
+    "links x3, friction x0.7, damping x0.5": Plant(1.0, 0.7, 0.5, 3.0),
+    "springs 10 % apart": Plant(apart=0.1),
     "springs x0.7": Plant(0.7),
     "springs x1.3": Plant(1.3),
 }
@@ -62,9 +80,9 @@ class Setting:
     factors on K_3 and K_4 and on the suggested stiffness and damping.
     """
 
-    pretension: float = 0.26
+    pretension: float = 0.22
     delay: float = 0.03
-    rates: float = 500.0
+    rates: float = 600.0
     load: float = 350.0
     forces: float = 200.0
     friction: float = 0.7
@@ -107,16 +125,29 @@ class Run:
     """The whole hand at rest with a setting of a law, on a wrong hand."""
 
     def __init__(self, library: Library, hand: Hand, law: int, setting: Setting, plant: Plant, seed: int = 0) -> None:
+        self.library, self.hand, self.law, self.plant, self.seed = library, hand, law, plant, seed
+        self._rest(setting)
+        while setting.pretension > LESS and self._wound_up():
+            setting = replace(setting, pretension=setting.pretension - LESS)
+            self._rest(setting)
+        for _ in range(CONTRACTIONS if plant.apart else 0):
+            self._contract()
+        self._begin = len(self._q)
+
+    def _rest(self, setting: Setting) -> None:
+        """Begin, and wait until the hand rests."""
+
         def prepare(loop: ClosedLoop) -> None:
             setting.prepare(loop)
             world = loop.hand.world
-            world.friction[:] *= plant.friction
-            world.damping[:] *= plant.damping
-            world.spring[:] = plant.springs
+            world.friction[:] *= self.plant.friction
+            world.damping[:] *= self.plant.damping
+            unequal = self.plant.apart / 2 * (-1.0) ** np.arange(loop.step.tendons)
+            world.spring[: loop.step.tendons] = self.plant.springs * (1 + unequal)
+            world.heavier = self.plant.links - 1
 
-        self.library, self.hand = library, hand
-        self.loop = ClosedLoop(library, seed=seed, prepare=prepare)
-        self.loop.step.input.law = law
+        self.loop = ClosedLoop(self.library, seed=self.seed, prepare=prepare)
+        self.loop.step.input.law = self.law
         self.loop.step.input.stiffness *= setting.stiffness
         self.loop.step.input.damping *= setting.damping * np.sqrt(setting.stiffness)
         self.goal, self.step = self.loop.start.copy(), self._longest_step()
@@ -126,13 +157,38 @@ class Run:
         self._q: list[Array] = []
         self._f: list[Array] = []
         self._contact: list[Array] = []
-        while len(self._q) < BEFORE or (len(self._q) < LONGEST and self._off() > AWAY):
+        while len(self._q) < BEFORE or (len(self._q) < LONGEST and self._moved() > MOVED):
             self.tick()
-        self._begin = len(self._q)
 
-    def _off(self) -> float:
-        """How far [rad] the joints are off."""
-        return float(np.abs(self.loop.hand.world.q - self.goal).max())
+    def _contract(self) -> None:
+        """Tell the tick what springs that differ do to joints at rest: this grows with the forces, as no load does."""
+        gains, given, state = self.loop.step.gains, self.loop.step.input, self.loop.step.state
+        low, seen = float(gains.force_low[0]), []
+        for factor in (RAISED, 1.0):
+            seen.append((np.mean(self._q[-LATELY:], axis=0), float(np.mean(state.f[: self.loop.step.tendons]))))
+            gains.force_low = low * factor
+            for _ in range(SLOWLY):
+                self.tick()
+        (rest, least), (moved, most) = seen
+        given.torque = given.stiffness * (rest - moved) / (most / least - 1)
+        for _ in range(SLOWLY):
+            self.tick()
+
+    def _wound_up(self) -> bool:
+        """Whether the step would wind a motor up beyond its travel."""
+        model, theta = self.loop.step.model, self.loop.hand.world.theta
+        wound = [
+            np.abs(
+                theta[rows]
+                - self.library[f"{name}_coupling"](self.goal[joints]).sum(axis=1) * self.step / model.motor_pulley
+            )
+            for name, (rows, joints) in self.hand.blocks.items()
+        ]
+        return float(np.concatenate(wound).max()) > MOST_WOUND * float(model.motor_travel)
+
+    def _moved(self) -> float:
+        """How far [rad] the joints have moved lately."""
+        return float(np.abs(self._q[-1] - self._q[-LATELY]).max())
 
     def _longest_step(self) -> float:
         """The step [rad] of all joints that the motors' travel allows, at most STEP."""
@@ -267,7 +323,8 @@ def turned(run: Run) -> Record:
         world.gravity = _rotated(np.array(GRAVITY), -angle)
         run.load = np.zeros(len(run.goal))
         for points, joints in fingers:
-            run.load[joints] = points.torques(world.q[joints], world.qd[joints], omega * AXIS, alpha * AXIS)
+            torques = points.torques(world.q[joints], world.qd[joints], omega * AXIS, alpha * AXIS)
+            run.load[joints] = run.plant.links * torques
         run.tick()
     return run.record()
 
