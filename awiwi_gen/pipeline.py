@@ -318,20 +318,22 @@ def _examine(job: Job, directory: Path) -> Proof:
 
 
 def _judged(job: Job, directory: Path, library: Library, records: Mapping[str, Record]) -> list[Verdict]:
-    from awiwi_gen.build import Headers
-    from awiwi_gen.compiler import compiler, machine
+    from awiwi_gen.build import object_keys
     from awiwi_gen.judge import Loaded, judge_derivation, judge_record, verdict_key
     from awiwi_gen.parameters import derivations
+    from awiwi_gen.resources import CSRC
 
-    shared, identity = Headers.of(directory), compiler().identity
+    objects = object_keys(directory)
+    # All kernels are judged again with other solvers, or other numbers to read; else those whose own objects are others.
+    shared = [digest for source, digest in objects.items() if source.parent == CSRC or source.name == "params.c"]
     derived = derivations(job.kernels, records)
     loaded = Loaded(library, job.hand.quantities(), derived)
     verdicts = []
     for kernel in job.kernels:
         record, used = records[kernel.name], {family: records[name] for family, name in kernel.needs.items()}
-        text = (directory / f"{kernel.name}.c").read_text(encoding="utf-8")
+        own = [objects[directory / f"{name}.c"] for name in (kernel.name, *kernel.needs.values())]
         numbers = derived[kernel.path].digest if kernel.path in derived else ""
-        digest = verdict_key(record, key(text, shared, numbers, identity, machine()))
+        digest = verdict_key(record, [*own, *shared], numbers)
         examine = partial(judge_record, kernel, record, used, loaded, job.options)
         verdicts.append(job.store.memo("verdicts", digest, examine))
         job.progress("verify", len(verdicts), len(job.kernels))
@@ -356,26 +358,24 @@ def _seal(job: Job, directory: Path) -> Seal | None:
 def _laws_running(job: Job, records: Mapping[str, Record]) -> Iterator[Callable[[], list[Law]]]:
     """Check the laws of physics on all parts on other cores while the body of the `with` statement runs."""
     from awiwi_gen import tasks
-    from awiwi_gen.judge import laws_key
+    from awiwi_gen.judge import PartLaws
 
-    parts: dict[str, list[tuple[Any, Record]]] = {}
+    members: dict[str, list[tuple[Any, Record]]] = {}
     for kernel in job.kernels:
-        parts.setdefault(kernel.path, []).append((kernel, records[kernel.name]))
-    keys = [laws_key([record for _, record in members]) for members in parts.values()]
-    absent = set(job.store.missing("laws", keys))
+        members.setdefault(kernel.path, []).append((kernel, records[kernel.name]))
     ports: dict[str, dict[str, Any]] = {}
     for kernel in job.catalog:  # a law may need a velocity that none of the kernels asked for takes
         ports.setdefault(kernel.path, {}).update(kernel.inputs)
-    work = [
-        (members, ports[path], digest, job.options, job.store)
-        for (path, members), digest in zip(parts.items(), keys, strict=True)
-        if digest in absent
-    ]
+    parts = [PartLaws(found, ports[path], job.options) for path, found in members.items()]
+    keys = [digest for part in parts for digest in part.keys.values()]
+    absent = set(job.store.missing("laws", keys))
+    missing = [(part, [name for name, digest in part.keys.items() if digest in absent]) for part in parts]
+    work = [(part, names, job.store) for part, names in missing if names]
     with parallel.running("physics", tasks.check_laws, work, job.progress) as finish:
 
         def laws() -> list[Law]:
             finish()
-            return [law for digest in keys for law in tasks.cached(job.store, "laws", digest)]
+            return [tasks.cached(job.store, "laws", digest) for digest in keys]
 
         yield laws
 
