@@ -241,7 +241,7 @@ def emit(job: Job, records: Mapping[str, Record], directory: Path) -> dict[str, 
     fingers = job.hand.fingers.values()
     room, whole = room_of(job.kernels), (len(fingers), sum(len(each.joints) for each in fingers), job.hand.tendons)
     files |= shared_files(job.hand.prefix, functions, job.hand.digest(), job.options, room, whole, fields)
-    files |= self_test_files(job.hand, job.kernels, records, job.options)
+    files |= self_test_files(job.hand, job.kernels, records, job.options, job.store)
     if numbers:
         files |= params_files(job.hand.prefix, numbers, job.options)
     has_tick = not no_tick(job.hand, job.kernels, job.options)
