@@ -247,7 +247,8 @@ def the_mass_matrix_is_positive_definite(x: Motion, mass_matrix: Any) -> Residua
     # Scaled to diagonals of one, as joints that slide and joints that turn have other units.
     sizes = np.sqrt(np.maximum(np.abs(np.diagonal(masses, axis1=1, axis2=2)), np.finfo(float).tiny))
     eigenvalues = np.linalg.eigvalsh(masses / (sizes[:, :, None] * sizes[:, None, :]))
-    missing = POSITIVE - np.minimum(eigenvalues[:, 0] / eigenvalues[:, -1], POSITIVE)
+    with np.errstate(all="ignore"):  # what is not a number breaks the law
+        missing = POSITIVE - np.minimum(eigenvalues[:, 0] / np.abs(eigenvalues).max(axis=1), POSITIVE)
     return np.array([arb(x) for x in missing.tolist()]), ONE
 
 
