@@ -60,9 +60,9 @@ def stages(graph: Graph, passes: tuple[Pass, ...], memo: Memo | None = None) -> 
     return result
 
 
-def optimise(graph: Graph) -> Stages:
-    """The stages of the cheapest order of passes; the last one is emitted."""
-    memo = Memo()
+def optimise(graph: Graph, memo: Memo | None = None) -> Stages:
+    """The stages of the cheapest order of passes; the last one is emitted. Graphs that are alike may share a memo."""
+    memo = memo or Memo()
     graph = memo.graph(graph)
     candidates = [stages(graph, passes, memo) for passes in ORDERS]
     weight, best = min(((_rough(c[-1][1], memo).weight, c) for c in candidates), key=lambda pair: pair[0])
