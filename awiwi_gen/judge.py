@@ -128,9 +128,9 @@ class PartLaws:
 
     @cached_property
     def keys(self) -> dict[str, str]:
-        """Key of each law, by its name: all that its scope has, and the code of the laws."""
+        """Key of each law, by its name: all that its scope has, and the code that checks it."""
         digests = {kernel.family: record.digest for kernel, record in self.members}
-        code = code_of("awiwi_gen.verify.physics", "awiwi_gen.verify.samples")
+        code = code_of(__name__)
         found = {}
         for name, scope in self.scopes.items():
             records = [digests[family] for family in scope.families]
