@@ -80,14 +80,19 @@ def object_key(source: Path, shared: Headers, identity: str) -> str:
     return key(text, *(shared.digests[name] for name in shared.included(text)), FLAGS, identity)
 
 
+def object_keys(directory: Path) -> dict[Path, str]:
+    """The digest of each object of a generated directory, by its source."""
+    shared, identity = Headers.of(directory), compiler().identity
+    return {source: object_key(source, shared, identity) for source in sources(directory)}
+
+
 def compile_objects(directory: Path, store: Cache, into: Path) -> list[Path]:
     """Objects of all C files of a generated directory and of csrc, as files in a folder; only new ones are compiled."""
-    cc, shared = compiler(), Headers.of(directory)
-    identity = cc.identity
+    cc, digests = compiler(), object_keys(directory)
     includes = (f"-I{directory}", f"-I{CSRC}")
 
     def compile_one(source: Path) -> Path:
-        digest, target = object_key(source, shared, identity), into / f"{source.stem}.o"
+        digest, target = digests[source], into / f"{source.stem}.o"
         found = store.read("objects", digest)
         if found is None:
             cc.run(*FLAGS, *includes, "-c", str(source), "-o", str(target))
@@ -99,7 +104,7 @@ def compile_objects(directory: Path, store: Cache, into: Path) -> list[Path]:
     from concurrent.futures import ThreadPoolExecutor
 
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        return list(pool.map(compile_one, sources(directory)))
+        return list(pool.map(compile_one, digests))
 
 
 def declarations(directory: Path, store: Cache, shared: Headers) -> str:
@@ -134,7 +139,7 @@ def compiled(directory: Path, store: Cache) -> Compiled:
     glue = _glue_source(manifest, declarations(directory, store, shared))
     python = f"{bindings()} {sysconfig.get_config_var('EXT_SUFFIX')}"
     name = "_awiwi_" + key(glue, python, GLUE_FLAGS, identity)[:16]
-    objects = [object_key(source, shared, identity) for source in sources(directory)]
+    objects = object_keys(directory).values()
     digest = key(name, glue, *objects)
     data = store.read("libraries", digest)
     if data is None:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from awiwi_gen.cache import Cache, key
 from awiwi_gen.emit.files import banner, render
 from awiwi_gen.emit.names import function_name
 from awiwi_gen.emit.options import Options
@@ -19,6 +20,7 @@ from awiwi_gen.ir.graph import Graph
 from awiwi_gen.kernel import Kernel
 from awiwi_gen.parameters import derivations, of_part
 from awiwi_gen.records import Record, solver_of
+from awiwi_gen.sources import code_of
 from awiwi_gen.verify.samples import draw
 from awiwi_gen.verify.verdict import STATUS, float_values, scales, stack
 
@@ -32,16 +34,18 @@ Values = Callable[..., dict[str, Any]]  # of a graph, from inputs and in an alge
 
 
 def self_test_files(
-    hand: Hand, kernels: Sequence[Kernel], records: Mapping[str, Record], options: Options
+    hand: Hand, kernels: Sequence[Kernel], records: Mapping[str, Record], options: Options, store: Cache
 ) -> dict[str, str]:
-    """The C file of the self-test and its header."""
+    """The C file of the self-test and its header; what it has of each kernel is kept in a cache."""
     derived, numbers = derivations(kernels, records), {path: each.value for path, each in hand.quantities().items()}
     tests = []
     for kernel in kernels:
         # A part's derived numbers may read more than the kernel: the hand's kernels are derived from a finger each.
         params, derivation = of_part(kernel.path, numbers), derived.get(kernel.path)
         values = partial(float_values, params=params, derivation=derivation)
-        tests.append(_test(kernel, records[kernel.name], hand.prefix, options, values))
+        record = records[kernel.name]
+        digest = key(record.digest, derivation.digest if derivation else "", code_of(__name__))
+        tests.append(store.memo("golden", digest, partial(_test, kernel, record, hand.prefix, options, values)))
     strings = {
         "banner": banner(),
         "prefix": hand.prefix,

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
-from awiwi_gen.cache import code_digest, key
+from awiwi_gen.cache import key
+from awiwi_gen.compiler import machine
 from awiwi_gen.emit.c import identifier
 from awiwi_gen.emit.options import Options
 from awiwi_gen.ir.algebras import Floats
@@ -18,7 +20,8 @@ from awiwi_gen.records import Record, problem_of, solver_of, values_of
 from awiwi_gen.sources import code_of
 from awiwi_gen.units import Quantity
 from awiwi_gen.verify.derived import judge_derived
-from awiwi_gen.verify.physics import Law, obey
+from awiwi_gen.verify.motion import Motion
+from awiwi_gen.verify.physics import Law, Scope, obey, scopes
 from awiwi_gen.verify.samples import SEED, draw, varied
 from awiwi_gen.verify.verdict import Verdict, derived_values, judge, judge_solver
 
@@ -26,14 +29,12 @@ if TYPE_CHECKING:
     from awiwi_gen.library import Library
 
 
-def verdict_key(record: Record, compiled: str) -> str:
-    """Key of a verdict: the record, the compiled text, the code that compiles and judges it."""
-    return key(record.digest, compiled, code_of(__name__, "awiwi_gen.build"), code_digest("csrc"))
+def verdict_key(record: Record, objects: Iterable[str], numbers: str) -> str:
+    """Key of a verdict: the record, the objects that run, the numbers they read, the code that calls and judges them.
 
-
-def laws_key(records: Sequence[Record]) -> str:
-    """Key of the laws of physics of a part: its records, and the code of the laws."""
-    return key(*(record.digest for record in records), code_of("awiwi_gen.verify.physics"))
+    ``objects`` are the keys of those objects, ``numbers`` is the digest of the derived numbers of the kernel's part.
+    """
+    return key(record.digest, *objects, numbers, code_of(__name__, "awiwi_gen.build"), machine())
 
 
 class Loaded:
@@ -111,9 +112,45 @@ def judge_derivation(loaded: Loaded, options: Options) -> Verdict:
     return judge_derived("params_derive", cases, options.dtype, options.math == "own")
 
 
-def physics(members: Sequence[tuple[Kernel, Record]], ports: Mapping[str, Port], options: Options) -> list[Law]:
-    """Level 5 for the kernels of one part."""
-    first = members[0][0]
-    graphs = {kernel.family: record.graph for kernel, record in members if record.graph is not None}
-    values = {**values_of(first), **{path: v for _, record in members for path, v in record.values.items()}}
-    return obey(first.path or "hand", graphs, draw(ports, first.path, options.dtype), values)
+@dataclass(frozen=True)
+class PartLaws:
+    """Level 5 for the kernels of one part; ``ports`` are all inputs that kernels of this part take, asked for or not."""
+
+    members: Sequence[tuple[Kernel, Record]]
+    ports: Mapping[str, Port]
+    options: Options
+
+    @cached_property
+    def scopes(self) -> dict[str, Scope]:
+        """What each law reads, by its name."""
+        inputs = {kernel.family: tuple(kernel.inputs) for kernel, record in self.members if record.graph is not None}
+        return scopes(inputs, self._numbers)
+
+    @cached_property
+    def keys(self) -> dict[str, str]:
+        """Key of each law, by its name: all that its scope has, and the code that checks it."""
+        digests = {kernel.family: record.digest for kernel, record in self.members}
+        code = code_of(__name__)
+        found = {}
+        for name, scope in self.scopes.items():
+            records = [digests[family] for family in scope.families]
+            inputs = [(port, self.ports[port]) for port in scope.inputs if port in self.ports]
+            numbers = sorted(self._numbers.items()) if scope.numbers else ()
+            found[name] = key(name, self._path, records, inputs, numbers, code)
+        return found
+
+    def check(self, names: Collection[str]) -> dict[str, Law]:
+        """The results of these laws, by name."""
+        graphs = {kernel.family: record.graph for kernel, record in self.members if record.graph is not None}
+        derived = {path: value for _, record in self.members for path, value in record.values.items()}
+        motion = Motion(graphs, draw(self.ports, self._path, self.options.dtype), {**self._numbers, **derived})
+        chosen = {name: self.scopes[name] for name in names}
+        return obey(self._path or "hand", chosen, motion, self._numbers)
+
+    @property
+    def _path(self) -> str:
+        return self.members[0][0].path
+
+    @property
+    def _numbers(self) -> Mapping[str, Fraction]:
+        return values_of(self.members[0][0])

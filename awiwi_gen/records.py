@@ -22,7 +22,7 @@ from awiwi_gen.errors import VerificationError
 from awiwi_gen.ir.cost import cost
 from awiwi_gen.ir.exact import exact_values
 from awiwi_gen.ir.graph import Graph
-from awiwi_gen.ir.passes import optimise
+from awiwi_gen.ir.passes import Memo, optimise
 from awiwi_gen.ir.passes.bind import bind, fill
 from awiwi_gen.ir.passes.lift import lift, settle
 from awiwi_gen.kernel import Kernel, Solver
@@ -139,7 +139,8 @@ def cheapest(bound: Mapping[str, Graph]) -> tuple[str, list[tuple[str, Graph]]]:
     """The route with the cheapest C, and its stages; a route that is far more expensive at first is not optimised."""
     raw = {route: cost(graph).weight for route, graph in bound.items()}
     promising = [route for route, weight in raw.items() if weight <= HOPELESS * min(raw.values())]
-    stages = {route: optimise(bound[route]) for route in promising}
+    memo = Memo()  # routes often meet after a few passes
+    stages = {route: optimise(bound[route], memo) for route in promising}
     best = min(stages, key=lambda route: cost(stages[route][-1][1]).weight)
     return best, stages[best]
 

@@ -18,6 +18,7 @@ IMPORT = re.compile(
 )
 
 
+@cache
 def code_of(*modules: str) -> str:
     """Digest of the text of some modules (full names) and of every module of the package that they import."""
     return _digest(frozenset().union(*map(closure, modules)))

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from awiwi_gen.cache import Cache
 from awiwi_gen.emit.options import Options
 from awiwi_gen.errors import OutputError
 from awiwi_gen.parallel import split
+
+if TYPE_CHECKING:
+    from awiwi_gen.judge import PartLaws
 
 # A kernel, what its record is made from (fingerprints of graphs, keys of other kernels' records), and its key.
 Task = tuple[Any, Mapping[str, Any], str]
@@ -75,9 +78,8 @@ def make_records(piece: tuple[list[Task], str, Options, Cache]) -> None:
         store.put("records", record.digest, record)
 
 
-def check_laws(piece: tuple[Any, ...]) -> None:
-    """Check the laws of physics on the kernels of one part."""
-    from awiwi_gen.judge import physics
-
-    members, ports, digest, options, store = piece
-    store.put("laws", digest, physics(members, ports, options))
+def check_laws(piece: tuple[PartLaws, list[str], Cache]) -> None:
+    """Check laws of physics on the kernels of one part."""
+    part, names, store = piece
+    for name, law in part.check(names).items():
+        store.put("laws", part.keys[name], law)

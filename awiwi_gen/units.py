@@ -15,7 +15,7 @@ import unicodedata
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from fractions import Fraction
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 from awiwi_gen.errors import Fault, InputError
@@ -37,7 +37,7 @@ class Dimension(NamedTuple):
     A: Fraction = Fraction(0)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Unit:
     """An SI unit: a dimension, and the factors it was written with.
 
@@ -68,7 +68,7 @@ class Unit:
         """Exponent of the radian, which the dimension leaves out: 1 for rad/s, 0 for Hz."""
         return dict(self.factors).get("rad", Fraction(0))
 
-    @property
+    @cached_property
     def label(self) -> str:
         """The unit as text that `parse_unit` reads back: "N m/rad", "kg m^2", "1"."""
         above = " ".join(_power(symbol, power) for symbol, power in self.factors if power > 0)

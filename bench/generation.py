@@ -89,16 +89,22 @@ class Bench:
     def __init__(self, scratch: Path) -> None:
         self.scratch, self.rows = scratch, []
         self.hand = scratch / "hand.toml"
-        for path in (ROOT / "awiwi_gen").glob("*.toml"):
+        # As where it is installed: modules are compiled once.
+        self.environment = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"} | {
+            "AWIWI_GEN_CACHE": str(scratch / "cache"),
+            "PYTHONPATH": str(ROOT),
+            "PYTHONPYCACHEPREFIX": str(scratch / "bytecode"),
+        }
+        packaged = ROOT / "awiwi_gen"
+        for path in (*packaged.glob("*.toml"), *packaged.glob("*.json")):  # with the certificate of the gains
             shutil.copy(path, scratch)
 
     def run(self, row: Row, *words: str) -> None:
         """Time one command of awiwi-gen and show the row so far."""
         command = [sys.executable, "-m", "awiwi_gen", *words, "--hand", str(self.hand), "-o", str(self.scratch / "c")]
-        environment = dict(os.environ) | {"AWIWI_GEN_CACHE": str(self.scratch / "cache"), "PYTHONPATH": str(ROOT)}
         start = time.perf_counter()
         quiet = [(os.POSIX_SPAWN_OPEN, number, os.devnull, os.O_WRONLY, 0) for number in (1, 2)]
-        process = os.posix_spawn(sys.executable, command, environment, file_actions=quiet)
+        process = os.posix_spawn(sys.executable, command, self.environment, file_actions=quiet)
         _, status, usage = os.wait4(process, 0)
         row.times.append(time.perf_counter() - start)
         row.processor.append(usage.ru_utime + usage.ru_stime)
@@ -121,8 +127,7 @@ class Bench:
     def stages(self) -> list[tuple[str, float, float]]:
         """(stage, wall [s], processors [s]) of one generate --verify as the place stands."""
         words = [sys.executable, "-c", STAGES, str(self.hand), str(self.scratch / "c")]
-        environment = dict(os.environ) | {"AWIWI_GEN_CACHE": str(self.scratch / "cache"), "PYTHONPATH": str(ROOT)}
-        done = subprocess.run(words, env=environment, check=True, capture_output=True, text=True)
+        done = subprocess.run(words, env=self.environment, check=True, capture_output=True, text=True)
         return [tuple(row) for row in json.loads(done.stdout)]
 
     def forget(self, *names: str) -> None:

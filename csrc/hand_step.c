@@ -10,12 +10,12 @@ static const awiwi_real HOT = (awiwi_real)0.9; /* heat from which on a motor's l
 
 /* -- motors -------------------------------------------------------------------------------------------------------- */
 
-/* The largest torque of a motor with so much heat. */
+/* The largest torque of a motor that is hot. */
 static awiwi_real limit_of(const awiwi_context *now, awiwi_real heat)
 {
     const awiwi_real most = now->hand->motor_torque, lasting = now->gains->continuous_torque;
     const awiwi_real share = (heat - HOT) / (1 - HOT);
-    if (share <= 0 || lasting >= most)
+    if (lasting >= most)
         return most;
     return share < 1 ? most + share * (lasting - most) : lasting;
 }

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 from awiwi_gen.hand import Hand
 from awiwi_gen.hand.capability import left_out
 from awiwi_gen.kernel import Kernel
@@ -27,8 +29,13 @@ from awiwi_gen.kernels.wrist import wrist_kernels
 
 def catalog(hand: Hand) -> list[Kernel]:
     """All kernels that a hand can have, in the order of its parts."""
+    return [*_catalog(hand)]
+
+
+@lru_cache(maxsize=4)  # a command asks for the hand in its file, for the kernels of its tick, for those of its gains
+def _catalog(hand: Hand) -> tuple[Kernel, ...]:
     impossible = left_out(hand)
-    return [kernel for kernel in declared(hand) if (kernel.path, kernel.family) not in impossible]
+    return tuple(kernel for kernel in declared(hand) if (kernel.path, kernel.family) not in impossible)
 
 
 def declared(hand: Hand) -> list[Kernel]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 from awiwi_gen.hand.parts import Finger
@@ -62,44 +63,52 @@ def motion(size: Size, rate: Unit = one) -> Port:
     return of_units((size.joints,), (unit * rate for unit in size.motions))
 
 
+@cache
 def torque(size: Size) -> Port:
     """One torque per joint, or force of a slide."""
     return of_units((size.joints,), size.torques)
 
 
+@cache
 def inertia(size: Size) -> Port:
     """A joint-space mass matrix."""
     arms = [one if slides else m for slides in size.sliding]
     return of_units((size.joints, size.joints), (kg * a * b for a in arms for b in arms))
 
 
+@cache
 def stiffness(size: Size) -> Port:
     """Derivatives of joint torques by joint angles."""
     return of_units((size.joints, size.joints), (a / b for a in size.torques for b in size.motions))
 
 
+@cache
 def coriolis(size: Size) -> Port:
     """A joint-space Coriolis matrix."""
     return of_units((size.joints, size.joints), (a * s / b for a in size.torques for b in size.motions))
 
 
+@cache
 def arms(size: Size) -> Port:
     """Derivatives of tendon lengths by joint angles."""
     return of_units((size.tendons, size.joints), [m / unit for unit in size.motions] * size.tendons)
 
 
+@cache
 def arms_derivative(size: Size) -> Port:
     """Second derivatives of tendon lengths by joint angles."""
     each = [m / a / b for a in size.motions for b in size.motions]
     return of_units((size.tendons, size.joints, size.joints), each * size.tendons)
 
 
+@cache
 def covariance(size: Size) -> Port:
     """Covariances of joint angles."""
     pairs = (sorted((a, b), key=lambda unit: unit.label) for a in size.motions for b in size.motions)  # "m rad"
     return of_units((size.joints, size.joints), (a * b for a, b in pairs))
 
 
+@cache
 def jacobian_port(size: Size) -> Port:
     """Velocity and angular velocity of the fingertip per unit velocity of each joint."""
     rows = [[m / unit for unit in size.motions]] * 3 + [[rad / unit for unit in size.motions]] * 3

@@ -29,26 +29,41 @@ ONCE: tuple[Pass, ...] = (units, *REPEATED)  # if it helps
 FINAL: tuple[Pass, ...] = (quotients, orient, signs, schedule)
 
 Stages = list[tuple[str, Graph]]
-Memo = dict[tuple[Pass, Graph], Graph]  # results of passes: different orders often reach the same graph
+
+
+class Memo:
+    """Results of passes: different orders often reach the same graph, which is then one object and hashed once."""
+
+    def __init__(self) -> None:
+        self._graphs: dict[Graph, Graph] = {}
+        self._results: dict[tuple[Pass, int], Graph] = {}
+
+    def graph(self, graph: Graph) -> Graph:
+        """The one object for all graphs that are equal to this one; it is kept, and so is its identity."""
+        return self._graphs.setdefault(graph, graph)
+
+    def after(self, apply: Pass, graph: Graph) -> Graph:
+        """The graph after a pass, for a graph from this memo."""
+        step = apply, id(graph)
+        if step not in self._results:
+            self._results[step] = self.graph(apply(graph))
+        return self._results[step]
 
 
 def stages(graph: Graph, passes: tuple[Pass, ...], memo: Memo | None = None) -> Stages:
     """The graph after each pass, with the pass's name; results in the memo are not computed again."""
-    memo = {} if memo is None else memo
-    result = []
+    memo = memo or Memo()
+    graph, result = memo.graph(graph), []
     for apply in passes:
-        step = apply, graph
-        found = memo.get(step)
-        if found is None:
-            found = memo[step] = apply(graph)
-        graph = found
+        graph = memo.after(apply, graph)
         result.append((apply.__name__, graph))
     return result
 
 
-def optimise(graph: Graph) -> Stages:
-    """The stages of the cheapest order of passes; the last one is emitted."""
-    memo: Memo = {}
+def optimise(graph: Graph, memo: Memo | None = None) -> Stages:
+    """The stages of the cheapest order of passes; the last one is emitted. Graphs that are alike may share a memo."""
+    memo = memo or Memo()
+    graph = memo.graph(graph)
     candidates = [stages(graph, passes, memo) for passes in ORDERS]
     weight, best = min(((_rough(c[-1][1], memo).weight, c) for c in candidates), key=lambda pair: pair[0])
     while True:
