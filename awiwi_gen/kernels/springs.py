@@ -106,9 +106,7 @@ def readings(spring: Any, readings: Any) -> Any:
     """dL, force and stiffness of every tendon from its sensor, by the design or by the tendon's own calibration."""
 
 
-@of_sensors(
-    lambda tendons: {"dL": Port((tendons,), m), "force": Port((tendons,), N)}, "section 4.1", guards=WITHIN
-)
+@of_sensors(lambda tendons: {"dL": Port((tendons,), m), "force": Port((tendons,), N)}, "section 4.1", guards=WITHIN)
 def tensions(spring: Any, readings: Any) -> Any:
     """dL and force of every tendon from its sensor: what a tick of the hand needs of `calibration_readings`."""
 
