@@ -7,7 +7,7 @@ beside its gains. Reading one compiles nothing.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from operator import itemgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -30,18 +30,32 @@ def digest_of(hand: Hand) -> str:
 
 def kept_certificate(digest: str, store: Cache, beside: Path | None = None) -> list[Row] | None:
     """The rows of the certificate of these numbers that is kept in the cache or in a file of the folder ``beside``."""
-    texts = [store.read("certificates", digest)]
-    files = sorted(beside.glob(f"*{SUFFIX}")) if beside is not None else []
-    texts += [file.read_bytes() for file in files if file.is_file()]
-    for text in texts:
-        try:
-            found = json.loads(text) if text else {}
-        except ValueError:
-            continue
-        if isinstance(found, dict) and found.get("digest") == digest:
+    for found in _certificates([store.read("certificates", digest), *_texts(beside)]):
+        if found.get("digest") == digest:
             rows: list[Row] = found["joints"]
             return rows
     return None
+
+
+def kept_rows(beside: Path | None) -> dict[str, Row]:
+    """Rows of all certificates in a folder, by the digest of their joint: those that another hand may share."""
+    return {row["digest"]: row for found in _certificates(_texts(beside)) for row in found["joints"] if "digest" in row}
+
+
+def _texts(beside: Path | None) -> Iterator[bytes]:
+    for file in sorted(beside.glob(f"*{SUFFIX}")) if beside is not None else []:
+        if file.is_file():
+            yield file.read_bytes()
+
+
+def _certificates(texts: Iterable[bytes | None]) -> Iterator[dict[str, Any]]:
+    for text in texts:
+        try:
+            found = json.loads(text) if text else None
+        except ValueError:
+            continue
+        if isinstance(found, dict) and isinstance(found.get("joints"), list):
+            yield found
 
 
 def certificate_text(hand: Hand, rows: list[Row]) -> str:

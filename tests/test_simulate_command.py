@@ -14,7 +14,7 @@ from commands import answer, complaint, told
 pytest.importorskip("scipy")
 
 from awiwi_gen.cache import Cache
-from awiwi_gen.certificates import certificate_lines, digest_of, kept_certificate
+from awiwi_gen.certificates import certificate_lines, digest_of, kept_certificate, kept_rows
 from awiwi_gen.hand import Hand
 from awiwi_gen.hand.gains import OPTIONAL, REQUIRED
 from awiwi_gen.loops.hand_joint import Drive, gains_of, joint_of, pair_of
@@ -22,6 +22,7 @@ from awiwi_gen.loops.laws import LAWS
 from awiwi_gen.loops.scenarios import FAMILY, PLANTS
 from awiwi_gen.loops.search import judged, worst_of
 from awiwi_gen.resources import DEFAULT_HAND
+from awiwi_gen.tune import hand_gains
 from awiwi_gen.tune.hand_gains import certificate, failing
 
 TENDON = 12  # the index's pip
@@ -135,6 +136,17 @@ def test_the_packaged_gains_are_accepted_and_their_certificate_says_what_the_che
         assert found[name] == pytest.approx(kept[name], rel=0.05), name
     assert sorted(rows) == list(range(hand.tendons))
     assert all(row["radius"] < 1 and row["cycle"] < 1e-3 for row in rows.values())
+
+
+def test_only_joints_that_no_certificate_beside_has_are_examined(lib, hand, packaged, tmp_path, monkeypatch):
+    known, store = kept_rows(DEFAULT_HAND.parent), Cache(tmp_path)
+    monkeypatch.setattr(hand_gains, "examine", pytest.fail)
+
+    assert failing(lib, hand, store, known=known) == []
+    assert certificate(lib, hand, store, known) == kept_certificate(digest_of(hand), store, DEFAULT_HAND.parent)
+    other = Hand.parse(AWIWI + tables(packaged | {"K_p": 0.99 * packaged["K_p"]}))
+    ((joint, number),) = hand_gains.gains_of_joints(lib, other).items()
+    assert hand_gains.joint_digest(lib, other, joint, other.gains[number]) not in known
 
 
 def test_gains_that_no_clock_of_3_khz_can_have_are_refused_with_the_plant_and_gains_that_run(lib, packaged, tmp_path):

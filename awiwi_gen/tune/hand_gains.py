@@ -9,8 +9,10 @@ packaged hands have theirs beside their gains.
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from itertools import product
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -18,7 +20,7 @@ import numpy as np
 import awiwi_gen
 from awiwi_gen import parallel
 from awiwi_gen.cache import Cache, key
-from awiwi_gen.certificates import VERSION, Row, certificate_text, digest_of, kept_certificate
+from awiwi_gen.certificates import VERSION, Row, certificate_text, digest_of, kept_certificate, kept_rows
 from awiwi_gen.errors import Fault, InputError, OutputError
 from awiwi_gen.hand import Hand
 from awiwi_gen.hand.file import HandFile
@@ -36,17 +38,18 @@ def require_running_gains(
 ) -> list[Row]:
     """The certificate of a hand's gains. Raises InputError with every tendon whose gains do not run, and gains that do.
 
-    A certificate for these numbers is taken from the cache or the folder ``beside``, else it is made.
+    A certificate for these numbers is taken from the cache or the folder ``beside``, else it is made; joints that a
+    certificate of other numbers has are not examined again.
     """
     if not hand.gains:
         return []
     rows = kept_certificate(digest_of(hand), store, beside)
     if rows is None:
-        library = awiwi_gen.build(hand, only=NEEDED)
-        faults = failing(library, hand, store, progress)
+        library, known = awiwi_gen.build(hand, only=NEEDED), kept_rows(beside)
+        faults = failing(library, hand, store, progress, known)
         if faults:
             raise InputError(faults)
-        rows = certificate(library, hand, store)
+        rows = certificate(library, hand, store, known)
         store.write("certificates", digest_of(hand), certificate_text(hand, rows).encode())
     return rows
 
@@ -66,15 +69,23 @@ def _with(hand: Hand, found: list[Tuned]) -> Hand:
     return hand.model_copy(update={"gains": gains})
 
 
-def certificate(library: Any, hand: Hand, store: Cache) -> list[Row]:
-    """A row for each set of gains of a joint: worst radius, margin and cycle over the family, and their plants."""
+def certificate(library: Any, hand: Hand, store: Cache, known: Mapping[str, Row] = MappingProxyType({})) -> list[Row]:
+    """A row for each set of gains of a joint: worst radius, margin and cycle over the family, and their plants.
+
+    ``known`` has rows of joints that `failing` did not examine, by digest.
+    """
     rows = []
     for each, number in gains_of_joints(library, hand).items():
-        found = store.get("clocked", joint_digest(library, hand, each, hand.gains[number]))
+        digest = joint_digest(library, hand, each, hand.gains[number])
+        row: Row = {"joint": each.name, "tendons": list(each.tendons)}
+        if digest in known:
+            rows.append(known[digest] | row)
+            continue
+        found = store.get("clocked", digest)
         if not isinstance(found, Clocked):  # `failing` has just put it there
             raise OutputError(f"{store.directory} was changed during the run; run it again")
-        row = {"joint": each.name, "tendons": list(each.tendons), "radius": found.radius, "margin": found.margin}
-        rows.append(row | {"cycle": found.cycle, "noise": found.noise, "at": dict(found.at), "plants": found.plants})
+        row |= {"radius": found.radius, "margin": found.margin, "cycle": found.cycle, "noise": found.noise}
+        rows.append(row | {"at": dict(found.at), "plants": found.plants, "digest": digest})
     return rows
 
 
@@ -95,8 +106,17 @@ def gains_of_joints(library: Any, hand: Hand) -> dict[Pulled, int]:
     }
 
 
-def failing(library: Any, hand: Hand, store: Cache | None = None, progress: Progress = silent) -> list[Fault]:
-    """A fault for each set of gains that does not run, and for each tendon whose joint has no pair."""
+def failing(
+    library: Any,
+    hand: Hand,
+    store: Cache | None = None,
+    progress: Progress = silent,
+    known: Mapping[str, Row] = MappingProxyType({}),
+) -> list[Fault]:
+    """A fault for each set of gains that does not run, and for each tendon whose joint has no pair.
+
+    Joints are not examined whose digest is ``known``: certificates have only such as run.
+    """
     store = store or Cache()
     faults = []
     joints, _ = pulled_joints(library, hand)
@@ -107,7 +127,8 @@ def failing(library: Any, hand: Hand, store: Cache | None = None, progress: Prog
             faults.append(Fault(key=f"gains[{number}].tendon", message=message))
     chosen = gains_of_joints(library, hand)
     digests = {each: joint_digest(library, hand, each, hand.gains[number]) for each, number in chosen.items()}
-    missing = set(store.missing("clocked", digests.values()))
+    chosen = {each: number for each, number in chosen.items() if digests[each] not in known}
+    missing = set(store.missing("clocked", [digests[each] for each in chosen]))
     work = [(hand, each, number, digests[each], store) for each, number in chosen.items() if digests[each] in missing]
     if len(work) == 1:
         keep(library, work[0])
