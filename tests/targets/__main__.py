@@ -4,7 +4,7 @@ python -m tests.targets                        all kernels on all targets; singl
 python -m tests.targets --all                  and at -O0, -O1, -O3
 python -m tests.targets --quick                what CI runs: one target of each kind
 python -m tests.targets --only 'index_*' --target M7 --scalar f64
-python -m tests.targets --accept               write the figures instead of comparing them; with --only, those of csrc too
+python -m tests.targets --accept               write the figures instead of comparing them
 
 Exit codes: 0 done, 1 bits differ or figures grew, 2 a tool is missing.
 """
@@ -24,7 +24,6 @@ import awiwi_gen
 from awiwi_gen.build import load
 from awiwi_gen.emit.options import Options
 from awiwi_gen.errors import AwiwiError
-from awiwi_gen.patterns import matches
 from awiwi_gen.pipeline import Job, cached_tree
 
 from .board import run_board, run_whole_hands
@@ -54,6 +53,8 @@ def main() -> int:
     parser.add_argument("--accept", action="store_true", help="write the figures instead of comparing them")
     parser.add_argument("--quick", action="store_true", help="one target of each kind")
     chosen = parser.parse_args()
+    if chosen.accept and chosen.only != "*":
+        parser.error("--accept writes whole columns; leave out --only")
     plan = [(scalar, *scope(chosen, scalar)) for scalar in chosen.scalar or ["f64", "f32"]]
     targets = [target for *_, selected in plan for target in selected]
     if missing := missing_packages(targets):
@@ -70,8 +71,7 @@ def main() -> int:
                 print(f"{column}: {len(result.runs) - 1} kernels, {'FAILED' if result.faults else good}", flush=True)
                 faults += [f"{column}: {fault}" for fault in result.faults]
                 if result.figures:
-                    table[column] = {name: cells for name, cells in result.figures.items() if belongs(name, only)}
-                    compilers[column] = version(target.compiler)
+                    table[column], compilers[column] = result.figures, version(target.compiler)
         if chosen.hand is None:
             faults += run_board(hand) + run_whole_hands(hand, ["f64"] if chosen.quick else ["f64", "f32"])
             faults += judge(compilers, table, chosen.accept)
@@ -81,11 +81,6 @@ def main() -> int:
     for fault in faults:
         print(fault, file=sys.stderr)
     return bool(faults)
-
-
-def belongs(name: str, only: str) -> bool:
-    """Whether figures are the same for a selection of kernels as for all: those of files about all kernels are not."""
-    return only == "*" or name.startswith("csrc/") or matches(name, only)
 
 
 def scope(chosen: argparse.Namespace, scalar: str) -> tuple[str, list[Target]]:
@@ -140,10 +135,7 @@ def judge(compilers: dict[str, str], table: dict[str, dict[str, Figures]], accep
     """Compare figures with the committed table, or write it; returns what grew under the table's own compilers."""
     known, old = read_table()
     if accept:
-        kept = {
-            column: {} if "self_test" in table[column] else old.get(column, {}) for column in table
-        }  # of a selection
-        write_table(known | compilers, old | {column: kept[column] | table[column] for column in table})
+        write_table(known | compilers, old | table)
         return []
     faults = []
     for column, figures in table.items():
