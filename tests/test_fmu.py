@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
 import sys
 import zipfile
 from pathlib import Path
@@ -88,9 +87,8 @@ def claw_hand(root):
 @pytest.fixture(scope="module")
 def built(claw_hand, tmp_path_factory):
     """The claw's FMUs; the controller is compiled by fmpy from nothing but the sources in it, which both have."""
-    folders = unpacked(tmp_path_factory.mktemp("claw"), "--hand", claw_hand, "--compile")
-    controller, _ = folders
-    shutil.rmtree(controller / "binaries")
+    controller, _ = unpacked(tmp_path_factory.mktemp("claw"), "--hand", claw_hand)
+    _, plant = unpacked(tmp_path_factory.mktemp("compiled_claw"), "--hand", claw_hand, "--compile")
     path = os.environ["PATH"]
     os.environ["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{path}"  # where the CMake of fmpy is
     try:
@@ -98,7 +96,7 @@ def built(claw_hand, tmp_path_factory):
         build_platform_binary(controller, controller / "build", configuration="None")  # equal bits at any optimisation
     finally:
         os.environ["PATH"] = path
-    return folders
+    return [controller, plant]
 
 
 def started(library, seed=0):
