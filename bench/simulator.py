@@ -2,7 +2,7 @@
 
 The adaptive law on the packaged hand's index pip, a step of 900 ticks. Run by `make bench`. Counts are the compiler's, so
 they are compared only with those of the same compiler and flags; with `--accept` the counted one becomes the committed one.
-The first count, before the simulator had a way of its own for plants of one kernel, stays.
+The first count, of four steps in each period, stays.
 """
 
 from __future__ import annotations

@@ -29,7 +29,7 @@ typedef struct awiwi_hand_world {
     awiwi_real load[AWIWI_ALL_JOINTS];        /* torque from outside [N m] */
     awiwi_real spring[AWIWI_ALL_TENDONS];     /* force of a spring over that of its calibration; 0 for a cut tendon */
     awiwi_real friction;                      /* of the motors, over that of the hand */
-    awiwi_real heavier;                       /* inertia that is added to the links, over theirs; not their weight */
+    awiwi_real added_inertia;                 /* of the links, as a share of their own; it has no weight */
     awiwi_real reading_noise;                 /* standard deviation, in counts; readings are whole counts */
     awiwi_real theta_step;                    /* of the motors' sensors [rad]; 0 for none */
     unsigned seed;

@@ -21,12 +21,18 @@
 #define awiwi_ldexp ldexpf
 #endif
 
-/* A loop of a few rounds, whose number the compiler knows, becomes as many statements. */
+/* Before a loop that is short or runs often: gcc unrolls it, wholly where it knows the number of rounds. */
 #if defined(__GNUC__) && !defined(__clang__)
 #define AWIWI_UNROLLED _Pragma("GCC unroll 8")
 #else
 #define AWIWI_UNROLLED
 #endif
+
+/* Whether x is finite. */
+static inline int awiwi_is_number(awiwi_real x)
+{
+    return x * 0 >= 0;
+}
 
 static inline awiwi_real awiwi_clamp(awiwi_real x, awiwi_real low, awiwi_real high)
 {
@@ -46,7 +52,7 @@ static inline int awiwi_ends_with(awiwi_real length, awiwi_real last, awiwi_real
 static inline awiwi_real awiwi_dot(const awiwi_real *a, const awiwi_real *b, int n)
 {
     awiwi_real sum = 0;
-    for (int i = 0; i < n; i++)
+    AWIWI_UNROLLED for (int i = 0; i < n; i++)
         sum += a[i] * b[i];
     return sum;
 }

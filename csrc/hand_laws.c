@@ -21,15 +21,6 @@ typedef struct finger_now {
     awiwi_real gained[JOINTS];    /* by how much the joints' rates have changed */
 } finger_now;
 
-/* a'b of all joints that a finger may have; those that it lacks are 0 in both. */
-static awiwi_real dot(const awiwi_real *a, const awiwi_real *b)
-{
-    awiwi_real sum = 0;
-    AWIWI_UNROLLED for (int j = 0; j < JOINTS; j++)
-        sum += a[j] * b[j];
-    return sum;
-}
-
 /* -- where the finger is ------------------------------------------------------------------------------------------- */
 
 /* Lengths of the tendons; those that are unknown have that of the last estimate. */
@@ -92,7 +83,7 @@ static unsigned estimate(const awiwi_context *now, finger_now *own)
         return AWIWI_NO_ESTIMATE;
     for (int j = 0; j < finger->joints; j++) {
         const awiwi_real last = qd[j];
-        qd[j] = awiwi_follow(last, (found[j] - q[j]) * now->per_period, now->pace);
+        qd[j] = awiwi_low_pass(last, (found[j] - q[j]) * now->per_period, now->pace);
         own->gained[j] = qd[j] - last;
         q[j] = found[j];
     }
@@ -159,7 +150,7 @@ static unsigned follow(const awiwi_context *now, const finger_now *own)
     AWIWI_UNROLLED for (int i = 0; i < JOINTS; i++)
         change[i] = i < n ? state->planned_tau[first + i] - state->tau[first + i] : 0;
     for (int i = 0, k = finger->first_tendon; i < finger->tendons; i++, k++)
-        state->f_des[k] = awiwi_clamp(state->planned_f[k] + dot(state->spread[k], change), low, high);
+        state->f_des[k] = awiwi_clamp(state->planned_f[k] + awiwi_dot(state->spread[k], change, JOINTS), low, high);
     return status;
 }
 
@@ -203,7 +194,7 @@ static awiwi_real bend_force(const awiwi_context *now, int k, awiwi_real bend)
 {
     const awiwi_hand_state *state = now->state;
     return state->friction[k] + now->hand->motor_pulley * state->f[k]
-           + now->geared * (bend / state->stiffness[k] - state->slope[k] * (state->xd[k] * state->xd[k]));
+           + now->inertia_per_radius * (bend / state->stiffness[k] - state->slope[k] * (state->xd[k] * state->xd[k]));
 }
 
 /* Every tendon's force is controlled. */
@@ -246,11 +237,20 @@ static awiwi_real backstep(const awiwi_context *now, int j, const awiwi_real *tu
            - (back + K * e2 + D * e3 - m * motion[4] + (slower * e1 + e2) / weight);
 }
 
+/* By how much the second derivative of a joint's torque is larger where the errors of all forces decay than the law wants
+   it. */
+static awiwi_real surplus(const awiwi_context *now, const finger_now *own, int i, awiwi_real wanted, awiwi_real tau,
+                          awiwi_real rate)
+{
+    const awiwi_hand_gains *gains = now->gains;
+    return gains->force_kp * (wanted - tau) - gains->force_kd * rate
+           - backstep(now, own->finger->first_joint + i, gains->tunings[own->index], wanted, tau, rate);
+}
+
 /* The impedance of every joint through the torques of its tendons and their rates (chapter 15), as far as forces
    within their limits give the torques; what forces change no torque are those of the cascade. */
 static unsigned backstepping(const awiwi_context *now, const finger_now *own, awiwi_real *torque)
 {
-    const awiwi_hand_gains *gains = now->gains;
     const awiwi_finger *finger = own->finger;
     awiwi_hand_state *state = now->state;
     const int n = finger->joints, first = finger->first_joint, t = finger->first_tendon;
@@ -262,16 +262,12 @@ static unsigned backstepping(const awiwi_context *now, const finger_now *own, aw
         || finger->joint_torque(state->q + first, fd, taud) != AWIWI_OK
         || finger->joint_torque(state->q + first, state->f_des + t, wanted) != AWIWI_OK)
         return status | AWIWI_NO_LAW;
-    for (int i = 0, j = first; i < JOINTS; i++, j++) {
-        change[i] = 0;
-        if (i >= n)
-            continue;
-        observe(now, j, tau[i], own->gained[i]);
-        change[i] = gains->force_kp * (wanted[i] - tau[i]) - gains->force_kd * taud[i]
-                    - backstep(now, j, gains->tunings[own->index], wanted[i], tau[i], taud[i]);
-    }
+    for (int i = 0; i < n; i++)
+        observe(now, first + i, tau[i], own->gained[i]);
+    for (int i = 0; i < JOINTS; i++)
+        change[i] = i < n ? surplus(now, own, i, wanted[i], tau[i], taud[i]) : 0;
     for (int i = 0; i < finger->tendons; i++)
-        torque[i] = bend_force(now, t + i, decay(now, t + i, fd[i]) + dot(state->spread[t + i], change));
+        torque[i] = bend_force(now, t + i, decay(now, t + i, fd[i]) + awiwi_dot(state->spread[t + i], change, JOINTS));
     return status;
 }
 

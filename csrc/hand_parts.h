@@ -17,7 +17,7 @@ typedef struct awiwi_context {
     awiwi_real fade;       /* share of the torque after a change that a tick takes away */
     awiwi_real heating;    /* share of the load that becomes heat in a tick */
     awiwi_real per_lasting; /* 1/continuous_torque [1/(N m)] */
-    awiwi_real geared;     /* inertia of a motor over the radius of its pulley [kg m] */
+    awiwi_real inertia_per_radius; /* of a motor and its pulley [kg m] */
 } awiwi_context;
 
 /* The context of a tick with these gains. */
@@ -28,15 +28,10 @@ awiwi_context awiwi_context_of(const awiwi_hand *hand, const awiwi_hand_gains *g
    is not good keeps its last value. */
 unsigned awiwi_sense(const awiwi_context *now);
 
-/* A filtered value a tick later, which takes a share `pace` of its change. */
-static inline awiwi_real awiwi_follow(awiwi_real value, awiwi_real now, awiwi_real pace)
+/* A low-pass filter of first order: its value a tick later, which takes a share `pace` of the change. */
+static inline awiwi_real awiwi_low_pass(awiwi_real value, awiwi_real now, awiwi_real pace)
 {
     return value + pace * (now - value);
-}
-
-static inline int awiwi_is_number(awiwi_real x)
-{
-    return x * 0 >= 0;
 }
 
 /* Whether a tendon of this status has an unknown length. */

@@ -85,7 +85,7 @@ static int move_finger(const awiwi_hand_plant *plant, int index, awiwi_real h, a
 {
     const awiwi_finger *finger = plant->hand->finger + index;
     const int first = finger->first_joint;
-    const awiwi_real share = 1 / (1 + world->heavier); /* of torque and weight, for links with their own inertia */
+    const awiwi_real share = 1 / (1 + world->added_inertia); /* of torque and weight, for links with their own inertia */
     awiwi_real tau[JOINTS], qdd[JOINTS], g[3];
     for (int i = 0; i < 3; i++) {
         const awiwi_real axis[3] = {finger->base[i], finger->base[3 + i], finger->base[6 + i]};

@@ -50,13 +50,13 @@ static void take_angles(const awiwi_context *now)
         const awiwi_real theta = input->theta[i], change = theta - state->theta[i], ticks = 1 + state->lost[i];
         awiwi_real *rate = state->thd + i;
         if (input->theta_valid[i] && awiwi_size(theta) <= most && awiwi_size(change) <= fastest * ticks) {
-            *rate = awiwi_follow(*rate, change / ticks * per_period, pace);
+            *rate = awiwi_low_pass(*rate, change / ticks * per_period, pace);
             state->theta[i] = theta;
             state->lost[i] = 0;
             if (awiwi_size(theta) > end)
                 state->tendon_status[i] |= AWIWI_TRAVEL;
         } else {
-            *rate = awiwi_follow(*rate, 0, pace);
+            *rate = awiwi_low_pass(*rate, 0, pace);
             state->lost[i] = ticks;
             state->tendon_status[i] |= AWIWI_ANGLE_LOST;
         }
@@ -71,7 +71,7 @@ static void elongate(const awiwi_context *now)
     (void)now->hand->sensors(state->reading, travel, state->f);
     for (int i = 0; i < now->hand->tendons; i++) {
         const awiwi_real x = state->slack[i] - travel[i] + compliance * state->f[i];
-        state->xd[i] = awiwi_follow(state->xd[i], (x - state->x[i]) * per_period, pace);
+        state->xd[i] = awiwi_low_pass(state->xd[i], (x - state->x[i]) * per_period, pace);
         state->x[i] = x;
     }
 }

@@ -35,7 +35,7 @@ static unsigned drive(const awiwi_context *now, int k, awiwi_real wanted)
         status |= AWIWI_SATURATED;
     }
     const awiwi_real load = torque * now->per_lasting;
-    *heat = awiwi_follow(*heat, load * load, now->heating);
+    *heat = awiwi_low_pass(*heat, load * load, now->heating);
     now->state->torque[k] = torque;
     return status;
 }

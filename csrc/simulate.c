@@ -1,50 +1,14 @@
 /* A control law on a clock, and a plant in continuous time: loops of kernels, simulated. */
 #include "numerics.h"
+#include "dense.h"
 #include "noise.h"
 #include "awiwi_simulate.h"
 
 #include <string.h>
 
-static int finite(awiwi_real x)
-{
-    return x >= -AWIWI_REAL_MAX && x <= AWIWI_REAL_MAX;
-}
-
-/* Loops over a block's arguments take four at a time: they are a third of what a tick executes. */
-static int all_finite(const awiwi_real *x, int n)
-{
-    awiwi_real sum = 0; /* of zeros; infinity and NaN times zero are NaN */
-    int i = 0;
-    for (; i + 4 <= n; i += 4)
-        sum += (x[i] + x[i + 1] + (x[i + 2] + x[i + 3])) * 0;
-    for (; i < n; i++)
-        sum += x[i] * 0;
-    return sum >= 0;
-}
-
-static void take(const awiwi_real *signals, const int *from, int n, awiwi_real *in)
-{
-    int i = 0;
-    for (; i + 4 <= n; i += 4) {
-        in[i] = signals[from[i]];
-        in[i + 1] = signals[from[i + 1]];
-        in[i + 2] = signals[from[i + 2]];
-        in[i + 3] = signals[from[i + 3]];
-    }
-    for (; i < n; i++)
-        in[i] = signals[from[i]];
-}
-
 static void put(const awiwi_real *out, const int *to, int n, awiwi_real *signals)
 {
-    int i = 0;
-    for (; i + 4 <= n; i += 4) {
-        signals[to[i]] = out[i];
-        signals[to[i + 1]] = out[i + 1];
-        signals[to[i + 2]] = out[i + 2];
-        signals[to[i + 3]] = out[i + 3];
-    }
-    for (; i < n; i++)
+    AWIWI_UNROLLED for (int i = 0; i < n; i++)
         signals[to[i]] = out[i];
 }
 
@@ -67,11 +31,12 @@ static int call(const awiwi_block *block, const awiwi_real *signals, awiwi_real 
         add_products(block, signals, out);
         return AWIWI_OK;
     }
-    take(signals, block->from, block->inputs, in);
+    AWIWI_UNROLLED for (int i = 0; i < block->inputs; i++)
+        in[i] = signals[block->from[i]];
     return block->kernel(in, out);
 }
 
-static int rates(const awiwi_loop *loop, awiwi_real *signals)
+int awiwi_rates(const awiwi_loop *loop, awiwi_real *signals)
 {
     awiwi_real out[AWIWI_MOST_ARGUMENTS];
     for (int i = 0; i < loop->plant_blocks; i++) {
@@ -81,11 +46,6 @@ static int rates(const awiwi_loop *loop, awiwi_real *signals)
         put(out, block->to, block->outputs, signals);
     }
     return AWIWI_OK;
-}
-
-int awiwi_rates(const awiwi_loop *loop, awiwi_real *signals)
-{
-    return rates(loop, signals);
 }
 
 /* One step of Runge and Kutta's method of fourth order, from states and rates at its start to those at its end. `error`
@@ -102,7 +62,7 @@ static int advance(const awiwi_loop *loop, awiwi_real h, const awiwi_real *start
         const awiwi_real ahead = h * reach[stage], weight = share[stage];
         for (int i = 0; i < n; i++)
             x[i] = start[i] + ahead * rate[i];
-        if (rates(loop, signals))
+        if (awiwi_rates(loop, signals))
             return AWIWI_OUT_OF_DOMAIN;
         for (int i = 0; i < n; i++)
             sum[i] += weight * rate[i];
@@ -111,11 +71,11 @@ static int advance(const awiwi_loop *loop, awiwi_real h, const awiwi_real *start
         fourth[i] = rate[i];
         x[i] = start[i] + h / 6 * sum[i];
     }
-    if (rates(loop, signals))
+    if (awiwi_rates(loop, signals))
         return AWIWI_OUT_OF_DOMAIN;
     for (int i = 0; i < n; i++) {
-        const awiwi_real apart = rate[i] - fourth[i], size = apart < 0 ? -apart : apart;
-        most = size > most ? size : most;
+        const awiwi_real apart = awiwi_size(rate[i] - fourth[i]);
+        most = apart > most ? apart : most;
     }
     *error = h / 6 * most;
     return AWIWI_OK;
@@ -138,7 +98,7 @@ static void act(const awiwi_loop *loop, int late, awiwi_real *signals)
         const awiwi_actuator *actuator = loop->actuator + i;
         const awiwi_real u = signals[actuator->from], limit = actuator->limit;
         if (!actuator->late == !late)
-            signals[actuator->to] = !finite(u) ? 0 : u < -limit ? -limit : u > limit ? limit : u;
+            signals[actuator->to] = awiwi_is_number(u) ? awiwi_clamp(u, -limit, limit) : 0;
     }
 }
 
@@ -149,7 +109,7 @@ static int run_law(const awiwi_loop *loop, awiwi_real *signals)
     for (int i = 0; i < loop->law_blocks; i++) {
         const awiwi_block *block = loop->law + i;
         const int status = call(block, signals, out);
-        if ((status == AWIWI_OK || status == AWIWI_NOT_CONVERGED) && all_finite(out, block->outputs))
+        if ((status == AWIWI_OK || status == AWIWI_NOT_CONVERGED) && awiwi_all_finite(out, block->outputs))
             put(out, block->to, block->outputs, signals);
         else
             refused = 1;
@@ -162,7 +122,7 @@ static int run_law(const awiwi_loop *loop, awiwi_real *signals)
 /* Everything in a tick but the motion of the plant. Sensors see its present outputs, computed anew if they are old. */
 static int control(const awiwi_loop *loop, unsigned tick, int old, awiwi_real *signals)
 {
-    if (old && rates(loop, signals))
+    if (old && awiwi_rates(loop, signals))
         return AWIWI_OUT_OF_DOMAIN;
     sense(loop, tick, signals);
     act(loop, 1, signals);
@@ -177,7 +137,7 @@ static int integrate(const awiwi_loop *loop, awiwi_real *signals)
     const size_t size = sizeof(awiwi_real) * 2 * (size_t)loop->states;
     awiwi_real before[2 * AWIWI_MOST_RATES], error = 0;
     int parts = loop->tolerance > 0 ? 1 : loop->substeps;
-    if (rates(loop, signals))
+    if (awiwi_rates(loop, signals))
         return AWIWI_OUT_OF_DOMAIN;
     for (int done = 0; done < parts;) {
         memcpy(before, signals, size);
@@ -192,7 +152,7 @@ static int integrate(const awiwi_loop *loop, awiwi_real *signals)
             done++;
         }
     }
-    return all_finite(signals, loop->states) ? AWIWI_OK : AWIWI_NOT_FINITE;
+    return awiwi_all_finite(signals, loop->states) ? AWIWI_OK : AWIWI_NOT_FINITE;
 }
 
 int awiwi_tick(const awiwi_loop *loop, unsigned tick, awiwi_real *signals)
@@ -208,7 +168,7 @@ int awiwi_simulate(const awiwi_loop *loop, const awiwi_run *run, awiwi_real *sig
 {
     awiwi_real *row = run->record;
     *refused = 0;
-    *status = all_finite(signals, loop->states) ? AWIWI_OK : AWIWI_NOT_FINITE;
+    *status = awiwi_all_finite(signals, loop->states) ? AWIWI_OK : AWIWI_NOT_FINITE;
     for (int tick = 0; tick < run->ticks; tick++) {
         if (*status == AWIWI_OUT_OF_DOMAIN || *status == AWIWI_NOT_FINITE)
             return tick;

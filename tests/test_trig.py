@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import platform
 import re
-import shutil
 import subprocess
 from pathlib import Path
 
@@ -13,6 +12,7 @@ import mpmath
 import numpy as np
 import pytest
 from functions import ERROR, build, compile_with, pattern, run, worst_ulp
+from tools import need
 
 from awiwi_gen.build import compiler
 from awiwi_gen.emit.c import Printer
@@ -182,8 +182,9 @@ def test_one_angle_or_several_and_python_compute_the_same_bits(flags, tmp_path):
     ],
 )
 def test_compilers_compute_several_angles_at_once_without_being_told(flags, scalar, multiplication, tmp_path):
-    if not shutil.which("objdump") or "clang" in compiler().version:
-        pytest.skip("there is no objdump, or another compiler than gcc")
+    need("objdump")
+    if "clang" in compiler().version:
+        pytest.skip("reads the assembly of gcc")
     options = Options(scalar)
     text = (
         f'#include "numerics.h"\n#include "sincos.h"\n{options.c_type} three(const {options.c_type} *q);\n'

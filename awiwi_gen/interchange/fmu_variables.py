@@ -74,7 +74,7 @@ FAULTS = (
     ("damping", "joint", "N m s/rad", "of the link"),
     ("spring", "tendon", "1", "force of the spring over that of its calibration; 0 for a cut tendon"),
     ("friction", "", "1", "of the motors, over that of the hand"),
-    ("heavier", "", "1", "inertia that is added to the links, over theirs; not their weight"),
+    ("added_inertia", "", "1", "of the links, as a share of their own; it has no weight"),
     ("reading_noise", "", "1", "standard deviation of readings, in counts"),
     ("theta_step", "", "rad", "of the motors' sensors; 0 for none"),
 )

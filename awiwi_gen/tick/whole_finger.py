@@ -21,17 +21,11 @@ if TYPE_CHECKING:
 
 Array = np.ndarray[Any, Any]
 BEFORE, EVENT = 900, 900  # ticks at rest at first, and from an event on
-MOVED, LATELY, LONGEST = (
-    1e-3,
-    300,
-    6000,
-)  # a hand rests that has not moved so far [rad] in so many ticks, or after the last
+MOVED, LATELY, LONGEST = 1e-3, 300, 6000  # a hand rests that moved less [rad] in so many ticks, or after the last
 STEP = 0.2  # rad, of all joints at once, but not more than this share of the motors' travel winds up
 WOUND = 0.5
-MOST_WOUND, LESS = (
-    0.95,
-    0.07,
-)  # share of that travel, and of the range of forces: a pretension that takes more is less by it
+MOST_WOUND = 0.95  # of the motors' travel: where pretension and step need more, the pretension is lowered, by a share
+LESS = 0.07  # of the range of forces
 DEFLEXION = 0.05  # rad, by which a load step deflects joints of the wanted stiffness
 WALL, WALL_DAMPING = 1e4, 5.0  # N/m, N s/m: of a wall that only pushes, half-way on the fingertip's path
 TURNING, FREQUENCY = 10.0, 2.0  # rad/s^2, Hz: of the palm about an axis that is askew to all joints, through its origin
@@ -66,7 +60,7 @@ PLANTS: Mapping[str, Plant] = {
     "friction x1.3, damping x2": Plant(friction=1.3, damping=2.0),
     "links x0.7": Plant(links=0.7),
     "links x3": Plant(links=3.0),
-    "links x3, friction x0.7, damping x0.5": Plant(1.0, 0.7, 0.5, 3.0),
+    "links x3, friction x0.7, damping x0.5": Plant(links=3.0, friction=0.7, damping=0.5),
     "springs 10 % apart": Plant(apart=0.1),
     "springs x0.7": Plant(0.7),
     "springs x1.3": Plant(1.3),
@@ -144,7 +138,7 @@ class Run:
             world.damping[:] *= self.plant.damping
             unequal = self.plant.apart / 2 * (-1.0) ** np.arange(loop.step.tendons)
             world.spring[: loop.step.tendons] = self.plant.springs * (1 + unequal)
-            world.heavier = self.plant.links - 1
+            world.added_inertia = self.plant.links - 1
 
         self.loop = ClosedLoop(self.library, seed=self.seed, prepare=prepare)
         self.loop.step.input.law = self.law
@@ -176,15 +170,11 @@ class Run:
 
     def _wound_up(self) -> bool:
         """Whether the step would wind a motor up beyond its travel."""
-        model, theta = self.loop.step.model, self.loop.hand.world.theta
-        wound = [
-            np.abs(
-                theta[rows]
-                - self.library[f"{name}_coupling"](self.goal[joints]).sum(axis=1) * self.step / model.motor_pulley
-            )
-            for name, (rows, joints) in self.hand.blocks.items()
-        ]
-        return float(np.concatenate(wound).max()) > MOST_WOUND * float(model.motor_travel)
+        model, theta = self.loop.step.model, self.loop.hand.world.theta.copy()
+        for name, (rows, joints) in self.hand.blocks.items():
+            arms = self.library[f"{name}_coupling"](self.goal[joints]).sum(axis=1)
+            theta[rows] -= arms * self.step / model.motor_pulley
+        return float(np.abs(theta).max()) > MOST_WOUND * float(model.motor_travel)
 
     def _moved(self) -> float:
         """How far [rad] the joints have moved lately."""

@@ -245,7 +245,7 @@ static void simulation(const scene *start)
         now.world.reading_noise = i % 2 ? 30 : 0;
         now.world.theta_step = i % 3 ? 0 : 0.01;
         now.world.spring[i % HAND_TENDONS] = i % 4 ? 1 : 0;
-        now.world.heavier = i % 2 ? 0.5 : 0;
+        now.world.added_inertia = i % 2 ? 0.5 : 0;
         for (int tick = 0; tick < 30; tick++) {
             double torque[HAND_TENDONS];
             for (int k = 0; k < HAND_TENDONS; k++)
