@@ -287,7 +287,7 @@ def assemble_batch(source: Path, into: Path, flags: tuple[str, ...], ways: tuple
 
 def _glue_source(manifest: dict[str, Any], declared: str) -> str:
     """JSON of what the wrapper is made from: declarations, loops over samples, and the kernels in a uniform shape."""
-    from awiwi_gen.emit.names import input_name, output_name
+    from awiwi_gen.emit.batch import c_arrays
 
     loops, prototypes = [], []
     scalar, prefix = manifest["c_type"], manifest["prefix"]
@@ -303,26 +303,24 @@ def _glue_source(manifest: dict[str, Any], declared: str) -> str:
             f"extern const awiwi_hand_plant {prefix}_simulated_hand;",
         ]
     for entry in manifest["kernels"]:
-        inputs = [input_name(p["name"]) for p in entry["inputs"]]
-        sizes = {output_name(p["name"]): prod(p["shape"]) for p in entry["outputs"]}
-        outputs = list(sizes)
-        signature = [f"const {scalar} *{n}, ptrdiff_t {n}_step" for n in inputs]
-        signature += [f"{scalar} *{n}" for n in outputs]
-        call = [f"{n} + i*{n}_step" for n in inputs] + [f"{n} + i*{sizes[n]}" for n in outputs]
-        if entry["status"]:
-            signature.append("int *status")
+        signature, call = ["ptrdiff_t n"], []
         if entry["params"]:
-            signature.insert(0, f"const {prefix}_params *p")
-            call.insert(0, "p")
-        head = f"void Batch_{entry['name']}(ptrdiff_t n, {', '.join(signature)})"
-        prototypes.append(f"{head};")
+            signature.append(f"const {prefix}_params *p")
+            call.append("p")
+        for kind, name, size in c_arrays(entry, scalar):
+            given = kind.startswith("const")
+            signature += [f"{kind}*{name}", *[f"ptrdiff_t {name}_step"] * given]
+            call.append(f"{name} + i*{f'{name}_step' if given else size}")
+        signature += ["int *status"] * entry["status"]
         keep = "status[i] = " if entry["status"] else ""
         body = f"for (ptrdiff_t i = 0; i < n; i++) {keep}{prefix}_{entry['name']}({', '.join(call)});"
-        loops.append(f"static {head} {{ {body} }}")
+        loops.append(f"static void Loop_{entry['name']}({', '.join(signature)}) {{ {body} }}")
         loops.append(_flat_source(entry, prefix, scalar))
-    table = ", ".join(f"Flat_{entry['name']}" for entry in manifest["kernels"])
-    prototypes.append("extern awiwi_flat FlatKernels[];")
-    loops.append(f"static awiwi_flat FlatKernels[] = {{ {table} }};")
+    # Tables, as a function of its own in the module is sixty lines of C for cffi.
+    for kind, table in (("void *", "Loop"), ("awiwi_flat ", "Flat")):
+        members = ", ".join(f"{table}_{entry['name']}" for entry in manifest["kernels"])
+        prototypes.append(f"extern {kind}{table}Kernels[];")
+        loops.append(f"static {kind}{table}Kernels[] = {{ {members} }};")
     return json.dumps({"declared": declared, "prototypes": prototypes, "loops": loops})
 
 

@@ -58,7 +58,8 @@ class KernelFunction:
     ``out=M`` writes into what a call with such inputs returned before: fresh memory can cost more than a kernel.
     Kernels can be pickled and copied; another process loads the library again from the same cache.
 
-    ``flat`` is the kernel as a C function of one array with all inputs and one with all outputs.
+    ``flat`` is the kernel as a C function of one array with all inputs and one with all outputs, ``loop`` the address of
+    the one that calls it for one sample after another.
     """
 
     def __init__(self, entry: Mapping[str, Any], library: Library, loop: Any, flat: Any, params: Any) -> None:
@@ -72,7 +73,7 @@ class KernelFunction:
         self.__doc__ = docstring(entry)
         self.dtype = library.dtype
         self.flat = flat
-        self._entry, self._library, self._loop = entry, library, loop
+        self._entry, self._library, self._address = entry, library, loop
         self._vectorised: Any = None  # undecided
         self._seen = 0
         self._params: tuple[Any, ...] = () if params is None else (params,)
@@ -98,6 +99,15 @@ class KernelFunction:
         kinds = inspect.Parameter
         parameters = [kinds(name, kinds.POSITIONAL_OR_KEYWORD) for name in self._names]
         self.__signature__ = inspect.Signature([*parameters, kinds("out", kinds.KEYWORD_ONLY, default=None)])
+
+    @cached_property
+    def _loop(self) -> Any:
+        """The C function that calls the kernel for one sample after another."""
+        number = C_TYPES[self.dtype.char]
+        arguments = ["ptrdiff_t", *["const void *"] * len(self._params)]
+        arguments += [f"const {number} *", "ptrdiff_t"] * len(self.inputs) + [f"{number} *"] * len(self.outputs)
+        arguments += ["int *"] * self._entry["status"]
+        return self._library.ffi.cast(f"void (*)({', '.join(arguments)})", self._address)
 
     @cached_property
     def _work(self) -> int:
@@ -304,7 +314,7 @@ class Library(Kernels):
 
     def _kernel(self, place: int, entry: Mapping[str, Any]) -> KernelFunction:
         params = self.params if entry["params"] else None
-        return KernelFunction(entry, self, getattr(self.c, f"Batch_{entry['name']}"), self.c.FlatKernels[place], params)
+        return KernelFunction(entry, self, self.c.LoopKernels[place], self.c.FlatKernels[place], params)
 
     def finger(self, name: str) -> FingerView:
         """One finger: its kernels without its name, its joints and tendons. Raises InputError for a name it lacks."""

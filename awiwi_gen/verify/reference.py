@@ -88,13 +88,18 @@ def _joined(
 
 def reference(values: BallArrays) -> Reference:
     """Ball values rounded to pairs of doubles; a ball that contains zero becomes zero."""
-    high, low = {}, {}
-    for name, elements in values.items():
-        centres = [[ZERO if x.contains(0) else x.mid() for x in column] for column in elements]
-        first = [[float(x) for x in column] for column in centres]
-        rest = [[float(x - h) for x, h in zip(c, f, strict=True)] for c, f in zip(centres, first, strict=True)]
-        high[name], low[name] = np.array(first).T, np.array(rest).T
+    pairs = {id(column): _rounded(column) for elements in values.values() for column in elements}
+    high, low = (
+        {name: np.array([pairs[id(column)][part] for column in elements]).T for name, elements in values.items()}
+        for part in (0, 1)
+    )
     return Reference(high, low)
+
+
+def _rounded(column: list[arb]) -> tuple[list[float], list[float]]:
+    """Centres of balls as doubles, and what these leave."""
+    first = [0.0 if x.contains(ZERO) else float(x) for x in column]
+    return first, [float(x - h) if h else 0.0 for x, h in zip(column, first, strict=True)]
 
 
 def domain(values: BallArrays) -> list[int]:
