@@ -31,7 +31,7 @@ EXTRAS = {
     "mujoco": ("mujoco", INTERCHANGE),
     "scipy": ("scipy", "studies"),
 }
-COMMAND_LINE = ("typer", "pydantic")  # Typer imports pydantic
+COMMAND_LINE = ("typer", "pydantic")
 HAND = ("pydantic", "tree_sitter", "tree_sitter_toml")  # to read a hand file
 GENERATE = ("casadi", "flint", "jinja2", "sympy", *HAND)  # to derive, emit and prove
 
