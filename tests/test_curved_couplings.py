@@ -106,6 +106,11 @@ def test_a_urdf_loses_the_curve_and_says_so(hand):
     assert losses["couplings by a curve: its offset and ratio only"] == ("claw end",)
 
 
+def test_an_offset_that_differences_of_angles_leave_by_rounding_is_none():
+    assert Mimic.of("b", "a", Polynomial([1.4e-17, 0.857])) == Mimic("b", "a", 0.857)
+    assert Mimic.of("b", "a", Polynomial([1e-9, 0.857])).offset == 1e-9
+
+
 def test_followers_of_followers_are_composed_up_to_the_fourth_power():
     names = {name: name for name in "abc"}
     owner = dict.fromkeys("abc", "claw")

@@ -24,6 +24,8 @@ LEAST_MASS = 1e-9
 """Mass [kg] of moving bodies that have none, with a radius of gyration of 1 mm: MuJoCo refuses bodies without."""
 TRAVEL = 0.1
 """How far [m] slides are taken to go to both sides where nothing says it."""
+ROUNDING = 1e-14
+"""What differences of angles [rad], or of positions [m], leave at most where they are equal."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,8 +131,9 @@ class Mimic:
 
     @classmethod
     def of(cls, follower: str, leader: str, curve: Polynomial) -> Self:
-        """A joint that follows another one by a curve."""
+        """A joint that follows another one by a curve; an offset that differences of angles leave by rounding is none."""
         offset, ratio, *powers = map(float, [*curve.coef, 0.0][: max(2, len(curve.coef))])
+        offset = offset if abs(offset) > ROUNDING else 0.0
         while powers and not powers[-1]:
             powers.pop()
         return cls(follower, leader, ratio, offset, tuple(powers))
