@@ -45,7 +45,7 @@ _WORST = ("worst difference from MuJoCo", "from Pinocchio")
 # Our fingers with what no published hand has.
 OWN = ("wrapped_finger", "inside_finger", "curved_finger", "sliding_finger", "telescope_finger", "oblique_slides")
 _NO_MASSES = (".dae", ".glb")  # meshes that MuJoCo cannot read: half a gigabyte
-QUICK = ("Shadow (gymnasium)", "ORCA v2", "Robotiq three-finger", "Allegro (URDF)", "iCub mk3 (URDF)", "MyoHand")
+QUICK = ("Shadow (gymnasium)", "Robotiq three-finger", "iCub mk3 (URDF)", "MyoHand")
 KERNELS = "{}_[bcgilmpt]*"  # all but solvers and what they need: seconds for a finger instead of minutes
 
 
