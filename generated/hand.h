@@ -10,8 +10,8 @@
 #define AWIWI_PARAMS "baked"
 
 /* SHA-256 of the hand's numbers, the options and the generated C; and its first digits as a number. */
-#define AWIWI_BUILD_DIGEST "0b86c13ddc9fea1069139a88fc01e5421852544261ca847e8033201d0cfbf408"
-#define AWIWI_BUILD_ID 0x0b86c13du
+#define AWIWI_BUILD_DIGEST "3efeff1fa08b84bf8d4227520462298fab0cbcd4f92dd1ff6bcbdeb884e133ce"
+#define AWIWI_BUILD_ID 0x3efeff1fu
 
 /* -- counts and names ------------------------------------------------------------------------------------------------ */
 

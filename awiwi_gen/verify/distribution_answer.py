@@ -2,14 +2,50 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+from math import prod
 from typing import Any
 
 import numpy as np
 from flint import arb, arb_mat
 
+from awiwi_gen.verify.samples import without_noise
+
 Array = np.ndarray[Any, Any]
+Columns = list[list[arb]]
 
 SINGULAR = 1e-9  # singular values below this share of the largest count as zero
+
+
+def demanded(
+    f: Columns, k: Columns, P: Columns, dP: Columns, beyond: Sequence[tuple[Array, Array]]
+) -> tuple[Array, Array]:
+    """Torques (samples, n) and stiffnesses (samples, n, n) of forces and what lies beyond: exact, alike on all processors.
+
+    Forces and stiffnesses of m tendons, P and dP row by row are balls, each a list over the samples.
+    """
+    m, n = len(f), len(beyond[0][0])
+    torque, stiffness = (
+        np.array([without_noise(part).ravel() for part in each]).T for each in zip(*beyond, strict=True)
+    )
+
+    def total(terms: Iterable[tuple[list[arb], ...]], more: Array) -> list[float]:
+        products = [[prod(each, start=arb(1)) for each in zip(*factors, strict=True)] for factors in terms]
+        return [float(sum(each, arb(x))) for *each, x in zip(*products, more.tolist(), strict=True)]
+
+    tau = [total(((P[i * n + a], f[i]) for i in range(m)), -torque[a]) for a in range(n)]
+    K = [
+        total(
+            [
+                *((k[i], P[i * n + a], P[i * n + b]) for i in range(m)),
+                *((f[i], dP[(i * n + a) * n + b]) for i in range(m)),
+            ],
+            stiffness[a * n + b],
+        )
+        for a in range(n)
+        for b in range(n)
+    ]
+    return -np.array(tau).T, np.array(K).T.reshape(-1, n, n)
 
 
 class System:

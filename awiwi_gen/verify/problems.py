@@ -20,6 +20,7 @@ from awiwi_gen.verify.problems_gains import GainMatching
 from awiwi_gen.verify.problems_resting import Resting
 from awiwi_gen.verify.problems_riccati import JointRegulator, Riccati
 from awiwi_gen.verify.reference import Reference, reference
+from awiwi_gen.verify.samples import rounded
 
 Array = np.ndarray[Any, Any]
 
@@ -91,7 +92,7 @@ class LeastSquares(Problem):
         lengths, _ = self.model(pose.astype(np.float64))
         lengths = lengths + np.where(noisy[:, None], random.uniform(-NOISE, NOISE, lengths.shape), 0)
         nearby = np.clip(pose + random.uniform(-near, near, pose.shape), low, high)
-        found = {"h": lengths.astype(start.dtype), "start": nearby.astype(start.dtype)}
+        found = {"h": rounded(lengths).astype(start.dtype), "start": nearby.astype(start.dtype)}
         held = [*self.solver.held]
         return found | ({"measured": pose[:, held].astype(start.dtype)} if held else {})
 

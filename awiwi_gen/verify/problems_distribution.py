@@ -12,11 +12,12 @@ from flint import arb
 from awiwi_gen.ir.algebras import Balls, Floats
 from awiwi_gen.ir.graph import Graph, prune
 from awiwi_gen.ir.interpret import evaluate
-from awiwi_gen.verify.distribution_answer import System
+from awiwi_gen.verify.distribution_answer import System, demanded
 from awiwi_gen.verify.nearest_forces import Demands, minima
 from awiwi_gen.verify.other_minima import Found
 from awiwi_gen.verify.problem import Problem
 from awiwi_gen.verify.reference import Reference, reference
+from awiwi_gen.verify.samples import rounded
 
 Array = np.ndarray[Any, Any]
 Limits = tuple[float, float]  # limits of every force [N]
@@ -43,16 +44,17 @@ LAST_STEP = 1e-40  # largest step [N] after which the next would change nothing 
 
 @dataclass(frozen=True)
 class Answer:
-    """The optimal forces f (m,) [N] for one demand tau (n,) [N m], K (n, n) [N m/rad].
+    """The optimal forces f (m,) [N] for one demand, of which K (n, n) [N m/rad] is the stiffness.
 
+    `beyond` are the torque (n,) [N m] and the stiffness (n, n) that the demand has and these forces have not.
     `held` (m,) is -1 for a tendon at the lower limit, 1 at the upper one, 0 between them. The torque cannot be reached
     unless `feasible`; other forces do the same unless `unique`.
     """
 
     f: Array
     held: Array
-    tau: Array
     K: Array
+    beyond: tuple[Array, Array]
     feasible: bool
     unique: bool
 
@@ -97,8 +99,12 @@ class Distribution(Problem):
         """Poses and limits as drawn, with demands for them."""
         dtype, (low, high) = drawn["q"].dtype, (drawn[end][:, 0] for end in ("f_min", "f_max"))
         answers = self.answers(drawn["q"], low, high)
-        tau, K = (np.array([getattr(a, name) for a in answers]).astype(dtype) for name in ("tau", "K"))
-        return {"q": drawn["q"], "tau": tau, "K": K, "f_min": low, "f_max": high}
+        held, between = (np.array([getattr(answer, name) for answer in answers]).T for name in ("held", "f"))
+        forces = np.where(held, np.where(held < 0, low, high), rounded(between))
+        f = [[arb(x) for x in row] for row in forces.tolist()]
+        (k,) = self.curve(f, "k", algebra=Balls(len(low)))
+        tau, K = demanded(f, k, *self._coupling(drawn["q"]), [answer.beyond for answer in answers])
+        return {"q": drawn["q"], "tau": tau.astype(dtype), "K": K.astype(dtype), "f_min": low, "f_max": high}
 
     # -- demands ----------------------------------------------------------------------------------------------
 
@@ -140,8 +146,8 @@ class Distribution(Problem):
     def _answer(self, draft: _Draft, state: _State, P: Array, dP: Array, limits: Limits, part: float) -> Answer:
         """Forces, and a demand out of reach by a part of the draft's miss for which they are stationary."""
         reached, at, excess = self._out_of_reach(draft, state, P, dP, limits, part)
-        tau, feasible = draft.torque_excess - P.T @ reached.f, not draft.torque_excess.any()
-        return Answer(reached.f, at, tau, reached.K - excess, feasible, _is_unique(P, reached.growth))
+        feasible, beyond = not draft.torque_excess.any(), (draft.torque_excess, -excess)
+        return Answer(reached.f, at, reached.K - excess, beyond, feasible, _is_unique(P, reached.growth))
 
     def _out_of_reach(
         self, draft: _Draft, state: _State, P: Array, dP: Array, limits: Limits, part: float
@@ -243,15 +249,18 @@ class Distribution(Problem):
         reasons = [f"it ends at a minimum that is not the nearest at {farther} samples"]
         return self._exact(inputs, answers), reasons if farther > FARTHER * len(answers) else []
 
+    def _coupling(self, q: Array) -> tuple[list[list[arb]], list[list[arb]]]:
+        """P and its derivatives, row by row, at all samples."""
+        balls, given = Balls(len(q)), [[arb(float(x)) for x in column] for column in q.T]
+        P = evaluate(self.graphs["coupling"], balls, lambda node: given[node[2]])["P"]
+        if "coupling_derivative" not in self.graphs:
+            return P, [[arb(0)] * len(q)] * (len(P) * q.shape[1])
+        return P, evaluate(self.graphs["coupling_derivative"], balls, lambda node: given[node[2]])["dP"]
+
     def _exact(self, inputs: Mapping[str, Array], answers: list[Answer]) -> Reference:
         """The answers at 256 bits."""
         q, samples = inputs["q"], len(inputs["q"])
-        balls = Balls(samples)
-        given = [[arb(float(x)) for x in column] for column in q.T]
-        P = evaluate(self.graphs["coupling"], balls, lambda node: given[node[2]])["P"]
-        dP = [[arb(0)] * samples] * (len(P) * q.shape[1])
-        if "coupling_derivative" in self.graphs:
-            dP = evaluate(self.graphs["coupling_derivative"], balls, lambda node: given[node[2]])["dP"]
+        balls, (P, dP) = Balls(samples), self._coupling(q)
         f = [[arb(float(a.f[i])) for a in answers] for i in range(len(self.solver.equations))]
         for i, row in enumerate(f):
             for s, answer in enumerate(answers):
@@ -309,7 +318,7 @@ class DistributionUpdate(Distribution):
         low, high = (demands[end][:, None].astype(np.float64) for end in ("f_min", "f_max"))
         answers = np.array([answer.f for answer in self.answers(demands["q"], demands["f_min"], demands["f_max"])])
         moved = np.random.default_rng(len(answers)).uniform(-LAST, LAST, answers.shape) * (high - low)
-        return demands | {"f_last": np.clip(answers + moved, low, high).astype(drawn["f_last"].dtype)}
+        return demands | {"f_last": np.clip(rounded(answers + moved), low, high).astype(drawn["f_last"].dtype)}
 
     def run(self, call: Callable[..., Any], inputs: Mapping[str, Array]) -> Any:
         """Some updates, each on from the forces of the one before: they end at the answer, and then stay."""

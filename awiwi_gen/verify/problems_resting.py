@@ -20,6 +20,7 @@ from awiwi_gen.ir.graph import Node
 from awiwi_gen.ir.interpret import evaluate
 from awiwi_gen.verify.problem import Problem
 from awiwi_gen.verify.reference import Reference, reference
+from awiwi_gen.verify.samples import rounded
 
 Array = np.ndarray[Any, Any]
 
@@ -89,8 +90,8 @@ class Resting(Problem):
             arms = state.P[:, self.tendons][:, :, self.joints]
             f[:, self.tendons] = np.abs(np.einsum("sij,sj->si", np.linalg.pinv(arms.swapaxes(1, 2)),
                                                   -state.balance[:, self.joints]))  # fmt: skip
-        f *= random.uniform(0.5, 1.5, (len(start), 1))
-        pose = self._descend(pose, f, low, high)
+        f = rounded(f * random.uniform(0.5, 1.5, (len(start), 1)))
+        pose = rounded(self._descend(pose, f, low, high))
         good = np.flatnonzero(self._well_posed(pose, f, low, high))
         if not len(good):
             raise InputError("found no pose of the finger in which lengths and springs tell its angles, rather than stops; "
@@ -100,7 +101,7 @@ class Resting(Problem):
         pose[:, held] = pose[:, held].astype(start.dtype)
         lengths, near = self._state(pose, f).h, np.array(self.solver.near)
         nearby = np.clip(pose + random.uniform(-near, near, pose.shape), low, high)
-        found = {"h": lengths.astype(start.dtype), "start": nearby.astype(start.dtype)}
+        found = {"h": rounded(lengths).astype(start.dtype), "start": nearby.astype(start.dtype)}
         return found | ({"measured": pose[:, held].astype(start.dtype)} if held else {})
 
     def solve(self, inputs: Mapping[str, Array]) -> Reference:

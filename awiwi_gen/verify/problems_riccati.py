@@ -12,6 +12,7 @@ from flint import arb, arb_mat, ctx
 from awiwi_gen.ir.algebras import PRECISION_BITS
 from awiwi_gen.verify.problem import Problem
 from awiwi_gen.verify.reference import Reference, reference
+from awiwi_gen.verify.samples import rounded
 
 Array = np.ndarray[Any, Any]
 
@@ -36,7 +37,7 @@ class Riccati(Problem):
         plants = tables()
         while len(plants) < samples:
             plants.append((_joint, _chain, _dense)[len(plants) % 3](random))
-        A, B, Q, R = (np.array(parts, dtype) for parts in zip(*plants[:samples], strict=True))
+        A, B, Q, R = (rounded(np.array(parts)).astype(dtype) for parts in zip(*plants[:samples], strict=True))
         return {"A": A.reshape(samples, N, N), "B": B, "Q": Q.reshape(samples, N, N), "R": R}
 
     def solve(self, inputs: Mapping[str, Array]) -> Reference:

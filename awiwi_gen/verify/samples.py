@@ -14,6 +14,8 @@ from awiwi_gen.kernel import Port
 SAMPLES = 320
 SEED = 20120301  # printed with every report; the samples of a part depend on it and on the part's name only
 
+NOISE = 1e-9  # far more than rounding leaves of zero
+
 VARIATION = Fraction(1, 1000)  # of numbers that are read at run time; a thousandth keeps loops closed at joint limits
 
 Array = np.ndarray[Any, Any]
@@ -52,3 +54,13 @@ def draw(ports: Mapping[str, Port], part: str, dtype: type = np.float64, samples
         rows[0], rows[1], rows[2] = np.clip(0.0, low, high), low, high
         drawn[name] = rows.astype(dtype)
     return drawn
+
+
+def rounded(values: Array) -> Array:
+    """What NumPy computes, in single precision: its last bits differ from processor to processor, the samples must not."""
+    return np.asarray(values, np.float32).astype(np.float64)
+
+
+def without_noise(values: Array) -> Array:
+    """The same, with zeros for what is small beside the largest value: there may be nothing but last bits in it."""
+    return np.where(np.abs(values) > NOISE * np.abs(values).max(initial=0.0), rounded(values), 0.0)
