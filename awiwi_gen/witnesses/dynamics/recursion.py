@@ -1,8 +1,9 @@
 """Dynamics of a finger by recursion along the chain, the route with the fewest operations.
 
 A finger whose last joints are parallel is a planar chain in a rotating plane (`planar_chain`). For all others, torques
-come from Newton's and Euler's equations, and the mass matrix and the Coriolis matrix from composite bodies. What acts in
-the joints themselves (`joints`) is added to either.
+come from Newton's and Euler's equations, and the mass matrix and the Coriolis matrix from composite bodies. Where no axis
+is parallel or at a quarter turn to the next (`skew_chain`), the former are in axes of their own. What acts in the joints
+themselves (`joints`) is added to all.
 """
 
 from collections.abc import Callable
@@ -15,6 +16,7 @@ from awiwi_gen.witnesses.dynamics.assembly import Assembly, assemble
 from awiwi_gen.witnesses.dynamics.composite_bodies import mass_and_coriolis
 from awiwi_gen.witnesses.dynamics.newton_euler import torques, weight
 from awiwi_gen.witnesses.dynamics.planar_chain import RotatingPlane, rotating_plane
+from awiwi_gen.witnesses.dynamics.skew_chain import skew_chain, skew_torques
 from awiwi_gen.witnesses.joints import armature, armature_rate, passive_torque, spring_energy
 
 PlanarTorques = Callable[[RotatingPlane, list[SX], list[SX], SX], list[SX]]
@@ -37,12 +39,12 @@ def gravity(finger: Finger, q: SX, g: SX) -> SX:
 
 def bias(finger: Finger, q: SX, qd: SX, g: SX) -> SX:
     """Joint torques (n) [N m] of a motion without acceleration: C qd + gravity + passive torques."""
-    return _torques(assemble(finger, q), qd, SX.zeros(q.numel()), g) + _at_joints(finger, q, qd)
+    return _torques(finger, q, qd, SX.zeros(q.numel()), g) + _at_joints(finger, q, qd)
 
 
 def inverse_dynamics(finger: Finger, q: SX, qd: SX, qdd: SX, g: SX) -> SX:
     """Joint torques (n) [N m] of a motion (eq. 2.4 to 2.15)."""
-    return _torques(assemble(finger, q), qd, qdd, g) + armature(finger, q) * qdd + _at_joints(finger, q, qd)
+    return _torques(finger, q, qd, qdd, g) + armature(finger, q) * qdd + _at_joints(finger, q, qd)
 
 
 def inverse_dynamics_derivatives(finger: Finger, q: SX, qd: SX, qdd: SX, g: SX) -> tuple[SX, SX]:
@@ -50,18 +52,18 @@ def inverse_dynamics_derivatives(finger: Finger, q: SX, qd: SX, qdd: SX, g: SX) 
 
     The torques are written in the form with the shortest derivatives.
     """
-    tau = _torques(assemble(finger, q), qd, qdd, g, RotatingPlane.torques_to_differentiate)
+    tau = _torques(finger, q, qd, qdd, g, RotatingPlane.torques_to_differentiate)
     tau += armature(finger, q) * qdd + _at_joints(finger, q, qd)
     return ca.jacobian(tau, q), ca.jacobian(tau, qd)
 
 
 def forward_dynamics(finger: Finger, q: SX, qd: SX, tau: SX, g: SX) -> SX:
     """Joint accelerations (n) [rad/s^2] that joint torques tau cause: M qdd = tau - bias (eq. 2.1)."""
-    assembly, zero = assemble(finger, q), SX.zeros(q.numel())
+    assembly, zero, rotors = assemble(finger, q), SX.zeros(q.numel()), armature(finger, q)
     plane, tau = rotating_plane(assembly), tau - _at_joints(finger, q, qd)
     if plane is not None and all(joint.ratio.is_one() for joint in assembly.joints):
-        return _solve_absolute(plane, armature(finger, q), qd, tau, g)
-    return _solve(_mass_and_coriolis(finger, assembly, q, zero)[0], tau - _torques(assembly, qd, zero, g))
+        return _solve_absolute(plane, rotors, qd, tau, g)
+    return _solve(_mass_and_coriolis(finger, assembly, q, zero)[0], tau - _torques(finger, q, qd, zero, g))
 
 
 def dynamics(finger: Finger, q: SX, qd: SX, g: SX) -> tuple[SX, SX, SX]:
@@ -119,13 +121,18 @@ def _of_links(assembly: Assembly, qd: SX) -> tuple[SX, SX]:
     return joint_mass, jacobian.T @ (coriolis @ jacobian + mass @ jacobian_rate)
 
 
-def _torques(assembly: Assembly, qd: SX, qdd: SX, g: SX, planar: PlanarTorques = RotatingPlane.torques) -> SX:
+def _torques(finger: Finger, q: SX, qd: SX, qdd: SX, g: SX, planar: PlanarTorques = RotatingPlane.torques) -> SX:
+    """Joint torques (n) [N m] of a motion, but for those in the joints themselves."""
+    chain = skew_chain(finger, q)
+    if chain is not None:
+        return skew_torques(chain, qd, qdd, g)
+    assembly = assemble(finger, q)
     plane = rotating_plane(assembly)
     if plane is None:
         return torques(assembly, qd, qdd, g)
     jacobian, jacobian_rate = _joint_jacobian(assembly, qd)
-    speeds, accelerations = jacobian @ qd, jacobian @ qdd + jacobian_rate @ qd
-    return jacobian.T @ ca.vertcat(*planar(plane, ca.vertsplit(speeds), ca.vertsplit(accelerations), g))
+    speeds, rates = jacobian @ qd, jacobian @ qdd + jacobian_rate @ qd
+    return jacobian.T @ ca.vertcat(*planar(plane, ca.vertsplit(speeds), ca.vertsplit(rates), g))
 
 
 def _weight(assembly: Assembly, g: SX, n: int) -> SX:
