@@ -20,6 +20,7 @@ from awiwi_gen.ir.passes.bind import bind
 from awiwi_gen.kernels import catalog
 from awiwi_gen.records import prepare, values_of
 from awiwi_gen.verify.samples import draw
+from awiwi_gen.witnesses.dynamics import recursion
 from awiwi_gen.witnesses.dynamics.skew_chain import skew_chain
 from bench.skew import skew_hand
 
@@ -242,3 +243,19 @@ def test_operations_of_five_skew_joints_and_of_a_sixth(family, of_five, further)
     five, six = (operations(awiwi_gen.Hand.parse(skew_hand(joints)), family) for joints in (5, 6))
 
     assert (five, six - five) == (of_five, further)
+
+
+def test_articulated_bodies_take_as_many_operations_for_each_further_joint(monkeypatch):
+    monkeypatch.setattr(recursion, "LONG", 1)
+    four, five = (operations(awiwi_gen.Hand.parse(skew_hand(joints)), "forward_dynamics") for joints in (4, 5))
+
+    assert (four, five - four) == (879, 366)
+
+
+@pytest.mark.parametrize("least", [1, 8])
+def test_both_ways_to_accelerations_agree_with_the_definition(monkeypatch, least):
+    """Articulated bodies, and M with the bias: of rotors, springs, damping and friction in a chain of skew axes."""
+    monkeypatch.setattr(recursion, "LONG", least)
+    found = records(awiwi_gen.Hand.parse(chain(*MIXED)), ("bias", "inverse_dynamics", "forward_dynamics"))
+
+    assert max(record.agreement for record in found.values()) < 1e-60
