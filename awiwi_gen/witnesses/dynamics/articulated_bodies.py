@@ -56,8 +56,9 @@ class _Inertia:
 class _FreeJoint:
     """An articulated body seen through its joint about z, which a torque drives.
 
-    `reciprocal` [1/(kg m^2)] is that of the inertia about the joint, `rest` the rotor's part of this inertia. The `rotary`
-    and `linear` gains (3 each) are the force and the moment per acceleration of the joint, times the reciprocal.
+    `reciprocal` [1/(kg m^2)] is that of the inertia about the joint, with the rotor; `rest` is the rotor's part of this
+    inertia. `rotary` (3) and `linear` (3) [1/m] are the moment and the force that the body takes per acceleration of the
+    joint, times the reciprocal. `inertia` is what the joint transmits.
     """
 
     reciprocal: SX
@@ -110,7 +111,7 @@ def accelerations(chain: SkewChain, rotors: SX, qd: SX, tau: SX, g: SX) -> SX:
 
 
 def _about_z(matrix: SX, turn: Vector) -> SX:
-    """A matrix (3 x 3) in axes from which its own are rotated about z: 8 products, by the double angle."""
+    """A matrix (3 x 3) in the axes from which its own are rotated about z: 8 products, by the double angle."""
     (c, s), ((xx, xy, xz), (yx, yy, yz), (zx, zy, zz)) = turn, map(ca.horzsplit, ca.vertsplit(matrix))
     difference = (xx - yy) * c - (xy + yx) * s
     return ca.vertcat(
@@ -121,7 +122,7 @@ def _about_z(matrix: SX, turn: Vector) -> SX:
 
 
 def _about_x(matrix: SX, turn: Vector) -> SX:
-    """The same of axes rotated about x."""
+    """The same for axes that are rotated about x."""
     to_z = Turn(0, None, None).permutation()
     return to_z.T @ _about_z(to_z @ matrix @ to_z.T, turn) @ to_z
 

@@ -2,8 +2,8 @@
 
 A finger whose last joints are parallel is a planar chain in a rotating plane (`planar_chain`). For all others, torques
 come from Newton's and Euler's equations, and the mass matrix and the Coriolis matrix from composite bodies. Where no axis
-is parallel or at a quarter turn to the next (`skew_chain`), the former are in axes of their own, and the accelerations of
-many joints come from articulated bodies. What acts in the joints themselves (`joints`) is added to all.
+is parallel or at a quarter turn to the next (`skew_chain`), torques and M are in axes of their own, and the accelerations
+of many joints come from articulated bodies. What acts in the joints themselves (`joints`) is added to all.
 """
 
 from collections.abc import Callable
@@ -17,17 +17,20 @@ from awiwi_gen.witnesses.dynamics.assembly import Assembly, assemble
 from awiwi_gen.witnesses.dynamics.composite_bodies import mass_and_coriolis
 from awiwi_gen.witnesses.dynamics.newton_euler import torques, weight
 from awiwi_gen.witnesses.dynamics.planar_chain import RotatingPlane, rotating_plane
-from awiwi_gen.witnesses.dynamics.skew_chain import skew_chain, skew_torques
+from awiwi_gen.witnesses.dynamics.skew_chain import skew_chain, skew_mass_matrix, skew_torques
 from awiwi_gen.witnesses.joints import armature, armature_rate, passive_torque, spring_energy
 
-# Joints of a skew chain from which on articulated bodies take fewer operations than M and its factors do: with 7, 8 and 9
-# joints 1984, 2352 and 2722 instead of 1962, 2468 and 3035. Each rotor adds some 25, so with rotors it is one joint more.
-LONG = 8
+# Joints of a skew chain from which on articulated bodies take fewer operations than M and its factors do: with 8, 9 and 10
+# joints 2352, 2722 and 3090 instead of 2300, 2825 and 3404. With rotors at all joints, only 10 joints take fewer.
+LONG = 9
 PlanarTorques = Callable[[RotatingPlane, list[SX], list[SX], SX], list[SX]]
 
 
 def mass_matrix(finger: Finger, q: SX) -> SX:
     """M (n x n) [kg m^2] by composite bodies."""
+    chain = skew_chain(finger, q)
+    if chain is not None:
+        return skew_mass_matrix(chain) + ca.diag(armature(finger, q))
     return _mass_and_coriolis(finger, assemble(finger, q), q, SX.zeros(q.numel()))[0]
 
 
@@ -69,7 +72,7 @@ def forward_dynamics(finger: Finger, q: SX, qd: SX, tau: SX, g: SX) -> SX:
         return accelerations(chain, rotors, qd, tau, g)
     if plane is not None and all(joint.ratio.is_one() for joint in assembly.joints):
         return _solve_absolute(plane, rotors, qd, tau, g)
-    return _solve(_mass_and_coriolis(finger, assembly, q, zero)[0], tau - _torques(finger, q, qd, zero, g))
+    return _solve(mass_matrix(finger, q), tau - _torques(finger, q, qd, zero, g))
 
 
 def dynamics(finger: Finger, q: SX, qd: SX, g: SX) -> tuple[SX, SX, SX]:

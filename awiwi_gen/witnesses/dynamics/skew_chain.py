@@ -60,6 +60,11 @@ class Link:
         scaled = sy * x + cy * y
         return ca.vertcat(c * x - s * y, scaled - s_lean * z, s_lean / c_lean * scaled + c_lean * z)
 
+    def body_inward(self, body: Moments) -> Moments:
+        """A body of the link's axes, in those of the link before."""
+        to_z = Turn(0, None, None).permutation()
+        return body.rotated_about_z(*self.turn).rotated(to_z).rotated_about_z(*self.lean).rotated(to_z.T)
+
 
 @dataclass(frozen=True)
 class SkewChain:
@@ -207,3 +212,19 @@ def skew_torques(chain: SkewChain, qd: SX, qdd: SX, g: SX) -> SX:
         result.append(moment[2])
         force, moment = link.inward(force), link.inward(moment)
     return ca.vertcat(*reversed(result))
+
+
+def skew_mass_matrix(chain: SkewChain) -> SX:
+    """M (n x n) [kg m^2] by composite bodies, as in `composite_bodies`."""
+    n = len(chain.links)
+    result, beyond = SX.zeros(n, n), Moments.none()
+    columns: dict[int, tuple[SX, SX]] = {}  # force and moment per acceleration of each joint further out
+    for i, link in reversed(list(enumerate(chain.links))):
+        columns = {j: (force, moment + ca.cross(link.offset, force)) for j, (force, moment) in columns.items()}
+        beyond = link.body + beyond.moved(link.offset)
+        columns[i] = ca.cross(_Z, beyond.first), beyond.inertia(_Z)
+        for j, (_, moment) in columns.items():
+            result[i, j] = result[j, i] = moment[2]
+        columns = {j: (link.inward(force), link.inward(moment)) for j, (force, moment) in columns.items()}
+        beyond = link.body_inward(beyond)
+    return result
