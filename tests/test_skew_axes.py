@@ -237,7 +237,13 @@ def test_two_axes_that_only_the_numbers_put_at_a_right_angle_divide_nothing_by_z
 
 @pytest.mark.parametrize(
     ("family", "of_five", "further"),
-    [("mass_matrix", 400, 190), ("bias", 538, 143), ("inverse_dynamics", 567, 144), ("forward_dynamics", 1013, 382)],
+    [
+        ("mass_matrix", 400, 190),
+        ("gravity", 112, 28),
+        ("bias", 538, 143),
+        ("inverse_dynamics", 567, 144),
+        ("forward_dynamics", 1013, 382),
+    ],
 )
 def test_operations_of_five_skew_joints_and_of_a_sixth(family, of_five, further):
     five, six = (operations(awiwi_gen.Hand.parse(skew_hand(joints)), family) for joints in (5, 6))

@@ -17,7 +17,7 @@ from awiwi_gen.witnesses.dynamics.assembly import Assembly, assemble
 from awiwi_gen.witnesses.dynamics.composite_bodies import mass_and_coriolis
 from awiwi_gen.witnesses.dynamics.newton_euler import torques, weight
 from awiwi_gen.witnesses.dynamics.planar_chain import RotatingPlane, rotating_plane
-from awiwi_gen.witnesses.dynamics.skew_chain import skew_chain, skew_mass_matrix, skew_torques
+from awiwi_gen.witnesses.dynamics.skew_chain import skew_chain, skew_mass_matrix, skew_torques, skew_weight
 from awiwi_gen.witnesses.joints import armature, armature_rate, passive_torque, spring_energy
 
 # Joints of a skew chain from which on articulated bodies take fewer operations than M and its factors do: with 8, 9 and 10
@@ -41,7 +41,8 @@ def coriolis_matrix(finger: Finger, q: SX, qd: SX) -> SX:
 
 def gravity(finger: Finger, q: SX, g: SX) -> SX:
     """Joint torques (n) [N m] that hold the finger at rest."""
-    return _weight(assemble(finger, q), g, q.numel())
+    chain = skew_chain(finger, q)
+    return _weight(assemble(finger, q), g, q.numel()) if chain is None else skew_weight(chain, g)
 
 
 def bias(finger: Finger, q: SX, qd: SX, g: SX) -> SX:

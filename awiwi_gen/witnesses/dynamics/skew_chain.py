@@ -228,3 +228,17 @@ def skew_mass_matrix(chain: SkewChain) -> SX:
         columns = {j: (link.inward(force), link.inward(moment)) for j, (force, moment) in columns.items()}
         beyond = link.body_inward(beyond)
     return result
+
+
+def skew_weight(chain: SkewChain, g: SX) -> SX:
+    """Joint torques (n) [N m] against gravity, from first moments: no body has mass."""
+    down, downs = chain.in_first_axes(g), []
+    for link in chain.links:
+        down = link.outward(down)
+        downs.append(down)
+    result, first = [], SX.zeros(3)
+    for link, down in reversed(list(zip(chain.links, downs, strict=True))):
+        first = link.body.first + first
+        result.append(ca.cross(down, first)[2])
+        first = link.inward(first)
+    return ca.vertcat(*reversed(result))
