@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import casadi as ca
 import numpy as np
 import pytest
 from chains import chain, records, rpy
@@ -19,8 +20,20 @@ from awiwi_gen.ir.passes.bind import bind
 from awiwi_gen.kernels import catalog
 from awiwi_gen.records import prepare, values_of
 from awiwi_gen.verify.samples import draw
+from awiwi_gen.witnesses.dynamics import recursion
+from awiwi_gen.witnesses.dynamics.skew_chain import skew_chain
+from bench.skew import skew_hand
 
 SKEW_FINGER = Path(__file__).with_name("skew_finger.toml")
+# What a joint may have beside its link, for chains whose joints all turn about axes askew to each other.
+ROTOR = {"armature": '"40 g mm^2"'}
+LOSSES = {
+    "damping": '"0.002 N m s/rad"',
+    "friction": '{ torque = "3 N mm", velocity = "0.5 rad/s" }',
+    "spring": '{ stiffness = "0.1 N m/rad", reference = "30 deg" }',
+}
+MIXED = [ROTOR, rpy(37, 20, -12) | LOSSES, rpy(0, -52) | ROTOR | LOSSES, rpy(33) | {"turn": '"z+90"'}]
+TURNED_TWICE = rpy(20, 90, 20) | {"turn": '"x+90"'}  # back to a quarter turn, but only by these numbers
 BASE = 'base = { position = ["40 mm", "0 mm", "3 mm"], rpy = ["90 deg", "0 deg", "180 deg"], source = "assumed" }\n'
 
 
@@ -196,5 +209,59 @@ def test_names_of_joints_may_have_63_characters():
 def test_both_derivations_agree_on_a_quarter_turn_between_two_other_angles(pitch, turn):
     hand = awiwi_gen.Hand.parse(chain({}, {**rpy(5, pitch, -7), "turn": f'"{turn}"'}, {}))
     found = records(hand, ("fingertip_pose", "mass_matrix"))
+
+    assert max(record.agreement for record in found.values()) < 1e-60
+
+
+def is_skew_chain(text):
+    found = kernel(awiwi_gen.Hand.parse(text), "bias")
+    finger = found.part.symbolic(lambda path, _: ca.SX.sym(path))
+    return skew_chain(finger, ca.SX.sym("q", found.inputs["q"].size)) is not None
+
+
+def test_chains_of_axes_askew_are_those_without_quarter_turns_followers_slides_and_four_bars():
+    assert is_skew_chain(chain(*MIXED))
+    assert is_skew_chain(chain({"turn": '"x+90"'}, rpy(0, 40)))  # where the finger stands does not matter
+    assert is_skew_chain(chain({}, rpy(40, 0, 10) | {"turn": '"x+90"'}))
+    for link in ({}, rpy(yaw=30), {"turn": '"x+90"'}, rpy(5, 90, -7), TURNED_TWICE):
+        assert not is_skew_chain(chain({}, rpy(40), link))
+    assert not is_skew_chain(chain({}))
+    assert not is_skew_chain(SKEW_FINGER.read_text(encoding="utf-8"))
+
+
+def test_two_axes_that_only_the_numbers_put_at_a_right_angle_divide_nothing_by_zero():
+    found = records(awiwi_gen.Hand.parse(chain({}, TURNED_TWICE)), ("inverse_dynamics", "forward_dynamics"))
+
+    assert max(record.agreement for record in found.values()) < 1e-60
+
+
+@pytest.mark.parametrize(
+    ("family", "of_five", "further"),
+    [
+        ("mass_matrix", 400, 190),
+        ("gravity", 112, 28),
+        ("bias", 538, 143),
+        ("inverse_dynamics", 567, 144),
+        ("forward_dynamics", 1013, 382),
+    ],
+)
+def test_operations_of_five_skew_joints_and_of_a_sixth(family, of_five, further):
+    five, six = (operations(awiwi_gen.Hand.parse(skew_hand(joints)), family) for joints in (5, 6))
+
+    assert (five, six - five) == (of_five, further)
+
+
+def test_articulated_bodies_take_as_many_operations_for_each_further_joint(monkeypatch):
+    monkeypatch.setattr(recursion, "LONG", 1)
+    four, five = (operations(awiwi_gen.Hand.parse(skew_hand(joints)), "forward_dynamics") for joints in (4, 5))
+
+    assert (four, five - four) == (879, 366)
+
+
+@pytest.mark.parametrize("least", [1, 9])
+def test_both_ways_to_accelerations_agree_with_the_definition(monkeypatch, least):
+    """Articulated bodies, and M with the bias: of rotors, springs, damping and friction in a chain of skew axes."""
+    monkeypatch.setattr(recursion, "LONG", least)
+    found = records(awiwi_gen.Hand.parse(chain(*MIXED)), ("bias", "inverse_dynamics", "forward_dynamics"))
 
     assert max(record.agreement for record in found.values()) < 1e-60

@@ -135,7 +135,9 @@ def turns_of(link: Any) -> tuple[list[Turn], Any]:
         rotation = _product(turns)
         across = ca.sqrt(rotation[0, 2] ** 2 + rotation[1, 2] ** 2)
         first, last = _turn(2, rotation[0, 2], -rotation[1, 2]), _turn(2, rotation[2, 0], rotation[2, 1])
-        both = [first, _turn(0, across, rotation[2, 2])]
+        # Across is never negative: axes at right angles are a quarter turn apart, whatever the other numbers are.
+        lean = Turn(0, 1, None) if rotation[2, 2].is_zero() else _turn(0, across, rotation[2, 2])
+        both = [first, lean]
         return (both, last.angle) if last.quarters is None else ([*both, last], 0)
     if turns and turns[-1].axis == 2 and turns[-1].quarters is None:
         return turns[:-1], turns[-1].angle
@@ -241,7 +243,7 @@ class Assembly:
 
 
 @dataclass(frozen=True)
-class _Part:
+class Part:
     """A joint of the chain as the hand file gives it: its fixed rotations, then a rotation about z or a `travel` along it.
 
     The angle about z is `angle`, or for the coupler of a four-bar the angle with cosine and sine `cos_sin`. `offset` leads
@@ -269,7 +271,7 @@ class _Part:
 
 def assemble(finger: Finger, q: SX) -> Assembly:
     """All that recursions need at joint angles q (n) [rad], or [m] of slides."""
-    parts = list(_shifted(list(_parts(finger, q))))
+    parts = list(_shifted(list(parts_of(finger, q))))
     bodies, palm_moment = _masses_moved_inward(parts)
     joints: list[Joint] = []
     start, angle = (SX(1), SX(0)), SX(0)
@@ -278,15 +280,15 @@ def assemble(finger: Finger, q: SX) -> Assembly:
         if part.fixed_rotation is not None:
             start, angle = (SX(1), SX(0)), SX(0)
         if following is not None and following.cos_sin is not None:  # a crank: its coupler starts from here
-            before_crank = _sum_of_angles(start, (ca.cos(angle), ca.sin(angle)))
+            before_crank = sum_of_angles(start, (ca.cos(angle), ca.sin(angle)))
         angle += part.angle
         if part.cos_sin is not None:
-            start, angle = _sum_of_angles(before_crank, part.cos_sin), SX(0)
+            start, angle = sum_of_angles(before_crank, part.cos_sin), SX(0)
         next_turns = following.turns if following is not None else []
         to_next, taken = fixed_rotation(next_turns), SX(0)
         if len(next_turns) > 1 and next_turns[0].axis == 2 and next_turns[0].quarters is None:
             taken, next_turns = next_turns[0].angle, next_turns[1:]
-        cos_sin = _sum_of_angles(start, (ca.cos(angle + taken), ca.sin(angle + taken)))
+        cos_sin = sum_of_angles(start, (ca.cos(angle + taken), ca.sin(angle + taken)))
         in_link = (part.link, part.shift, part.slides, part.travel, part.offset, body)
         if to_next is None:
             next_rotation, rotation, axis, body = None, about_z(cos_sin), _Z, body.rotated_about_z(*cos_sin)
@@ -304,7 +306,8 @@ def assemble(finger: Finger, q: SX) -> Assembly:
     return Assembly(SX.eye(3) if first is None else first.T, joints, palm_moment)
 
 
-def _parts(finger: Finger, q: SX) -> Iterator[_Part]:
+def parts_of(finger: Finger, q: SX) -> Iterator[Part]:
+    """The joints of a finger's chain, base to tip, at joint angles q (n) [rad], or [m] of slides: as in the hand file."""
     position = coordinates(finger)
     for index, link in enumerate(finger.links):
         coordinate = position[link.joint]
@@ -314,7 +317,7 @@ def _parts(finger: Finger, q: SX) -> Iterator[_Part]:
             own, ratio, change = followed(finger, link.joint, angle)
             moved = own if link.reference is None else own - link.reference
             angle, travel = (SX(yaw), moved) if link.slides else (moved + yaw, _ZERO)
-            yield _Part(
+            yield Part(
                 coordinate, turns, angle, None, ratio, change, offset, body, index, slides=link.slides, travel=travel
             )
         else:
@@ -322,12 +325,12 @@ def _parts(finger: Finger, q: SX) -> Iterator[_Part]:
             start = SX(link.start + link.four_bar.reference)
             now, (c, s) = FourBar(link.four_bar, crank), FourBar(link.four_bar, start).coupler
             arm = ca.vertcat(link.four_bar.crank, 0, 0)
-            yield _Part(coordinate, turns, crank, None, SX(1), SX(0), arm, Moments.none(), index)
-            relative = _sum_of_angles(now.coupler, (c, -s))
-            yield _Part(coordinate, [], SX(0), relative, now.ratio - 1, now.ratio_derivative, offset, body, index)
+            yield Part(coordinate, turns, crank, None, SX(1), SX(0), arm, Moments.none(), index)
+            relative = sum_of_angles(now.coupler, (c, -s))
+            yield Part(coordinate, [], SX(0), relative, now.ratio - 1, now.ratio_derivative, offset, body, index)
 
 
-def _shifted(parts: Sequence[_Part]) -> Iterator[_Part]:
+def _shifted(parts: Sequence[Part]) -> Iterator[Part]:
     """The parts, each joint shifted along its axis to where the offset before it has no component along that axis."""
     shift = SX(0)
     for part, following in zip(parts, [*parts[1:], None], strict=True):
@@ -342,7 +345,7 @@ def _shifted(parts: Sequence[_Part]) -> Iterator[_Part]:
         yield replace(part, offset=offset, body=body, shift=before)
 
 
-def _masses_moved_inward(parts: Sequence[_Part]) -> tuple[list[Moments], SX]:
+def _masses_moved_inward(parts: Sequence[Part]) -> tuple[list[Moments], SX]:
     """The parts' bodies, each with its mass moved to the body before, and the first moment moved into the palm."""
     bodies, moved = [], Moments.none()
     for part, before in zip(reversed(parts), [*reversed(parts[:-1]), None], strict=True):
@@ -376,7 +379,7 @@ def about_z(cos_sin: Vector) -> SX:
     return ca.vertcat(ca.horzcat(c, -s, 0), ca.horzcat(s, c, 0), ca.horzcat(0, 0, 1))
 
 
-def _sum_of_angles(one: Vector, other: Vector) -> Vector:
+def sum_of_angles(one: Vector, other: Vector) -> Vector:
     """Cosine and sine of a sum, from those of its terms."""
     return one[0] * other[0] - one[1] * other[1], one[1] * other[0] + one[0] * other[1]
 

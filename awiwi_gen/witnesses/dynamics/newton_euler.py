@@ -62,7 +62,7 @@ def torques(assembly: Assembly, qd: SX, qdd: SX, g: SX) -> SX:
             acceleration = acceleration + 2 * rate * ca.cross(spin, joint.axis) + change * joint.axis
         first = joint.body.first
         force = gradient @ first + joint.body.mass * acceleration
-        loads.append((force, _inertial_moment(joint.body, spin, gradient) + ca.cross(first, acceleration)))
+        loads.append((force, inertial_moment(joint.body, spin, gradient) + ca.cross(first, acceleration)))
         acceleration = acceleration + gradient @ joint.offset
 
     result = SX.zeros(qd.numel())
@@ -90,7 +90,7 @@ def weight(assembly: Assembly, g: SX, n: int) -> SX:
     return result
 
 
-def _inertial_moment(body: Moments, spin: SX, gradient: SX) -> SX:
+def inertial_moment(body: Moments, spin: SX, gradient: SX) -> SX:
     """Moment (3) [N m] of a body about its joint: the integral of r x (A r) dm."""
     s, a = body.second, gradient
     x, y, z = ca.vertsplit(spin)
