@@ -54,8 +54,7 @@ def timed(module, name, stage):
 job = pipeline.Job(Hand.load(Path(sys.argv[1])))
 job.catalog
 spent.append(["start, read the hand, make the catalogue", *(a - b for a, b in zip(now(), (start, 0.0)))])
-from awiwi_gen import build
-import awiwi_gen.records
+import awiwi_gen.build, awiwi_gen.records
 timed(pipeline, "derive", "derive, check units")
 timed(sys.modules["awiwi_gen.build"], "load", "compile, link, load")
 timed(pipeline, "_judged", "compare the compiled kernels")

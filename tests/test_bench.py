@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import math
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +16,7 @@ import awiwi_gen
 from awiwi_gen.hand import Hand
 from bench import hands, skew
 from bench.counts import count
+from bench.generation import STAGES
 from bench.measure import Driver, called_costs
 from bench.objects import build, code_bytes
 from bench.ours import kernels_of
@@ -152,3 +155,13 @@ def test_peers_get_the_same_skew_finger_as_we():
     theirs = outputs("mass_matrix", skew.plain_finger(hand), {"q": q}, PLAIN)["M"]
 
     np.testing.assert_allclose(np.reshape(theirs, (2, 2)), lib.index_mass_matrix(q), rtol=1e-13)
+
+
+def test_the_stages_of_a_run_are_timed(root, tmp_path):
+    words = [sys.executable, "-c", STAGES, str(root / "tests" / "one_finger.toml"), str(tmp_path / "made")]
+    done = subprocess.run(words, capture_output=True, text=True, check=True)
+    times = {stage: processors for stage, _, processors in json.loads(done.stdout)}
+
+    assert len(times) == 8
+    assert all(seconds >= 0 for seconds in times.values())
+    assert times["compile, link, load"] > 0
