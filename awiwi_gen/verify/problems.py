@@ -15,10 +15,11 @@ from awiwi_gen.ir.graph import Graph, Node
 from awiwi_gen.ir.interpret import evaluate
 from awiwi_gen.kernel import Solver
 from awiwi_gen.verify.problem import Problem
-from awiwi_gen.verify.problems_distribution import Distribution, DistributionUpdate
+from awiwi_gen.verify.problems_distribution import Distribution
 from awiwi_gen.verify.problems_gains import GainMatching
 from awiwi_gen.verify.problems_resting import Resting
 from awiwi_gen.verify.problems_riccati import JointRegulator, Riccati
+from awiwi_gen.verify.problems_update import DistributionUpdate
 from awiwi_gen.verify.reference import Reference, reference
 from awiwi_gen.verify.samples import rounded
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -37,8 +37,6 @@ DETERMINED = 1e-4  # smallest effect of a pattern of forces, relative to the lar
 ROUNDS = 8  # of Newton's method with a derivative in floats, at most: each gains ten digits at least
 SAME_DISTANCE = 1e-9  # of the demand: distances that differ by less are those of one minimum
 FARTHER = 0.02  # share of the samples that may end at a minimum which is not the nearest known
-UPDATES = 8  # from the last forces to the answer, at most
-LAST = 0.05  # of the range of forces: how far the last forces may be from the answer
 LAST_STEP = 1e-40  # largest step [N] after which the next would change nothing that two doubles show
 
 
@@ -306,26 +304,6 @@ class Distribution(Problem):
         return {
             "f": found.f, "torque": -np.einsum("sia,si->sa", P, f), "stiffness": stiffness, "outside": outside,
         }  # fmt: skip
-
-
-@dataclass(frozen=True)
-class DistributionUpdate(Distribution):
-    """The same demands, with last forces that are farther from the answer than a tick's demands move it."""
-
-    def sample(self, drawn: dict[str, Array]) -> dict[str, Array]:
-        """Poses and limits as drawn, with demands for them, and forces near the answers."""
-        demands = super().sample(drawn)
-        low, high = (demands[end][:, None].astype(np.float64) for end in ("f_min", "f_max"))
-        answers = np.array([answer.f for answer in self.answers(demands["q"], demands["f_min"], demands["f_max"])])
-        moved = np.random.default_rng(len(answers)).uniform(-LAST, LAST, answers.shape) * (high - low)
-        return demands | {"f_last": np.clip(rounded(answers + moved), low, high).astype(drawn["f_last"].dtype)}
-
-    def run(self, call: Callable[..., Any], inputs: Mapping[str, Array]) -> Any:
-        """Some updates, each on from the forces of the one before: they end at the answer, and then stay."""
-        found = call(**inputs)
-        for _ in range(UPDATES - 1):
-            found = call(**{**inputs, "f_last": found.f})
-        return found
 
 
 def _draft(kind: int, P: Array, random: Any) -> _Draft:
