@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 import tomllib
@@ -162,5 +163,5 @@ def test_the_extras_are_those_of_the_project(root):
     own[INTERCHANGE] = set(project["optional-dependencies"][INTERCHANGE]) - {"awiwi_gen[generate]"}
     own[LEARN] = set(project["optional-dependencies"][LEARN])
     for extra, packages in own.items():
-        names = {package.partition(">=")[0] for package in packages}
+        names = {re.split("[<>=]", package)[0] for package in packages}
         assert names == {package for package, of in EXTRAS.values() if of == extra}

@@ -18,34 +18,49 @@ SINGULAR = 1e-9  # singular values below this share of the largest count as zero
 
 
 def demanded(
-    f: Columns, k: Columns, P: Columns, dP: Columns, beyond: Sequence[tuple[Array, Array]]
+    f: Columns, k: Columns, P: Columns, dP: Columns, beyond: Sequence[tuple[Array, Array]], free: Array
 ) -> tuple[Array, Array]:
     """Torques (samples, n) and stiffnesses (samples, n, n) of forces and what lies beyond: exact, alike on all processors.
 
-    Forces and stiffnesses of m tendons, P and dP row by row are balls, each a list over the samples.
+    Forces and stiffnesses of m tendons, P and dP row by row are balls, each a list over the samples. No tendon that is
+    `free` (samples, m) has a part in the torque beyond.
     """
     m, n = len(f), len(beyond[0][0])
-    torque, stiffness = (
-        np.array([without_noise(part).ravel() for part in each]).T for each in zip(*beyond, strict=True)
-    )
+    stiffness = np.array([without_noise(part).ravel() for _, part in beyond]).T
+    torque = [
+        _without(without_noise(part), arb_mat(m, n, [column[s] for column in P]), np.flatnonzero(free[s]).tolist())
+        for s, (part, _) in enumerate(beyond)
+    ]
 
-    def total(terms: Iterable[tuple[list[arb], ...]], more: Array) -> list[float]:
+    def total(terms: Iterable[tuple[list[arb], ...]], more: Iterable[float | arb]) -> list[float]:
         products = [[prod(each, start=arb(1)) for each in zip(*factors, strict=True)] for factors in terms]
-        return [float(sum(each, arb(x))) for *each, x in zip(*products, more.tolist(), strict=True)]
+        return [float(sum(each, arb(x))) for *each, x in zip(*products, more, strict=True)]
 
-    tau = [total(((P[i * n + a], f[i]) for i in range(m)), -torque[a]) for a in range(n)]
+    tau = [total(((P[i * n + a], f[i]) for i in range(m)), (-each[a] for each in torque)) for a in range(n)]
     K = [
         total(
             [
                 *((k[i], P[i * n + a], P[i * n + b]) for i in range(m)),
                 *((f[i], dP[(i * n + a) * n + b]) for i in range(m)),
             ],
-            stiffness[a * n + b],
+            stiffness[a * n + b].tolist(),
         )
         for a in range(n)
         for b in range(n)
     ]
     return -np.array(tau).T, np.array(K).T.reshape(-1, n, n)
+
+
+def _without(torque: Array, P: arb_mat, free: list[int]) -> list[arb]:
+    """A torque (n) without what some tendons can give."""
+    whole = arb_mat([[x] for x in torque.tolist()])
+    rows = [P.tolist()[i] for i in free] if torque.any() else []
+    rows = [rows[i] for i in _independent(np.array([[float(x) for x in row] for row in rows]).T)] if rows else []
+    if rows:
+        given = arb_mat(rows)
+        whole = whole - given.transpose() * (given * given.transpose()).solve(given * whole)
+    left: list[arb] = whole.entries()
+    return left
 
 
 class System:

@@ -17,7 +17,6 @@ from awiwi_gen.verify.nearest_forces import Demands, minima
 from awiwi_gen.verify.other_minima import Found
 from awiwi_gen.verify.problem import Problem
 from awiwi_gen.verify.reference import Reference, reference
-from awiwi_gen.verify.samples import rounded
 
 Array = np.ndarray[Any, Any]
 Limits = tuple[float, float]  # limits of every force [N]
@@ -97,11 +96,11 @@ class Distribution(Problem):
         """Poses and limits as drawn, with demands for them."""
         dtype, (low, high) = drawn["q"].dtype, (drawn[end][:, 0] for end in ("f_min", "f_max"))
         answers = self.answers(drawn["q"], low, high)
-        held, between = (np.array([getattr(answer, name) for answer in answers]).T for name in ("held", "f"))
-        forces = np.where(held, np.where(held < 0, low, high), rounded(between))
+        held, forces = (np.array([getattr(answer, name) for answer in answers]).T for name in ("held", "f"))
         f = [[arb(x) for x in row] for row in forces.tolist()]
         (k,) = self.curve(f, "k", algebra=Balls(len(low)))
-        tau, K = demanded(f, k, *self._coupling(drawn["q"]), [answer.beyond for answer in answers])
+        beyond, coupling = [answer.beyond for answer in answers], self._coupling(drawn["q"])
+        tau, K = demanded(f, k, *coupling, beyond, held.T == 0)
         return {"q": drawn["q"], "tau": tau.astype(dtype), "K": K.astype(dtype), "f_min": low, "f_max": high}
 
     # -- demands ----------------------------------------------------------------------------------------------

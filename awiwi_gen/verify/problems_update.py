@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from awiwi_gen.verify.problems_distribution import Array, Distribution
-from awiwi_gen.verify.samples import rounded
 
 UPDATES = 8  # from the last forces to the answer, at most
 LAST = 0.05  # of the range of forces: how far the last forces may be from the answer
@@ -25,7 +24,7 @@ class DistributionUpdate(Distribution):
         low, high = (demands[end][:, None].astype(np.float64) for end in ("f_min", "f_max"))
         answers = np.array([answer.f for answer in self.answers(demands["q"], demands["f_min"], demands["f_max"])])
         moved = np.random.default_rng(len(answers)).uniform(-LAST, LAST, answers.shape) * (high - low)
-        return demands | {"f_last": np.clip(rounded(answers + moved), low, high).astype(drawn["f_last"].dtype)}
+        return demands | {"f_last": np.clip(answers + moved, low, high).astype(drawn["f_last"].dtype)}
 
     def run(self, call: Callable[..., Any], inputs: Mapping[str, Array]) -> Any:
         """Some updates, each on from the forces of the one before: they end at the answer, and then stay."""
